@@ -1,0 +1,1 @@
+"""From readings to strokes, friction parameters and flaws."""

@@ -1,0 +1,1 @@
+"""The plans we run: one validated TOML file each, and their reader."""

@@ -1,0 +1,1 @@
+"""The session's store: live file, sealed copy, readers."""

@@ -1,0 +1,1 @@
+"""From a scene to a prediction: arrays in, arrays out, no files."""
