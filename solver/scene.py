@@ -1,0 +1,220 @@
+"""Scene: all that defines one run of the solver, frozen, checked when made.
+
+Field names are the keys of a scene file. Lengths in mm, stresses in MPa, angles in degrees. In the finger's own frame
+X points distally along the finger axis, -Y is palmar, and the origin is the centre of the tip's arc.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+Slide = Literal["+x", "-x", "none"]
+
+
+class SceneError(ValueError):
+    """A scene that cannot be run as it stands: the key, its value, and what is allowed."""
+
+    def __init__(self, key: str, value: object, allowed: str) -> None:
+        """Name the dotted `key`, the `value` found there, and what is `allowed`."""
+        super().__init__(f"{key} = {value!r} is not allowed: {allowed}.")
+        self.key = key
+        self.value = value
+        self.allowed = allowed
+
+
+def _within(key: str, value: float, low: float, high: float, unit: str = "") -> None:
+    """Raise SceneError unless low <= value <= high (nan is never within)."""
+    if not low <= value <= high:
+        raise SceneError(key, value, f"it must lie between {low:g} and {high:g}{unit and ' ' + unit}")
+
+
+@dataclass(frozen=True, slots=True)
+class Finger:
+    """Outline of the finger: a half-disc tip, straight edges back to the cut, two layers of skin, a bone."""
+
+    tip_radius: float = 5.0  # of the skin's outline [mm]
+    epidermis: float = 0.75  # thickness [mm]
+    dermis: float = 1.25  # thickness [mm]
+    shaft_length: float = 15.0  # from the centre of the tip's arc back to the cut [mm]
+    bone_radius: float = 1.5  # [mm]
+    bone_centre: tuple[float, float] = (-1.0, 0.75)  # centre of the bone's arc, finger frame [mm]
+    contact_angle: float = 45.0  # between finger axis and surface, tip down [degrees]
+
+    def __post_init__(self) -> None:
+        """Check ranges, and that some fat is left between dermis and bone everywhere."""
+        _within("finger.tip_radius", self.tip_radius, 0.5, 50.0, "mm")
+        for name in ("epidermis", "dermis"):
+            _within(f"finger.{name}", getattr(self, name), 0.01 * self.tip_radius, 0.8 * self.tip_radius, "mm")
+        _within("finger.shaft_length", self.shaft_length, self.tip_radius, 20.0 * self.tip_radius, "mm")
+        _within("finger.bone_radius", self.bone_radius, 0.05 * self.tip_radius, 0.9 * self.tip_radius, "mm")
+        if len(self.bone_centre) != 2 or not all(math.isfinite(c) for c in self.bone_centre):
+            raise SceneError("finger.bone_centre", self.bone_centre, "it must be two finite lengths in mm")
+        _within("finger.bone_centre[0]", self.bone_centre[0], -0.8 * self.shaft_length, self.tip_radius, "mm")
+        _within("finger.contact_angle", self.contact_angle, 10.0, 90.0, "degrees")
+        least = 0.02 * self.tip_radius
+        if not self.fat_thickness() >= least:
+            raise SceneError(
+                "finger.bone_centre",
+                self.bone_centre,
+                f"bone and dermis must leave at least {least:g} mm of fat between them, and they leave "
+                f"{self.fat_thickness():.3g} mm",
+            )
+
+    @property
+    def core_radius(self) -> float:
+        """Radius of the inner side of the dermis [mm]."""
+        return self.tip_radius - self.epidermis - self.dermis
+
+    def fat_thickness(self) -> float:
+        """Return the least distance from bone to dermis [mm]; negative where the bone sticks out of the fat.
+
+        The reference finger's bone is nearest to the dermis along its dorsal edge:
+
+        >>> Finger().fat_thickness()
+        0.75
+        """
+        x, y = self.bone_centre
+        beside = self.core_radius - abs(y) - self.bone_radius
+        if x <= 0.0:  # the end of the bone may still reach past the centre of the tip
+            angles = [math.radians(a) for a in range(-90, 91, 2)]
+            ahead = [(x + self.bone_radius * math.cos(a), y + self.bone_radius * math.sin(a)) for a in angles]
+            reach = max((math.hypot(*p) for p in ahead if p[0] > 0.0), default=0.0)
+            return min(beside, self.core_radius - reach)
+        return min(beside, self.core_radius - math.hypot(x, y) - self.bone_radius)
+
+    def pulp_thickness(self) -> float:
+        """Return the distance from the point of first touch to the end of the bone [mm].
+
+        >>> round(Finger().pulp_thickness(), 3)
+        4.74
+        """
+        angle = math.radians(self.contact_angle)
+        x, y = self.tip_radius * math.sin(angle), -self.tip_radius * math.cos(angle)
+        return math.hypot(x - self.bone_centre[0], y - self.bone_centre[1]) - self.bone_radius
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """An isotropic elastic tissue."""
+
+    E: float  # Young's modulus [MPa]
+    nu: float  # Poisson's ratio [-]
+
+
+@dataclass(frozen=True, slots=True)
+class Materials:
+    """The four tissues; defaults are the paper's Table 3 (after Maeno et al. 1998)."""
+
+    epidermis: Material = Material(0.136, 0.48)
+    dermis: Material = Material(0.08, 0.48)
+    fat: Material = Material(0.034, 0.48)
+    bone: Material = Material(200.0, 0.3)
+
+    def __post_init__(self) -> None:
+        """Check each tissue: here, where it has a name."""
+        for name in ("epidermis", "dermis", "fat", "bone"):
+            tissue: Material = getattr(self, name)
+            _within(f"materials.{name}.E", tissue.E, 1e-6, 1e12, "MPa")
+            if not 0.0 <= tissue.nu <= 0.4999999:
+                allowed = "it must lie between 0 and 0.4999999, since a material with nu = 0.5 has no strain energy of "
+                raise SceneError(f"materials.{name}.nu", tissue.nu, allowed + "volume change to compute")
+
+
+@dataclass(frozen=True, slots=True)
+class Friction:
+    """Coulomb friction whose traction never exceeds a bound: |t| <= min(mu p, tau_max)."""
+
+    mu: float  # coefficient of friction [-]
+    tau_max: float | None = None  # traction bound [MPa]; None: there is none
+
+    def __post_init__(self) -> None:
+        """Check ranges."""
+        _within("friction.mu", self.mu, 0.0, 1e6)
+        if self.tau_max is not None:
+            _within("friction.tau_max", self.tau_max, 0.0, 1e12, "MPa")
+
+    @property
+    def cap(self) -> float:
+        """The traction bound [MPa], infinite where there is none."""
+        return math.inf if self.tau_max is None else self.tau_max
+
+
+@dataclass(frozen=True, slots=True)
+class Loading:
+    """How the bone is driven: down by the indentation within 1 s, then along the surface."""
+
+    indentation: float  # [mm]
+    slide: Slide = "+x"  # "+x": proximal to distal; "-x": distal to proximal
+    speed: float = 15.0  # [mm/s]; rescales time and nothing else in an elastic finger
+
+    def __post_init__(self) -> None:
+        """Check ranges."""
+        _within("loading.indentation", self.indentation, 1e-9, 20.0, "mm")
+        if self.slide not in ("+x", "-x", "none"):
+            raise SceneError("loading.slide", self.slide, 'it must be "+x", "-x" or "none"')
+        _within("loading.speed", self.speed, 1e-6, 1e4, "mm/s")
+
+    @property
+    def direction(self) -> int:
+        """+1 when the bone slides along +x, -1 along -x, 0 when it is pressed only."""
+        return {"+x": 1, "-x": -1, "none": 0}[self.slide]
+
+
+@dataclass(frozen=True, slots=True)
+class Receptor:
+    """The nerve ending: a patch of tissue on the inward normal through the point of first touch."""
+
+    depth: float = 1.9  # of its middle below the skin [mm]
+    ending: tuple[float, float] = (0.2, 1.0)  # its size across and along the skin [mm]
+
+    def __post_init__(self) -> None:
+        """Check ranges."""
+        _within("receptor.depth", self.depth, 1e-3, 50.0, "mm")
+        if len(self.ending) != 2 or not all(1e-3 <= size <= 20.0 for size in self.ending):
+            raise SceneError("receptor.ending", self.ending, "it must be two lengths between 0.001 and 20 mm")
+
+
+@dataclass(frozen=True, slots=True)
+class Solve:
+    """How the scene is to be solved."""
+
+    kinematics: Literal["small"] = "small"  # small strain
+    course: Literal["steady", "history"] = "steady"  # "steady": the settled state alone; "history": all the way to it
+    tolerance: float | None = None  # relative error asked for in the ending-averaged SED [-]; None: the solver's own
+
+    def __post_init__(self) -> None:
+        """Check that we can do what is asked for."""
+        if self.kinematics != "small":
+            raise SceneError("solve.kinematics", self.kinematics, 'only "small" (small strain) can be solved')
+        if self.course not in ("steady", "history"):
+            raise SceneError("solve.course", self.course, 'it must be "steady" or "history"')
+        if self.tolerance is not None:
+            _within("solve.tolerance", self.tolerance, 1e-4, 0.5)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """One run of the solver. Friction and loading have no default that anybody could mean."""
+
+    title: str = ""
+    finger: Finger = field(default_factory=Finger)
+    width: float = 15.0  # of the finger, used only where forces in N meet forces per mm [mm]; assumed
+    materials: Materials = field(default_factory=Materials)
+    friction: Friction
+    loading: Loading
+    receptor: Receptor = field(default_factory=Receptor)
+    solve: Solve = field(default_factory=Solve)
+
+    def __post_init__(self) -> None:
+        """Check what several tables decide together."""
+        _within("width", self.width, 0.1, 1000.0, "mm")
+        skin = self.finger.epidermis + self.finger.dermis
+        half = self.receptor.ending[0] / 2.0
+        if not half < self.receptor.depth < self.finger.tip_radius - half:
+            raise SceneError("receptor.depth", self.receptor.depth, "the ending must lie between skin and finger axis")
+        if self.receptor.depth + half > skin + 1e-9:
+            raise SceneError("receptor.depth", self.receptor.depth, f"the ending must end within {skin:g} mm of skin")
+        room = self.finger.pulp_thickness()
+        if self.loading.indentation >= room:
+            allowed = f"it must stay below the {room:.3g} mm of tissue between first touch and bone"
+            raise SceneError("loading.indentation", self.loading.indentation, allowed)
