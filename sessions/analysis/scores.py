@@ -1,0 +1,201 @@
+"""Scores of several subjects: means with their intervals, and how they go with a prediction."""
+
+import itertools
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+CONFIDENCE = 0.95
+SCALE = (0.0, 100.0)  # ends of the scale; nobody can answer beyond them
+_RESAMPLES = 10_000
+_EXACT_UP_TO = 7  # 7! = 5040 orders are counted one by one
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """One answer."""
+
+    subject: str  # a code, never a name
+    descriptor: str  # e.g. "stickiness"
+    index: int  # the stimulus' number on the descriptor
+    score: float  # 0 to 100
+
+
+@dataclass(frozen=True, slots=True)
+class ScoreTable:
+    """The answers of one session."""
+
+    session: str  # what tells this session from every other, e.g. its folder's name
+    subject: str
+    simulated: bool
+    scores: tuple[Score, ...]  # answered trials only
+
+
+@dataclass(frozen=True, slots=True)
+class MeanScore:
+    """What n subjects answered on one stimulus. A bound is None where `reason` says why."""
+
+    descriptor: str
+    index: int
+    n: int  # subjects, not trials
+    mean: float
+    sd: float | None  # standard deviation between subjects
+    low: float | None  # 95 % t interval of the mean
+    high: float | None
+    bootstrap: tuple[float, float] | None  # percentile interval over subjects, only where the t interval leaves 0..100
+    reason: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Relation:
+    """How y goes with x over n stimuli. A number is None where `reason` says why."""
+
+    n: int
+    pearson: float | None
+    low: float | None  # 95 % interval of pearson (Fisher's z)
+    high: float | None
+    spearman: float | None
+    spearman_p: float | None  # exact, two-sided: the share of all orders at least as far from 0
+    slope: float | None  # least-squares line y = intercept + slope x
+    intercept: float | None
+    without: tuple[tuple[int, float | None], ...]  # (label, pearson over the others) for each stimulus left out
+    reason: str | None
+
+
+def joined(tables: Iterable[ScoreTable]) -> tuple[ScoreTable, ...]:
+    """Return each session once, in the order first met.
+
+    >>> table = ScoreTable("a", "P01", False, ())
+    >>> len(joined([table, table]))
+    1
+    """
+    first: dict[str, ScoreTable] = {}
+    for table in tables:
+        first.setdefault(table.session, table)
+    return tuple(first.values())
+
+
+def subject_scores(tables: Iterable[ScoreTable]) -> tuple[Score, ...]:
+    """Return one score a subject and stimulus: the mean of the subject's own repeats, over all its sessions.
+
+    Trials are not subjects; pooling them would make intervals too narrow.
+
+    >>> first = ScoreTable("a", "P01", False, (Score("P01", "stickiness", 20, 10.0),))
+    >>> again = ScoreTable("b", "P01", False, (Score("P01", "stickiness", 20, 30.0),))
+    >>> subject_scores([first, again])
+    (Score(subject='P01', descriptor='stickiness', index=20, score=20.0),)
+    """
+    given: defaultdict[tuple[str, str, int], list[float]] = defaultdict(list)
+    for table in tables:
+        for score in table.scores:
+            given[table.subject, score.descriptor, score.index].append(score.score)
+    return tuple(Score(*key, score=float(np.mean(values))) for key, values in given.items())
+
+
+def mean_scores(tables: Iterable[ScoreTable]) -> tuple[MeanScore, ...]:
+    """Return the mean over subjects of every stimulus, by descriptor (as first met) and index.
+
+    Intervals are mean ± t(0.975, n - 1) s / sqrt(n), n the number of subjects.
+    """
+    answers: defaultdict[str, defaultdict[int, list[float]]] = defaultdict(lambda: defaultdict(list))
+    for score in subject_scores(tables):
+        answers[score.descriptor][score.index].append(score.score)
+    return tuple(
+        _mean(descriptor, index, values)
+        for descriptor, by_index in answers.items()
+        for index, values in sorted(by_index.items())
+    )
+
+
+def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> Relation:
+    """Return how y goes with x; `labels` name the points (their stimulus' index).
+
+    Pearson's r with its 95 % interval by Fisher's z, which takes four points and |r| < 1; Spearman's rho with its
+    exact p up to seven points; the least-squares line of y on x.
+    """
+    n = len(x)
+    without = tuple((label, _pearson([*x[:i], *x[i + 1 :]], [*y[:i], *y[i + 1 :]])) for i, label in enumerate(labels))
+    r = _pearson(x, y)
+    if r is None:
+        why = f"{n} points are too few for a correlation" if n < 3 else "one of the two does not vary"
+        return Relation(n, None, None, None, None, None, None, None, without, why)
+    slope, intercept = np.polyfit(x, y, 1)
+    low, high = _fisher_interval(x, y)
+    why = None if low is not None else f"no interval of r from {n} points" if n < 4 else "no interval of a perfect r"
+    rho = float(stats.spearmanr(x, y).statistic)
+    return Relation(n, r, low, high, rho, _exact_p(x, y, rho), float(slope), float(intercept), without, why)
+
+
+def reversed_subjects(tables: Iterable[ScoreTable]) -> tuple[tuple[str, str, float], ...]:
+    """Return (subject, descriptor, r) of all whose scores fall as the index rises.
+
+    They perhaps used the scale backwards; nothing is turned round for them.
+    """
+    points: defaultdict[tuple[str, str], list[tuple[float, float]]] = defaultdict(list)
+    for score in subject_scores(tables):
+        points[score.subject, score.descriptor].append((score.index, score.score))
+    rs = {key: _pearson([i for i, _ in pairs], [s for _, s in pairs]) for key, pairs in points.items()}
+    return tuple((subject, descriptor, r) for (subject, descriptor), r in rs.items() if r is not None and r < 0)
+
+
+def score_matrix(tables: Iterable[ScoreTable], descriptor: str) -> Mapping[str, Mapping[int, float]]:
+    """Return subject -> index -> score of one descriptor, subjects sorted."""
+    rows: defaultdict[str, dict[int, float]] = defaultdict(dict)
+    for score in subject_scores(tables):
+        if score.descriptor == descriptor:
+            rows[score.subject][score.index] = score.score
+    return {subject: rows[subject] for subject in sorted(rows)}
+
+
+def _mean(descriptor: str, index: int, values: Sequence[float]) -> MeanScore:
+    n, mean = len(values), float(np.mean(values))
+    if n < 2:
+        return MeanScore(descriptor, index, n, mean, None, None, None, None, "one subject alone has no interval")
+    sd = float(np.std(values, ddof=1))
+    half = float(stats.t.ppf((1 + CONFIDENCE) / 2, n - 1)) * sd / math.sqrt(n)
+    low, high = mean - half, mean + half
+    bootstrap = _bootstrap(values) if low < SCALE[0] or high > SCALE[1] else None
+    return MeanScore(descriptor, index, n, mean, sd, low, high, bootstrap, None)
+
+
+def _bootstrap(values: Sequence[float]) -> tuple[float, float]:
+    """Return the percentile interval of the mean, resampling subjects; always inside the range of the answers."""
+    drawn = np.random.default_rng(0).choice(np.asarray(values), (_RESAMPLES, len(values)))
+    low, high = np.quantile(drawn.mean(axis=1), [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+    return float(low), float(high)
+
+
+def _varies(values: Sequence[float]) -> bool:
+    """Say whether values differ by more than round-off."""
+    return float(np.ptp(values)) > 1e-12 * float(np.max(np.abs(values)))
+
+
+def _pearson(x: Sequence[float], y: Sequence[float]) -> float | None:
+    """Return Pearson's r, None for fewer than three points or where one of the two does not vary."""
+    if len(x) < 3 or not _varies(x) or not _varies(y):
+        return None
+    return float(stats.pearsonr(x, y).statistic)
+
+
+def _fisher_interval(x: Sequence[float], y: Sequence[float]) -> tuple[float | None, float | None]:
+    """Return the 95 % interval of Pearson's r by Fisher's z; None where it has none."""
+    result = stats.pearsonr(x, y)
+    if len(x) < 4 or abs(float(result.statistic)) > 1 - 1e-12:
+        return None, None
+    interval = result.confidence_interval(CONFIDENCE)
+    return float(interval.low), float(interval.high)
+
+
+def _exact_p(x: Sequence[float], y: Sequence[float], rho: float) -> float | None:
+    """Return the share of all orders of y whose |rho| is at least |rho|; None where they are too many to count."""
+    n = len(x)
+    if n > _EXACT_UP_TO:
+        return None
+    rank_x, rank_y = stats.rankdata(x) - (n + 1) / 2, stats.rankdata(y) - (n + 1) / 2
+    orders = rank_y[np.array(list(itertools.permutations(range(n))))]  # (n!, n)
+    rhos = orders @ rank_x / math.sqrt(float(rank_x @ rank_x) * float(rank_y @ rank_y))
+    return float(np.mean(np.abs(rhos) >= abs(rho) - 1e-12))

@@ -1,0 +1,138 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sessions.analysis.scores import (
+    Score,
+    ScoreTable,
+    joined,
+    mean_scores,
+    relation,
+    reversed_subjects,
+    score_matrix,
+    subject_scores,
+)
+
+
+def table(subject, values, *, session=None, descriptor="stickiness", indices=(0, 20, 50, 80, 100)):
+    scores = tuple(Score(subject, descriptor, i, v) for i, v in zip(indices, values, strict=False))
+    return ScoreTable(session or f"{subject}-visit", subject, False, scores)
+
+
+def points_with_r(r):
+    """Five points whose Pearson r is r by construction: two orthogonal unit vectors, mixed."""
+    u = np.array([-2, -1, 0, 1, 2]) / math.sqrt(10)
+    v = np.array([2, -1, -2, -1, 2]) / math.sqrt(14)
+    return list(u), list(r * u + math.sqrt(1 - r * r) * v)
+
+
+def test_the_interval_of_ten_subjects_is_2_262157_standard_errors_wide_each_way():
+    values = [41, 48, 55, 39, 52, 44, 47, 58, 50, 46]
+    (mean,) = mean_scores(table(f"P{i:02}", [v], indices=(50,)) for i, v in enumerate(values))
+    error = math.sqrt(sum((v - 48) ** 2 for v in values) / 9 / 10)
+    assert (mean.n, mean.mean) == (10, 48)
+    assert mean.high - mean.mean == pytest.approx(2.262157 * error, rel=1e-6)
+    assert mean.mean - mean.low == pytest.approx(2.262157 * error, rel=1e-6)
+    assert mean.bootstrap is None
+
+
+def test_repeats_of_one_subject_are_averaged_before_subjects_are_counted():
+    tables = [table("P01", [10], session="a"), table("P01", [30], session="b"), table("P02", [40])]
+    (mean,) = mean_scores(tables)
+    assert (mean.n, mean.mean) == (2, 30)
+
+
+def test_a_session_handed_in_twice_counts_once():
+    visit = table("P01", [10, 20])
+    assert joined([visit, table("P02", [5]), visit]) == (visit, table("P02", [5]))
+
+
+def test_one_subject_alone_has_a_mean_and_a_reason_instead_of_an_interval():
+    (mean,) = mean_scores([table("P01", [37])])
+    assert (mean.mean, mean.low, mean.high, mean.sd) == (37, None, None, None)
+    assert "one subject" in mean.reason
+
+
+def test_an_interval_past_the_end_of_the_scale_brings_one_that_stays_on_it():
+    (mean,) = mean_scores(table(f"P{i}", [v], indices=(100,)) for i, v in enumerate([100, 100, 99, 100, 93]))
+    assert mean.high > 100
+    assert 93 <= mean.bootstrap[0] < mean.mean < mean.bootstrap[1] <= 100
+
+
+@pytest.mark.parametrize(("r", "low", "high"), [(0.95, 0.42, 0.997), (0.97, 0.61, 0.998)])
+def test_the_interval_of_r_from_five_points_is_as_wide_as_fisher_says(r, low, high):
+    found = relation(*points_with_r(r), labels=(0, 20, 50, 80, 100))
+    assert found.pearson == pytest.approx(r)
+    assert (round(found.low, 2), round(found.high, 3)) == (low, high)
+
+
+def test_a_perfect_order_of_five_has_the_exact_p_of_two_in_120():
+    found = relation([1, 2, 3, 4, 5], [1, 2, 4, 8, 16], labels=(0, 20, 50, 80, 100))
+    assert found.spearman == pytest.approx(1)
+    assert found.spearman_p == pytest.approx(2 / 120)
+
+
+def test_the_published_slipperiness_friction_is_out_of_order_at_55_only():
+    index, mu = (0, 20, 55, 75, 100), (0.62, 0.55, 0.44, 0.52, 0.24)  # the published Table 2
+    found = relation(index, mu, labels=index)
+    # One neighbouring pair is exchanged: rho = -(1 - 6 * 2 / (5 * 24)) = -0.9.
+    assert found.spearman == pytest.approx(-0.9)
+    assert dict(found.without)[55] < found.pearson < 0
+
+
+def test_the_line_is_the_least_squares_line():
+    found = relation([0, 1, 2, 3], [1, 3, 5, 7], labels=(0, 1, 2, 3))
+    assert (found.slope, found.intercept) == (pytest.approx(2), pytest.approx(1))
+
+
+def test_a_perfect_r_has_no_interval_and_says_so():
+    found = relation([0, 1, 2, 3], [1, 3, 5, 7], labels=(0, 1, 2, 3))
+    assert found.low is None
+    assert "perfect" in found.reason
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "why"), [([1, 2], [3, 4], "too few"), ([], [], "too few"), ([1, 2, 3], [4, 4, 4], "vary")]
+)
+def test_without_a_correlation_there_is_a_reason_and_no_number(x, y, why):
+    found = relation(x, y, labels=tuple(range(len(x))))
+    assert (found.pearson, found.spearman, found.slope) == (None, None, None)
+    assert why in found.reason
+
+
+def test_three_points_have_an_r_but_no_interval():
+    found = relation([1, 2, 3], [1, 3, 2], labels=(1, 2, 3))
+    assert found.pearson == pytest.approx(0.5)
+    assert (found.low, found.high) == (None, None)
+
+
+def test_a_subject_whose_scores_fall_with_the_index_is_named():
+    tables = [table("P01", [0, 20, 50, 80, 100]), table("P02", [90, 70, 50, 30, 5])]
+    ((subject, descriptor, r),) = reversed_subjects(tables)
+    assert (subject, descriptor) == ("P02", "stickiness")
+    assert r < -0.9
+
+
+def test_the_matrix_of_scores_holds_a_row_a_subject():
+    assert score_matrix([table("P02", [1, 2]), table("P01", [3])], "stickiness") == {
+        "P01": {0: 3},
+        "P02": {0: 1, 20: 2},
+    }
+
+
+@given(st.lists(st.floats(0, 100), min_size=2, max_size=12))
+def test_the_mean_lies_inside_its_interval_whatever_was_answered(values):
+    (mean,) = mean_scores(table(f"P{i}", [v]) for i, v in enumerate(values))
+    assert mean.low <= mean.mean <= mean.high
+    if mean.bootstrap is not None:
+        assert min(values) - 1e-9 <= mean.bootstrap[0] <= mean.bootstrap[1] <= max(values) + 1e-9
+
+
+@given(st.permutations([("P01", 3.0), ("P02", 50.0), ("P03", 97.0)]))
+def test_the_order_of_the_sessions_does_not_matter(answers):
+    means = mean_scores(table(subject, [v]) for subject, v in answers)
+    assert means[0].mean == pytest.approx(50)
+    assert {s.subject for s in subject_scores(table(p, [v]) for p, v in answers)} == {"P01", "P02", "P03"}
