@@ -1,0 +1,166 @@
+"""The simulated bench: a stimulus mounted on a six-axis transducer, a finger that strokes it, and what is felt."""
+
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulators.noise import white_noise
+from simulators.stroke import PRESS, RELEASE, Course, Stroke
+from simulators.surface import CONTACT_AREA, Surface
+
+Array = NDArray[np.float64]
+Six = tuple[float, float, float, float, float, float]
+
+RATED: Six = (36.0, 36.0, 36.0, 500.0, 500.0, 500.0)  # an SI-36-0.5 calibration [N, N mm]
+
+
+@dataclass(frozen=True, slots=True)
+class BenchSettings:
+    """How good the bench is. Forces are in N, torques in N mm."""
+
+    noise_force: float = 0.004  # standard deviation of the white noise of each force [N]
+    noise_torque: float = 0.05  # and of each torque [N mm]
+    drift_force: float = 0.010  # no force drifts further than this from its zero [N]
+    drift_torque: float = 0.1  # no torque drifts further than this [N mm]
+    drift_period: tuple[float, float] = (120.0, 600.0)  # each axis drifts to and fro with a period between these [s]
+    offset: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # unloaded reading: weight of the plate, strain of the mounting
+    gains: Six = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)  # felt over true; 1 where the calibration is exact [-]
+    tilt: tuple[float, float] = (0.0, 0.0)  # of the stimulus about the transducer's x and y axes [degrees]
+    height: float = 20.0  # the stimulus's face above the transducer's origin [mm]
+    rated: Six = RATED  # beyond this an axis saturates
+
+
+@dataclass(frozen=True, slots=True)
+class PlantedStroke:
+    """What was truly done in one stroke. Times are the bench's [s]."""
+
+    surface: Surface
+    mu: float  # [-]
+    tau_max: float  # greatest tangential force over CONTACT_AREA [MPa]
+    peak_normal_force: float  # [N]
+    speed: float  # mean over the steady slide [mm/s]
+    direction: int
+    touch: float  # first contact
+    onset: float  # planted N first exceeds three standard deviations of the noise
+    slip: float  # the whole contact slides from here on
+    peak: float  # of the normal force
+    steady: tuple[float, float]  # full speed and full press
+    lift: float  # planted N last exceeds three standard deviations of the noise
+    end: float  # last contact
+
+
+class Bench:
+    """One transducer with whatever is mounted on it. Time counts from where its user says; threads may share it.
+
+    The wrench is what the finger exerts on the stimulus in the transducer's frame: x from proximal to distal, z out
+    of the face, so that pressing is Fz < 0. Noise is a function of the seed and the instant asked about.
+    """
+
+    def __init__(self, seed: int = 0, settings: BenchSettings | None = None) -> None:
+        """Start unloaded, with nothing mounted."""
+        self.settings = settings or BenchSettings()
+        self.seed = seed
+        self._lock = threading.Lock()
+        self._mounted: Surface | None = None
+        # Beginning [s], course and surface of each stroke; in order, never overlapping. Replaced, never changed.
+        self._strokes: tuple[tuple[float, Course, Surface], ...] = ()
+        self._rotation = _rotation(*self.settings.tilt)
+        draw = np.random.default_rng([seed, 1])
+        limits = np.repeat([self.settings.drift_force, self.settings.drift_torque], 3)
+        self._drift_size = limits * draw.uniform(0.3, 1.0, 6)
+        self._drift_rate = 2 * np.pi / draw.uniform(*self.settings.drift_period, 6)
+        self._drift_phase = draw.uniform(0.0, 2 * np.pi, 6)
+
+    def mount(self, surface: Surface) -> None:
+        """Put a stimulus on the transducer; later strokes rub on it."""
+        with self._lock:
+            self._mounted = surface
+
+    def begin_stroke(self, stroke: Stroke, at: float) -> PlantedStroke:
+        """Let a stroke over the mounted stimulus begin at time `at` [s]; return what it plants.
+
+        Raises ValueError when nothing is mounted or the stroke before has not ended by then.
+        """
+        with self._lock:
+            surface = self._mounted
+            if surface is None:
+                raise ValueError("nothing is mounted on the bench: mount a surface before a stroke begins")
+            if self._strokes and at < self._strokes[-1][0] + self._strokes[-1][1].lift:
+                raise ValueError(f"a stroke cannot begin at {at} s: the one before has not ended")
+            course = Course(stroke, surface.mu, surface.holds)
+            self._strokes = (*self._strokes, (at, course, surface))
+        return self._planted(at, course, surface)
+
+    def planted(self) -> tuple[PlantedStroke, ...]:
+        """Return the truth of every stroke begun so far, in order."""
+        return tuple(self._planted(*stroke) for stroke in self._strokes)
+
+    def exerted(self, times: Array) -> Array:
+        """Return the wrench (n, 6) [N, N mm] that the finger truly exerts at `times` (n,) [s], without any error."""
+        wrench = np.zeros((len(times), 6))
+        if not len(times):
+            return wrench
+        first, last = float(np.min(times)), float(np.max(times))
+        for begun, course, _ in reversed(self._strokes):
+            if begun + course.lift < first:
+                break
+            if begun + course.touch <= last:
+                wrench += _exerted(course, times - begun, self.settings.height)
+        forces, torques = wrench[:, :3], wrench[:, 3:]
+        return np.hstack([forces @ self._rotation.T, torques @ self._rotation.T])
+
+    def wrench(self, times: Array) -> Array:
+        """Return the wrench (n, 6) [N, N mm] that the transducer feels at `times` (n,) [s], noise and drift too."""
+        settings = self.settings
+        felt = self.exerted(times) * np.array(settings.gains) + np.array(settings.offset)
+        felt += self._drift_size * np.sin(self._drift_rate * times[:, None] + self._drift_phase)
+        return felt + white_noise(self.seed, times) * np.repeat([settings.noise_force, settings.noise_torque], 3)
+
+    def _planted(self, begun: float, course: Course, surface: Surface) -> PlantedStroke:
+        """Return the truth of a stroke, its times on the bench's axis."""
+        start, stop = course.steady
+        travel = course.position(np.array([start, stop]))
+        limit = 3.0 * self.settings.noise_force
+        pressing = np.linspace(course.touch, course.touch + PRESS, 15001)
+        onset = pressing[np.argmax(course.normal_force(pressing) > limit)]
+        releasing = np.linspace(course.lift, course.lift - RELEASE, 12001)
+        lift = releasing[np.argmax(course.normal_force(releasing) > limit)]
+        peak = course.stroke.peak_normal_force
+        return PlantedStroke(
+            surface=surface,
+            mu=course.mu,
+            tau_max=course.mu * peak / CONTACT_AREA,
+            peak_normal_force=peak,
+            speed=float((travel[1] - travel[0]) / (stop - start)),
+            direction=course.stroke.direction,
+            touch=begun + course.touch,
+            onset=begun + float(onset),
+            slip=begun + course.slip,
+            peak=begun + course.peak,
+            steady=(begun + start, begun + stop),
+            lift=begun + float(lift),
+            end=begun + course.lift,
+        )
+
+
+def _exerted(course: Course, time: Array, height: float) -> Array:
+    """Return the wrench (n, 6) of a course about the transducer's origin; the face lies `height` [mm] above it."""
+    stroke = course.stroke
+    normal = course.normal_force(time)
+    tangential = course.ratio(time) * normal
+    along = stroke.direction * course.position(time)
+    slant = np.radians(stroke.slant)
+    x, y = along * np.cos(slant), along * np.sin(slant) + stroke.across
+    fx, fy, fz = stroke.direction * tangential * np.cos(slant), stroke.direction * tangential * np.sin(slant), -normal
+    # Torque is r x F with r = (x, y, height).
+    return np.column_stack([fx, fy, fz, y * fz - height * fy, height * fx - x * fz, x * fy - y * fx])
+
+
+def _rotation(about_x: float, about_y: float) -> Array:
+    """Return the matrix (3, 3) that turns the stimulus's axes about x, then about y [degrees]."""
+    (sx, cx), (sy, cy) = ((np.sin(a), np.cos(a)) for a in np.radians([about_x, about_y]))
+    turn_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    turn_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    return turn_y @ turn_x

@@ -1,0 +1,124 @@
+"""The course of a simulated stroke: approach, touch, stick ramp, slide, lift."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+PRESS = 0.10  # from touch to full normal force [s]
+RELEASE = 0.12  # from full normal force to lift [s]
+SPEED_UP = 0.15  # from rest to full speed [s]
+ROLL = 0.3  # how far the centre of pressure rolls while the skin sticks [mm]
+
+
+@dataclass(frozen=True, slots=True)
+class Stroke:
+    """What a hand does in one stroke. Times count from the stroke's beginning, when nothing touches yet."""
+
+    peak_normal_force: float  # reached once, in the slide [N]
+    speed: float  # mean over the steady slide [mm/s]
+    direction: int = 1  # +1 proximal to distal, -1 distal to proximal
+    approach: float = 0.7  # before the touch: the unloaded stretch [s]
+    stick: float = 0.5  # from touch to slide where the surface holds the finger; where it does not, 0 is used [s]
+    slide: float = 2.0  # from the first slip to the lift [s]
+    peak_at: float = 0.55  # when the normal force peaks, as a share of the slide [-]
+    peak_width: float = 0.25  # how long it stays near its peak [s]
+    sag: float = 0.35  # how far the normal force lies below its peak, on average, away from it [-]
+    wander: float = 0.12  # how far it wanders about that level [-]
+    speed_wander: float = 0.05  # how far the speed wanders about its mean [-]
+    phases: tuple[float, float, float] = (0.3, 2.1, 4.4)  # of the wandering [rad]
+    slant: float = 0.0  # angle of the path to the x axis [degrees]
+    across: float = 0.0  # where the path crosses x = 0 [mm]
+
+    def __post_init__(self) -> None:
+        """Refuse a course no hand can take."""
+        if self.peak_normal_force <= 0.0 or self.speed <= 0.0 or self.approach < 0.0 or self.stick < 0.0:
+            raise ValueError("a stroke needs a force and a speed above 0, and no time below 0")
+        if self.direction not in (1, -1):
+            raise ValueError(f"a stroke has direction {self.direction}, which must be 1 or -1")
+        if self.slide < 0.8 or not 0.35 <= self.peak_at <= 0.75:
+            raise ValueError("a stroke slides for at least 0.8 s and peaks between 0.35 and 0.75 of the slide")
+        if not 0.0 <= self.wander < self.sag <= 0.8 - self.wander:
+            raise ValueError("wander must lie below sag, and both together below 0.8, or the peak is not the greatest")
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """A stroke over a surface: forces and position at any time since the stroke began."""
+
+    stroke: Stroke
+    mu: float  # of the surface [-]
+    holds: bool  # the surface blocks the finger before it slides
+
+    @property
+    def touch(self) -> float:
+        """First instant of contact [s]."""
+        return self.stroke.approach
+
+    @property
+    def slip(self) -> float:
+        """Instant from which the whole contact slides [s]."""
+        return self.touch + (self.stroke.stick if self.holds else 0.0)
+
+    @property
+    def lift(self) -> float:
+        """Last instant of contact [s]."""
+        return self.slip + self.stroke.slide
+
+    @property
+    def peak(self) -> float:
+        """Instant of the greatest normal force [s]."""
+        return self.slip + self.stroke.peak_at * self.stroke.slide
+
+    @property
+    def steady(self) -> tuple[float, float]:
+        """Stretch in which the finger slides at its full speed and presses fully [s]."""
+        return self.slip + max(SPEED_UP, 0.0 if self.holds else PRESS), self.lift - RELEASE
+
+    def normal_force(self, time: Array) -> Array:
+        """Return N (n,) [N] at `time` (n,) [s]: minimum-jerk press and release, and a level that peaks once."""
+        stroke = self.stroke
+        first, second, _ = stroke.phases
+        since = time - self.touch
+        wander = 0.6 * np.sin(2 * np.pi * 0.9 * since + first) + 0.4 * np.sin(2 * np.pi * 2.3 * since + second)
+        away = 1.0 - np.exp(-0.5 * ((time - self.peak) / stroke.peak_width) ** 2)
+        level = 1.0 - away * (stroke.sag + stroke.wander * wander)
+        pressed = minimum_jerk(since / PRESS) * (1.0 - minimum_jerk((time - self.lift + RELEASE) / RELEASE))
+        return stroke.peak_normal_force * level * pressed
+
+    def ratio(self, time: Array) -> Array:
+        """Return T/N (n,) [-]: a straight climb from touch to slip where the surface holds, then mu."""
+        if not self.holds or self.stroke.stick == 0.0:
+            return np.full_like(time, self.mu)
+        return self.mu * np.clip((time - self.touch) / self.stroke.stick, 0.0, 1.0)
+
+    def position(self, time: Array) -> Array:
+        """Return the centre of pressure along the path (n,) [mm], positive in the stroke's own direction.
+
+        While the skin sticks it only rolls; then speed rises as minimum jerk does and wanders about its mean.
+        """
+        stroke = self.stroke
+        sliding = np.maximum(time - self.slip, 0.0)
+        rate = 2 * np.pi * 1.3  # of the wandering [rad/s]
+        sway = stroke.speed * stroke.speed_wander / rate * np.sin(rate * sliding + stroke.phases[2])
+        travelled = stroke.speed * _risen(sliding, SPEED_UP) + sway * minimum_jerk(sliding / 0.3)
+        rolled = ROLL * self.ratio(time) / self.mu if self.holds else 0.0
+        return travelled + rolled - 0.5 * stroke.speed * stroke.slide
+
+
+def minimum_jerk(phase: Array) -> Array:
+    """Return 0 before phase 0, 1 after phase 1, and between them the smoothest way (Flash and Hogan, 1985, eq. 4).
+
+    >>> minimum_jerk(np.array([-1.0, 0.0, 0.5, 1.0, 2.0]))
+    array([0. , 0. , 0.5, 1. , 1. ])
+    """
+    u = np.clip(phase, 0.0, 1.0)
+    return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+
+
+def _risen(time: Array, rise: float) -> Array:
+    """Return the integral of `minimum_jerk(t / rise)` from 0 to `time` >= 0 [s]."""
+    u = np.minimum(time / rise, 1.0)
+    return rise * u**4 * (2.5 - 3.0 * u + u**2) + np.maximum(time - rise, 0.0)

@@ -1,0 +1,73 @@
+"""A simulated subject: a hand that strokes a surface and a judge who scores it, from a seed. It knows no solver."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from simulators.stroke import Stroke
+from simulators.surface import Surface
+
+
+@dataclass(frozen=True, slots=True)
+class SubjectSettings:
+    """How subjects differ from one another and from themselves. Scores are on the 0 to 100 line."""
+
+    gain_spread: float = 0.06  # standard deviation between subjects of how far they spread their scores [-]
+    offset_spread: float = 3.0  # and of where they put the middle
+    judgement_noise: float = 4.0  # standard deviation between judgements of the same surface
+    friction_weight: float = 0.0  # share of a judgement that follows friction instead of the maker's index [-]
+
+
+class SimulatedSubject:
+    """One subject. The same seed strokes and scores in the same way, whatever the order of the surfaces."""
+
+    def __init__(self, seed: int, settings: SubjectSettings | None = None) -> None:
+        """Draw the habits that this subject keeps."""
+        self.seed = seed
+        self.settings = settings or SubjectSettings()
+        draw = np.random.default_rng([seed, 2])
+        self._gain = float(draw.normal(1.0, self.settings.gain_spread))
+        self._offset = float(draw.normal(0.0, self.settings.offset_spread))
+        self._stick = float(draw.uniform(0.4, 0.6))
+        self._pace = float(draw.uniform(0.9, 1.1))
+        self._slant = float(draw.normal(0.0, 1.5))
+
+    def stroke(self, surface: Surface, repetition: int = 1) -> Stroke:
+        """Return how the subject strokes `surface`: force and speed are the surface's own, the course is personal."""
+        draw = self._draw(surface, repetition, 3)
+        return Stroke(
+            peak_normal_force=surface.peak_normal_force,
+            speed=surface.speed,
+            direction=surface.direction,
+            approach=float(draw.uniform(0.6, 1.0)),
+            stick=float(self._stick * draw.uniform(0.9, 1.1)),
+            # A stroke covers some 40 mm; slower ones last longer, none shorter than it takes to feel anything.
+            slide=float(np.clip(40.0 * self._pace / surface.speed, 1.9, 2.8) * draw.uniform(0.95, 1.05)),
+            peak_at=float(draw.uniform(0.4, 0.7)),
+            sag=float(draw.uniform(0.28, 0.4)),
+            wander=float(draw.uniform(0.06, 0.14)),
+            phases=_phases(draw),
+            slant=self._slant + float(draw.normal(0.0, 0.5)),
+            across=float(draw.normal(0.0, 1.0)),
+        )
+
+    def score(self, surface: Surface, repetition: int = 1) -> float:
+        """Return the score on the line from 0 to 100, in tenths: the mark's position in hundredths of the line."""
+        draw = self._draw(surface, repetition, 4)
+        settings = self.settings
+        # Friction between the paper's extremes, as a score: stickier is more, slipperier is less.
+        rubbing = 100.0 * (surface.mu - 0.24) / (0.67 - 0.24)
+        felt = rubbing if surface.descriptor == "stickiness" else 100.0 - rubbing
+        judged = (1.0 - settings.friction_weight) * surface.index + settings.friction_weight * felt
+        marked = 50.0 + self._gain * (judged - 50.0) + self._offset + float(draw.normal(0.0, settings.judgement_noise))
+        return round(min(max(marked, 0.0), 100.0), 1)
+
+    def _draw(self, surface: Surface, repetition: int, purpose: int) -> np.random.Generator:
+        """Return a source of chance of this subject, this surface and this purpose alone."""
+        name = int.from_bytes(surface.descriptor.encode(), "big")
+        return np.random.default_rng([self.seed, purpose, name, surface.index, repetition])
+
+
+def _phases(draw: np.random.Generator) -> tuple[float, float, float]:
+    first, second, third = draw.uniform(0.0, 2 * np.pi, 3)
+    return float(first), float(second), float(third)
