@@ -1,0 +1,50 @@
+"""The named flaws of a recording and its strokes: a name for scripts, a sentence for people."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Literal
+
+Grade = Literal["note", "doubtful", "refused"]  # numbers stand; numbers stand but doubt them; numbers were withheld
+
+
+class FlawName(StrEnum):
+    """Every flaw there is."""
+
+    LOST_READINGS = "lost_readings"
+    SATURATED = "saturated"
+    FROZEN = "frozen_sensor"
+    DEAD = "dead_sensor"
+    TOO_LITTLE_FORCE = "too_little_force"
+    DRIFT = "drift"
+    NO_UNLOADED_STRETCH = "no_unloaded_stretch"
+    ZERO_AFTER_CONTACT = "zero_after_contact"
+    NO_STROKE = "no_stroke"
+    SECOND_STROKE = "second_stroke"
+    LIGHT_TOUCH = "light_touch"
+    NOT_LIFTED = "not_lifted_between"
+    BEGINS_IN_CONTACT = "begins_in_contact"
+    ENDS_IN_CONTACT = "ends_in_contact"
+    SLOW_ONSET = "slow_onset"
+    NO_STEADY_SLIDING = "no_steady_sliding"
+    SPEED_NOT_MEASURABLE = "speed_not_measurable"
+    HEIGHT_UNKNOWN = "height_unknown"
+    NORMAL_IMPLAUSIBLE = "normal_axis_implausible"
+    UNITS_IMPLAUSIBLE = "units_implausible"
+    RATIO_ABOVE_ONE = "ratio_above_one_at_low_force"
+    WRONG_DIRECTION = "wrong_direction"
+    DIRECTION_TURNS = "direction_turns"
+    IRREGULAR_TIME = "irregular_time"
+    LOW_RATE = "low_rate"
+    UNKNOWN_RATE = "unknown_rate"
+    NOT_ANSWERED = "recording_flaw"
+
+
+@dataclass(frozen=True, slots=True)
+class Flaw:
+    """One named defect, where it lies and what it costs."""
+
+    name: FlawName
+    sentence: str  # what was found, and what it does to the numbers
+    grade: Grade
+    trial: int | None = None  # None: the whole recording, or a recording without trials
+    stroke: int | None = None  # position in `Analysis.strokes`; None: not one stroke's

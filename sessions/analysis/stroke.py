@@ -1,0 +1,56 @@
+"""A stroke: the touching movement inside a trial, with its numbers and what is wrong with them."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StrokeCurve:
+    """The course of a stroke with some time around it; n readings. nan where a value means nothing. Read-only."""
+
+    time: Array  # (n,) [s, device time]
+    normal: Array  # (n,) filtered normal force [N]
+    tangential: Array  # (n,) filtered tangential force [N]
+    ratio: Array  # (n,) T/N [-]
+    position: Array  # (n, 2) centre of pressure [mm]
+    speed: Array  # (n,) of the centre of pressure [mm/s]
+
+    def __post_init__(self) -> None:
+        """Make the columns read-only views."""
+        for field in fields(self):
+            view = getattr(self, field.name).view()
+            view.flags.writeable = False
+            object.__setattr__(self, field.name, view)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stroke:
+    """One stroke. None stands where the recording allows no honest number; `flaws` says why."""
+
+    trial: int | None  # None where the recording has no trials
+    onset: float | None  # [s, device time]; None where the recording begins in contact
+    lift: float | None  # [s, device time]; None where it ends in contact
+    steady: Interval | None  # steady window [s, device time]
+    break_away: float | None  # end of the stick phase [s, device time], where one is seen
+    direction: int | None  # +1 proximal to distal (along +x of the face frame), -1 back
+    direction_from: str | None  # "centre of pressure" or "tangential force"
+    speed: float | None  # slope of the centre of pressure on time over the steady window [mm/s]
+    speed_error: float | None  # its standard error [mm/s]
+    mu_static: float | None  # height of the static peak [-]; None where none stands out
+    mu_dynamic: float | None  # mean of T/N over the steady window [-]
+    mu_dynamic_sd: float | None  # standard deviation of T/N in it [-]
+    mu_dynamic_interval: Interval | None  # see `AnalysisSettings.interval_kind`
+    mu_max: float | None  # greatest T/N above the force floor, smoothed as the settings say [-]
+    tau_max: float | None  # greatest tangential force over the contact area [MPa]
+    normal_force: float | None  # mean over the steady window [N]
+    tangential_force: float | None  # mean over the steady window [N]
+    peak_normal: float | None  # [N]
+    peak_tangential: float | None  # [N]
+    readings: int  # in the steady window
+    flaws: tuple[str, ...]
+    curve: StrokeCurve | None = None
