@@ -1,0 +1,100 @@
+"""Prediction: what one run of the solver found, with the audits that vouch for it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.mesh import Mesh
+from solver.scene import Scene
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Row:
+    """The same ending at arc positions along the skin, the reference ending being the one at 0."""
+
+    arc: Array  # (r,) from first touch, positive towards the tip, on the undeformed skin [mm]
+    sed: Array  # (r,) SED averaged over each ending [MPa]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Skin:
+    """The skin's nodes that may touch, in order from proximal to distal."""
+
+    x: Array  # (k,) deformed position along the surface, bone's first touch at 0 [mm]
+    gap: Array  # (k,) height over the surface, 0 where it touches [mm]
+    pressure: Array  # (k,) [MPa], 0 where the gap is open
+    traction: Array  # (k,) tangential, of the surface on the skin along +x [MPa]
+    state: tuple[str, ...]  # (k,) "open", "stick", "slip" or "cap"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class History:
+    """The course in time: pre-indentation over 1 s, then sliding. m instants."""
+
+    time: Array  # (m,) [s]
+    bone_x: Array  # (m,) travel of the bone along the surface [mm]
+    bone_y: Array  # (m,) travel of the bone, negative into the surface [mm]
+    sed_ending: Array  # (m,) [MPa]
+    sed_point: Array  # (m,) [MPa]
+    normal_force: Array  # (m,) [N/mm]
+    tangential_force: Array  # (m,) drag opposing the slide [N/mm]
+    contact_width: Array  # (m,) [mm]
+    slipping: Array  # (m,) part of the touching skin nodes that slip [-]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prediction:
+    """The settled response of one scene, or the last state of its course."""
+
+    scene: Scene
+    sed_ending: float  # SED averaged over the ending [MPa]
+    sed_point: float  # SED at the ending's middle [MPa]
+    normal_force: float  # of the surface on the finger along +y [N/mm]
+    tangential_force: float  # drag opposing the slide [N/mm]
+    contact_width: float  # from the first to the last touching point, along the surface [mm]
+    error_estimate: float  # of sed_ending, relative [-]
+    dofs: int  # unknown displacements
+    newton_iterations: int  # solutions of a linear system with trial contact states
+    wall_s: float  # the solve alone, of this scene [s]
+    setup_s: float  # mesh and tables; shared by scenes solved together [s]
+    row: Row
+    model: Mapping[str, Any]  # what was modelled, what was left out, and the evidence that it could be
+    audits: Mapping[str, float]  # checks; residuals relative unless their name says otherwise
+    skin: Skin
+    mesh: Mesh
+    displacement: Array  # (nodes, 2) relative to the bone [mm]
+    history: History | None = None
+    warnings: tuple[str, ...] = field(default=())  # one sentence each
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `daq-app solve --json` prints: plain numbers, lists and strings."""
+        plain: dict[str, Any] = {
+            name: getattr(self, name)
+            for name in (
+                "sed_ending",
+                "sed_point",
+                "normal_force",
+                "tangential_force",
+                "contact_width",
+                "error_estimate",
+                "dofs",
+                "newton_iterations",
+                "wall_s",
+                "setup_s",
+            )
+        }
+        plain["title"] = self.scene.title
+        plain["row"] = {"arc": self.row.arc.tolist(), "sed": self.row.sed.tolist()}
+        plain["model"] = dict(self.model)
+        plain["audits"] = dict(self.audits)
+        plain["warnings"] = list(self.warnings)
+        if self.history is not None:
+            course = {f.name: getattr(self.history, f.name).tolist() for f in fields(self.history)}
+            plain["time"], plain["bone_x"], plain["bone_y"] = (course.pop(k) for k in ("time", "bone_x", "bone_y"))
+            plain["history"] = course
+        return plain
