@@ -1,0 +1,155 @@
+"""How all pictures look: palette (Okabe and Ito 2008), sizes, and SVG that is the same on every run and machine."""
+
+# pyright: reportUnknownMemberType=false
+# matplotlib does not type the keyword arguments it passes on.
+
+import io
+import re
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from html import escape
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex, to_rgb
+from matplotlib.figure import Figure
+
+SKY = "#56B4E9"  # normal force
+VERMILLION = "#D55E00"  # tangential force
+PURPLE = "#CC79A7"  # mu
+GREEN = "#009E73"  # model
+INK = "#1a1a1a"
+GREY = "#767676"
+PALE = "#d9d9d9"
+
+TEXT = 8.5  # [pt]
+_LOOK: dict[Any, Any] = {
+    "font.family": "sans-serif",
+    # Text stays text, so that it can be searched, copied and read aloud. The layout is made for the first font, which
+    # is wider than the ones a reader without it sees instead: labels may come out shorter, never cut.
+    "font.sans-serif": ["DejaVu Sans"],
+    "svg.fonttype": "none",
+    "font.size": TEXT,
+    "axes.titlesize": TEXT,
+    "axes.titlelocation": "left",
+    "axes.titlepad": 5.0,
+    "axes.labelsize": TEXT,
+    "xtick.labelsize": TEXT - 0.5,
+    "ytick.labelsize": TEXT - 0.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.6,
+    "axes.edgecolor": GREY,
+    "axes.labelcolor": INK,
+    "text.color": INK,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "lines.solid_capstyle": "round",
+    "axes.unicode_minus": True,
+    "path.simplify": True,
+    "path.simplify_threshold": 0.3,
+}
+_FONTS = "'DejaVu Sans', Verdana, 'Liberation Sans', Arial, Helvetica, sans-serif"
+
+Cell = str | float | int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """One picture, and the numbers it shows."""
+
+    name: str  # of its files, without ending
+    title: str  # read aloud, and shown on hovering
+    svg: str
+    header: tuple[str, ...]  # names with units
+    rows: tuple[tuple[Cell, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Plate:
+    """One numbered figure of the report: its panels and the caption under them."""
+
+    name: str  # its anchor on the page
+    caption: str
+    panels: tuple[Panel, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """An empty picture with one or more axes, drawn on and then turned to SVG."""
+
+    figure: Figure
+    axes: tuple[Axes, ...]
+    hover: dict[str, str] = field(default_factory=dict[str, str])  # artist's gid: what hovering shows
+
+    def note(self, text: str) -> str:
+        """Return a gid for an artist that shows `text` on hovering."""
+        gid = f"h{len(self.hover)}"
+        self.hover[gid] = text
+        return gid
+
+
+def look() -> AbstractContextManager[None]:
+    """Return the context every picture is drawn in."""
+    return mpl.rc_context(_LOOK)
+
+
+def sheet(width: float, height: float, heights: tuple[float, ...] = (1.0,), *, share_x: bool = False) -> Sheet:
+    """Return an empty picture of that size [CSS px, 96 an inch] with one axes under another; call inside `look`."""
+    figure = Figure(figsize=(width / 96, height / 96), layout="constrained")
+    grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    axes: list[Axes] = []
+    for row in range(len(heights)):
+        axes.append(figure.add_subplot(grid[row, 0], sharex=axes[0] if share_x and axes else None))
+    return Sheet(figure, tuple(axes))
+
+
+def shades(colour: str, n: int) -> tuple[str, ...]:
+    """Return n shades of a colour from light to dark, apart in grey as well.
+
+    >>> shades("#808080", 1)
+    ('#808080',)
+    """
+    if n == 1:
+        return (colour.lower(),)
+    return tuple(_mixed(colour, 0.3 - 1.0 * i / (n - 1)) for i in range(n))
+
+
+def _mixed(colour: str, towards: float) -> str:
+    """Return the colour moved by `towards` (-1 to 1) of the way to black (below 0) or white (above)."""
+    goal, share = (1.0, towards) if towards > 0 else (0.0, -towards)
+    red, green, blue = (c + share * (goal - c) for c in to_rgb(colour))
+    return to_hex((red, green, blue))
+
+
+def svg(drawn: Sheet, name: str, title: str, *, simulated: bool) -> str:
+    """Return the picture as an SVG document, inside `look`; the same drawing gives the same bytes."""
+    if simulated:
+        drawn.figure.suptitle("SIMULATED", x=0.995, ha="right", fontsize=6.5, color=GREY, fontweight="bold")
+    buffer = io.StringIO()
+    with mpl.rc_context({"svg.hashsalt": name}):
+        drawn.figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
+    return _finished(buffer.getvalue(), name, title, drawn.hover, simulated=simulated)
+
+
+def _finished(text: str, name: str, title: str, hover: Mapping[str, str], *, simulated: bool) -> str:
+    """Return the SVG with titles for hovering, fonts to fall back on, and ids nobody else on a page has."""
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
+    for gid, words in hover.items():
+        text = text.replace(f'<g id="{gid}">', f'<g id="{gid}"><title>{escape(words)}</title>', 1)
+    text = re.sub(r"'DejaVu Sans'(?:, [^;\"]*)?(?=[;\"])", _FONTS, text)
+    text = re.sub(r'\bid="([^"]+)"', rf'id="{name}-\1"', text)
+    text = re.sub(r"url\(#([^)]+)\)", rf"url(#{name}-\1)", text)
+    text = re.sub(r'href="#([^"]+)"', rf'href="#{name}-\1"', text)
+    text = text.replace("<svg ", f'<svg role="img" aria-label="{escape(title)}" ', 1)
+    head = '<?xml version="1.0" encoding="utf-8"?>\n'
+    if simulated:
+        head += "<!-- SIMULATED: this picture shows no measurement of a real device or person -->\n"
+    return head + text

@@ -1,0 +1,142 @@
+"""The report as one self-contained page, and its figures as files with their numbers."""
+
+import csv
+import io
+import os
+from itertools import chain
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+from markupsafe import Markup
+
+from sessions.exports import report_tables
+from sessions.exports.figures import Panel, Plate, plates
+from sessions.exports.report_prose import question, summary
+from sessions.exports.report_tables import Table
+from sessions.report import Report
+
+HEAD = "<!DOCTYPE html>"
+
+
+class ReportError(Exception):
+    """A report that could not be written: where, why, what to do."""
+
+
+def page(report: Report) -> str:
+    """Return the page: no script, nothing asked of any network; the same report gives the same bytes."""
+    figures = {plate.name: plate for plate in plates(report)}
+    tables = report_tables.tables(report)
+    environment = Environment(
+        loader=PackageLoader("sessions.exports", "."),
+        autoescape=select_autoescape(default=True, default_for_string=True),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    return environment.get_template("report.html.jinja").render(
+        report=report,
+        question=question(report),
+        summary=summary(report),
+        figures=figures,
+        drawing=_drawing,
+        numbers=_numbers(figures, tables),
+        contents=_contents(report, figures, tables),
+        tables=tables,
+    )
+
+
+def write_report(report: Report, path: Path) -> None:
+    """Write the page to `path`: a new file, then swapped in, so that readers see the old page or the new one.
+
+    Raises ReportError when that cannot be done, or when `path` holds something that is no page.
+    """
+    if path.exists() and not _is_page(path):
+        raise ReportError(f"{path} holds something that is no report, so it is left alone: choose another file")
+    _swap_in(path, page(report))
+
+
+def write_figures(report: Report, folder: Path) -> tuple[Path, ...]:
+    """Write every picture of the report to `folder` as SVG, each with its numbers as CSV; return the files."""
+    written: list[Path] = []
+    for plate in plates(report):
+        for panel in plate.panels:
+            for ending, text in ((".svg", panel.svg), (".csv", _csv(panel, report))):
+                path = folder / (_file_name(panel.name) + ending)
+                _swap_in(path, text)
+                written.append(path)
+    return tuple(written)
+
+
+def _numbers(figures: dict[str, Plate], tables: dict[str, tuple[Table, ...]]) -> dict[str, int]:
+    """Return the numbers of figures and of tables, each counted from 1 in the order of the page."""
+    order = ("scores", "course", "friction", "speed", "finger", "response", "relation")
+    numbered = {name: n for n, name in enumerate((name for name in order if name in figures), 1)}
+    return numbered | {table.name: n for n, table in enumerate(chain.from_iterable(tables.values()), 1)}
+
+
+def _contents(
+    report: Report, figures: dict[str, Plate], tables: dict[str, tuple[Table, ...]]
+) -> tuple[tuple[str, str], ...]:
+    """Return anchor and words of the sections that the page has."""
+    parts = (
+        ("who", "who and what", True),
+        ("excluded", "excluded", True),
+        ("scores", "scores", "scores" in figures),
+        ("friction", "forces and friction", "course" in figures or bool(tables["strokes"])),
+        ("predictions", "predicted responses", bool(tables["predictions"])),
+        ("relation", "prediction against score", bool(tables["relation"])),
+        ("planted", "planted against recovered", bool(tables["planted"])),
+        ("model", "the model", bool(report.modelled or report.left_out)),
+        ("again", "to do it again", True),
+    )
+    return tuple((anchor, words) for anchor, words, there in parts if there)
+
+
+def _drawing(panel: Panel) -> Markup:
+    """Return the picture as it stands in a page: without the head an SVG file has."""
+    return Markup(panel.svg[panel.svg.index("<svg") :])
+
+
+def _csv(panel: Panel, report: Report) -> str:
+    """Return the numbers of a picture; empty where there is none."""
+    out = io.StringIO()
+    if report.simulated:
+        out.write(f"# {report.head}\n")
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(panel.header)
+    writer.writerows(["" if value is None else value for value in row] for row in panel.rows)
+    return out.getvalue()
+
+
+def _file_name(name: str) -> str:
+    """Return a name any file system takes."""
+    return "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "-" for c in name)
+
+
+def _is_page(path: Path) -> bool:
+    """Say whether a file begins as our pages do; an empty one may be replaced as well."""
+    try:
+        with path.open("rb") as file:
+            start = file.read(len(HEAD))
+    except OSError as error:
+        raise ReportError(f"{path} cannot be read ({error.strerror}): choose another file") from error
+    return start in (b"", HEAD.encode())
+
+
+def _swap_in(path: Path, text: str) -> None:
+    """Write a file beside its place, then put it there in one step."""
+    beside = path.with_name(f".{path.name}.{os.getpid()}.new")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            with beside.open("w", encoding="utf-8", newline="\n") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            beside.replace(path)
+        finally:
+            beside.unlink(missing_ok=True)
+    except OSError as error:
+        raise ReportError(
+            f"{path} cannot be written ({error.strerror}): choose a folder you may write to, with room on its disk"
+        ) from error

@@ -1,0 +1,78 @@
+"""What a report says in sentences: its question and, in short, its answer."""
+
+from sessions.analysis.scores import Relation
+from sessions.exports.wording import correlation, digits, plural, significant
+from sessions.report import Experiment, Report
+
+
+def question(report: Report) -> str:
+    """Return what the session asks, as far as what it holds can answer it."""
+    judged = " and ".join(e.descriptor for e in report.experiments)
+    if not report.experiments:
+        return "What forces does this recording hold, where does something stroke the surface, and with what friction?"
+    if not report.predictions:
+        return f"How do people scale {judged}, and with what friction do fingers stroke the same surfaces?"
+    return (
+        f"People scale the {judged} of surfaces they stroke. Does the strain-energy density that a finger model "
+        "predicts at a receptor, from nothing but the friction of one finger on the same surfaces, follow their scores?"
+    )
+
+
+def summary(report: Report) -> tuple[str, ...]:
+    """Return the findings in short, a sentence each."""
+    sentences: list[str] = []
+    subjects = {answers.subject for e in report.experiments for answers in e.answers}
+    if subjects:
+        stimuli = sum(len(e.scores) for e in report.experiments)
+        sentences.append(
+            f"{_capital(plural(len(subjects), 'subject'))} scored {_plural(stimuli, 'stimulus', 'stimuli')}."
+        )
+    if report.course is not None or report.strokes:
+        sentences.append(_strokes(report))
+    for experiment in report.experiments:
+        seds = [p.sed for p in report.predictions if p.experiment == experiment.name and p.sed is not None]
+        if seds:
+            sentences.append(_predicted(experiment, min(seds), max(seds)))
+    missing = sum(p.sed is None for p in report.predictions)
+    if missing:
+        sentences.append(f"{_capital(plural(missing, 'trial'))} got no prediction; the tables say why.")
+    return tuple(sentences)
+
+
+def _strokes(report: Report) -> str:
+    """Return how many strokes were found and how many gave friction."""
+    n = len(report.strokes)
+    if n == 0:
+        return "No stroke was found in the recording; the flaws below say why."
+    measured = sum(s.mu_dynamic is not None for s in report.strokes)
+    words = f"{_capital(plural(n, 'stroke'))} {'was' if n == 1 else 'were'} found; {measured} gave a dynamic friction"
+    values = [s.mu_dynamic for s in report.strokes if s.mu_dynamic is not None]
+    return words + (f", from µ = {digits(min(values), 2)} to {digits(max(values), 2)}." if values else ".")
+
+
+def _predicted(experiment: Experiment, low: float, high: float) -> str:
+    """Return how prediction and score go together in one experiment."""
+    name, ends = _capital(experiment.name), f"{digits(1e3 * low, 2)} to {digits(1e3 * high, 2)} kPa"
+    words = f"{name}: the predicted SED runs from {ends}"
+    words += f" (a range of {significant(200 * (high - low) / (high + low), 2)} % of its middle)"
+    return words + related_words(experiment.score_relation) + "."
+
+
+def related_words(related: Relation | None) -> str:
+    """Return r with its interval and n as the end of a sentence, or why there is none."""
+    if related is None:
+        return "; there are no scores to hold it against"
+    if related.pearson is None:
+        return f"; no correlation with the scores: {related.reason}"
+    words = f"; against the mean scores r = {correlation(related.pearson)}"
+    if related.low is not None and related.high is not None:
+        words += f", 95 % interval {correlation(related.low)} to {correlation(related.high)}"
+    return words + f", n = {related.n} stimuli"
+
+
+def _plural(n: int, one: str, many: str) -> str:
+    return f"{n} {one if n == 1 else many}"
+
+
+def _capital(words: str) -> str:
+    return words[:1].upper() + words[1:]

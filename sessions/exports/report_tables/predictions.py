@@ -1,0 +1,124 @@
+"""Tables of predictions: responses, forces beside measured ones, both directions."""
+
+from sessions.exports.report_tables.cells import Cell, Column, Notes, Table, grouped
+from sessions.exports.wording import direction, places, sed, significant, tau
+from sessions.report import PredictionFinding, Report
+
+
+def prediction_table(report: Report) -> Table | None:
+    """Return what the model was given, and the SED it predicts."""
+    if not report.predictions:
+        return None
+    notes = Notes()
+    columns = (
+        Column("trial"),
+        Column("index"),
+        Column("µ"),
+        Column("which µ"),
+        Column("τ max", "kPa"),
+        Column("depth", "mm"),
+        Column("SED", "kPa"),
+        Column("estimated error", "%"),
+        Column("solved in", "s"),
+    )
+
+    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+        return (
+            Cell(str(p.trial)),
+            Cell(str(p.index)),
+            notes.number(p.mu, places(3), p.reasons.get("mu")),
+            Cell(p.mu_rule),
+            notes.number(p.tau_max, tau, p.reasons.get("tau_max")),
+            Cell(f"{p.indentation:g}"),
+            notes.number(p.sed, sed, p.reasons.get("sed")),
+            notes.number(p.error_estimate, lambda v: significant(100 * v, 2), p.reasons.get("error_estimate")),
+            notes.number(p.wall_s, lambda v: significant(v, 2), p.reasons.get("wall_s")),
+        )
+
+    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
+    caption = (
+        "Predictions: SED averaged over the ending in the settled state (1 kPa = 1 mJ/cm³). Estimated error: of one "
+        "SED, from the mesh; differences between stimuli, which share the mesh, are more accurate."
+    )
+    return Table("table-predictions", caption, columns, groups, notes.listed())
+
+
+def force_table(report: Report) -> Table | None:
+    """Return the model's forces beside the measured ones."""
+    if not report.predictions:
+        return None
+    notes = Notes()
+    columns = (
+        Column("trial"),
+        Column("index"),
+        Column("model N", "N/mm"),
+        Column("model N × width", "N"),
+        Column("measured N", "N"),
+        Column("model T × width", "N"),
+        Column("measured T", "N"),
+        Column("depth of the model", "mm"),
+        Column("depth to match", "mm"),
+    )
+
+    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+        def cell(name: str, value: float | None, decimals: int = 2) -> Cell:
+            return notes.number(value, places(decimals), p.reasons.get(name))
+
+        return (
+            Cell(str(p.trial)),
+            Cell(str(p.index)),
+            cell("normal_per_mm", p.normal_per_mm, 4),
+            cell("normal_force", p.normal_force),
+            cell("measured_normal", p.measured_normal),
+            cell("tangential_force", p.tangential_force),
+            cell("measured_tangential", p.measured_tangential),
+            Cell(f"{p.indentation:g}"),
+            cell("matching_depth", p.matching_depth),
+        )
+
+    width = "the finger's width" if report.width is None else f"a width of {report.width:g} mm"
+    caption = (
+        f"Forces of the model, per mm and times {width} (assumed), beside the means measured over the steady window. "
+        "Depth to match: indentation at which the model would press as hard as the subject did."
+    )
+    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
+    return Table("table-forces", caption, columns, groups, notes.listed())
+
+
+def direction_table(report: Report) -> Table | None:
+    """Return the SED of both directions at equal depth."""
+    if all(p.opposite_sed is None for p in report.predictions):
+        return None
+    notes = Notes()
+    columns = (
+        Column("trial"),
+        Column("index"),
+        Column("depth", "mm"),
+        Column("stroked"),
+        Column("SED as stroked", "kPa"),
+        Column("SED the other way", "kPa"),
+        Column("proximal over distal"),
+    )
+
+    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+        ratio = None
+        if p.sed is not None and p.opposite_sed is not None:
+            backward, forward = (p.sed, p.opposite_sed) if p.direction < 0 else (p.opposite_sed, p.sed)
+            ratio = backward / forward
+        why = p.reasons.get("opposite_sed") or p.reasons.get("sed")
+        return (
+            Cell(str(p.trial)),
+            Cell(str(p.index)),
+            Cell(f"{p.indentation:g}"),
+            Cell(direction(p.direction)),
+            notes.number(p.sed, sed, p.reasons.get("sed")),
+            notes.number(p.opposite_sed, sed, why),
+            notes.number(ratio, places(3), why),
+        )
+
+    caption = (
+        "Both directions at equal depth, each with its trial's friction. Last column: SED while sliding towards the "
+        "body (distal to proximal) over SED while sliding away from it."
+    )
+    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
+    return Table("table-directions", caption, columns, groups, notes.listed())

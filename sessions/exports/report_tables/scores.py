@@ -1,0 +1,107 @@
+"""Tables of scores, and of how predictions go with them."""
+
+from sessions.analysis.scores import MeanScore, Relation
+from sessions.exports.report_tables.cells import Cell, Column, Group, Notes, Table
+from sessions.exports.wording import NONE, correlation, digits, places, significant
+from sessions.report import Report
+
+
+def score_table(report: Report) -> Table | None:
+    """Return mean scores with their intervals."""
+    notes = Notes()
+    groups = tuple(Group(e.name, tuple(_score_row(m, notes) for m in e.scores)) for e in report.experiments if e.scores)
+    if not groups:
+        return None
+    columns = (
+        Column("index"),
+        Column("subjects"),
+        Column("mean score", "0–100"),
+        Column("standard deviation"),
+        Column("95 % interval of the mean"),
+    )
+    caption = "Scores: mean ± t(0.975, n − 1) s / √n, n subjects. Repeats of one subject are averaged first."
+    return Table("table-scores", caption, columns, groups, notes.listed())
+
+
+def _score_row(mean: MeanScore, notes: Notes) -> tuple[Cell, ...]:
+    if mean.low is None or mean.high is None:
+        interval = notes.number(None, str, mean.reason)
+    else:
+        text = f"{digits(mean.low, 1)} to {digits(mean.high, 1)}"
+        interval = Cell(text)
+        if mean.bootstrap is not None:
+            within = f"{digits(mean.bootstrap[0], 1)} to {digits(mean.bootstrap[1], 1)}"
+            why = (
+                "The t interval leaves the scale, where no score can be. Resampling the subjects gives instead, "
+                f"for index {mean.index} of {mean.descriptor}, {within}."
+            )
+            interval = Cell(text, notes.mark(why), why)
+    return (
+        Cell(str(mean.index)),
+        Cell(str(mean.n)),
+        Cell(digits(mean.mean, 1)),
+        notes.number(mean.sd, places(1), mean.reason),
+        interval,
+    )
+
+
+def answer_tables(report: Report) -> tuple[Table, ...]:
+    """Return every subject's scores, a table an experiment."""
+    tables: list[Table] = []
+    for e in report.experiments:
+        if e.answers:
+            notes = Notes()
+            rows = tuple(
+                (Cell(a.subject), *(notes.number(s, places(1), "not answered") for s in a.scores)) for a in e.answers
+            )
+            columns = (Column("subject"), *(Column(f"index {index}") for index in e.indices))
+            caption = f"Every score of {e.descriptor} [0–100]; repeats of one subject averaged."
+            tables.append(Table(f"table-answers-{e.name}", caption, columns, (Group("", rows),), notes.listed()))
+    return tuple(tables)
+
+
+def relation_table(report: Report) -> Table | None:
+    """Return how the predicted SED goes with mean scores and with the indices."""
+    notes = Notes()
+    groups: list[Group] = []
+    for e in report.experiments:
+        related = [("mean score", e.score_relation), ("index", e.index_relation)]
+        rows = tuple(_relation_row(name, r, notes) for name, r in related if r is not None)
+        if rows:
+            groups.append(Group(e.name, rows))
+    if not groups:
+        return None
+    columns = (
+        Column("SED against"),
+        Column("stimuli"),
+        Column("Pearson's r"),
+        Column("95 % interval"),
+        Column("Spearman's rho"),
+        Column("exact p of rho"),
+        Column("slope", "Pa a point"),
+        Column("r without one"),
+    )
+    caption = (
+        "Relation of the predicted SED to scores and to the stimuli's indices. The forces are those of one subject: "
+        "a case study. Interval: Fisher's z. p: two-sided, counted over all orders. Last column: r when the stimulus "
+        "of that index is left out."
+    )
+    return Table("table-relation", caption, columns, tuple(groups), notes.listed())
+
+
+def _relation_row(name: str, related: Relation, notes: Notes) -> tuple[Cell, ...]:
+    if related.low is None or related.high is None:
+        interval = notes.number(None, str, related.reason)
+    else:
+        interval = Cell(f"{correlation(related.low)} to {correlation(related.high)}")
+    left_out = ", ".join(f"{label}: {NONE if r is None else correlation(r)}" for label, r in related.without)
+    return (
+        Cell(name),
+        Cell(str(related.n)),
+        notes.number(related.pearson, correlation, related.reason),
+        interval,
+        notes.number(related.spearman, correlation, related.reason),
+        notes.number(related.spearman_p, places(3), related.reason or "too many orders to count"),
+        notes.number(related.slope, lambda v: significant(1e6 * v, 3), related.reason),
+        Cell(left_out),
+    )

@@ -1,0 +1,113 @@
+"""Tables of strokes: what was found, and what had been planted."""
+
+from collections.abc import Callable
+
+from sessions.exports.report_tables.cells import Cell, Column, Notes, Table, grouped
+from sessions.exports.wording import NONE, digits, places, signed, tau
+from sessions.report import Planted, Report, StrokeFinding
+
+
+def stroke_table(report: Report) -> Table | None:
+    """Return the strokes with their friction, speed and flaws."""
+    if not report.strokes:
+        return None
+    notes = Notes()
+    columns = (
+        Column("stroke"),
+        Column("trial"),
+        Column("index"),
+        Column("onset", "s"),
+        Column("µ static"),
+        Column("µ dynamic"),
+        Column("µ maximum"),
+        Column("τ max", "kPa"),
+        Column("normal force", "N"),
+        Column("speed", "mm/s"),
+        Column("direction"),
+        Column("flaws"),
+    )
+    groups = grouped(report, report.strokes, lambda s: s.experiment, lambda s: _stroke_row(s, notes))
+    caption = (
+        "Strokes. µ dynamic: mean over the steady window (± half its 95 % interval); µ static: height of the static "
+        "peak; µ maximum: greatest above the force floor; τ max: greatest tangential force over the contact area; "
+        "normal force: mean over the steady window; speed: slope of the centre of pressure (± its standard error)."
+    )
+    return Table("table-strokes", caption, columns, groups, notes.listed())
+
+
+def _stroke_row(stroke: StrokeFinding, notes: Notes) -> tuple[Cell, ...]:
+    def cell(name: str, value: float | None, shown: Callable[[float], str]) -> Cell:
+        return notes.number(value, shown, stroke.reasons.get(name))
+
+    half = None if stroke.mu_interval is None else (stroke.mu_interval[1] - stroke.mu_interval[0]) / 2
+    error = stroke.speed_error
+    marks = ", ".join(name.replace("_", " ") for name in stroke.flaws)
+    return (
+        Cell(str(stroke.number)),
+        cell("trial", stroke.trial, places(0)),
+        cell("index", stroke.index, places(0)),
+        cell("onset", stroke.onset, places(3)),
+        cell("mu_static", stroke.mu_static, places(3)),
+        cell("mu_dynamic", stroke.mu_dynamic, lambda v: digits(v, 3) + (f" ± {digits(half, 3)}" if half else "")),
+        cell("mu_max", stroke.mu_max, places(3)),
+        cell("tau_max", stroke.tau_max, tau),
+        cell("normal_force", stroke.normal_force, places(2)),
+        cell("speed", stroke.speed, lambda v: digits(v, 1) + (f" ± {digits(error, 1)}" if error else "")),
+        cell("direction", stroke.direction, lambda v: {1: "p → d", -1: "d → p"}[int(v)]),
+        Cell(marks or "none"),
+    )
+
+
+def planted_table(report: Report) -> Table | None:
+    """Return what the simulator planted beside what the analysis found."""
+    if not report.planted:
+        return None
+    notes = Notes()
+    found = {stroke.trial: stroke for stroke in report.strokes if stroke.trial is not None}
+    given = {prediction.trial: prediction for prediction in report.predictions}
+    columns = (
+        Column("trial"),
+        Column("index"),
+        Column("µ planted"),
+        Column("µ found"),
+        Column("off by", "%"),
+        Column("τ max planted", "kPa"),
+        Column("τ max found", "kPa"),
+        Column("off by", "%"),
+        Column("speed planted", "mm/s"),
+        Column("speed found", "mm/s"),
+        Column("off by", "%"),
+        Column("direction"),
+    )
+
+    def row(p: Planted) -> tuple[Cell, ...]:
+        stroke = found.get(p.trial)
+        cells: list[Cell] = [
+            Cell(str(p.trial)),
+            Cell(NONE if stroke is None or stroke.index is None else str(stroke.index)),
+        ]
+        prediction = given.get(p.trial)
+        mu = (
+            prediction.mu
+            if prediction is not None and prediction.mu is not None
+            else stroke.mu_dynamic
+            if stroke
+            else None
+        )
+        quantities: tuple[tuple[str, float, float | None, Callable[[float], str]], ...] = (
+            ("mu_dynamic", p.mu, mu, places(3)),
+            ("tau_max", p.tau_max, stroke.tau_max if stroke else None, tau),
+            ("speed", p.speed, stroke.speed if stroke else None, places(1)),
+        )
+        for name, truth, value, shown in quantities:
+            reason = stroke.reasons.get(name) if stroke else "no stroke was found in this trial"
+            off = None if value is None else 100 * (value / truth - 1)
+            cells += [Cell(shown(truth)), notes.number(value, shown, reason), notes.number(off, signed, reason)]
+        right = stroke is not None and stroke.direction == p.direction
+        cells.append(Cell("as planted" if right else NONE if stroke is None or stroke.direction is None else "wrong"))
+        return tuple(cells)
+
+    names = {p.trial: s.experiment for p in report.planted if (s := found.get(p.trial)) is not None}
+    groups = grouped(report, report.planted, lambda p: names.get(p.trial, ""), row)
+    caption = "Planted friction beside what the analysis found. The analysis does not know what was planted."
+    return Table("table-planted", caption, columns, groups, notes.listed())

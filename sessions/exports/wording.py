@@ -1,0 +1,82 @@
+"""Numbers and names as people read them."""
+
+import math
+from collections.abc import Callable
+
+NONE = "–"
+
+
+def digits(value: float, places: int) -> str:
+    """Return a number with so many decimals and a true minus sign.
+
+    >>> digits(-0.25, 2)
+    '−0.25'
+    """
+    return f"{value:.{places}f}".replace("-", "−")
+
+
+def significant(value: float, figures: int) -> str:
+    """Return a number with so many significant figures, never in powers of ten.
+
+    >>> significant(8.0331, 3), significant(1523.4, 3), significant(0.0, 3)
+    ('8.03', '1523', '0')
+    """
+    if value == 0.0:
+        return "0"
+    return digits(value, max(0, figures - 1 - math.floor(math.log10(abs(value)))))
+
+
+def places(n: int) -> Callable[[float], str]:
+    """Return what shows a number with n decimals.
+
+    >>> places(1)(2.25)
+    '2.2'
+    """
+    return lambda value: digits(value, n)
+
+
+def signed(value: float) -> str:
+    """Return a number with one decimal and its sign.
+
+    >>> signed(-0.25)
+    '−0.2'
+    """
+    return f"{value:+.1f}".replace("-", "−")
+
+
+def sed(megapascal: float) -> str:
+    """Return a strain-energy density in kPa."""
+    return digits(1e3 * megapascal, 3)
+
+
+def tau(megapascal: float) -> str:
+    """Return a traction in kPa."""
+    return significant(1e3 * megapascal, 3)
+
+
+def correlation(r: float) -> str:
+    """Return a coefficient with two decimals, or three where two would make it perfect.
+
+    >>> correlation(-0.5), correlation(0.997)
+    ('−0.50', '+0.997')
+    """
+    text = f"{r:+.2f}" if abs(r) < 0.995 or abs(r) > 0.9995 else f"{r:+.3f}"
+    return text.replace("-", "−")
+
+
+def direction(sign: int | None) -> str:
+    """Return the direction of a stroke in words.
+
+    >>> direction(-1)
+    'distal to proximal'
+    """
+    return {1: "proximal to distal", -1: "distal to proximal", None: NONE}[sign]
+
+
+def plural(n: int, noun: str) -> str:
+    """Return a count with its noun.
+
+    >>> plural(1, "subject"), plural(10, "subject")
+    ('1 subject', '10 subjects')
+    """
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"

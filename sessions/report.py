@@ -1,0 +1,183 @@
+"""The findings of a session as plain data, ready for any export. Null numbers carry their reason."""
+
+from dataclasses import asdict, dataclass
+
+from sessions.analysis.scores import MeanScore, Relation
+
+Numbers = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """One thing somebody must know to judge or repeat the session."""
+
+    name: str
+    value: str
+    remark: str = ""  # e.g. that nobody set it
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """The scores of one subject, one for each index of its experiment; None where it gave none."""
+
+    subject: str
+    scores: tuple[float | None, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """One block: stimuli of one descriptor, stroked one way."""
+
+    name: str
+    descriptor: str
+    instruction: str
+    direction: int  # +1 proximal to distal, -1 distal to proximal
+    indentation: float  # of the model [mm]
+    scale_ends: tuple[str, str]
+    indices: tuple[int, ...]  # of its stimuli, rising
+    scores: tuple[MeanScore, ...]
+    answers: tuple[Answers, ...]
+    score_relation: Relation | None  # SED [MPa] against mean score; None where one of the two is missing
+    index_relation: Relation | None  # SED [MPa] against index
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """What was felt in one stroke; m instants. mu is None where too little normal force makes it meaningless."""
+
+    origin: float  # contact onset, or the recording's beginning where it begins in contact [s, device time]
+    time: Numbers  # since `origin` [s]
+    normal: Numbers  # [N]
+    tangential: Numbers  # [N]
+    mu: tuple[float | None, ...]  # [-]
+    speed: tuple[float | None, ...]  # of the centre of pressure, along the stroke [mm/s]
+    every: int  # one reading in so many is kept
+
+
+@dataclass(frozen=True, slots=True)
+class StrokeFinding:
+    """One stroke. A number is None where honesty allows none; `reasons` then says why under the number's name."""
+
+    number: int  # from 1, in order of time
+    trial: int | None
+    experiment: str  # "" where the session has no plan
+    index: int | None
+    code: str
+    onset: float | None  # [s, device time]; None where the recording begins in contact
+    lift: float | None
+    steady: tuple[float, float] | None
+    direction: int | None
+    speed: float | None  # [mm/s]
+    speed_error: float | None  # standard error of speed [mm/s]
+    mu_static: float | None
+    mu_dynamic: float | None
+    mu_interval: tuple[float, float] | None  # of mu_dynamic
+    mu_max: float | None
+    tau_max: float | None  # [MPa]
+    normal_force: float | None  # mean over the steady window [N]
+    flaws: tuple[str, ...]
+    reasons: dict[str, str]
+    trace: Trace | None
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """Response of the ending in the course of one predicted stroke."""
+
+    time: Numbers  # [s], pressing from 0 to 1, then sliding
+    sed: Numbers  # [MPa]
+
+
+@dataclass(frozen=True, slots=True)
+class PredictionFinding:
+    """What the model says of one trial. A number is None where `reasons` says why under the number's name."""
+
+    trial: int
+    experiment: str
+    index: int
+    code: str
+    mu: float | None
+    mu_rule: str  # which mu the model got: "maximum" or "mean over steady window"
+    tau_max: float | None  # [MPa]
+    indentation: float  # [mm]
+    direction: int
+    sed: float | None  # [MPa], averaged over the ending
+    error_estimate: float | None  # relative, of sed
+    normal_per_mm: float | None  # [N/mm]
+    normal_force: float | None  # normal_per_mm times the finger's width [N]
+    tangential_force: float | None  # likewise [N]
+    measured_normal: float | None  # [N]
+    measured_tangential: float | None  # [N]
+    matching_depth: float | None  # at which model and measured normal force are equal [mm]
+    opposite_sed: float | None  # at the same depth, slid the other way [MPa]
+    wall_s: float | None
+    history: History | None
+    reasons: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """The finger of one trial in its settled state, k nodes, in the world: surface at y = 0, finger above it [mm]."""
+
+    experiment: str
+    index: int
+    nodes: tuple[tuple[float, float], ...]  # deformed, as the picture shows them (lengths true)
+    triangles: tuple[tuple[int, int, int], ...]
+    sed: Numbers  # at the nodes [MPa]
+    outlines: dict[str, tuple[tuple[float, float], ...]]  # deformed layer boundaries by name
+    patch: tuple[tuple[float, float], ...]  # the ending's outline
+    contact: tuple[tuple[float, float], ...]  # skin points in and beside the contact
+    pressure: Numbers  # at those [MPa]
+    traction: Numbers  # along +x, on the skin [MPa]
+    state: tuple[str, ...]  # "stick", "slip" or "open"
+
+
+@dataclass(frozen=True, slots=True)
+class Planted:
+    """What a simulator planted in one trial: handed in, never known here."""
+
+    trial: int
+    mu: float  # [-]
+    tau_max: float  # [MPa]
+    speed: float  # [mm/s]
+    direction: int
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """Forces over the whole recording, thinned to the least and the greatest of each stretch of time."""
+
+    time: Numbers  # [s, device time]
+    normal: Numbers  # [N]
+    tangential: Numbers  # [N]
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """Everything a reader needs; exports only lay it out."""
+
+    title: str
+    session: str
+    simulated: bool
+    head: str  # first line of whatever is made of a simulated session; "" for a real one
+    sealed: str  # whether predictions were sealed before scores
+    versions: tuple[Fact, ...]
+    people: tuple[Fact, ...]
+    apparatus: tuple[Fact, ...]
+    excluded: tuple[str, ...]
+    flaws: tuple[Fact, ...]  # name, sentence, where
+    experiments: tuple[Experiment, ...]
+    course: Course | None
+    strokes: tuple[StrokeFinding, ...]
+    predictions: tuple[PredictionFinding, ...]
+    fields: tuple[Field, ...]
+    planted: tuple[Planted, ...]
+    modelled: tuple[Fact, ...]
+    left_out: tuple[Fact, ...]
+    again: tuple[Fact, ...]  # everything needed to do it again ...
+    commands: tuple[str, ...]  # ... and what to type
+    width: float | None  # of the finger [mm], where forces per mm met forces
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the report as JSON can hold it."""
+        return asdict(self)

@@ -1,0 +1,242 @@
+"""A made-up report: the published friction, scores near the index, a finger with a field in closed form."""
+
+import math
+
+import numpy as np
+
+from sessions.analysis.scores import Score, ScoreTable, mean_scores, relation, score_matrix
+from sessions.report import (
+    Answers,
+    Course,
+    Experiment,
+    Fact,
+    Field,
+    History,
+    Planted,
+    PredictionFinding,
+    Report,
+    StrokeFinding,
+    Trace,
+)
+
+# The published Tables 1 and 2, and SEDs of the small-strain reference where it has them, else between its neighbours.
+TABLES = {
+    "stickiness": {
+        0: (0.28, 0.008033, 20.0, 0.008566),
+        20: (0.44, 0.015478, 22.0, 0.008720),
+        50: (0.48, 0.019038, 21.0, 0.008811),
+        80: (0.64, 0.049998, 17.5, 0.009500),
+        100: (0.67, 0.05255, 15.0, 0.009553),
+    },
+    "slipperiness": {
+        0: (0.62, 0.04707, 13.0, 0.0053575),
+        20: (0.55, 0.042404, 33.0, 0.005300),
+        55: (0.44, 0.03009, 39.0, 0.005250),
+        75: (0.52, 0.0260, 38.0, 0.005290),
+        100: (0.24, 0.00877, 39.0, 0.005185),
+    },
+}
+DIRECTION = {"stickiness": 1, "slipperiness": -1}
+DEPTH = {"stickiness": 2.0, "slipperiness": 1.5}
+
+
+def tables(subjects=10):
+    draw = np.random.default_rng(3)
+    return [
+        ScoreTable(
+            f"visit-{p}",
+            f"P{p:02}",
+            True,
+            tuple(
+                Score(f"P{p:02}", d, i, float(np.clip(round(i + draw.normal(0, 6), 1), 0, 100)))
+                for d, rows in TABLES.items()
+                for i in rows
+            ),
+        )
+        for p in range(1, subjects + 1)
+    ]
+
+
+def experiment(descriptor, score_tables):
+    rows = TABLES[descriptor]
+    means = tuple(m for m in mean_scores(score_tables) if m.descriptor == descriptor)
+    seds = [rows[m.index][3] for m in means]
+    return Experiment(
+        name=descriptor,
+        descriptor=descriptor,
+        instruction="Stroke the surface once and say how it feels.",
+        direction=DIRECTION[descriptor],
+        indentation=DEPTH[descriptor],
+        scale_ends=("not at all", "as much as I can imagine"),
+        indices=tuple(rows),
+        scores=means,
+        answers=tuple(
+            Answers(subject, tuple(given.get(i) for i in rows))
+            for subject, given in score_matrix(score_tables, descriptor).items()
+        ),
+        score_relation=relation([m.mean for m in means], seds, [m.index for m in means]) if means else None,
+        index_relation=relation(list(rows), [row[3] for row in rows.values()], list(rows)),
+    )
+
+
+def trace(mu, speed, onset):
+    t = np.arange(0, 2.4, 0.005)
+    normal = 3.0 * np.clip(t / 0.15, 0, 1) * (1 + 0.15 * np.sin(2.2 * t)) * np.clip((2.4 - t) / 0.2, 0, 1)
+    ratio = mu * np.clip(t / 0.5, 0, 1) * (1 + 0.02 * np.sin(17 * t + 9 * mu))
+    felt = normal > 0.3
+    v = speed * np.clip((t - 0.4) / 0.2, 0, 1) * (1 + 0.06 * np.sin(11 * t))
+    return Trace(
+        origin=onset,
+        time=tuple(t.tolist()),
+        normal=tuple(normal.tolist()),
+        tangential=tuple((ratio * normal).tolist()),
+        mu=tuple(float(r) if f else None for r, f in zip(ratio, felt, strict=True)),
+        speed=tuple(float(x) if f else None for x, f in zip(v, felt, strict=True)),
+        every=1,
+    )
+
+
+def stroke(number, descriptor, index):
+    mu, tau, speed, _ = TABLES[descriptor][index]
+    onset = 10.0 * number
+    sticky = descriptor == "stickiness"
+    return StrokeFinding(
+        number=number,
+        trial=number,
+        experiment=descriptor,
+        index=index,
+        code=f"K{number}",
+        onset=onset,
+        lift=onset + 2.4,
+        steady=(onset + 0.8, onset + 2.0),
+        direction=DIRECTION[descriptor],
+        speed=None if number == 7 else speed * 1.02,
+        speed_error=None if number == 7 else 0.4,
+        mu_static=mu * 1.04 if sticky else None,
+        mu_dynamic=mu * 1.004,
+        mu_interval=(mu * 0.99, mu * 1.015),
+        mu_max=mu * 1.03,
+        tau_max=tau * 0.995,
+        normal_force=3.1,
+        flaws=("speed_not_measurable",) if number == 7 else (),
+        reasons={
+            **({} if sticky else {"mu_static": "no static peak stands out of the noise"}),
+            **({"speed": "the centre of pressure moves in steps as large as the stroke"} if number == 7 else {}),
+        },
+        trace=trace(mu, speed, onset),
+    )
+
+
+def prediction(number, descriptor, index):
+    mu, tau, _, sed = TABLES[descriptor][index]
+    t = np.linspace(0, 2.0, 81)
+    press = np.clip(t, 0, 1) ** 1.9 * sed * 1.03
+    course = press + np.clip(t - 1, 0, None) / (0.1 + np.clip(t - 1, 0, None)) * (sed - 1.03 * sed)
+    return PredictionFinding(
+        trial=number,
+        experiment=descriptor,
+        index=index,
+        code=f"K{number}",
+        mu=mu,
+        mu_rule="maximum" if descriptor == "stickiness" else "mean over steady window",
+        tau_max=tau,
+        indentation=DEPTH[descriptor],
+        direction=DIRECTION[descriptor],
+        sed=sed,
+        error_estimate=0.001,
+        normal_per_mm=0.2,
+        normal_force=3.0,
+        tangential_force=2.0,
+        measured_normal=3.1,
+        measured_tangential=3.1 * mu,
+        matching_depth=1.93 if number != 10 else None,
+        opposite_sed=sed * 0.7,
+        wall_s=0.05,
+        history=History(tuple(t.tolist()), tuple(course.tolist())),
+        reasons={} if number != 10 else {"matching_depth": "at no depth up to 3 mm does the model press so hard"},
+    )
+
+
+def finger_field(descriptor, index):
+    """Return a half-disc and shaft at 45 degrees, flattened at the surface, with a smooth made-up SED."""
+    angles, radii = np.linspace(-math.pi / 2, math.pi / 2, 61), np.linspace(1.5, 5.0, 22)
+    a, r = (grid.ravel() for grid in np.meshgrid(angles, radii, indexing="ij"))
+    local = np.column_stack([r * np.cos(a), r * np.sin(a)])
+    world = _placed(local)
+    n = len(radii)
+    quads = [(i * n + j, i * n + j + 1, (i + 1) * n + j + 1, (i + 1) * n + j) for i in range(60) for j in range(n - 1)]
+    triangles = [t for q in quads for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))]
+    sed = 0.012 * np.exp(-(((world[:, 0]) / 2.5) ** 2) - ((world[:, 1] - 1.0) / 1.6) ** 2)
+    arc = np.linspace(-math.pi / 2, math.pi / 2, 91)
+    outlines = {
+        name: _pairs(_placed(radius * np.column_stack([np.cos(arc), np.sin(arc)])))
+        for name, radius in (("skin", 5.0), ("epidermis", 4.25), ("dermis", 3.0), ("bone", 1.5))
+    }
+    around = -math.pi / 4 + np.array([-0.16, 0.16, 0.16, -0.16])
+    patch = _placed(np.array([3.0, 3.0, 3.2, 3.2])[:, None] * np.column_stack([np.cos(around), np.sin(around)]))
+    x = np.linspace(-4.2, 4.2, 85)
+    inside = np.abs(x) < 3.4
+    pressure = np.where(inside, 0.06 * np.sqrt(np.clip(1 - (x / 3.4) ** 2, 0, 1)), 0.0)
+    traction = -DIRECTION[descriptor] * np.minimum(0.6 * pressure, 0.02)
+    capped = 0.6 * pressure > 0.02
+    state = ["open" if not i else "cap" if c else "slip" for i, c in zip(inside, capped, strict=True)]
+    return Field(
+        experiment=descriptor,
+        index=index,
+        nodes=_pairs(world),
+        triangles=tuple(triangles),
+        sed=tuple(sed.tolist()),
+        outlines=outlines,
+        patch=_pairs(patch),
+        contact=tuple((float(v), 0.0) for v in x),
+        pressure=tuple(pressure.tolist()),
+        traction=tuple(traction.tolist()),
+        state=tuple(state),
+    )
+
+
+def _placed(local):
+    c = math.cos(math.pi / 4)
+    world = np.column_stack([c * local[:, 0] + c * local[:, 1], -c * local[:, 0] + c * local[:, 1]])
+    world[:, 1] += 5.0 - 2.0
+    world[:, 1] = np.maximum(world[:, 1], 0.0)
+    return world
+
+
+def _pairs(points):
+    return tuple((float(x), float(y)) for x, y in points)
+
+
+def example(**changes):
+    score_tables = tables()
+    numbered = [(d, i) for d, rows in TABLES.items() for i in rows]
+    strokes = tuple(stroke(k, *which) for k, which in enumerate(numbered, 1))
+    t = np.arange(0, 110, 0.05)
+    force = sum(np.where((t > 10 * k) & (t < 10 * k + 2.4), 3.0, 0.0) for k in range(1, 11))
+    values = {
+        "title": "sensotact-friction, subject P01",
+        "session": "P01-forces",
+        "simulated": True,
+        "head": "SIMULATED: the transducer and the subject of this recording are simulated",
+        "sealed": "Predictions were not sealed before the scores were given.",
+        "versions": (Fact("daq-app", "0.1.0"), Fact("numpy", "2.4.6")),
+        "people": (Fact("subjects who scored", "10"),),
+        "apparatus": (Fact("height of the face", "0 mm", "default, set by nobody"),),
+        "excluded": ("Take 1 of trial 3 was discarded by the experimenter: slipped off.",),
+        "flaws": (Fact("speed_not_measurable", "The centre of pressure moves in steps.", "trial 7"),),
+        "experiments": tuple(experiment(d, score_tables) for d in TABLES),
+        "course": Course(tuple(t.tolist()), tuple(force.tolist()), tuple((0.5 * force).tolist())),
+        "strokes": strokes,
+        "predictions": tuple(prediction(k, *which) for k, which in enumerate(numbered, 1)),
+        "fields": (finger_field("stickiness", 100), finger_field("slipperiness", 100)),
+        "planted": tuple(
+            Planted(k, TABLES[d][i][0], TABLES[d][i][1], TABLES[d][i][2], DIRECTION[d])
+            for k, (d, i) in enumerate(numbered, 1)
+        ),
+        "modelled": (Fact("plane strain", "unit thickness"),),
+        "left_out": (Fact("viscosity", "no constants are known"),),
+        "again": (Fact("seed", "7"),),
+        "commands": ("daq-app analyse P01-forces", "daq-app report P01-forces -o report.html"),
+        "width": 15.0,
+    }
+    return Report(**{**values, **changes})
