@@ -63,6 +63,8 @@ class SessionPlan:
     frame: Frame
     contact_area: float = 100.0  # [mm2], for tau_max
     contact_area_origin: Origin = "default"
+    contact_angle: float = 45.0  # between the finger's axis and the face [degrees]
+    contact_angle_origin: Origin = "default"
 
     @property
     def trials(self) -> tuple[Trial, ...]:

@@ -1,1 +1,19 @@
-"""The session's store: live file, sealed copy, readers."""
+"""What a session leaves on the disk: written as it happens, sealed when it ends, readable ever after."""
+
+from sessions.recording.errors import RecordingError
+from sessions.recording.log import LoggedEvent, Take, TrialRecord
+from sessions.recording.provenance import Setting, provenance
+from sessions.recording.reader import Recording
+from sessions.recording.writer import Acknowledged, SessionWriter
+
+__all__ = [
+    "Acknowledged",
+    "LoggedEvent",
+    "Recording",
+    "RecordingError",
+    "SessionWriter",
+    "Setting",
+    "Take",
+    "TrialRecord",
+    "provenance",
+]

@@ -1,0 +1,98 @@
+"""The event log of a session, and what it says about each trial."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from sessions.plan import SessionPlan, Trial
+
+Outcome = Literal["scored", "not answered", "skipped", "open"]
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedEvent:
+    """One thing that happened in a session, as it was written down."""
+
+    number: int  # from 1, without gaps
+    time_ns: int  # session clock [ns]
+    kind: str  # one of the kinds of docs/session-format.md
+    trial: int | None  # number of the trial it belongs to
+    readings: int  # how many readings had been handed to the recording before it
+    data: Mapping[str, Any]  # what else is known, by name; plain JSON values
+
+
+@dataclass(frozen=True, slots=True)
+class Take:
+    """One attempt at a trial: the readings received from `start_ns` up to, not including, `stop_ns`."""
+
+    number: int  # from 1 within its trial
+    start_ns: int  # session clock [ns]
+    stop_ns: int | None  # None when the recording ended in the middle of it
+    strokes: int  # contacts the live detector saw, or strokes the experimenter reported, in it
+    discarded: str | None  # why it does not count; None for the take that counts or is still open
+
+
+@dataclass(frozen=True, slots=True)
+class TrialRecord:
+    """What came of one planned trial."""
+
+    trial: Trial
+    outcome: Outcome  # "open": the session ended before the trial was done
+    take: Take | None  # the take that counts
+    other_takes: tuple[Take, ...]  # discarded ones, and one the recording ended in; their readings are kept too
+    score: float | None  # the subject's answer, 0 to 100; None unless outcome is "scored"
+
+    @property
+    def answered(self) -> bool:
+        """Say whether the subject gave a score."""
+        return self.outcome == "scored"
+
+    @property
+    def start_ns(self) -> int | None:
+        """Return when the take that counts began [ns, session clock]."""
+        return self.take.start_ns if self.take else None
+
+    @property
+    def stop_ns(self) -> int | None:
+        """Return when the take that counts ended [ns, session clock]."""
+        return self.take.stop_ns if self.take else None
+
+
+def trial_records(plan: SessionPlan, events: Sequence[LoggedEvent]) -> tuple[TrialRecord, ...]:
+    """Return the record of every planned trial, in the plan's order."""
+    return tuple(_record(trial, [event for event in events if event.trial == trial.number]) for trial in plan.trials)
+
+
+def _record(trial: Trial, events: Sequence[LoggedEvent]) -> TrialRecord:
+    """Follow the events of one trial; a later outcome replaces an earlier one."""
+    takes: dict[int, Take] = {}
+    outcome: Outcome = "open"
+    score: float | None = None
+    kept: int | None = None
+    for event in events:
+        number = event.data.get("take")
+        match event.kind:
+            case "take_started":
+                takes[event.data["take"]] = Take(event.data["take"], event.time_ns, None, 0, None)
+                outcome, score, kept = "open", None, None
+            case "contact_onset" | "stroke_done" if takes:
+                last = max(takes)
+                takes[last] = replace(takes[last], strokes=takes[last].strokes + 1)
+            case "scored":
+                score = event.data["score"]
+            case "take_kept" if number in takes:
+                takes[number] = replace(takes[number], stop_ns=event.time_ns)
+                outcome, kept = ("scored" if score is not None else "not answered"), number
+            case "take_discarded" if number in takes:
+                stop = takes[number].stop_ns  # a take that was kept first ended when it was kept
+                takes[number] = replace(
+                    takes[number], stop_ns=event.time_ns if stop is None else stop, discarded=event.data["reason"]
+                )
+                outcome, score, kept = ("skipped" if outcome == "skipped" else "open"), None, None
+            case "skip":
+                outcome = "skipped"
+            case _:
+                pass
+    counts = takes[kept] if kept is not None else None
+    others = tuple(take for take in takes.values() if take is not counts)
+    return TrialRecord(trial, outcome, counts, others, score if outcome == "scored" else None)

@@ -1,0 +1,63 @@
+"""Where a recording came from: software, machine, clock, settings. Nothing personal."""
+
+import os
+import platform
+import sqlite3
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from drivers.clock import Clock
+from sessions.plan import Origin
+
+LIBRARIES = ("numpy", "scipy", "h5py", "msgspec")
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A value that shaped the recording, and whether anybody chose it."""
+
+    name: str
+    value: float | str | bool | None
+    unit: str  # "" for none
+    origin: Origin
+
+
+def provenance(clock: Clock, settings: Iterable[Setting] = ()) -> dict[str, Any]:
+    """Return what is known of program, machine and clock at this moment, and the settings given."""
+    told = clock.factor != 1.0
+    return {
+        "created_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+        "software": software_versions(),
+        "machine": {
+            "system": platform.system(),
+            "release": platform.release(),
+            "processor": platform.machine(),
+            "cores": os.cpu_count(),
+        },
+        "clock": {
+            "kind": "told: faster than the machine's clock" if told else "the machine's monotonic clock",
+            "factor": clock.factor,
+            "now_ns": clock.now_ns(),  # the session clock when created_utc was read
+        },
+        "settings": {
+            setting.name: {"value": setting.value, "unit": setting.unit, "origin": setting.origin}
+            for setting in settings
+        },
+    }
+
+
+def software_versions() -> dict[str, str]:
+    """Return the version of this program, of Python, and of every library a number may depend on."""
+    try:
+        program = version("daq-app")
+    except PackageNotFoundError:
+        program = "not installed"
+    return {
+        "daq-app": program,
+        "python": platform.python_version(),
+        "sqlite": sqlite3.sqlite_version,
+        **{name: version(name) for name in LIBRARIES},
+    }

@@ -1,0 +1,257 @@
+"""A recording as it lies on the disk, read without altering it, whole or torn."""
+
+import json
+import shutil
+import sqlite3
+import tempfile
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from drivers.readings import ReadingBlock
+from drivers.transducer import TransducerInfo
+from sessions.plan import SessionPlan
+from sessions.recording.errors import RecordingError
+from sessions.recording.head import info_from_dict, plan_from_dict
+from sessions.recording.log import LoggedEvent, TrialRecord, trial_records
+from sessions.recording.schema import (
+    COLUMNS,
+    FORMAT,
+    FORMAT_VERSION,
+    LIVE_FILE,
+    blobs_crc,
+    block_from_blobs,
+    event_crc,
+    text_crc,
+)
+from sessions.recording.torn import log_tail
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One session: head and event log in memory, readings read from the file when asked for."""
+
+    folder: Path
+    plan: SessionPlan
+    info: TransducerInfo | None  # None for a scores-only visit
+    simulated_sentence: str | None  # heads every file made from this recording when something was simulated
+    provenance: Mapping[str, Any]
+    events: tuple[LoggedEvent, ...]
+    trials: tuple[TrialRecord, ...]  # every planned trial, in the plan's order
+    _log_losses: tuple[str, ...]
+
+    @staticmethod
+    def open(folder: Path) -> "Recording":
+        """Open a session folder, sealed or not, also while it is being written and after a crash.
+
+        Raises RecordingError when it holds no recording, one of a later format, or one whose head is damaged.
+        """
+        path = folder / LIVE_FILE
+        if not path.is_file():
+            raise RecordingError(f"{folder} holds no recording: there is no {LIVE_FILE}; give a session folder")
+        losses = list(_torn_log(path))
+        try:
+            with _connected(path) as connection:
+                head = _head(path, connection)
+                events = _events(connection, losses)
+        except sqlite3.Error as error:
+            raise RecordingError(f"{path} cannot be read ({error}); restore the folder from a copy") from error
+        if not any(event.kind == "ended" for event in events):
+            losses.append("the session has no end: it was cut short, or is still running")
+        try:
+            plan, transducer = plan_from_dict(head["plan"]), head["transducer"]
+            info = info_from_dict(transducer) if transducer else None
+        except (ValueError, KeyError, TypeError, msgspec.ValidationError) as error:
+            raise RecordingError(f"{path}: its head is damaged ({error}); restore the folder from a copy") from error
+        simulated = None if head["simulated"] == "no" else head["simulated"]
+        trials = trial_records(plan, events)
+        return Recording(folder, plan, info, simulated, head["provenance"], events, trials, tuple(losses))
+
+    @property
+    def simulated(self) -> bool:
+        """Say whether transducer or subject were simulated."""
+        return self.simulated_sentence is not None
+
+    @cached_property
+    def losses(self) -> tuple[str, ...]:
+        """Name what the file lost or holds damaged, a sentence each; reads the whole file once."""
+        found = list(self._log_losses)
+        for _ in self.blocks(found):
+            pass
+        return tuple(found)
+
+    @property
+    def flaws(self) -> tuple[str, ...]:
+        """Name what went wrong while recording, as the event log tells it, a sentence each."""
+        trouble = [f"{event.data['sentence']}" for event in self.events if event.kind == "readings_lost"]
+        for record in self.trials:
+            if record.take and record.take.strokes > 1:
+                trouble.append(
+                    f"trial {record.trial.number} holds {record.take.strokes} strokes where one was asked for"
+                )
+        return tuple(trouble)
+
+    def trial(self, number: int) -> TrialRecord:
+        """Return the record of the trial with this number. Raises KeyError when the plan has none."""
+        for record in self.trials:
+            if record.trial.number == number:
+                return record
+        raise KeyError(f"the plan of {self.folder} has no trial {number}")
+
+    def readings(self, trial: int | None = None) -> ReadingBlock:
+        """Return all readings, or those of the take of `trial` that counts (none where no take does)."""
+        if trial is None:
+            return ReadingBlock.joined(self.blocks())
+        record = self.trial(trial)
+        if record.start_ns is None:
+            return ReadingBlock.empty()
+        return self.readings_between(record.start_ns, record.stop_ns)
+
+    def readings_between(self, start_ns: int, stop_ns: int | None) -> ReadingBlock:
+        """Return the readings received from `start_ns` up to, not including, `stop_ns` (None: to the end) [ns]."""
+        found: list[ReadingBlock] = []
+        for block in self.blocks(between=(start_ns, stop_ns)):
+            inside = block.received_ns >= start_ns
+            if stop_ns is not None:
+                inside &= block.received_ns < stop_ns
+            found.append(ReadingBlock(**{field.name: getattr(block, field.name)[inside] for field in fields(block)}))
+        return ReadingBlock.joined(found)
+
+    def blocks(
+        self, losses: list[str] | None = None, between: tuple[int, int | None] | None = None
+    ) -> Iterator[ReadingBlock]:
+        """Yield the readings block by block as they were committed; damaged blocks are left out and named in `losses`.
+
+        `between` limits it to blocks that hold readings received in that span of the session clock [ns].
+        """
+        damaged: list[str] = [] if losses is None else losses
+        path = self.folder / LIVE_FILE
+        try:
+            with _connected(path) as connection:
+                yield from _blocks(connection, damaged, between)
+        except sqlite3.DatabaseError as error:
+            damaged.append(f"{LIVE_FILE} cannot be read to its end ({error})")
+
+
+def _blocks(
+    connection: sqlite3.Connection, losses: list[str], between: tuple[int, int | None] | None
+) -> Iterator[ReadingBlock]:
+    """Yield the undamaged blocks of an open file."""
+    condition, limits = "", ()
+    if between is not None:
+        condition = " WHERE received_last_ns >= ?" + ("" if between[1] is None else " AND received_first_ns < ?")
+        limits = tuple(limit for limit in between if limit is not None)
+    expected = 1
+    for (number,) in connection.execute(
+        "SELECT number FROM blocks" + condition + " ORDER BY number", limits
+    ).fetchall():
+        if between is None and number != expected:
+            losses.append(f"blocks {expected} to {number - 1} of the readings are missing")
+        expected = number + 1
+        try:
+            block = _block(connection, number)
+        except (ValueError, TypeError, sqlite3.DatabaseError) as error:
+            losses.append(f"block {number} of the readings is damaged and left out ({error})")
+        else:
+            yield block
+
+
+def _block(connection: sqlite3.Connection, number: int) -> ReadingBlock:
+    """Return one block. Raises ValueError when it is not what was written."""
+    names = ", ".join(COLUMNS)
+    told = "readings, crc32, sequence_first, sequence_last, counter_first, counter_last"
+    row = connection.execute(f"SELECT {told}, {names} FROM blocks WHERE number=?", (number,)).fetchone()
+    readings, crc, ends, columns = row[0], row[1], list(row[2:6]), row[6:]
+    if blobs_crc(columns) != crc:
+        raise ValueError("its bytes do not give the CRC-32 stored with them")
+    block = block_from_blobs(columns)
+    if len(block) != readings or ends != [column[i] for column in (block.sequence, block.counter) for i in (0, -1)]:
+        raise ValueError("its readings are not those its row tells of")
+    return block
+
+
+def _head(path: Path, connection: sqlite3.Connection) -> dict[str, Any]:
+    """Return the head's values by name, JSON already read. Raises RecordingError when it is not ours or damaged."""
+    rows = connection.execute("SELECT name, value, crc32 FROM head ORDER BY number").fetchall()
+    for name, value, crc in rows:
+        if text_crc(value) != crc:
+            raise RecordingError(
+                f"{path}: {name} in its head is damaged (CRC-32 differs); restore the folder from a copy"
+            )
+    head = {name: value if name == "simulated" else json.loads(value) for name, value, _ in rows}
+    made = head.get("format", {})
+    if made.get("name") != FORMAT or made.get("version", 0) > FORMAT_VERSION:
+        raise RecordingError(
+            f"{path} holds {made or 'no format'}; this program reads '{FORMAT}' up to version {FORMAT_VERSION}:"
+            " use a later program"
+        )
+    return head
+
+
+def _events(connection: sqlite3.Connection, losses: list[str]) -> tuple[LoggedEvent, ...]:
+    """Return the undamaged events, and name the others in `losses`."""
+    found: list[LoggedEvent] = []
+    expected = 1
+    rows = connection.execute("SELECT number, time_ns, kind, trial, readings, data, crc32 FROM events ORDER BY number")
+    for number, time_ns, kind, trial, readings, data, crc in rows:
+        if number != expected:
+            losses.append(f"events {expected} to {number - 1} are missing")
+        expected = number + 1
+        event = LoggedEvent(number, time_ns, kind, trial, readings, {})
+        if event_crc(event, data) != crc:
+            losses.append(f"event {number} is damaged and left out (CRC-32 differs)")
+        else:
+            found.append(LoggedEvent(number, time_ns, kind, trial, readings, json.loads(data)))
+    return tuple(found)
+
+
+def _torn_log(path: Path) -> Iterator[str]:
+    """Name what a crash tore off the end of the write-ahead log."""
+    log = _beside(path, "-wal")
+    if log.is_file():
+        torn = log_tail(log.read_bytes()).torn_bytes
+        if torn:
+            yield (
+                f"the last {torn} bytes of the write-ahead log hold no whole commit and are left out:"
+                " they had not been acknowledged, or were damaged since"
+            )
+
+
+@contextmanager
+def _connected(path: Path) -> Generator[sqlite3.Connection]:
+    """Open the file for reading, in place where SQLite can do so without writing to it, else as a copy."""
+    sides = (_beside(path, "-wal"), _beside(path, "-journal"))
+    left_over = [side for side in sides if side.is_file() and side.stat().st_size]
+    address = f"{path.resolve().as_uri()}?mode=ro"
+    if not left_over:
+        with closing(sqlite3.connect(address + "&immutable=1", uri=True)) as connection:
+            yield connection
+        return
+    with closing(sqlite3.connect(address, uri=True)) as connection:
+        if _answers(connection):
+            yield connection
+            return
+    with tempfile.TemporaryDirectory() as room:
+        for file in (path, *left_over):
+            shutil.copy(file, room)
+        with closing(sqlite3.connect(Path(room) / path.name)) as connection:
+            yield connection
+
+
+def _answers(connection: sqlite3.Connection) -> bool:
+    """Say whether SQLite can read here: not so where it may not make a side file, or where a rollback is due."""
+    try:
+        connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    except sqlite3.OperationalError:
+        return False
+    return True
+
+
+def _beside(path: Path, ending: str) -> Path:
+    """Return the side file SQLite keeps next to `path`."""
+    return path.with_name(path.name + ending)

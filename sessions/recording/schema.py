@@ -1,0 +1,91 @@
+"""The live store: one SQLite file a session. Its tables, their meaning, its version, and its check sums.
+
+`docs/session-format.md` tells the same to someone without this program; keep the two together.
+"""
+
+import zlib
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.readings import ReadingBlock
+from sessions.recording.log import LoggedEvent
+
+FORMAT = "daq-app session"
+FORMAT_VERSION = 1  # also PRAGMA user_version of the live file
+APPLICATION_ID = 0x44415146  # "DAQF" in ASCII: PRAGMA application_id, at byte 68 of the file
+
+LIVE_FILE = "session.sqlite"
+SEALED_FILE = "session.h5"
+DESCRIPTION_FILE = "session.json"
+MANIFEST_FILE = "MANIFEST.json"
+
+TABLES = (
+    """CREATE TABLE head (
+        number INTEGER PRIMARY KEY, -- order of the rows; the first says SIMULATED or that nothing was
+        name TEXT NOT NULL UNIQUE,  -- simulated, format, plan, transducer, provenance
+        value TEXT NOT NULL,        -- a sentence or a JSON document
+        crc32 INTEGER NOT NULL      -- of the value's UTF-8 bytes
+    ) STRICT""",
+    """CREATE TABLE blocks (
+        number INTEGER PRIMARY KEY,         -- from 1 without gaps
+        readings INTEGER NOT NULL,          -- n, readings in this block
+        sequence_first INTEGER NOT NULL, sequence_last INTEGER NOT NULL,       -- record numbers of the device
+        counter_first INTEGER NOT NULL, counter_last INTEGER NOT NULL,         -- ticks of the device
+        received_first_ns INTEGER NOT NULL, received_last_ns INTEGER NOT NULL, -- session clock, smallest and largest
+        sequence BLOB NOT NULL,    -- n x int64, little-endian, as all blobs
+        counter BLOB NOT NULL,     -- n x int64
+        status BLOB NOT NULL,      -- n x int64
+        time BLOB NOT NULL,        -- n x float64 [s]
+        received_ns BLOB NOT NULL, -- n x int64 [ns]
+        raw BLOB NOT NULL,         -- n x 6 float64, reading after reading
+        crc32 INTEGER NOT NULL     -- of the six blobs, one after the other in this order
+    ) STRICT""",
+    """CREATE TABLE events (
+        number INTEGER PRIMARY KEY, -- from 1 without gaps
+        time_ns INTEGER NOT NULL,   -- session clock
+        kind TEXT NOT NULL,
+        trial INTEGER,              -- number of the trial it belongs to
+        readings INTEGER NOT NULL,  -- readings handed to the recording before it
+        data TEXT NOT NULL,         -- JSON object
+        crc32 INTEGER NOT NULL      -- of the UTF-8 text of the six values before it, joined by line feeds
+    ) STRICT""",
+)
+
+# Columns of a ReadingBlock in the order of the blobs, with the type of one number.
+COLUMNS = {"sequence": "<i8", "counter": "<i8", "status": "<i8", "time": "<f8", "received_ns": "<i8", "raw": "<f8"}
+
+
+def text_crc(text: str) -> int:
+    """Return the CRC-32 of a text's UTF-8 bytes."""
+    return zlib.crc32(text.encode())
+
+
+def event_crc(event: LoggedEvent, data: str) -> int:
+    """Return the CRC-32 of an event whose data is written as the JSON text `data`."""
+    trial = "" if event.trial is None else str(event.trial)
+    return text_crc("\n".join([str(event.number), str(event.time_ns), event.kind, trial, str(event.readings), data]))
+
+
+def blobs(block: ReadingBlock) -> tuple[bytes, ...]:
+    """Return the six columns of a block as little-endian bytes, in the order of `COLUMNS`."""
+    return tuple(np.ascontiguousarray(getattr(block, name), kind).tobytes() for name, kind in COLUMNS.items())
+
+
+def blobs_crc(columns: tuple[bytes, ...]) -> int:
+    """Return the CRC-32 over all columns, one after the other."""
+    crc = 0
+    for column in columns:
+        crc = zlib.crc32(column, crc)
+    return crc
+
+
+def block_from_blobs(columns: tuple[bytes, ...]) -> ReadingBlock:
+    """Return the readings whose columns are `columns`, in the order of `COLUMNS`.
+
+    Raises ValueError when the columns differ in length.
+    """
+    arrays: dict[str, NDArray[np.int64] | NDArray[np.float64]] = {
+        name: np.frombuffer(column, kind) for (name, kind), column in zip(COLUMNS.items(), columns, strict=True)
+    }
+    return ReadingBlock(**{**arrays, "raw": arrays["raw"].reshape(-1, 6)})  # pyright: ignore[reportArgumentType]  columns differ in type

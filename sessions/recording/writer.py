@@ -1,0 +1,251 @@
+"""The one writer of a session: a commit a second, and at once for every event and score."""
+
+import os
+import sqlite3
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from drivers.clock import Clock, RealClock
+from drivers.readings import ReadingBlock
+from drivers.transducer import TransducerInfo
+from sessions.plan import SessionPlan
+from sessions.recording.errors import RecordingError
+from sessions.recording.head import info_to_dict, json_text, plan_to_dict, simulated_sentence
+from sessions.recording.log import LoggedEvent
+from sessions.recording.schema import (
+    APPLICATION_ID,
+    FORMAT,
+    FORMAT_VERSION,
+    LIVE_FILE,
+    TABLES,
+    blobs,
+    blobs_crc,
+    event_crc,
+    text_crc,
+)
+
+COMMIT_EVERY_NS = 1_000_000_000
+LARGEST_BLOCK = 65_536  # readings: about 6 MB, far below what one SQLite row may hold
+
+
+@dataclass(frozen=True, slots=True)
+class Acknowledged:
+    """What is safe on the disk: it survives the end of this process and of the machine's power."""
+
+    readings: int = 0
+    events: int = 0
+    time_ns: int = 0  # session clock when it became so
+
+
+class SessionWriter:
+    """Writes one session into a folder of its own. Everything else is in memory until `acknowledged` counts it."""
+
+    def __init__(self, connection: sqlite3.Connection, path: Path, clock: Clock) -> None:
+        """Use `SessionWriter.create`."""
+        self._connection = connection
+        self._path = path
+        self._clock = clock
+        self._blocks: list[ReadingBlock] = []  # handed over, not yet safe
+        self._events: list[LoggedEvent] = []
+        self._block_rows = 0
+        self._readings = 0
+        self._event_count = 0
+        self._acknowledged = Acknowledged(time_ns=clock.now_ns())
+        self._failure: str | None = None
+
+    @staticmethod
+    def create(
+        folder: Path,
+        plan: SessionPlan,
+        info: TransducerInfo | None,
+        provenance: Mapping[str, Any],
+        *,
+        subject_simulated: bool = False,
+        clock: Clock | None = None,
+    ) -> "SessionWriter":
+        """Begin a recording in `folder`, which is made, or is empty: nothing is ever written over.
+
+        `info` is None for a scores-only visit. `clock` times events and commits (the machine's when None).
+        Raises RecordingError when the folder holds something or cannot be written.
+        """
+        path = folder / LIVE_FILE
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            if any(folder.iterdir()):
+                raise RecordingError(f"{folder} is not empty; give a new folder, for nothing is written over")
+            os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
+        except OSError as error:
+            raise RecordingError(
+                f"{folder} cannot hold a recording ({error.strerror}); give a folder that can be written"
+            ) from error
+        simulated = simulated_sentence(info, subject_simulated)
+        head = {
+            "simulated": simulated or "no",
+            "format": json_text({"name": FORMAT, "version": FORMAT_VERSION}),
+            "plan": json_text(plan_to_dict(plan)),
+            "transducer": json_text(info_to_dict(info) if info else None),
+            "provenance": json_text(dict(provenance)),
+        }
+        try:
+            connection = sqlite3.connect(path, isolation_level=None)
+            _prepare(connection, head)
+        except sqlite3.Error as error:
+            raise RecordingError(
+                f"{path} cannot be begun ({error}); free space, or give a folder on a local disk"
+            ) from error
+        _sync_folder(folder)
+        return SessionWriter(connection, path, clock or RealClock())
+
+    @property
+    def folder(self) -> Path:
+        """Return the session's folder."""
+        return self._path.parent
+
+    @property
+    def acknowledged(self) -> Acknowledged:
+        """Return how much is safe."""
+        return self._acknowledged
+
+    def readings(self, block: ReadingBlock) -> None:
+        """Take readings over; commits when the last commit lies a second back. Raises RecordingError when it cannot."""
+        self._check()
+        if len(block):
+            self._blocks.append(block)
+            self._readings += len(block)
+        waiting = self._readings - self._acknowledged.readings
+        if self._clock.now_ns() - self._acknowledged.time_ns >= COMMIT_EVERY_NS or waiting >= LARGEST_BLOCK:
+            self.commit()
+
+    def event(
+        self,
+        kind: str,
+        trial: int | None = None,
+        data: Mapping[str, Any] | None = None,
+        *,
+        time_ns: int | None = None,
+        commit: bool = True,
+    ) -> LoggedEvent:
+        """Write an event down after all readings handed over before it; on return both are safe.
+
+        With `commit` False both wait for the next commit. `time_ns` is now on the session clock unless given.
+        Raises RecordingError when it cannot be written.
+        """
+        self._check()
+        event = LoggedEvent(
+            self._event_count + 1,
+            self._clock.now_ns() if time_ns is None else time_ns,
+            kind,
+            trial,
+            self._readings,
+            dict(data or {}),
+        )
+        json_text(event.data)  # what JSON cannot hold is refused here, before it spoils a commit
+        self._events.append(event)
+        self._event_count += 1
+        if commit:
+            self.commit()
+        return event
+
+    def commit(self) -> Acknowledged:
+        """Make all that was handed over safe, and say how much that is now."""
+        self._check()
+        now_ns = self._clock.now_ns()
+        rows = self._block_rows
+        try:
+            if self._blocks or self._events:
+                self._connection.execute("BEGIN IMMEDIATE")
+                rows = self._insert_blocks()
+                self._insert_events()
+                self._connection.execute("COMMIT")
+        except sqlite3.Error as error:
+            self._fail(error)
+        self._block_rows = rows
+        self._blocks.clear()
+        self._events.clear()
+        self._acknowledged = Acknowledged(self._readings, self._event_count, now_ns)
+        return self._acknowledged
+
+    def close(self) -> None:
+        """Commit, fold the write-ahead log into the file and let go of it. Harmless when repeated."""
+        if self._failure is None:
+            self.commit()
+            self._failure = "it was closed"
+            # One plain file that any reader opens without side files; when this fails the log simply stays beside it.
+            with suppress(sqlite3.Error):
+                self._connection.execute("PRAGMA journal_mode=DELETE")
+        self._connection.close()
+
+    def _insert_blocks(self) -> int:
+        """Insert the waiting readings in rows of at most LARGEST_BLOCK, and return the number of the last row."""
+        rows = self._block_rows
+        waiting = ReadingBlock.joined(self._blocks)
+        for start in range(0, len(waiting), LARGEST_BLOCK):
+            block = waiting.between(start, start + LARGEST_BLOCK)
+            rows += 1
+            columns = blobs(block)
+            ends = [int(column[i]) for column in (block.sequence, block.counter) for i in (0, -1)]
+            received = int(block.received_ns.min()), int(block.received_ns.max())
+            values = (rows, len(block), *ends, *received, *columns, blobs_crc(columns))
+            self._connection.execute(f"INSERT INTO blocks VALUES ({','.join('?' * len(values))})", values)
+        return rows
+
+    def _insert_events(self) -> None:
+        """Insert the waiting events."""
+        for event in self._events:
+            data = json_text(event.data)
+            values = (
+                event.number,
+                event.time_ns,
+                event.kind,
+                event.trial,
+                event.readings,
+                data,
+                event_crc(event, data),
+            )
+            self._connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", values)
+
+    def _fail(self, error: sqlite3.Error) -> None:
+        """Undo the half-written commit, and refuse everything from now on."""
+        with suppress(sqlite3.Error):
+            self._connection.execute("ROLLBACK")
+        safe = self._acknowledged
+        self._failure = (
+            f"the disk took no more ({error}): the first {safe.readings} readings and {safe.events} events are safe; "
+            "free space on the disk and begin a new session"
+        )
+        raise RecordingError(f"{self._path}: {self._failure}") from error
+
+    def _check(self) -> None:
+        """Raise RecordingError when nothing can be written any more."""
+        if self._failure is not None:
+            raise RecordingError(f"{self._path}: {self._failure}")
+
+
+def _prepare(connection: sqlite3.Connection, head: Mapping[str, str]) -> None:
+    """Lay out the tables and write the head, in one commit."""
+    connection.execute(f"PRAGMA application_id={APPLICATION_ID}")
+    (mode,) = connection.execute("PRAGMA journal_mode=WAL").fetchone()
+    if mode != "wal":
+        raise sqlite3.OperationalError(f"the disk allows no write-ahead log, journal mode is {mode}")
+    connection.execute("PRAGMA synchronous=FULL")
+    connection.execute("BEGIN IMMEDIATE")
+    for table in TABLES:
+        connection.execute(table)
+    for number, (name, value) in enumerate(head.items(), 1):
+        connection.execute("INSERT INTO head VALUES (?,?,?,?)", (number, name, value, text_crc(value)))
+    connection.execute(f"PRAGMA user_version={FORMAT_VERSION}")
+    connection.execute("COMMIT")
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make the new names in `folder` survive a power cut, where the system lets a folder be synced."""
+    if os.name != "posix":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
