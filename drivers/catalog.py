@@ -1,0 +1,81 @@
+"""The list of drivers: which name opens what."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from drivers.address import Address, parse_address
+from drivers.clock import Clock
+from drivers.links import UdpLink
+from drivers.net_ft import handshake
+from drivers.net_ft.device import NetFtTransducer
+from drivers.transducer import DeviceFault, LinkLost, SetupError, Transducer, TransducerInfo
+
+
+@dataclass(frozen=True, slots=True)
+class Driver:
+    """One way to reach a transducer."""
+
+    name: str  # the scheme of its addresses
+    open: Callable[[Address, Clock], Transducer]
+    identify: Callable[[Address, float], TransducerInfo]  # who answers within so many real seconds; changes nothing
+    usual: tuple[str, ...]  # addresses where such a device stands unless somebody moved it
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What answered at one address: either who, or why nobody did."""
+
+    uri: str
+    info: TransducerInfo | None
+    problem: str | None
+
+
+def _open_net_ft(address: Address, clock: Clock) -> Transducer:
+    place = handshake.where(address)
+    return NetFtTransducer(
+        handshake.prepare(place),
+        connect=lambda: UdpLink(address.host, place.rdt_port),
+        still_there=lambda: handshake.answers(place),
+        clock=clock,
+    )
+
+
+def _identify_net_ft(address: Address, patience: float) -> TransducerInfo:
+    return handshake.identify(handshake.where(address), patience)
+
+
+DRIVERS: tuple[Driver, ...] = (Driver("net-ft", _open_net_ft, _identify_net_ft, ("net-ft://192.168.1.1",)),)
+
+
+def open_transducer(uri: str, clock: Clock) -> Transducer:
+    """Return the transducer at `uri`, identified and set as the address asks, not yet streaming.
+
+    Raises SetupError when the address or a setting cannot be met, LinkLost when nothing answers.
+    """
+    address = parse_address(uri)
+    return _driver(address).open(address, clock)
+
+
+def reachable(named: Iterable[str] = (), patience: float = 0.5) -> tuple[Found, ...]:
+    """Return what answers now at the usual addresses and at those `named`, within `patience` real seconds each.
+
+    Only reads who is there: a device in use is not disturbed.
+    """
+    usual = [uri for driver in DRIVERS for uri in driver.usual]
+    return tuple(_found(uri, patience) for uri in dict.fromkeys([*usual, *named]))
+
+
+def _found(uri: str, patience: float) -> Found:
+    try:
+        address = parse_address(uri)
+        return Found(uri, _driver(address).identify(address, patience), None)
+    except (SetupError, LinkLost, DeviceFault) as error:
+        return Found(uri, None, str(error))
+
+
+def _driver(address: Address) -> Driver:
+    for driver in DRIVERS:
+        if driver.name == address.scheme:
+            return driver
+    known = ", ".join(f"{driver.name}://" for driver in DRIVERS)
+    raise SetupError(f"{address.uri}: there is no driver {address.scheme!r}; addresses begin with {known}")

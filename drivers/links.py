@@ -1,0 +1,155 @@
+"""Ways for bytes to reach a device and come back. The only file that opens ports."""
+
+import contextlib
+import socket
+import time
+from dataclasses import dataclass
+from typing import Protocol
+
+from drivers.transducer import LinkLost, SetupError
+
+RECEIVE_BUFFER = 4 * 2**20  # asked of the system for UDP [bytes]; it may grant less
+MOST_BODY = 64 * 1024  # a page longer than this is refused [bytes]
+MOST_HEAD = 8 * 1024
+
+
+class Link(Protocol):
+    """A way to one device."""
+
+    def send(self, data: bytes) -> None:
+        """Send `data`. Raises LinkLost when the link is gone for good."""
+        ...
+
+    def receive(self, timeout: float) -> bytes | None:
+        """Return what arrived next, or None when nothing came within `timeout` real seconds."""
+        ...
+
+    def close(self) -> None:
+        """Give the port back. Harmless when repeated."""
+        ...
+
+
+class UdpLink:
+    """Datagrams to and from one host and port; those of others are not seen."""
+
+    def __init__(self, host: str, port: int) -> None:
+        """Bind a free local port. Raises SetupError when the host cannot be found, LinkLost when no way leads there."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+            self._socket.connect((_resolved(host), port))
+        except OSError as error:
+            self._socket.close()
+            raise LinkLost(f"no way leads to {host}: {_reason(error)}; check the network cable and settings") from None
+        except SetupError:
+            self._socket.close()
+            raise
+        self._where = f"{host}, UDP port {port}"
+        self._timeout = 0.0
+        self._socket.settimeout(0.0)
+
+    def send(self, data: bytes) -> None:
+        """Send one datagram. An earlier one that was refused is no reason to give up: the device may be starting."""
+        try:
+            self._socket.send(data)
+        except ConnectionError:
+            with contextlib.suppress(ConnectionError):
+                self._socket.send(data)
+        except OSError as error:
+            raise LinkLost(f"cannot send to {self._where}: {_reason(error)}; check the network cable") from None
+
+    def receive(self, timeout: float) -> bytes | None:
+        """Return the next datagram, or None when none came within `timeout` seconds."""
+        if timeout != self._timeout:
+            self._socket.settimeout(timeout)
+            self._timeout = timeout
+        try:
+            return self._socket.recv(65536)
+        except (TimeoutError, BlockingIOError, ConnectionError):  # the last: an earlier datagram of ours was refused
+            return None
+        except OSError as error:
+            raise LinkLost(f"cannot receive from {self._where}: {_reason(error)}; check the network cable") from None
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._socket.close()
+
+
+@dataclass(frozen=True, slots=True)
+class HttpAnswer:
+    """What a web page answered."""
+
+    status: int
+    body: bytes
+
+
+def http_get(host: str, port: int, path: str, patience: float) -> HttpAnswer:
+    """Return the answer to one GET; the whole exchange ends within `patience` real seconds.
+
+    Redirects are not followed. Raises SetupError when the host cannot be found, LinkLost when nothing answers in time
+    or what answers is not HTTP or is longer than MOST_BODY.
+    """
+    where = f"http://{host}:{port}{path}"
+    deadline = time.monotonic() + patience
+    address = _resolved(host)
+    try:
+        with socket.create_connection((address, port), timeout=patience) as connection:
+            connection.sendall(f"GET {path} HTTP/1.0\r\nHost: {host}\r\nConnection: close\r\n\r\n".encode("ascii"))
+            return _answer(connection, deadline, where)
+    except TimeoutError:
+        raise LinkLost(f"{where} gave no answer within {patience:g} s; check power, cable and address") from None
+    except OSError as error:
+        raise LinkLost(f"nothing answers at {where}: {_reason(error)}; check power, cable and address") from None
+
+
+def _answer(connection: socket.socket, deadline: float, where: str) -> HttpAnswer:
+    """Read one HTTP/1.0 answer: to its stated length, or else to the end of the connection."""
+    received = bytearray()
+    head, body_at, length = b"", -1, None
+    while length is None or len(received) < body_at + length:
+        remaining = deadline - time.monotonic()
+        if remaining <= 0.0:
+            raise TimeoutError
+        connection.settimeout(remaining)
+        chunk = connection.recv(16384)
+        if not chunk:
+            break
+        received += chunk
+        if body_at < 0:
+            end = received.find(b"\r\n\r\n")
+            if end < 0 and len(received) <= MOST_HEAD:
+                continue
+            if end < 0:
+                raise LinkLost(f"{where} does not answer as a web page does; check the address and the http port")
+            head, body_at = bytes(received[:end]), end + 4
+            length = _stated_length(head)
+        if len(received) - body_at > MOST_BODY or (length or 0) > MOST_BODY:
+            raise LinkLost(f"{where} sends more than {MOST_BODY} bytes; check that it is the address of the box")
+    words = head.split(b"\r\n", 1)[0].split(None, 2)
+    if body_at < 0 or len(words) < 2 or not words[0].startswith(b"HTTP/") or not words[1].isdigit():
+        raise LinkLost(f"{where} does not answer as a web page does; check the address and the http port")
+    if length is not None and len(received) < body_at + length:
+        raise LinkLost(f"{where} broke off after {len(received) - body_at} of {length} bytes; try again")
+    return HttpAnswer(int(words[1][:4]), bytes(received[body_at:]))
+
+
+def _stated_length(head: bytes) -> int | None:
+    """Return the Content-Length of an HTTP head, or None where it states none that can be read."""
+    for line in head.split(b"\r\n")[1:]:
+        name, _, value = line.partition(b":")
+        if name.strip().lower() == b"content-length" and value.strip().isdigit():
+            return min(int(value.strip()[:12]), MOST_BODY + 1)
+    return None
+
+
+def _resolved(host: str) -> str:
+    """Return the IPv4 address of a host's name. Raises SetupError when it has none."""
+    try:
+        return socket.gethostbyname(host)
+    except (OSError, UnicodeError):
+        raise SetupError(f"the host {host!r} cannot be found; give its IP address, for example 192.168.1.1") from None
+
+
+def _reason(error: OSError) -> str:
+    """Return why an operation failed, in the system's words."""
+    return (error.strerror or type(error).__name__).lower()

@@ -1,0 +1,221 @@
+"""The page on which the networked box tells who it is: netftapi2.xml (manual 9620-05-NET FT, chapter 9)."""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.calibration import Calibration
+from drivers.net_ft.wire import COUNTER_RATE, status_words
+from drivers.transducer import SetupError
+
+_POUND = 4.4482216152605  # [N]
+_FORCE = {  # unit as boxes spell it, in lower case and without "-", "." and blanks: newtons in one
+    "n": 1.0,
+    "kn": 1000.0,
+    "lb": _POUND,
+    "lbf": _POUND,
+    "klb": 1000.0 * _POUND,
+    "klbf": 1000.0 * _POUND,
+    "kg": 9.80665,
+    "kgf": 9.80665,
+    "g": 0.00980665,
+    "gf": 0.00980665,
+}
+_TORQUE = {  # newton millimetres in one
+    "nm": 1000.0,
+    "nmm": 1.0,
+    "knm": 1e6,
+    "lbin": 25.4 * _POUND,
+    "lbfin": 25.4 * _POUND,
+    "inlb": 25.4 * _POUND,
+    "inlbf": 25.4 * _POUND,
+    "lbft": 304.8 * _POUND,
+    "lbfft": 304.8 * _POUND,
+    "ftlb": 304.8 * _POUND,
+    "ftlbf": 304.8 * _POUND,
+    "kgcm": 98.0665,
+    "kgfcm": 98.0665,
+}
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
+_FILTERS = ("off", "838", "326", "152", "73", "35", "18", "8", "5", "1500", "2000", "2500", "3000")  # by code [Hz]
+
+
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """What the box says of itself and of the configuration in force."""
+
+    product: str
+    serial: str  # of the calibration in force; empty where the box states none
+    model: str  # of the transducer, as the box states it, which is not always right
+    counts_per_force: float  # counts in one force unit
+    counts_per_torque: float
+    newtons: float  # in one force unit
+    newton_millimetres: float  # in one torque unit
+    rated: tuple[float, ...]  # six ranges in the box's units; empty where it states none
+    rate: float  # readings a second it streams [Hz]; nan where it states none
+    streams: bool  # false when its real-time output is switched off
+    settings: Mapping[str, str]  # what else was in force, for people
+
+    def calibration(self) -> Calibration:
+        """Return what turns its counts into N and N mm."""
+        units = np.repeat([self.newtons, self.newton_millimetres], 3)
+        counts = np.repeat([self.counts_per_force, self.counts_per_torque], 3)
+        rated: NDArray[np.float64] = np.array(self.rated) * units if self.rated else np.full(6, np.nan)
+        source = f"counts per unit read from {self.product}"
+        return Calibration(self.serial, "counts", np.diag(units / counts), rated, source)
+
+
+def parse_configuration(page: bytes) -> Configuration:
+    """Return what netftapi2.xml says. Raises SetupError where a needed element is missing, double or makes no sense."""
+    found = _elements(page)
+    product = _one(found, "prodname")
+    force, torque = _one(found, "scfgfu"), _one(found, "scfgtu")
+    rated = _ratings(found)
+    settings = {
+        "configuration": _optional(found, "cfgnam"),
+        "filter": _filter(_optional(found, "setuserfilter")),
+        "stored bias [gauge counts]": " ".join(re.split(r"[;,\s]+", _optional(found, "setbias"))),
+        "tool transform": _transform(found),
+        "status at opening": _status(_optional(found, "runstat")),
+    }
+    return Configuration(
+        product=product,
+        serial=_optional(found, "cfgcalsn"),
+        model=_optional(found, "mfgtxdmdl"),
+        counts_per_force=_positive("cfgcpf", _one(found, "cfgcpf")),
+        counts_per_torque=_positive("cfgcpt", _one(found, "cfgcpt")),
+        newtons=_unit("force", force, _FORCE),
+        newton_millimetres=_unit("torque", torque, _TORQUE),
+        rated=rated,
+        rate=_rate(_optional(found, "comrdtrate")),
+        streams=_optional(found, "comrdte").lower() != "disabled",
+        settings={name: value for name, value in settings.items() if value},
+    )
+
+
+def true_rate(stated: float) -> float:
+    """Return the rate the box really streams at when it is set to, or shows, `stated` [Hz].
+
+    It can only send every k-th of its 7000 readings a second, rounds up to such a rate, and shows it as a whole number.
+
+    >>> true_rate(200), round(true_rate(150), 2), round(true_rate(152), 2)
+    (200.0, 152.17, 152.17)
+    """
+    return COUNTER_RATE / math.floor(COUNTER_RATE / stated + 1e-9)
+
+
+def _elements(page: bytes) -> dict[str, list[str]]:
+    """Return the texts of all elements that hold text alone, by name. Declarations and entities are refused."""
+    found: dict[str, list[str]] = {}
+    path: list[str] = []
+    text: list[str] = []
+    bare = True
+
+    def start(name: str, _: dict[str, str]) -> None:
+        nonlocal bare
+        path.append(name)
+        text.clear()
+        bare = True
+
+    def end(name: str) -> None:
+        nonlocal bare
+        path.pop()
+        if not path and name != "netft":
+            raise SetupError(f"the box's configuration page is <{name}> and not <netft>; check the address")
+        if bare:
+            found.setdefault(name, []).append("".join(text).strip())
+        bare = False
+
+    def refuse(*_: object) -> None:
+        raise SetupError("the box's configuration page declares a document type, which no box does; check the address")
+
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    parser.CharacterDataHandler = text.append
+    parser.StartDoctypeDeclHandler = refuse
+    parser.EntityDeclHandler = refuse
+    try:
+        parser.Parse(page, True)
+    except expat.ExpatError as error:
+        raise SetupError(
+            f"the box's configuration page is broken ({expat.ErrorString(error.code)}, line {error.lineno}); try again"
+        ) from None
+    except (LookupError, ValueError):  # what expat raises for an encoding it does not know
+        raise SetupError("the box's configuration page is in an unknown encoding; check the address") from None
+    return found
+
+
+def _one(found: Mapping[str, list[str]], name: str) -> str:
+    """Return the text of an element that must be there exactly once."""
+    texts = found.get(name, [])
+    if len(texts) != 1 or not texts[0]:
+        how = "does not say" if not any(texts) else "says more than once"
+        raise SetupError(f"the box's configuration page {how} what {name} is; check the address and the box's set-up")
+    return texts[0]
+
+
+def _optional(found: Mapping[str, list[str]], name: str) -> str:
+    """Return the text of an element, or nothing where it is missing or contradicts itself."""
+    texts = found.get(name, [])
+    return texts[0] if len(texts) == 1 else ""
+
+
+def _number(text: str) -> float:
+    """Return a number written with a point, or nan: no other spelling, whatever the language of the computer."""
+    return float(text) if len(text) <= 40 and _NUMBER.fullmatch(text) else math.nan
+
+
+def _positive(name: str, text: str) -> float:
+    value = _number(text)
+    if not (math.isfinite(value) and value > 0.0):
+        raise SetupError(
+            f"the box says {name} is {text[:40]!r}, which must be a number above 0; check its configuration"
+        )
+    return value
+
+
+def _unit(kind: str, text: str, units: Mapping[str, float]) -> float:
+    size = units.get(re.sub(r"[\s.·-]", "", text).lower())
+    if size is None:
+        raise SetupError(
+            f"the box gives {kind} in {text[:20]!r}, a unit unknown here; choose N and N-m on its own page"
+        )
+    return size
+
+
+def _ratings(found: Mapping[str, list[str]]) -> tuple[float, ...]:
+    values = tuple(_number(part) for part in re.split(r"[;,\s]+", _optional(found, "cfgmr")) if part)
+    return values if len(values) == 6 and all(math.isfinite(v) and v > 0.0 for v in values) else ()
+
+
+def _rate(text: str) -> float:
+    value = _number(text)
+    return true_rate(value) if 1.0 <= value <= COUNTER_RATE else math.nan
+
+
+def _filter(code: str) -> str:
+    """Return the low-pass filter in force from its code, or the code itself where it is unknown."""
+    known = code.isascii() and code.isdecimal() and len(code) < 3 and int(code) < len(_FILTERS)
+    name = _FILTERS[int(code)] if known else code
+    return f"{name} Hz" if name.isdecimal() and known else name
+
+
+def _transform(found: Mapping[str, list[str]]) -> str:
+    """Return the tool transform in force with its units, or nothing where there is none."""
+    values = [part for part in re.split(r"[;,\s]+", _optional(found, "cfgtfx")) if part]
+    if not any(_number(value) != 0.0 for value in values):
+        return ""
+    units = f"{_optional(found, 'scfgtdu')}, {_optional(found, 'scfgtau')}".strip(", ")
+    return f"{' '.join(values)} [{units}]"
+
+
+def _status(text: str) -> str:
+    if not re.fullmatch(r"0x[0-9a-fA-F]{1,8}", text):
+        return text
+    return "; ".join(status_words(int(text, 16))) or "healthy"

@@ -1,0 +1,239 @@
+"""The networked force/torque box as a transducer: streaming, accounting, loss and return."""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+
+from drivers.clock import Clock
+from drivers.links import Link
+from drivers.net_ft.wire import SATURATED, START, STOP, decode
+from drivers.readings import ReadingBlock
+from drivers.sequence import SequenceAccount
+from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, TransducerInfo
+
+# All in real seconds, since networks know no other.
+_TICK = 0.05  # longest wait for a datagram, and so for a stop
+_ASK_EVERY = 0.1  # between two start requests while nothing comes
+_PATIENCE = 1.0  # until a box that never sent anything is given up
+_SILENCE = 3.0  # until a box that has fallen silent is given up
+_QUIET = 0.3  # silence after which the box is asked to start again
+_THEFTS = 3  # so many returns within _THEFT_SPAN mean that somebody else keeps taking the stream
+_THEFT_SPAN = 3.0
+
+
+class NetFtTransducer:
+    """One box, through a link that is opened at each start. A thread drains the link; readings are decoded when read.
+
+    Time is (counter - first counter) / 7000 Hz, by the box's own oscillator (good to 0.5 %). After a reboot of the
+    box, sequence and time go on behind a gap whose length is taken from the session's clock.
+    """
+
+    def __init__(
+        self, info: TransducerInfo, connect: Callable[[], Link], still_there: Callable[[], bool], clock: Clock
+    ) -> None:
+        """Take an identified box. `still_there` tells whether it answers at all, to explain a silence."""
+        self._info = info
+        self._connect = connect
+        self._still_there = still_there
+        self._clock = clock
+        self._step = round(info.counter_rate / info.rate) if info.rate > 0.0 else None  # nan: learn it
+        self._period = 1.0 / info.rate / clock.factor if info.rate > 0.0 else 0.0  # between two readings [real s]
+        self._lock = threading.Lock()  # over all that _digest touches
+        self._pending: deque[tuple[bytes, int]] = deque()  # datagrams with their arrival [ns], from the thread
+        self._arrived = threading.Event()  # something is pending, or the stream has ended
+        self._stopping = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._ended: str | None = None  # why the stream ended, when nobody had stopped it
+        self._reset()
+
+    @property
+    def info(self) -> TransducerInfo:
+        """Identity, calibration and settings, as read from the box at opening."""
+        return self._info
+
+    @property
+    def health(self) -> Health:
+        """Totals since start, of all that has arrived up to now."""
+        with self._lock:
+            self._digest()
+            account = self._account
+            return Health(
+                received=self._received,
+                lost=account.lost,
+                repeated=account.repeated,
+                late=account.late,
+                malformed=self._wrong_length + account.garbage,
+                stalled=account.frozen,
+                restarted=account.restarted,
+                saturated=self._saturated,
+                lag_ms=self._lag_ms,
+            )
+
+    def start(self) -> None:
+        """Ask for the stream until it comes. Raises LinkLost when it does not, DeviceFault when its rate is wrong."""
+        if self._thread is not None:
+            raise SetupError(f"{self._info.uri} is streaming already; stop it before starting it again")
+        self._reset()
+        link = self._connect()
+        self._thread = threading.Thread(target=self._drain, args=(link,), name=f"net-ft {self._info.serial}")
+        self._thread.start()
+        patience = _PATIENCE + 4.0 * self._period
+        deadline = time.monotonic() + patience
+        while self.health.received == 0:
+            self._arrived.wait(_TICK)
+            self._arrived.clear()
+            if self._ended is not None or time.monotonic() > deadline:
+                self.stop()
+                raise LinkLost(self._ended or self._never_came(patience))
+        if self._step is not None and self._account.step not in (None, self._step):
+            self.stop()
+            raise DeviceFault(
+                f"{self._info.uri} is set to {self._info.rate:g} Hz but sends "
+                f"{self._info.counter_rate / (self._account.step or 1):g} Hz; switch it off and on, then open it again"
+            )
+
+    def read(self, timeout: float) -> ReadingBlock:
+        """Return all readings not yet handed over, waiting up to `timeout` session seconds for the first."""
+        deadline = time.monotonic() + timeout / self._clock.factor
+        while True:
+            self._arrived.clear()
+            streaming = self._thread is not None and self._thread.is_alive()
+            with self._lock:
+                self._digest(end=not streaming)
+                blocks, self._ready = self._ready, []
+            if blocks:
+                block = ReadingBlock.joined(blocks)
+                self._lag_ms = (self._clock.now_ns() - int(block.received_ns[-1])) * 1e-6
+                return block
+            if not streaming and self._ended is not None:
+                raise LinkLost(self._ended)
+            remaining = deadline - time.monotonic()
+            if not streaming or remaining <= 0.0:
+                return ReadingBlock.empty()
+            self._arrived.wait(min(remaining, _TICK))
+
+    def stop(self) -> None:
+        """End streaming; what had arrived can still be read. Harmless when repeated."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+
+    def close(self) -> None:
+        """Stop; port and thread are given back. Harmless when repeated."""
+        self.stop()
+
+    def _reset(self) -> None:
+        """Forget what an earlier stream left."""
+        self._pending.clear()
+        self._arrived.clear()
+        self._stopping.clear()
+        self._ended = None
+        self._account = SequenceAccount(self._step, self._info.counter_rate)
+        self._held: list[tuple[bytes, int]] = []
+        self._ready: list[ReadingBlock] = []
+        self._zero: int | None = None  # counter of the first reading
+        self._received = self._wrong_length = self._saturated = 0
+        self._lag_ms = 0.0
+
+    def _drain(self, link: Link) -> None:
+        """Be the receiving thread: ask for the stream, take what comes, ask again when it falls silent, and end it."""
+        try:
+            self._listen(link)
+        except LinkLost as error:
+            self._ended = str(error)
+        finally:
+            try:
+                link.send(STOP)
+                link.send(STOP)  # it is not acknowledged and may be lost; a second one does no harm
+                while (datagram := link.receive(0.0)) is not None:
+                    self._pending.append((datagram, self._clock.now_ns()))
+            except LinkLost:
+                pass
+            link.close()
+            self._arrived.set()
+
+    def _listen(self, link: Link) -> None:
+        """Take datagrams until told to stop, or until the box has been silent for too long."""
+        receive, keep, now_ns = link.receive, self._pending.append, self._clock.now_ns
+        link.send(START)
+        heard = asked = time.monotonic()
+        silent = True
+        returns: deque[float] = deque(maxlen=_THEFTS)
+        while not self._stopping.is_set():
+            datagram = receive(_TICK)
+            now = time.monotonic()
+            if datagram is not None:
+                keep((datagram, now_ns()))
+                if not self._arrived.is_set():
+                    self._arrived.set()
+                heard, silent = now, False
+                continue
+            if now - heard > _SILENCE + 4.0 * self._period:
+                raise LinkLost(self._fell_silent(now - heard))
+            if now - asked > _ASK_EVERY + 2.0 * self._period and (silent or now - heard > _QUIET + 2.0 * self._period):
+                if not silent:
+                    returns.append(now)
+                    silent = True
+                    if len(returns) == _THEFTS and now - returns[0] < _THEFT_SPAN:
+                        raise LinkLost(
+                            f"{self._info.uri} stopped sending {_THEFTS} times within {_THEFT_SPAN:g} s; "
+                            "another program on the network probably takes its stream: end that program"
+                        )
+                link.send(START)
+                asked = now
+
+    def _digest(self, *, end: bool = False) -> None:
+        """Turn pending datagrams into accounted readings. The lock is held."""
+        if not self._pending and not (end and self._held):
+            return
+        arrived = self._held
+        while self._pending:
+            arrived.append(self._pending.popleft())
+        decoded = decode([datagram for datagram, _ in arrived])
+        self._wrong_length += decoded.malformed
+        origin: list[int] = decoded.origin.tolist()
+        received_ns = [arrived[i][1] for i in origin]
+        records = decoded.records
+        numbers, counters = records["number"].astype(np.uint32), records["counter"].astype(np.uint32)
+        verdict = self._account.take(numbers, counters, received_ns, end=end)
+        self._held = [arrived[origin[-1]]] if verdict.held else []
+        if not len(verdict.kept):
+            return
+        if self._zero is None:
+            self._zero = int(verdict.counter[0])
+        kept = records[verdict.kept]
+        status = kept["status"].astype(np.int64)
+        self._received += len(kept)
+        self._saturated += int(np.count_nonzero(status & SATURATED))
+        self._ready.append(
+            ReadingBlock(
+                sequence=verdict.sequence,
+                counter=verdict.counter,
+                status=status,
+                time=(verdict.counter - self._zero) / self._info.counter_rate,
+                received_ns=np.array(received_ns, np.int64)[verdict.kept],
+                raw=kept["counts"].astype(np.float64),
+            )
+        )
+
+    def _never_came(self, patience: float) -> str:
+        """Return why a start failed."""
+        if self._still_there():
+            return (
+                f"{self._info.uri} answers on its web page but sent no reading within {patience:.1f} s; "
+                "check that no firewall holds back its UDP datagrams"
+            )
+        return f"{self._info.uri} sent no reading within {patience:.1f} s; check its power and network cable"
+
+    def _fell_silent(self, seconds: float) -> str:
+        """Return why a running stream was given up."""
+        if self._still_there():
+            return (
+                f"{self._info.uri} has sent nothing for {seconds:.1f} s though its web page still answers; "
+                "end any other program that reads it, and check for a firewall"
+            )
+        return f"{self._info.uri} has sent nothing for {seconds:.1f} s; check its power and network cable"

@@ -1,0 +1,208 @@
+"""Lost, repeated, late and frozen records, from a record's number and the device's own counter alone.
+
+Record k of an undisturbed stream has number a + k and counter b + k·step, both modulo 2**32: it lies on a line. A
+record on the line is judged at once. One off the line is held until the next says who is right: if the next goes on
+from the held one, the stream itself has moved (it was started anew, the device rebooted, its rate was changed, its
+counter stood still for a while); if not, the held one was garbage and must not move anything.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+WRAP = 2**32
+NEAR = 10_000  # a rejected record at most so many numbers behind was late; further off it was garbage
+
+Relation = Literal["same", "next", "frozen", "behind", "off"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Accounted:
+    """The verdict on a batch of records: k of them are kept."""
+
+    kept: NDArray[np.intp]  # (k,) their positions in the batch
+    sequence: NDArray[np.int64]  # (k,) their numbers, unwrapped; a missing number is a lost record
+    counter: NDArray[np.int64]  # (k,) the device's counter, unwrapped and never running backwards
+    held: bool  # the batch's last record is undecided: put it at the head of the next batch
+
+
+@dataclass(frozen=True, slots=True)
+class _Record:
+    """Where the stream stood at one record."""
+
+    number: int  # as sent, 0 .. WRAP - 1
+    counter: int
+    received_ns: int
+
+
+class SequenceAccount:
+    """Judges the records of one stream in the order in which they arrived."""
+
+    def __init__(self, step: int | None, counter_rate: float, first: int = 1) -> None:
+        """Expect the first record to have number `first`, and counters `step` apart (None: learn it from the stream).
+
+        `counter_rate` [Hz] turns host time into ticks, once: to bridge a reboot, whose length the device cannot tell.
+        """
+        self.step = step
+        self.lost = 0
+        self.repeated = 0
+        self.late = 0
+        self.garbage = 0
+        self.frozen = 0
+        self.restarted = 0
+        self._counter_rate = counter_rate
+        self._first = first
+        self._last: _Record | None = None
+        self._sequence = 0  # unwrapped number and counter of the last record kept
+        self._counter = 0
+
+    def take(
+        self,
+        numbers: NDArray[np.uint32],
+        counters: NDArray[np.uint32],
+        received_ns: Sequence[int],
+        *,
+        end: bool = False,
+    ) -> Accounted:
+        """Judge a batch of n records: their numbers (n,), counters (n,) and when they arrived (n) [ns].
+
+        With `end` no further batch will come, and nothing is held back.
+        """
+        if len(numbers) == 0:
+            return Accounted(np.empty(0, np.intp), np.empty(0, np.int64), np.empty(0, np.int64), held=False)
+        return self._on_the_line(numbers, counters, received_ns) or self._one_by_one(
+            [_Record(*record) for record in zip(numbers.tolist(), counters.tolist(), received_ns, strict=True)], end
+        )
+
+    def _on_the_line(
+        self, numbers: NDArray[np.uint32], counters: NDArray[np.uint32], received_ns: Sequence[int]
+    ) -> Accounted | None:
+        """Return the verdict when every record lies ahead on the line, gaps or not, and None otherwise."""
+        last = self._last
+        if last is None or self.step is None:
+            return None
+        ahead = np.diff(numbers, prepend=np.uint32(last.number))  # unsigned, so it wraps as the device does
+        ticks = np.diff(counters, prepend=np.uint32(last.counter))
+        if np.any((ahead == 0) | (ahead >= WRAP // 2)) or np.any(ticks != ahead * np.uint32(self.step)):
+            return None
+        sequence = self._sequence + np.cumsum(ahead, dtype=np.int64)
+        counter = self._counter + np.cumsum(ticks, dtype=np.int64)
+        self.lost += int(sequence[-1]) - self._sequence - len(numbers)
+        self._sequence, self._counter = int(sequence[-1]), int(counter[-1])
+        self._last = _Record(int(numbers[-1]), int(counters[-1]), received_ns[-1])
+        return Accounted(np.arange(len(numbers)), sequence, counter, held=False)
+
+    def _one_by_one(self, records: list[_Record], end: bool) -> Accounted:
+        """Judge each record on its own."""
+        kept: list[int] = []
+        places: list[tuple[int, int]] = []
+        held: int | None = None
+
+        def keep(position: int) -> None:
+            kept.append(position)
+            places.append((self._sequence, self._counter))
+
+        for position, record in enumerate(records):
+            relation = "off" if self._last is None else self._relation(self._last, record)
+            if relation == "off":
+                if held is None:
+                    held = position
+                    continue
+                relation = self._relation(records[held], record, learning=True)
+                if relation == "off":
+                    self._reject(records[held])
+                    held = position
+                    continue
+                if relation in ("next", "frozen"):
+                    self._adopt(records[held])
+                    keep(held)
+                    held = None
+                    self._learn(record)
+            elif held is not None:
+                self._reject(records[held])
+                held = None
+            if self._move(record, relation):
+                keep(position)
+        if end and held is not None:
+            self._reject(records[held])
+            held = None
+        table = np.array(places, np.int64).reshape(-1, 2)
+        return Accounted(np.array(kept, np.intp), table[:, 0], table[:, 1], held=held is not None)
+
+    def _relation(self, before: _Record, record: _Record, *, learning: bool = False) -> Relation:
+        """Say how `record` lies to `before`; when `learning`, a number one ahead may come after any number of ticks."""
+        ahead = _signed(record.number - before.number)
+        ticks = _signed(record.counter - before.counter)
+        on_line = self.step is not None and ticks == _signed(ahead * self.step)
+        if ahead == 0:
+            return "same" if ticks == 0 else "off"
+        if ahead < 0:
+            return "behind" if on_line or ticks == 0 else "off"
+        if on_line or (learning and ahead == 1 and ticks > 0):
+            return "next"
+        return "frozen" if ticks == 0 else "off"
+
+    def _move(self, record: _Record, relation: Relation) -> bool:
+        """Count a record whose relation is clear; return whether it is kept."""
+        if relation == "same":
+            self.repeated += 1
+        elif relation == "behind":
+            self.late += 1
+        else:
+            assert self._last is not None
+            self.frozen += relation == "frozen"
+            self._go(record, _signed(record.number - self._last.number), _signed(record.counter - self._last.counter))
+            return True
+        return False
+
+    def _learn(self, record: _Record) -> None:
+        """Take the step from a record that comes right after the one just adopted."""
+        assert self._last is not None
+        ticks = _signed(record.counter - self._last.counter)
+        if _signed(record.number - self._last.number) == 1 and ticks > 0:
+            self.step = ticks
+
+    def _adopt(self, record: _Record) -> None:
+        """Go on from a record off the line: the stream has moved there."""
+        last = self._last
+        if last is None:
+            self._sequence = self._first - 1
+            self._go(record, max(_signed(record.number - self._first), 0) + 1, record.counter)
+            return
+        ahead, ticks = _signed(record.number - last.number), _signed(record.counter - last.counter)
+        step = self.step or 1
+        if ticks <= 0:  # the counter began anew: only the host's clock knows for how long the device was away
+            self.restarted += 1
+            away = (record.received_ns - last.received_ns) * 1e-9 * self._counter_rate
+            ahead = max(round(away / step), 2)
+            ticks = ahead * step
+        elif ahead <= 0:  # the same device numbers its records anew: its counter tells what is missing
+            ahead = max(round(ticks / step), 1)
+        self._go(record, ahead, ticks)
+
+    def _go(self, record: _Record, ahead: int, ticks: int) -> None:
+        """Move to `record`, which lies `ahead` numbers and `ticks` further on."""
+        self.lost += ahead - 1
+        self._sequence += ahead
+        self._counter += ticks
+        self._last = record
+
+    def _reject(self, record: _Record) -> None:
+        """Count a record that nothing went on from."""
+        behind = 0 if self._last is None else -_signed(record.number - self._last.number)
+        if 0 < behind <= NEAR:
+            self.late += 1
+        else:
+            self.garbage += 1
+
+
+def _signed(difference: int) -> int:
+    """Return a difference modulo 2**32 as the nearer of its two readings, in [-2**31, 2**31).
+
+    >>> _signed(5 - (2**32 - 1)), _signed(-3)
+    (6, -3)
+    """
+    return (difference + WRAP // 2) % WRAP - WRAP // 2

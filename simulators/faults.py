@@ -1,0 +1,107 @@
+"""What can go wrong on the way from a box, and in the box, on a timetable and from a seed."""
+
+import heapq
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+Kind = Literal["lose", "repeat", "reorder", "corrupt", "shorten", "delay", "stall", "saturate", "reboot", "unplug"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+_ON_THE_WAY: tuple[Kind, ...] = ("lose", "repeat", "reorder", "corrupt", "shorten", "delay")
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One kind of fault for a stretch of the box's time.
+
+    On the way, for a share of the datagrams: `lose`, `repeat` (sent twice), `reorder` (swapped with the next),
+    `corrupt` (other bytes, same length), `shorten` (fewer bytes), `delay` (sent later). In the box: `stall` (the same
+    reading again and again), `saturate` (status says the values are invalid), `reboot` (switched off, then on),
+    `unplug` (nothing comes through, and the box does not notice).
+    """
+
+    kind: Kind
+    start: float  # [s]
+    stop: float  # [s]
+    share: float = 1.0  # of the datagrams in the stretch [-]
+    delay: float = 0.05  # of a datagram that is delayed [s]
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be carried out."""
+        if self.kind not in KINDS:
+            raise ValueError(f"fault kind {self.kind!r} is unknown; there are {', '.join(KINDS)}")
+        if not (0.0 <= self.start < self.stop and 0.0 < self.share <= 1.0 and self.delay > 0.0):
+            raise ValueError(f"fault {self.kind!r} needs 0 <= start < stop, 0 < share <= 1 and a delay above 0")
+
+
+class Faults:
+    """The timetable of one box. The same seed hurts the same datagrams in the same way."""
+
+    def __init__(
+        self, timetable: Iterable[Fault] = (), *, seed: int = 0, repeat: float = 0.0, remember: bool = False
+    ) -> None:
+        """Begin the timetable anew every `repeat` seconds, if above 0. `remember` keeps what was sent, for tests."""
+        self._timetable = tuple(timetable)
+        self._seed = seed
+        self._repeat = repeat
+        self._count = 0  # datagrams so far
+        self._swapped: bytes | None = None
+        self._delayed: list[tuple[float, int, bytes]] = []
+        self.made: list[bytes] | None = [] if remember else None  # every datagram the box made
+        self.delivered: list[bytes] | None = [] if remember else None  # every datagram that left, in that order
+
+    def active(self, kind: Kind, time: float) -> bool:
+        """Tell whether a fault of the box itself is on at `time` [s]."""
+        return self._at(kind, time) is not None
+
+    def route(self, time: float, datagrams: list[bytes]) -> list[bytes]:
+        """Return what really leaves at `time` [s] when the box sends `datagrams`: those, hurt, and what is overdue."""
+        if self.made is not None:
+            self.made += datagrams
+        leaving = [hurt for datagram in datagrams for hurt in self._hurt(time, datagram)]
+        while self._delayed and self._delayed[0][0] <= time:
+            leaving.append(heapq.heappop(self._delayed)[2])
+        if self.delivered is not None:
+            self.delivered += leaving
+        return leaving
+
+    def _hurt(self, time: float, datagram: bytes) -> list[bytes]:
+        """Return what becomes of one datagram, in the order it leaves."""
+        self._count += 1
+        for kind in _ON_THE_WAY:
+            fault = self._at(kind, time)
+            if fault is None:
+                continue
+            draw = np.random.default_rng([self._seed, self._count, KINDS.index(kind)])
+            if draw.uniform() < fault.share:
+                return self._carried_out(fault, time, datagram, draw)
+        return [datagram, *self._take_swapped()]
+
+    def _carried_out(self, fault: Fault, time: float, datagram: bytes, draw: np.random.Generator) -> list[bytes]:
+        match fault.kind:
+            case "repeat":
+                return [datagram, datagram, *self._take_swapped()]
+            case "reorder" if self._swapped is None:
+                self._swapped = datagram
+                return []
+            case "corrupt":
+                return [draw.bytes(len(datagram)), *self._take_swapped()]
+            case "shorten":
+                return [datagram[: int(draw.integers(0, len(datagram)))], *self._take_swapped()]
+            case "delay":
+                heapq.heappush(self._delayed, (time + fault.delay, self._count, datagram))
+                return []
+            case "lose":
+                return []
+            case _:
+                return [datagram, *self._take_swapped()]
+
+    def _take_swapped(self) -> list[bytes]:
+        swapped, self._swapped = self._swapped, None
+        return [] if swapped is None else [swapped]
+
+    def _at(self, kind: Kind, time: float) -> Fault | None:
+        local = time % self._repeat if self._repeat > 0.0 else time
+        return next((f for f in self._timetable if f.kind == kind and f.start <= local < f.stop), None)

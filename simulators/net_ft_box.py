@@ -1,0 +1,254 @@
+"""The networked force/torque box on this computer's own network: its UDP, TCP and HTTP ports."""
+
+import contextlib
+import os
+import selectors
+import socket
+import struct
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+
+from drivers.clock import Clock
+from drivers.transducer import SetupError
+from simulators.bench import Bench
+from simulators.faults import Faults
+from simulators.net_ft_electronics import Electronics
+
+HOST = "127.0.0.1"
+_BURST = 200  # records sent at one go after the computer was busy, so as not to drown the reader
+_NAP = 0.02  # longest wait, and so for an end [real s]
+_SHORTEST_NAP = 0.0005  # records due within it leave together [real s]
+
+
+@dataclass(slots=True)
+class _Stream:
+    """A stream somebody asked for."""
+
+    to: tuple[str, int]
+    tick: int  # of the next record
+    number: int  # of the next record
+    left: int | None  # records still to be sent; None: until stopped
+    in_datagram: int  # records a datagram
+    waiting: list[bytes] = field(default_factory=list[bytes])  # records of a datagram not yet full
+
+
+class NetFtBox:
+    """A box on loopback, with a simulated bench behind it. Its time, and the bench's, begins when it is started.
+
+    One thread serves all its ports. It tells that it is simulated in the product name on its page.
+    """
+
+    def __init__(
+        self,
+        bench: Bench,
+        clock: Clock,
+        *,
+        rate: int = 200,
+        rdt_port: int = 0,
+        tcp_port: int = 0,
+        http_port: int = 0,
+        rate_error: float = 0.0,
+        faults: Faults | None = None,
+        first_tick: int = 0,
+        first_record: int = 1,
+    ) -> None:
+        """Set up a box that streams at `rate` [Hz] by an oscillator wrong by `rate_error` [-]. Port 0 is a free one.
+
+        `first_tick` is its counter when it starts, as if it had run for long; `first_record` the first number of the
+        first stream. Both serve to see them wrap.
+        """
+        self._clock = clock
+        self._faults = faults or Faults()
+        self._inside = Electronics(bench, self._faults, rate=rate, rate_error=rate_error, first_tick=first_tick)
+        self._wanted = ((socket.SOCK_DGRAM, "rdt", rdt_port), (socket.SOCK_STREAM, "tcp", tcp_port))
+        self._wanted += ((socket.SOCK_STREAM, "http", http_port),)
+        self._first_record = first_record
+        self._on = True
+        self._stream: _Stream | None = None
+        self._selector = selectors.SelectSelector()  # the one whose waits are finer than a millisecond
+        self._bound: list[socket.socket] = []
+        self._closing = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._origin_ns = 0
+
+    @property
+    def uri(self) -> str:
+        """The address to open it at; known once it is started."""
+        rdt, tcp, http = (bound.getsockname()[1] for bound in self._bound)
+        return f"net-ft://{HOST}?rdt={rdt}&tcp={tcp}&http={http}"
+
+    def now(self) -> float:
+        """Return the box's and the bench's time [s]: 0 when it was started."""
+        return (self._clock.now_ns() - self._origin_ns) * 1e-9
+
+    def start(self) -> None:
+        """Open the ports and begin to serve. Raises SetupError when a port is in use."""
+        try:
+            for kind, name, port in self._wanted:
+                self._bound.append(_open_port(kind, name, port))
+        except SetupError:
+            self._release()
+            raise
+        for bound, serve in zip(self._bound, (self._on_datagram, self._on_caller, self._on_caller), strict=True):
+            self._selector.register(bound, selectors.EVENT_READ, serve)
+        self._origin_ns = self._clock.now_ns()
+        self._thread = threading.Thread(target=self._serve, name="simulated net-ft box")
+        self._thread.start()
+
+    def close(self) -> None:
+        """Switch the box off and give back its ports. Harmless when repeated."""
+        self._closing.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+            self._release()
+
+    def _release(self) -> None:
+        opened = [key.fileobj for key in self._selector.get_map().values()]
+        for port in {*opened, *self._bound}:
+            assert isinstance(port, socket.socket)
+            port.close()
+        self._selector.close()
+
+    def _serve(self) -> None:
+        """Be the box until closed: send what is due, then wait for the next due record or a request."""
+        while not self._closing.is_set():
+            now = self.now()
+            if not self._has_power(now):
+                self._closing.wait(_NAP)
+                continue
+            plugged = not self._faults.active("unplug", now)
+            self._send_due(now, plugged)
+            if plugged:
+                for key, _ in self._selector.select(self._until_due()):
+                    key.data(key.fileobj)
+            else:
+                self._closing.wait(self._until_due())
+
+    def _until_due(self) -> float:
+        """Return how long nothing has to be sent [real s]."""
+        if self._stream is None:
+            return _NAP
+        due = (self._inside.time(self._stream.tick) - self.now()) / self._clock.factor
+        return min(max(due, _SHORTEST_NAP), _NAP)
+
+    def _has_power(self, now: float) -> bool:
+        """Follow the timetable's reboots; return whether the box is on."""
+        on = not self._faults.active("reboot", now)
+        if on and not self._on:
+            self._inside.reboot(now)
+            self._stream = None
+            while self._heard() is not None:  # what came while it was off is forgotten too
+                pass
+        self._on = on
+        return on
+
+    def _send_due(self, now: float, plugged: bool) -> None:
+        """Send the records that are due, at most a burst of them, and whatever was delayed until now."""
+        stream = self._stream
+        if stream is None:
+            return
+        step = self._inside.pages.step
+        due = (self._inside.tick(now) - stream.tick) // step + 1
+        count = min(max(due, 0), _BURST if stream.left is None else stream.left)
+        datagrams: list[bytes] = []
+        for reading in self._inside.readings([stream.tick + step * i for i in range(count)]):
+            stream.waiting.append(struct.pack(">I", stream.number % 2**32) + reading)
+            stream.number += 1
+            if len(stream.waiting) == stream.in_datagram:
+                datagrams.append(b"".join(stream.waiting))
+                stream.waiting.clear()
+        stream.tick += count * step
+        if stream.left is not None:
+            stream.left -= count
+            if stream.left == 0:
+                datagrams += [b"".join(stream.waiting)] if stream.waiting else []
+                self._stream = None
+        for datagram in self._faults.route(now, datagrams):
+            if plugged:
+                with contextlib.suppress(BlockingIOError, ConnectionError):  # a network drops what it cannot carry
+                    self._bound[0].sendto(datagram, stream.to)
+
+    def _heard(self) -> tuple[bytes, tuple[str, int]] | None:
+        """Return the next request and who asked, if there is one."""
+        try:
+            return self._bound[0].recvfrom(2048)
+        except ConnectionError:  # what we sent before was refused: the reader has gone
+            return b"", (HOST, 0)
+        except BlockingIOError:
+            return None
+
+    def _on_datagram(self, _: socket.socket) -> None:
+        """Carry out one request. Whoever asks for a stream last has it."""
+        request, asker = self._heard() or (b"", (HOST, 0))
+        if len(request) != 8 or request[:2] != b"\x12\x34":
+            return
+        command, count = struct.unpack(">HI", request[2:])
+        pages = self._inside.pages
+        if command == 0x0000:
+            self._stream = None
+        elif command in (0x0002, 0x0003) and pages.streams:
+            size = pages.buffered if command == 0x0003 else 1
+            self._stream = _Stream(asker, self._inside.tick(self.now()) + 1, self._first_record, count or None, size)
+            self._first_record = 1
+        elif command == 0x0042:
+            self._inside.set_bias(self.now())
+        # 0x0041 resets a threshold latch, and no threshold is ever crossed here.
+
+    def _on_caller(self, listener: socket.socket) -> None:
+        """Take a connection to the TCP command port or to the web pages."""
+        connection, _ = listener.accept()
+        connection.setblocking(False)
+        answer = self._answer_page if listener is self._bound[2] else self._answer_commands
+        self._selector.register(connection, selectors.EVENT_READ, partial(self._on_call, bytearray(), answer))
+
+    def _on_call(
+        self, heard: bytearray, answer: Callable[[bytearray], tuple[bytes, bool]], caller: socket.socket
+    ) -> None:
+        """Answer what a connection has said so far, and hang up when it is done."""
+        try:
+            said = caller.recv(4096)
+            heard += said
+            reply, done = answer(heard) if said else (b"", True)
+            caller.sendall(reply)
+        except (BlockingIOError, ConnectionError):
+            done = True
+        if done:
+            self._selector.unregister(caller)
+            caller.close()
+
+    def _answer_commands(self, heard: bytearray) -> tuple[bytes, bool]:
+        """Return the replies to all whole commands, which are 20 bytes each; the connection stays."""
+        replies = b""
+        while len(heard) >= 20:
+            replies += self._inside.tcp_reply(bytes(heard[:20]), self.now())
+            del heard[:20]
+        return replies, False
+
+    def _answer_page(self, heard: bytearray) -> tuple[bytes, bool]:
+        """Return the page asked for, once the request is whole."""
+        if b"\r\n\r\n" not in heard:
+            return b"", len(heard) > 8192
+        return self._inside.http_reply(bytes(heard), self.now()), True
+
+
+def _open_port(kind: socket.SocketKind, option: str, port: int) -> socket.socket:
+    """Return a socket on `port` of loopback. Raises SetupError when the port cannot be had."""
+    bound = socket.socket(socket.AF_INET, kind)
+    try:
+        if kind == socket.SOCK_STREAM and os.name == "posix":  # there it lets a port be had again soon after its end
+            bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        bound.bind((HOST, port))
+        if kind == socket.SOCK_STREAM:
+            bound.listen()
+    except OSError as error:
+        bound.close()
+        name = "UDP" if kind == socket.SOCK_DGRAM else "TCP"
+        raise SetupError(
+            f"{name} port {port} on {HOST} cannot be opened ({(error.strerror or 'refused').lower()}); "
+            f"end the program that holds it, or choose another {option} port"
+        ) from None
+    bound.setblocking(False)
+    return bound
