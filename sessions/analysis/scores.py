@@ -5,9 +5,13 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
+
+if TYPE_CHECKING:
+    from sessions.recording.reader import Recording
 
 CONFIDENCE = 0.95
 SCALE = (0.0, 100.0)  # ends of the scale; nobody can answer beyond them
@@ -64,6 +68,17 @@ class Relation:
     intercept: float | None
     without: tuple[tuple[int, float | None], ...]  # (label, pearson over the others) for each stimulus left out
     reason: str | None
+
+
+def score_table(recording: "Recording") -> ScoreTable:
+    """Return the answers of one session."""
+    subject = recording.plan.subject
+    scores = tuple(
+        Score(subject, record.trial.stimulus.descriptor, record.trial.stimulus.index, record.score)
+        for record in recording.trials
+        if record.score is not None
+    )
+    return ScoreTable(str(recording.folder.resolve()), subject, recording.simulated, scores)
 
 
 def joined(tables: Iterable[ScoreTable]) -> tuple[ScoreTable, ...]:

@@ -1,7 +1,7 @@
 """What a report says in sentences: its question and, in short, its answer."""
 
 from sessions.analysis.scores import Relation
-from sessions.exports.wording import correlation, digits, plural, significant
+from sessions.exports.wording import correlation, digits, plural, spread_share
 from sessions.report import Experiment, Report
 
 
@@ -54,7 +54,7 @@ def _predicted(experiment: Experiment, low: float, high: float) -> str:
     """Return how prediction and score go together in one experiment."""
     name, ends = _capital(experiment.name), f"{digits(1e3 * low, 2)} to {digits(1e3 * high, 2)} kPa"
     words = f"{name}: the predicted SED runs from {ends}"
-    words += f" (a range of {significant(200 * (high - low) / (high + low), 2)} % of its middle)"
+    words += f" (a range of {spread_share(low, high)})"
     return words + related_words(experiment.score_relation) + "."
 
 

@@ -26,6 +26,18 @@ def significant(value: float, figures: int) -> str:
     return digits(value, max(0, figures - 1 - math.floor(math.log10(abs(value)))))
 
 
+def with_error(value: float, error: float | None, least: int) -> str:
+    """Return a number and its error with as many decimals as give the error one figure, `least` of them at least.
+
+    >>> with_error(0.27982, 0.00031, 3), with_error(21.4, 0.42, 1), with_error(21.4, None, 1)
+    ('0.2798 ± 0.0003', '21.4 ± 0.4', '21.4')
+    """
+    if not error:
+        return digits(value, least)
+    decimals = max(least, -math.floor(math.log10(error)))
+    return f"{digits(value, decimals)} ± {digits(error, decimals)}"
+
+
 def places(n: int) -> Callable[[float], str]:
     """Return what shows a number with n decimals.
 
@@ -62,6 +74,15 @@ def correlation(r: float) -> str:
     """
     text = f"{r:+.2f}" if abs(r) < 0.995 or abs(r) > 0.9995 else f"{r:+.3f}"
     return text.replace("-", "−")
+
+
+def spread_share(low: float, high: float) -> str:
+    """Return a range as a share of the middle of its ends.
+
+    >>> spread_share(5.185, 5.3575)
+    '3.3 %'
+    """
+    return f"{significant(200 * (high - low) / (high + low), 2)} %"
 
 
 def direction(sign: int | None) -> str:

@@ -118,6 +118,7 @@ def stroke(number, descriptor, index):
         mu_max=mu * 1.03,
         tau_max=tau * 0.995,
         normal_force=3.1,
+        tangential_force=3.1 * mu,
         flaws=("speed_not_measurable",) if number == 7 else (),
         reasons={
             **({} if sticky else {"mu_static": "no static peak stands out of the noise"}),

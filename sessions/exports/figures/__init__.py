@@ -32,7 +32,7 @@ def plates(report: Report) -> tuple[Plate, ...]:
 def _course(report: Report) -> Plate:
     caption = (
         "Normal and tangential force over the whole recording, unfiltered; each stretch is drawn by its least and its"
-        " greatest value. Grey: the strokes that were found, with their numbers."
+        " greatest value. Grey: the strokes that were found, with their numbers; discarded takes are not searched."
     )
     panels = () if report.course is None else (course_panel(report.course, report.strokes, simulated=report.simulated),)
     return Plate("course", caption, panels)
@@ -97,7 +97,8 @@ def _relations(report: Report) -> Plate:
         "Predicted SED against mean score; each point is a stimulus with its index. Across: 95 % t interval of the "
         "mean score. Upright: estimated error of each SED from its mesh; all share one mesh, so that differences "
         "between them are more accurate than that. Line: least squares. r: Pearson's, with its 95 % interval by "
-        "Fisher's z. Beside it the same SEDs on an axis from 0."
+        "Fisher's z. Range of SED: greatest less least, and its share of their middle. Beside it the same SEDs on an "
+        "axis from 0."
     )
     panels = [
         relation_panel(e, [p for p in report.predictions if p.experiment == e.name], simulated=report.simulated)

@@ -6,7 +6,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from matplotlib.axes import Axes
+from scipy.optimize import isotonic_regression
 
 from sessions.exports.figures.style import GREY, INK, TEXT
 
@@ -26,22 +28,16 @@ def spread(wanted: Sequence[float], gap: float, low: float, high: float) -> list
     >>> spread([1.0, 1.0, 5.0], gap=1.0, low=0.0, high=10.0)
     [0.5, 1.5, 5.0]
     """
-    order = sorted(range(len(wanted)), key=lambda i: (wanted[i], i))
-    # Labels that touch form a block, whose middle lies at the mean of what its members want.
-    blocks: list[tuple[float, int]] = []  # middle, members
-    for i in order:
-        middle, size = wanted[i], 1
-        while blocks and middle - size * gap / 2 < blocks[-1][0] + blocks[-1][1] * gap / 2:
-            before, members = blocks.pop()
-            middle = (middle * size + before * members) / (size + members)
-            size += members
-        half = (size - 1) * gap / 2
-        blocks.append((max(min(middle, high - half), low + half), size))
-    placed: list[float] = [middle + (k - (size - 1) / 2) * gap for middle, size in blocks for k in range(size)]
-    result = [0.0] * len(wanted)
-    for i, place in zip(order, placed, strict=True):
-        result[i] = place
-    return result
+    n = len(wanted)
+    if not n:
+        return []
+    order = np.argsort(wanted, kind="stable")
+    steps = gap * np.arange(n)
+    # Without the steps, labels at least `gap` apart are numbers that do not fall.
+    rising = isotonic_regression(np.asarray(wanted)[order] - steps).x
+    places = np.empty(n)
+    places[order] = np.clip(rising, low, max(low, high - steps[-1])) + steps
+    return [float(place) for place in places]
 
 
 def label_right(axes: Axes, labels: Sequence[Label], head: str = "") -> None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from sessions.analysis.scores import MeanScore, Relation
 from sessions.exports.figures.style import GREEN, GREY, Panel, Sheet, sheet, svg
-from sessions.exports.wording import correlation
+from sessions.exports.wording import correlation, spread_share
 from sessions.report import Experiment, PredictionFinding
 
 
@@ -37,9 +37,7 @@ def relation_panel(
     axes.set_xticks([0, 20, 40, 60, 80, 100])
     axes.set_xlabel(f"mean score of {experiment.descriptor} [0–100]")
     axes.set_ylabel("predicted SED [kPa]")
-    axes.set_title(
-        f"{relation_words(experiment)}\nrange of SED: {high - low:.3f} kPa, {_share(low, high)} of its middle"
-    )
+    axes.set_title(f"{relation_words(experiment)}\nrange of SED: {high - low:.3f} kPa ({spread_share(low, high)})")
     beside.plot([0.0] * len(seds), seds, "_", color=GREEN, markersize=12, markeredgewidth=1.2)
     beside.set_ylim(0.0, 1.15 * high)
     beside.set_xlim(-1, 1)
@@ -70,16 +68,11 @@ def relation_words(experiment: Experiment) -> str:
     return words + f", n = {related.n}"
 
 
-def _share(low: float, high: float) -> str:
-    """Return the range as per cent of its middle."""
-    return f"{200 * (high - low) / (high + low):.2g} %"
-
-
 def _two_columns() -> Sheet:
     drawn = sheet(328, 300)
     (axes,) = drawn.axes
     axes.remove()
-    grid = drawn.figure.add_gridspec(1, 2, width_ratios=(1.0, 0.13))
+    grid = drawn.figure.add_gridspec(1, 2, width_ratios=(1.0, 0.18))
     return Sheet(
         drawn.figure, (drawn.figure.add_subplot(grid[0, 0]), drawn.figure.add_subplot(grid[0, 1])), drawn.hover
     )

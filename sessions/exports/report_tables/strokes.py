@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from sessions.exports.report_tables.cells import Cell, Column, Notes, Table, grouped
-from sessions.exports.wording import NONE, digits, places, signed, tau
+from sessions.exports.wording import NONE, places, signed, tau, with_error
 from sessions.report import Planted, Report, StrokeFinding
 
 
@@ -48,11 +48,11 @@ def _stroke_row(stroke: StrokeFinding, notes: Notes) -> tuple[Cell, ...]:
         cell("index", stroke.index, places(0)),
         cell("onset", stroke.onset, places(3)),
         cell("mu_static", stroke.mu_static, places(3)),
-        cell("mu_dynamic", stroke.mu_dynamic, lambda v: digits(v, 3) + (f" ± {digits(half, 3)}" if half else "")),
+        cell("mu_dynamic", stroke.mu_dynamic, lambda v: with_error(v, half, 3)),
         cell("mu_max", stroke.mu_max, places(3)),
         cell("tau_max", stroke.tau_max, tau),
         cell("normal_force", stroke.normal_force, places(2)),
-        cell("speed", stroke.speed, lambda v: digits(v, 1) + (f" ± {digits(error, 1)}" if error else "")),
+        cell("speed", stroke.speed, lambda v: with_error(v, error, 1)),
         cell("direction", stroke.direction, lambda v: {1: "p → d", -1: "d → p"}[int(v)]),
         Cell(marks or "none"),
     )

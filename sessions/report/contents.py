@@ -1,4 +1,4 @@
-"""The findings of a session as plain data, ready for any export. Null numbers carry their reason."""
+"""What a report holds: plain data, ready for any export. Null numbers carry their reason."""
 
 from dataclasses import asdict, dataclass
 
@@ -75,6 +75,7 @@ class StrokeFinding:
     mu_max: float | None
     tau_max: float | None  # [MPa]
     normal_force: float | None  # mean over the steady window [N]
+    tangential_force: float | None  # likewise [N]
     flaws: tuple[str, ...]
     reasons: dict[str, str]
     trace: Trace | None

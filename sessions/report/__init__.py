@@ -1,0 +1,94 @@
+"""The findings of a session as plain data, ready for any export."""
+
+from collections.abc import Sequence
+
+from sessions.analysis.analysis import Analysis
+from sessions.analysis.scores import MeanScore, Relation, ScoreTable, joined, score_table
+from sessions.recording.provenance import software_versions
+from sessions.recording.reader import Recording
+from sessions.report import facts
+from sessions.report.contents import (
+    Answers,
+    Course,
+    Experiment,
+    Fact,
+    Field,
+    History,
+    Planted,
+    PredictionFinding,
+    Report,
+    StrokeFinding,
+    Trace,
+)
+from sessions.report.experiments import experiments
+from sessions.report.strokes import course, flaws, strokes
+
+__all__ = [
+    "Answers",
+    "Course",
+    "Experiment",
+    "Fact",
+    "Field",
+    "History",
+    "MeanScore",
+    "Planted",
+    "PredictionFinding",
+    "Relation",
+    "Report",
+    "StrokeFinding",
+    "Trace",
+    "findings",
+]
+
+
+def findings(
+    recording: Recording,
+    analysis: Analysis,
+    scores: Sequence[ScoreTable] | None = None,
+    planted: Sequence[Planted] | None = None,
+) -> Report:
+    """Return the findings of a session.
+
+    `scores` are the tables of further visits, of this subject or others, joined by subject code; the session's own
+    scores are always among them. `planted` is what a simulator planted, trial by trial; None for real sessions.
+    """
+    tables = joined((score_table(recording), *(scores or ())))
+    found = strokes(recording, analysis)
+    head = _head(recording, tables)
+    return Report(
+        title=_title(recording),
+        session=recording.folder.name,
+        simulated=bool(head),
+        head=head,
+        versions=tuple(Fact(name, version) for name, version in software_versions().items()),
+        people=facts.people(recording, tables),
+        apparatus=facts.apparatus(recording, analysis),
+        excluded=facts.excluded(recording, found, tables),
+        flaws=flaws(analysis),
+        experiments=experiments(recording.plan, tables, {}),
+        course=course(recording),
+        strokes=found,
+        predictions=(),
+        fields=(),
+        planted=tuple(planted or ()),
+        sealed="",
+        modelled=(),
+        left_out=(),
+        again=facts.again(recording, analysis),
+        commands=(),
+        width=None,
+    )
+
+
+def _title(recording: Recording) -> str:
+    if not recording.plan.blocks:
+        return f"Recording {recording.folder.name}"
+    return f"{recording.plan.protocol}, subject {recording.plan.subject}"
+
+
+def _head(recording: Recording, tables: Sequence[ScoreTable]) -> str:
+    """Return the first line of everything made of this session when any of it was simulated, else ""."""
+    if recording.simulated_sentence is not None:
+        return recording.simulated_sentence
+    simulated = sum(table.simulated for table in tables)
+    return f"SIMULATED: {simulated} of the sessions whose scores are used here are simulated" if simulated else ""

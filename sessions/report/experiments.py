@@ -1,0 +1,48 @@
+"""The experiments of a session: who scored what, and how predictions go with it."""
+
+from collections.abc import Mapping, Sequence
+
+from sessions.analysis.scores import MeanScore, Relation, ScoreTable, mean_scores, relation, score_matrix
+from sessions.plan import Block, SessionPlan
+from sessions.report.contents import Answers, Experiment
+
+
+def experiments(
+    plan: SessionPlan, tables: Sequence[ScoreTable], seds: Mapping[tuple[str, int], float]
+) -> tuple[Experiment, ...]:
+    """Return one experiment a block; `seds` holds the predicted SED [MPa] by block and index, where there is one."""
+    means = mean_scores(tables)
+    return tuple(_experiment(block, means, tables, seds) for block in plan.blocks if block.trials)
+
+
+def _experiment(
+    block: Block, means: Sequence[MeanScore], tables: Sequence[ScoreTable], seds: Mapping[tuple[str, int], float]
+) -> Experiment:
+    descriptor = block.trials[0].stimulus.descriptor
+    indices = tuple(sorted({trial.stimulus.index for trial in block.trials}))
+    own = tuple(mean for mean in means if mean.descriptor == descriptor and mean.index in indices)
+    predicted = {index: seds[block.name, index] for index in indices if (block.name, index) in seds}
+    return Experiment(
+        name=block.name,
+        descriptor=descriptor,
+        instruction=block.instruction,
+        direction=block.direction,
+        indentation=block.indentation,
+        scale_ends=block.scale_ends,
+        indices=indices,
+        scores=own,
+        answers=tuple(
+            Answers(subject, tuple(given.get(index) for index in indices))
+            for subject, given in score_matrix(tables, descriptor).items()
+        ),
+        score_relation=_related({mean.index: mean.mean for mean in own}, predicted),
+        index_relation=_related({index: float(index) for index in indices}, predicted),
+    )
+
+
+def _related(x: Mapping[int, float], seds: Mapping[int, float]) -> Relation | None:
+    """Return how the SEDs go with x, over the indices that have both; None where there is none."""
+    both = [index for index in x if index in seds]
+    if not both:
+        return None
+    return relation([x[index] for index in both], [seds[index] for index in both], both)

@@ -1,0 +1,152 @@
+"""Who and what, what was excluded, and everything needed to do it again."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from sessions.analysis.analysis import Analysis
+from sessions.analysis.scores import ScoreTable, reversed_subjects
+from sessions.analysis.settings import AnalysisSettings
+from sessions.plan import PROXIMAL_TO_DISTAL, Block, Origin
+from sessions.recording.head import calibration_hash
+from sessions.recording.log import TrialRecord
+from sessions.recording.reader import Recording
+from sessions.report.contents import Fact, StrokeFinding
+
+_ORIGIN: dict[Origin, str] = {"measured": "measured", "set": "set", "default": "default: nobody set it"}
+
+
+def people(recording: Recording, tables: Sequence[ScoreTable]) -> tuple[Fact, ...]:
+    """Return who took part, and what they were asked to do."""
+    plan = recording.plan
+    scored = sorted({table.subject for table in tables if table.scores})
+    facts = [Fact("subject", plan.subject)] if plan.subject else []
+    if scored:
+        sessions = sum(bool(table.scores) for table in tables)
+        facts.append(
+            Fact(
+                "subjects who scored",
+                f"{len(scored)}: {', '.join(scored)}",
+                "in one session" if sessions == 1 else f"in {sessions} sessions",
+            )
+        )
+    if plan.blocks:
+        facts.append(Fact("protocol", plan.protocol))
+        facts.append(Fact("stimulus order", plan.order_rule, f"seed {plan.seed}"))
+    facts += [Fact(block.name, _block(block)) for block in plan.blocks]
+    return tuple(facts)
+
+
+def _block(block: Block) -> str:
+    way = "proximal to distal" if block.direction == PROXIMAL_TO_DISTAL else "distal to proximal"
+    indices = ", ".join(str(i) for i in sorted({trial.stimulus.index for trial in block.trials}))
+    ends = f"0 “{block.scale_ends[0]}”, 100 “{block.scale_ends[1]}”"
+    return f"{block.instruction} Stimuli {indices}, stroked {way}; scale: {ends}."
+
+
+def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
+    """Return what measured, how it was set, and what was done to its readings."""
+    info, plan = recording.info, recording.plan
+    if info is None:
+        return (Fact("transducer", "none: a visit for scores only"),)
+    rate = "unknown" if math.isnan(info.rate) else f"{info.rate:g} readings a second"
+    clock: Mapping[str, Any] = recording.provenance.get("clock", {})
+    facts = [
+        Fact("transducer", f"{info.model}, serial number {info.serial}", f"driver {info.driver}"),
+        Fact("rate", rate),
+        Fact("calibration", info.calibration.source, f"readings in {info.calibration.raw_unit}"),
+        Fact("normal axis", f"pressing is positive along {plan.frame.normal}", _ORIGIN[plan.frame.normal_origin]),
+        Fact("height of the face", f"{plan.frame.height:g} mm above the origin", _ORIGIN[plan.frame.height_origin]),
+        Fact("contact area", f"{plan.contact_area:g} mm²", _ORIGIN[plan.contact_area_origin]),
+        Fact("filter", analysis.filtered),
+        Fact("interval of µ", analysis.settings.interval_kind),
+    ]
+    if clock.get("factor", 1.0) != 1.0:
+        facts.append(Fact("clock", f"told time, {clock['factor']:g} times as fast as the wall clock"))
+    return tuple(fact for fact in facts if fact.value)
+
+
+def excluded(recording: Recording, strokes: Sequence[StrokeFinding], tables: Sequence[ScoreTable]) -> tuple[str, ...]:
+    """Return what does not enter the results, and why, a sentence each."""
+    sentences = [f"Lost: {loss}." for loss in recording.losses]
+    for record in recording.trials:
+        sentences += _trial(record)
+    for number, words in (("mu_dynamic", "dynamic friction"), ("speed", "speed")):
+        without = [str(stroke.number) for stroke in strokes if getattr(stroke, number) is None]
+        if without:
+            sentences.append(
+                f"No {words} is given for stroke {', '.join(without)}: the flaws below and the tables say why."
+            )
+    for subject, descriptor, r in reversed_subjects(tables):
+        sentences.append(
+            f"Nothing, but a doubt: the {descriptor} scores of {subject} fall as the index rises (r = {r:+.2f}): the "
+            "scale may have been used backwards; they are kept as given."
+        )
+    return tuple(sentences)
+
+
+def _trial(record: TrialRecord) -> list[str]:
+    """Return what was set aside in one trial."""
+    number = record.trial.number
+    sentences: list[str] = []
+    for take in record.other_takes:
+        why = f"discarded: {take.discarded}" if take.discarded is not None else "the recording ended in it"
+        sentences.append(f"Take {take.number} of trial {number} does not count ({why}); its readings are kept.")
+    if record.outcome == "skipped":
+        sentences.append(f"Trial {number} was skipped.")
+    elif record.outcome == "not answered":
+        sentences.append(f"Trial {number} has no score: the subject did not answer.")
+    elif record.outcome == "open":
+        sentences.append(f"Trial {number} was not done: the session ended before.")
+    return sentences
+
+
+def again(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
+    """Return all that shaped the numbers; values nobody set are marked."""
+    provenance, info = recording.provenance, recording.info
+    facts = [
+        Fact("session folder", recording.folder.name),
+        Fact("recorded", str(provenance.get("created_utc", "at an unknown time")), "UTC"),
+        Fact("recorded by", _versions(provenance.get("software", {}))),
+        Fact("machine", ", ".join(f"{name} {value}" for name, value in provenance.get("machine", {}).items())),
+    ]
+    if recording.plan.blocks:
+        facts.append(
+            Fact("plan", f"{recording.plan.protocol}, seed {recording.plan.seed}", "all of it in session.json")
+        )
+    if info is not None:
+        facts.append(Fact("transducer's address", info.uri))
+        facts.append(Fact("calibration matrix", f"SHA-256 {calibration_hash(info.calibration)}"))
+        facts += [Fact(f"transducer: {name}", value) for name, value in sorted(info.settings.items())]
+    settings: Mapping[str, Mapping[str, Any]] = provenance.get("settings", {})
+    facts += [
+        Fact(name, f"{told.get('value')} {told.get('unit', '')}".strip(), _ORIGIN.get(told.get("origin", "set"), ""))
+        for name, told in settings.items()
+    ]
+    if info is not None:
+        facts.append(Fact("analysis", _settings(analysis.settings)))
+    return tuple(fact for fact in facts if fact.value)
+
+
+def _settings(settings: AnalysisSettings) -> str:
+    """Return every setting with its value; those that differ from the defaults are marked."""
+    return "; ".join(_listed(settings, AnalysisSettings()))
+
+
+def _listed(chosen: Any, usual: Any, prefix: str = "") -> list[str]:  # noqa: ANN401 - any settings dataclass
+    words: list[str] = []
+    for field in fields(chosen):
+        value, default = getattr(chosen, field.name), getattr(usual, field.name)
+        if is_dataclass(value):
+            words += _listed(value, default, f"{prefix}{field.name}.")
+        else:
+            words.append(
+                f"{prefix}{field.name} {value:g}" if isinstance(value, float) else f"{prefix}{field.name} {value}"
+            )
+            words[-1] += "" if value == default else " (set)"
+    return words
+
+
+def _versions(software: Mapping[str, str]) -> str:
+    return ", ".join(f"{name} {version}" for name, version in software.items())
