@@ -1,0 +1,294 @@
+"""The maker's calibration file: from six gauge voltages to a wrench.
+
+The file (`.cal`, XML) belongs to one transducer with analogue outputs. Its working matrix is
+T(BasicTransform) x (Axis values / scale), as the maker's DAQ F/T C library computes it (ftconfig.c, version 1.0.2);
+newer files (1.1) also print the product as UserAxis, to five decimals, which serves as a check here.
+"""
+
+import hashlib
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.calibration import Calibration
+from drivers.transducer import SetupError
+
+Array = NDArray[np.float64]
+
+LONGEST = 64 * 1024  # a longer file is refused [bytes]; the maker's have about 3 kB
+AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+
+_ROUNDING = 0.5e-5  # the file's numbers have five decimals
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
+_POUND = 4.4482216152605  # [N]
+_FORCE = {"N": 1.0, "kN": 1e3, "lb": _POUND, "lbf": _POUND, "klb": 1e3 * _POUND, "kg": 9.80665, "g": 9.80665e-3}
+_TORQUE = {  # newton millimetres in one
+    "N-mm": 1.0,
+    "N-m": 1e3,
+    "kN-m": 1e6,
+    "in-lb": 25.4 * _POUND,
+    "lb-in": 25.4 * _POUND,
+    "ft-lb": 304.8 * _POUND,
+    "lb-ft": 304.8 * _POUND,
+    "kg-cm": 98.0665,
+}
+_DISTANCE = {"mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}  # millimetres in one
+_ANGLE = {"degrees": math.pi / 180.0, "deg": math.pi / 180.0, "radians": 1.0, "rad": 1.0}
+
+_ROOT = ("FTSensor",)
+_BODY = ("FTSensor", "Calibration")
+_Attributes = Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CalibrationFile:
+    """What a calibration file says."""
+
+    calibration: Calibration  # raw unit V; rated range from the file's `max`
+    sha256: str  # of the file's bytes, in hexadecimal
+    body: str  # of the transducer, e.g. "Nano43"
+    part_number: str  # e.g. "SI-36-0.5"
+    calibrated: str  # the day of calibration, as YYYY-MM-DD where the file's date can be understood
+    checked: bool  # the file prints its working matrix too, and both agree
+
+
+def read_calibration_file(path: Path) -> CalibrationFile:
+    """Return what the calibration file at `path` says. Raises SetupError where it cannot be read or makes no sense."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(LONGEST + 1)
+    except (OSError, ValueError) as error:
+        reason = (getattr(error, "strerror", None) or "not a file name").lower()
+        raise SetupError(f"{path}: cannot be read ({reason}); check the name of the calibration file") from None
+    return parse_calibration_file(data, path.name)
+
+
+def parse_calibration_file(data: bytes, name: str) -> CalibrationFile:
+    """Return what the bytes of a calibration file called `name` say. Raises SetupError with one sentence otherwise."""
+    try:
+        with np.errstate(all="ignore"):  # numbers too great for a matrix are found out below
+            return _parsed(data, name)
+    except _Unusable as why:
+        raise SetupError(f"{name}: {why}; take the file as the maker delivered it for this serial number") from None
+
+
+class _Unusable(Exception):
+    """Why a file cannot be used; the message is the middle of a sentence."""
+
+
+def _parsed(data: bytes, name: str) -> CalibrationFile:
+    found = _elements(data)
+    sensor, body = _only(found, _ROOT), _only(found, _BODY)
+    _refuse_what_is_not_known(sensor, body, found)
+    force = _unit(body, "ForceUnits", _FORCE)
+    torque = _unit(body, "TorqueUnits", _TORQUE)
+    units = np.repeat([force, torque], 3)  # N, N mm in one of the file's units
+    axes = _by_name(found, "Axis")
+    if len(axes) != 6:
+        raise _Unusable(f"it has {len(axes)} of the six Axis elements {', '.join(AXES)}")
+    scale = np.array([_above_zero(f"scale of {axis}", axes[axis].get("scale", "1")) for axis in AXES])
+    rated = np.array([_above_zero(f"max of {axis}", axes[axis].get("max", "")) for axis in AXES]) * units
+    transform = _transform(found, body)
+    matrix = transform @ (_rows(axes) * (units / scale)[:, None])
+    if not np.all(np.isfinite(matrix)) or np.linalg.matrix_rank(matrix) < 6:
+        raise _Unusable("its six Axis rows do not make a matrix that tells forces and torques apart")
+    user = _by_name(found, "UserAxis")
+    if len(user) == 6:
+        rounding = _ROUNDING * (units[:, None] + np.abs(transform) @ (units / scale)[:, None])
+        _check(matrix, _rows(user) * units[:, None], rounding)
+    serial, part, model = (
+        _word(where, key) for where, key in ((sensor, "Serial"), (body, "PartNumber"), (sensor, "BodyStyle"))
+    )
+    if not serial:
+        raise _Unusable("it names no Serial")
+    day = _day(_word(body, "CalDate"))
+    origin = " ".join(filter(None, (f"{name}:", model, part)))
+    source = f"{origin}, calibrated {day}" if day else f"{origin}, day of calibration not stated"
+    calibration = Calibration(serial, "V", _read_only(matrix), _read_only(rated), source)
+    return CalibrationFile(calibration, hashlib.sha256(data).hexdigest(), model, part, day, len(user) == 6)
+
+
+def _elements(data: bytes) -> list[tuple[tuple[str, ...], _Attributes]]:
+    """Return path and attributes of every element, in order. Declarations and entities are refused."""
+    if len(data) > LONGEST:
+        raise _Unusable(f"it is longer than {LONGEST} bytes, which no calibration file is")
+    found: list[tuple[tuple[str, ...], _Attributes]] = []
+    path: list[str] = []
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        path.append(tag)
+        if len(path) > 8:
+            raise _Unusable("its elements lie deeper in each other than in any calibration file")
+        found.append((tuple(path), attributes))
+
+    def end(_: str) -> None:
+        path.pop()
+
+    def refuse(*_: object) -> None:
+        raise _Unusable("it declares a document type, which no calibration file does")
+
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    parser.StartDoctypeDeclHandler = refuse
+    parser.EntityDeclHandler = refuse
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        raise _Unusable(f"it is not sound XML ({expat.ErrorString(error.code)}, line {error.lineno})") from None
+    except (LookupError, ValueError):  # what expat raises for an encoding it does not know
+        raise _Unusable("it is in an unknown encoding") from None
+    return found
+
+
+def _refuse_what_is_not_known(
+    sensor: _Attributes, body: _Attributes, found: list[tuple[tuple[str, ...], _Attributes]]
+) -> None:
+    """Raise where the file asks for a computation that is not done here: its wrench would not be true."""
+    for attributes, key, known in (
+        (sensor, "Family", ("DAQ",)),
+        (sensor, "NumGages", ("6",)),
+        (sensor, "CalFileVersion", ("1.0", "1.1")),
+        (body, "GainMultiplier", ("1",)),
+    ):
+        value = attributes.get(key, known[0]).strip()
+        if value not in known:
+            raise _Unusable(f"its {key} is {value[:20]!r}, and only {' or '.join(known)} can be read")
+    for path, _ in found:
+        if path[-1] in ("BiasSlope", "GainSlope", "Thermistor"):
+            raise _Unusable(f"its {path[-1]} asks for temperature compensation in software, which is not done here")
+
+
+def _only(found: list[tuple[tuple[str, ...], _Attributes]], path: tuple[str, ...]) -> _Attributes:
+    matching = [attributes for at, attributes in found if at == path]
+    if len(matching) != 1:
+        raise _Unusable(f"it has {len(matching)} {path[-1]} elements where a calibration file has one")
+    return matching[0]
+
+
+def _by_name(found: list[tuple[tuple[str, ...], _Attributes]], tag: str) -> dict[str, _Attributes]:
+    """Return the elements `tag` of the calibration by their axis."""
+    axes: dict[str, _Attributes] = {}
+    for path, attributes in found:
+        if path == (*_BODY, tag):
+            axis = attributes.get("Name", "").strip()
+            if axis not in AXES or axis in axes:
+                raise _Unusable(f"its {tag} {axis[:20]!r} is double or no axis")
+            axes[axis] = attributes
+    return axes
+
+
+def _rows(axes: Mapping[str, _Attributes]) -> Array:
+    """Return the six rows of numbers, shape (6, 6), in the order of AXES."""
+    rows = [[_number(text) for text in axes[axis].get("values", "").split()] for axis in AXES]
+    for axis, row in zip(AXES, rows, strict=True):
+        if len(row) != 6 or not all(math.isfinite(value) for value in row):
+            raise _Unusable(f"axis {axis} has not six numbers as its values")
+    return np.array(rows)
+
+
+def _transform(found: list[tuple[tuple[str, ...], _Attributes]], body: _Attributes) -> Array:
+    """Return the matrix (6, 6) that moves a wrench [N, N mm] to the origin and axes that BasicTransform names."""
+    placed = [attributes for path, attributes in found if path == (*_BODY, "BasicTransform")]
+    if not placed:
+        return np.eye(6)
+    if len(placed) > 1:
+        raise _Unusable("it has more than one BasicTransform")
+    values = {key: _number(placed[0].get(key, "0")) for key in ("Dx", "Dy", "Dz", "Rx", "Ry", "Rz")}
+    for key, value in values.items():
+        if not math.isfinite(value):
+            raise _Unusable(f"{key} of its BasicTransform is no number")
+    distance = _unit(body, "DistUnits", _DISTANCE)
+    angle = _unit(body, "AngleUnits", _ANGLE, "degrees")
+    d = np.array([values["Dx"], values["Dy"], values["Dz"]]) * distance
+    r = np.array([values["Rx"], values["Ry"], values["Rz"]]) * angle
+    return wrench_transform(d, r)
+
+
+def wrench_transform(d: Array, r: Array) -> Array:
+    """Return the matrix (6, 6) that takes a wrench [N, N mm] to a frame displaced by `d` (3,) [mm], turned by `r` (3,).
+
+    The turn [rad] is about x, then y, then z, as in the maker's DAQ F/T C library (ftrt.c, version 1.0.2).
+
+    >>> wrench_transform(np.array([0.0, 0.0, 4.0]), np.zeros(3))[3:, :3] + 0.0
+    array([[ 0.,  4.,  0.],
+           [-4.,  0.,  0.],
+           [ 0.,  0.,  0.]])
+    """
+    (sx, sy, sz), (cx, cy, cz) = np.sin(r), np.cos(r)
+    turn = np.array(
+        [
+            [cy * cz, sx * sy * cz + cx * sz, sx * sz - cx * sy * cz],
+            [-cy * sz, -sx * sy * sz + cx * cz, sx * cz + cx * sy * sz],
+            [sy, -sx * cy, cx * cy],
+        ]
+    )
+    dx, dy, dz = d
+    lever = np.array([[0.0, dz, -dy], [-dz, 0.0, dx], [dy, -dx, 0.0]])
+    return np.block([[turn, np.zeros((3, 3))], [turn @ lever, turn]])
+
+
+def _check(matrix: Array, printed: Array, rounding: Array) -> None:
+    """Raise where the file's own working matrix is another than the one computed, beyond its rounding."""
+    apart = np.abs(matrix - printed) > 1.01 * rounding
+    if np.any(apart):
+        axis, gauge = (int(i) for i in np.argwhere(apart)[0])
+        raise _Unusable(
+            f"its UserAxis {AXES[axis]} says {printed[axis, gauge]:.5f} for gauge {gauge} where its Axis rows give "
+            f"{matrix[axis, gauge]:.5f}"
+        )
+
+
+def _unit(attributes: _Attributes, key: str, known: Mapping[str, float], default: str = "") -> float:
+    text = attributes.get(key, default).strip()
+    if text not in known:
+        raise _Unusable(f"its {key} is {text[:20]!r}, and only {', '.join(known)} can be read")
+    return known[text]
+
+
+def _above_zero(what: str, text: str) -> float:
+    value = _number(text.strip())
+    if not (math.isfinite(value) and value > 0.0):
+        raise _Unusable(f"the {what} is {text[:40]!r}, which must be a number above 0")
+    return value
+
+
+def _number(text: str) -> float:
+    """Return a number written with a point, or nan: no other spelling, whatever the language of the computer."""
+    return float(text) if len(text) <= 40 and _NUMBER.fullmatch(text) else math.nan
+
+
+def _word(attributes: _Attributes, key: str) -> str:
+    """Return a short printable attribute, without blanks around it."""
+    text = attributes.get(key, "").strip()
+    if len(text) > 60 or not text.isprintable():
+        raise _Unusable(f"its {key} is no name")
+    return text
+
+
+def _day(text: str) -> str:
+    """Return a US date (month/day/year) as YYYY-MM-DD, or the text itself where it is none.
+
+    >>> _day("3/5/2014"), _day("spring 2014")
+    ('2014-03-05', 'spring 2014')
+    """
+    parts = re.fullmatch(r"(\d{1,2})/(\d{1,2})/(\d{4})", text, re.ASCII)
+    if parts is None:
+        return text
+    month, day, year = (int(part) for part in parts.groups())
+    try:
+        return date(year, month, day).isoformat()
+    except ValueError:
+        return text
+
+
+def _read_only(array: Array) -> Array:
+    array.flags.writeable = False
+    return array
