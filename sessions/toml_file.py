@@ -1,0 +1,190 @@
+"""A TOML file as frozen dataclasses, or one sentence that says which value is wrong and what is allowed."""
+
+import math
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import MISSING, fields, is_dataclass
+from pathlib import Path
+from types import NoneType
+from typing import Any, Literal, TypeVar, cast, get_args, get_origin, get_type_hints
+
+import msgspec
+
+T = TypeVar("T")
+
+
+class SettingsError(ValueError):
+    """A value in a file given by the user is wrong; the message names file, key, value and what is allowed."""
+
+
+class NotAllowed(ValueError):
+    """A value that is out of its range; raised by a dataclass that checks itself when it is made."""
+
+    def __init__(self, key: str, value: object, allowed: str) -> None:
+        """Name the `key` as the file does, the `value` found, and what is `allowed`."""
+        super().__init__(f"{key} = {value!r} is not allowed: {allowed}")
+        self.key = key
+        self.value = value
+        self.allowed = allowed
+
+
+def load_toml(path: Path, cls: type[T]) -> T:
+    """Return the dataclass that a TOML file describes.
+
+    Raises FileNotFoundError where there is none, SettingsError for anything wrong in it.
+    """
+    if not path.is_file():
+        raise FileNotFoundError(f"{path}: there is no such file; give the path of a TOML file")
+    try:
+        text = path.read_bytes().decode()
+        table = tomllib.loads(text)
+    except UnicodeDecodeError as error:
+        raise SettingsError(f"{path}: byte {error.start} is no UTF-8 text; save the file as UTF-8") from error
+    except tomllib.TOMLDecodeError as error:
+        raise SettingsError(f"{path}: this is not TOML: {error}") from error
+    try:
+        return from_table(table, cls, str(path))
+    except _Wrong as wrong:
+        line = _line_of(text, wrong.key)
+        where = f"{path}, line {line}" if line else str(path)
+        raise SettingsError(f"{where}: {wrong.sentence}") from wrong
+
+
+def from_table(table: Mapping[str, Any], cls: type[T], where: str) -> T:
+    """Return the dataclass that a table describes; `where` is how messages call the place it came from.
+
+    Unknown keys are refused, whole numbers are taken where a number with a fraction may stand, true and false are no
+    numbers, nan and infinity are refused. Raises SettingsError.
+    """
+    _check_keys(table, cls, "", where)
+    try:
+        return msgspec.convert(table, cls)
+    except msgspec.ValidationError as error:
+        path = _dotted(str(error))
+        cause = error.__cause__
+        if cause is None:
+            value, kind = _found_at(table, cls, path)
+            allowed = f"it must be {_in_words(kind)}"
+            raise _Wrong(where, path, f"{path} = {_shown(value)} is not allowed: {allowed}") from error
+        # A dataclass that checks itself names the key, in full or from itself on.
+        key = str(getattr(cause, "key", ""))
+        full = key if not path or key == path or key.startswith((f"{path}.", f"{path}[")) else f"{path}.{key}"
+        if not key:
+            raise _Wrong(where, path, f"{path or 'this'}: {cause}") from error
+        value: object = getattr(cause, "value", None)
+        allowed = str(getattr(cause, "allowed", cause)).rstrip(".")
+        raise _Wrong(where, full, f"{full} = {_shown(value)} is not allowed: {allowed}") from error
+
+
+class _Wrong(SettingsError):
+    """A SettingsError that still knows its key, so that the line can be found."""
+
+    def __init__(self, where: str, key: str, sentence: str) -> None:
+        super().__init__(f"{where}: {sentence}")
+        self.key = key
+        self.sentence = sentence
+
+
+def _check_keys(value: Any, kind: Any, key: str, where: str) -> None:  # noqa: ANN401  any TOML value, any annotation
+    """Refuse unknown and missing keys and numbers that are none, at any depth."""
+    if isinstance(value, float) and not math.isfinite(value):
+        raise _Wrong(where, key, f"{key} = {value} is not allowed: it must be a finite number")
+    if isinstance(value, list):
+        inner = _item_type(kind)
+        for i, item in enumerate(cast("list[Any]", value)):
+            _check_keys(item, inner, f"{key}[{i}]", where)
+    dataclass = _dataclass_in(kind)
+    if not isinstance(value, Mapping) or dataclass is None:
+        return
+    table = cast("Mapping[str, Any]", value)
+    hints = get_type_hints(dataclass)
+    for name, inside in table.items():
+        full = f"{key}.{name}" if key else name
+        if name not in hints:
+            raise _Wrong(where, full, f"{full} is not known; allowed here: {', '.join(hints)}")
+        _check_keys(inside, hints[name], full, where)
+    for field in fields(dataclass):
+        if field.default is MISSING and field.default_factory is MISSING and field.name not in table:
+            full = f"{key}.{field.name}" if key else field.name
+            raise _Wrong(where, key, f"{full} is missing; it must be {_in_words(hints[field.name])}")
+
+
+def _dataclass_in(kind: Any) -> Any:  # noqa: ANN401  annotations are objects of many classes
+    """Return the dataclass an annotation names, alone or in a union; else None."""
+    return next((choice for choice in (kind, *get_args(kind)) if is_dataclass(choice)), None)
+
+
+def _item_type(kind: Any) -> Any:  # noqa: ANN401  as above
+    """Return the type of the items of a tuple annotation; None where it is none, or its items differ."""
+    items = [item for item in get_args(kind) if item is not Ellipsis]
+    return items[0] if get_origin(kind) is tuple and len(items) == 1 else None
+
+
+def _in_words(kind: Any) -> str:  # noqa: ANN401  as above
+    """Say what an annotation allows.
+
+    >>> _in_words(tuple[float, float]), _in_words(Literal["steady", "history"]), _in_words(float | None)
+    ('a list of 2, each a number', '"steady" or "history"', 'a number')
+    """
+    simple = {float: "a number", int: "a whole number", str: "text in quotes", bool: "true or false"}
+    if kind in simple:
+        return simple[kind]
+    arguments = [argument for argument in get_args(kind) if argument is not NoneType]
+    if get_origin(kind) is Literal:
+        return " or ".join(f'"{choice}"' for choice in arguments)
+    if get_origin(kind) is tuple:
+        item = _in_words(arguments[0])
+        return f"a list, each {item}" if Ellipsis in arguments else f"a list of {len(arguments)}, each {item}"
+    if is_dataclass(kind):
+        return "a table"
+    return " or ".join(_in_words(argument) for argument in arguments) or "a value"
+
+
+def _dotted(message: str) -> str:
+    """Return the key a msgspec message speaks of, as a TOML file would write it; "" for the whole file."""
+    found = re.search(r" - at `\$\.?(.*?)`$", message)
+    return found.group(1) if found else ""
+
+
+def _found_at(table: Any, kind: Any, key: str) -> tuple[object, Any]:  # noqa: ANN401  as above
+    """Return the value at a dotted key, and the annotation it should have met."""
+    for part in re.findall(r"[^.\[\]]+", key):
+        if part.isdigit():
+            kinds = [item for item in get_args(kind) if item is not Ellipsis]
+            table, kind = table[int(part)], kinds[min(int(part), len(kinds) - 1)]
+        else:
+            table, kind = table[part], get_type_hints(_dataclass_in(kind))[part]
+    return table, kind
+
+
+def _shown(value: object) -> str:
+    """Return a value as TOML writes it, cut short.
+
+    >>> _shown("a"), _shown(True), _shown([1, 2.5])
+    ('"a"', 'true', '[1, 2.5]')
+    """
+    text = {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
+    if isinstance(value, str):
+        text = f'"{value}"'
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _line_of(text: str, key: str) -> int | None:
+    """Return the line of a TOML text on which a dotted key is set or its table begins; None when not found."""
+    counted: dict[str, int] = {}
+    here = ""
+    best: int | None = None
+    for number, line in enumerate(text.splitlines(), 1):
+        if header := re.match(r"\s*\[\[?\s*([\w.\-]+)\s*\]\]?\s*(#.*)?$", line):
+            here = header.group(1)
+            if line.lstrip().startswith("[["):
+                counted[here] = counted.get(here, -1) + 1
+                here += f"[{counted[here]}]"
+            if key == here:
+                best = number
+        elif assigned := re.match(r"\s*([\w.\-]+)\s*=", line):
+            full = f"{here}.{assigned.group(1)}" if here else assigned.group(1)
+            if key == full or key.startswith((f"{full}.", f"{full}[")):
+                return number
+    return best

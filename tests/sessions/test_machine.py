@@ -1,0 +1,331 @@
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sessions.machine import advance, start, trial_in_hand
+from sessions.plan import Frame, SessionPlan
+from sessions.protocols import plan, protocol
+from sessions.steps import (
+    Abort,
+    AskBegin,
+    AskFinish,
+    AskMount,
+    AskScore,
+    AskStroke,
+    Begin,
+    Closing,
+    ContactOnset,
+    DiscardTake,
+    Ended,
+    EndSession,
+    FingerLifted,
+    Finish,
+    KeepTake,
+    MeasureZero,
+    Mounting,
+    Pause,
+    Paused,
+    Ready,
+    Redo,
+    Refuse,
+    Resume,
+    Scored,
+    Scoring,
+    ShowInstruction,
+    Skip,
+    StartTake,
+    StimulusMounted,
+    StrokeDone,
+    Stroking,
+    Taring,
+    Tell,
+    Zeroed,
+)
+
+FORCES = plan(protocol("sensotact-friction"), "S01", 3)
+SCORES = plan(protocol("sensotact-friction"), "S01", 3, forces=False)
+CODES = [trial.stimulus.code for trial in FORCES.trials]
+FIRST = FORCES.trials[0]
+
+
+def after(plan, *events):
+    """State and last commands when `events` follow one another, none of them refused."""
+    state, commands = start(plan)
+    for event in events:
+        state, commands = advance(state, event)
+        assert not any(isinstance(command, Refuse) for command in commands), (event, commands)
+    return state, commands
+
+
+def mounted(trial=0):
+    return StimulusMounted(CODES[trial])
+
+
+STROKE = (ContactOnset(), FingerLifted())
+
+
+def done(trial=0, score=50.0):
+    return (mounted(trial), Zeroed(), *STROKE, Scored(score))
+
+
+# ---- the course as it is meant
+
+
+def test_a_session_waits_for_the_experimenter_and_then_reads_the_first_instruction():
+    assert start(FORCES)[1] == (AskBegin(),)
+    state, commands = after(FORCES, Begin())
+    assert isinstance(state, Mounting)
+    assert commands == (ShowInstruction(FORCES.blocks[0]), AskMount(FIRST))
+
+
+def test_a_trial_with_forces_goes_mount_zero_stroke_score():
+    assert after(FORCES, Begin(), mounted())[1] == (StartTake(1, 1), MeasureZero())
+    assert after(FORCES, Begin(), mounted(), Zeroed())[1] == (AskStroke(FIRST),)
+    assert isinstance(after(FORCES, Begin(), mounted(), Zeroed(), ContactOnset())[0], Stroking)
+    state, commands = after(FORCES, Begin(), mounted(), Zeroed(), *STROKE)
+    assert isinstance(state, Scoring)
+    assert commands == (AskScore(FIRST, FORCES.blocks[0].scale_ends),)
+    state, commands = after(FORCES, Begin(), *done())
+    assert commands == (KeepTake(1, 1), AskMount(FORCES.trials[1]))
+
+
+def test_a_trial_without_forces_has_no_zero_and_its_stroke_is_reported():
+    assert after(SCORES, Begin(), mounted())[1] == (StartTake(1, 1), AskStroke(SCORES.trials[0]))
+    _state, commands = after(SCORES, Begin(), mounted(), StrokeDone(), Scored(None))
+    assert commands == (KeepTake(1, 1), AskMount(SCORES.trials[1]))
+
+
+def test_a_new_block_begins_with_its_instruction():
+    five = [event for trial in range(5) for event in done(trial)]
+    assert after(FORCES, Begin(), *five)[1][1:] == (ShowInstruction(FORCES.blocks[1]), AskMount(FORCES.trials[5]))
+
+
+def test_a_whole_session_visits_every_trial_once_in_the_plans_order_and_ends_complete():
+    state, commands = start(FORCES)
+    kept = []
+    for event in (Begin(), *(event for trial in range(10) for event in done(trial)), Finish()):
+        state, commands = advance(state, event)
+        kept += [command.trial for command in commands if isinstance(command, KeepTake)]
+    assert kept == list(range(1, 11))
+    assert state == Ended("every trial is done", complete=True)
+    assert commands == (EndSession("every trial is done", complete=True),)
+
+
+def test_the_last_trial_can_be_repeated_before_the_session_is_ended():
+    all_done = (Begin(), *(event for trial in range(10) for event in done(trial)))
+    assert after(FORCES, *all_done)[1] == (KeepTake(10, 1), AskFinish())
+    state, commands = after(FORCES, *all_done, Redo("finger slipped off"))
+    assert commands == (DiscardTake(10, 1, "finger slipped off"), AskMount(FORCES.trials[9]))
+    state, commands = after(FORCES, *all_done, Redo("finger slipped off"), *done(9), Finish())
+    assert state == Ended("every trial is done", complete=True)
+
+
+# ---- what is refused
+
+
+def test_the_wrong_stimulus_is_refused_by_its_label():
+    state, _ = after(FORCES, Begin())
+    same, (refused,) = advance(state, StimulusMounted(CODES[1]))
+    assert same == state
+    assert refused == Refuse(f"trial 1 needs the stimulus {CODES[0]}, not {CODES[1]}")
+
+
+@pytest.mark.parametrize("score", [-0.1, 100.1, float("nan"), float("inf")])
+def test_a_score_off_the_line_is_refused(score):
+    state, _ = after(FORCES, Begin(), mounted(), Zeroed(), *STROKE)
+    same, (refused,) = advance(state, Scored(score))
+    assert same == state
+    assert refused.sentence.startswith("a score lies between 0 and 100")
+
+
+@pytest.mark.parametrize("event", [Redo(" "), Skip("")])
+def test_redo_and_skip_without_a_reason_are_refused(event):
+    state, _ = after(FORCES, Begin(), mounted())
+    assert advance(state, event)[0] == state
+    assert "needs a reason" in advance(state, event)[1][0].sentence
+
+
+def test_a_plan_without_trials_is_not_run():
+    with pytest.raises(ValueError, match="nothing to run"):
+        start(SessionPlan("imported", "S01", 0, "none", (), True, Frame()))
+
+
+def test_a_transducers_events_mean_nothing_in_a_visit_without_one_and_the_other_way_round():
+    state, _ = after(SCORES, Begin(), mounted())
+    assert isinstance(advance(state, ContactOnset())[1][0], Refuse)
+    state, _ = after(FORCES, Begin(), mounted(), Zeroed())
+    assert isinstance(advance(state, StrokeDone())[1][0], Refuse)
+
+
+# ---- redo, skip, pause, abort
+
+
+@pytest.mark.parametrize("so_far", [(), (Zeroed(),), (Zeroed(), STROKE[0]), (Zeroed(), *STROKE)])
+def test_redo_discards_the_take_and_opens_another_of_the_same_trial(so_far):
+    state, commands = after(FORCES, Begin(), mounted(), *so_far, Redo("sneezed"))
+    assert commands == (DiscardTake(1, 1, "sneezed"), StartTake(1, 2), MeasureZero())
+    assert isinstance(state, Taring)
+    assert trial_in_hand(state) == 1
+
+
+def test_redo_just_before_a_trial_repeats_the_one_before_and_the_order_goes_on_as_planned():
+    state, commands = after(FORCES, Begin(), *done(0), *done(1), Redo("wrong finger"))
+    assert commands == (DiscardTake(2, 1, "wrong finger"), AskMount(FORCES.trials[1]))
+    _state, commands = after(FORCES, Begin(), *done(0), *done(1), Redo("wrong finger"), *done(1))
+    assert commands == (KeepTake(2, 2), AskMount(FORCES.trials[2]))
+
+
+def test_pressing_redo_twice_does_not_reach_further_back():
+    state, _ = after(FORCES, Begin(), *done(0), *done(1), Redo("wrong finger"))
+    same, (refused,) = advance(state, Redo("wrong finger"))
+    assert same == state
+    assert refused == Refuse("trial 2 is about to be repeated already")
+
+
+def test_a_skipped_trial_can_be_taken_up_again():
+    state, commands = after(FORCES, Begin(), mounted(), Skip("surface dirty"))
+    assert commands == (DiscardTake(1, 1, "skipped: surface dirty"), AskMount(FORCES.trials[1]))
+    _state, commands = after(FORCES, Begin(), mounted(), Skip("surface dirty"), Redo("cleaned"))
+    assert commands == (AskMount(FIRST),)
+
+
+def test_a_pause_before_the_stroke_is_done_discards_the_take_and_mounts_anew():
+    state, commands = after(FORCES, Begin(), mounted(), Zeroed(), Pause())
+    assert [type(command) for command in commands] == [DiscardTake]
+    _state, commands = after(FORCES, Begin(), mounted(), Zeroed(), Pause(), Resume())
+    assert commands == (AskMount(FIRST),)
+    assert after(FORCES, Begin(), mounted(), Zeroed(), Pause(), Resume(), mounted())[1][0] == StartTake(1, 2)
+
+
+def test_a_pause_before_the_score_keeps_the_stroke_and_asks_again():
+    state, commands = after(FORCES, Begin(), mounted(), Zeroed(), *STROKE, Pause(), Resume())
+    assert isinstance(state, Scoring)
+    assert [type(command) for command in commands] == [AskScore]
+
+
+def test_a_further_stroke_before_the_score_is_told_and_the_take_stays():
+    state, commands = after(FORCES, Begin(), mounted(), Zeroed(), *STROKE, ContactOnset())
+    assert [type(command) for command in commands] == [Tell]
+    _state, commands = after(FORCES, Begin(), mounted(), Zeroed(), *STROKE, *STROKE, Scored(1.0))
+    assert commands[0] == KeepTake(1, 1)
+
+
+def test_abort_names_its_reason_and_discards_the_open_take():
+    state, commands = after(FORCES, Begin(), mounted(), Abort("fire alarm"))
+    assert commands == (DiscardTake(1, 1, "fire alarm"), EndSession("fire alarm", complete=False))
+    assert state == Ended("fire alarm", complete=False)
+
+
+# ---- random walks
+
+EVENTS = st.one_of(
+    st.sampled_from([Begin(), Zeroed(), ContactOnset(), FingerLifted(), StrokeDone(), Pause(), Resume(), Finish()]),
+    st.builds(StimulusMounted, st.sampled_from(CODES)),
+    st.builds(Scored, st.none() | st.floats(-10, 110)),
+    st.builds(Redo, st.sampled_from(["", "sneezed"])),
+    st.builds(Skip, st.sampled_from(["", "dirty"])),
+)
+PLANS = st.sampled_from([FORCES, SCORES])
+
+
+def meant(state):
+    """The event that leads on from `state`."""
+    match state:
+        case Mounting(place):
+            return StimulusMounted(place.trial.stimulus.code)
+        case Taring():
+            return Zeroed()
+        case Ready(place):
+            return ContactOnset() if place.plan.forces else StrokeDone()
+        case Stroking():
+            return FingerLifted()
+        case Scoring():
+            return Scored(40.0)
+        case Paused():
+            return Resume()
+        case Closing():
+            return Finish()
+        case _:
+            return Begin()
+
+
+@st.composite
+def walks(draw):
+    """A plan and events, at least half of which lead on."""
+    plan = draw(PLANS)
+    state, _ = start(plan)
+    events = []
+    for chance in draw(st.lists(st.none() | EVENTS, max_size=80)):
+        event = meant(state) if chance is None else chance
+        events.append(event)
+        state, _ = advance(state, event)
+    return plan, events
+
+
+def steps(plan, events):
+    """Every (state before, event, state after, commands) of a walk."""
+    state, _ = start(plan)
+    found = []
+    for event in events:
+        before = state
+        state, commands = advance(state, event)
+        found.append((before, event, state, commands))
+    return found
+
+
+@given(walk=walks())
+@settings(max_examples=300)
+def test_from_any_state_any_event_is_meant_or_refused_with_a_sentence(walk):
+    for before, _, state, commands in steps(*walk):
+        refusals = [command for command in commands if isinstance(command, Refuse)]
+        if refusals:
+            assert state == before
+            assert commands == tuple(refusals)
+            assert len(refusals[0].sentence.split()) > 3
+        else:
+            assert state != before or commands
+
+
+@given(walk=walks())
+def test_the_same_plan_and_events_give_the_same_session(walk):
+    assert steps(*walk) == steps(*walk)
+
+
+@given(walk=walks())
+@settings(max_examples=300)
+def test_no_walk_brings_the_order_into_disorder_or_confuses_takes(walk):
+    kept, open_take, begun, asked = {}, None, set(), {}
+    for _, _, state, commands in steps(*walk):
+        for command in commands:
+            match command:
+                case StartTake(trial, take):
+                    assert open_take is None
+                    assert (trial, take - 1) in begun or take == 1
+                    assert (trial, take) not in begun
+                    begun.add((trial, take))
+                    open_take = (trial, take)
+                case KeepTake(trial, take):
+                    assert open_take == (trial, take)
+                    assert trial not in kept
+                    kept[trial], open_take = take, None
+                case DiscardTake(trial, take):
+                    assert (trial, take) == open_take or kept.pop(trial) == take
+                    open_take = None
+                case AskMount(trial):
+                    asked.setdefault(trial.number)
+        if isinstance(state, Closing):
+            assert open_take is None
+    assert list(asked) == list(range(1, len(asked) + 1))
+
+
+@given(walk=walks())
+def test_every_walk_can_be_completed_and_can_be_aborted(walk):
+    plan, events = walk
+    state = ([start(plan)[0]] + [step[2] for step in steps(plan, events)])[-1]
+    if not isinstance(state, Ended):
+        assert isinstance(advance(state, Abort("enough"))[0], Ended)
+    for _ in range(100):
+        if isinstance(state, Ended):
+            break
+        state, _ = advance(state, meant(state))
+    assert isinstance(state, Ended)

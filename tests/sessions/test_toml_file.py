@@ -1,0 +1,128 @@
+from dataclasses import dataclass, field
+from typing import Literal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sessions.toml_file import NotAllowed, SettingsError, from_table, load_toml
+from solver.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Inner:
+    depth: float
+    pair: tuple[float, float] = (1.0, 2.0)
+
+    def __post_init__(self):
+        if self.depth > 10:
+            raise NotAllowed("depth", self.depth, "it must not exceed 10 mm")
+
+
+@dataclass(frozen=True, slots=True)
+class Outer:
+    count: int
+    inner: Inner
+    kind: Literal["one", "two"] = "one"
+    note: str = ""
+    limit: float | None = None
+    many: tuple[Inner, ...] = field(default_factory=tuple)
+
+
+GOOD = {"count": 3, "inner": {"depth": 2}}
+
+
+def test_whole_numbers_stand_for_numbers_and_defaults_for_what_is_left_out():
+    assert from_table(GOOD, Outer, "here") == Outer(3, Inner(2.0))
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"count": 2.5}, "here: count = 2.5 is not allowed: it must be a whole number"),
+        ({"count": True}, "here: count = true is not allowed: it must be a whole number"),
+        ({"inner": {"depth": True}}, "here: inner.depth = true is not allowed: it must be a number"),
+        ({"inner": {"depth": "2"}}, 'here: inner.depth = "2" is not allowed: it must be a number'),
+        ({"inner": {"depth": float("nan")}}, "here: inner.depth = nan is not allowed: it must be a finite number"),
+        ({"limit": float("inf")}, "here: limit = inf is not allowed: it must be a finite number"),
+        ({"inner": {"depth": 11}}, "here: inner.depth = 11.0 is not allowed: it must not exceed 10 mm"),
+        (
+            {"many": [{"depth": 1}, {"depth": 12}]},
+            "here: many[1].depth = 12.0 is not allowed: it must not exceed 10 mm",
+        ),
+        ({"many": [{"depth": 1, "x": 1}]}, "here: many[0].x is not known; allowed here: depth, pair"),
+        ({"inner": {}}, "here: inner.depth is missing; it must be a number"),
+        (
+            {"inner": {"depth": 1, "pair": [1]}},
+            "here: inner.pair = [1] is not allowed: it must be a list of 2, each a number",
+        ),
+        ({"kind": "three"}, 'here: kind = "three" is not allowed: it must be "one" or "two"'),
+        ({"note": 3}, "here: note = 3 is not allowed: it must be text in quotes"),
+        ({"inner": 3}, "here: inner = 3 is not allowed: it must be a table"),
+        ({"colour": 3}, "here: colour is not known; allowed here: count, inner, kind, note, limit, many"),
+    ],
+)
+def test_a_wrong_value_gives_one_sentence_with_its_key_its_value_and_what_is_allowed(change, sentence):
+    with pytest.raises(SettingsError) as caught:
+        from_table({**GOOD, **change}, Outer, "here")
+    assert str(caught.value) == sentence
+
+
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | st.dates(),
+    lambda inside: st.lists(inside, max_size=3) | st.dictionaries(st.sampled_from([*"abc", "depth", "pair"]), inside),
+    max_leaves=8,
+)
+
+
+@given(table=st.dictionaries(st.sampled_from(["count", "inner", "kind", "note", "limit", "many", "odd"]), VALUES))
+def test_any_table_gives_the_dataclass_or_one_sentence(table):
+    try:
+        made = from_table(table, Outer, "here")
+    except SettingsError as error:
+        made = error
+    assert isinstance(made, Outer) or str(made).startswith("here: ")
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"none\.toml: there is no such file"):
+        load_toml(tmp_path / "none.toml", Outer)
+
+
+@pytest.mark.parametrize("content", [b"count = = 1", b"count = 1\ncount = 2", b"\xff\xfe"])
+def test_what_is_not_toml_is_refused_with_the_files_name(tmp_path, content):
+    path = tmp_path / "broken.toml"
+    path.write_bytes(content)
+    with pytest.raises(SettingsError, match=r"broken\.toml: "):
+        load_toml(path, Outer)
+
+
+SCENE = "[finger]\ntip_radius = 5.0\n\n[friction]\nmu = 0.67\n\n[loading]\nindentation = 2.0\n"
+
+
+@pytest.mark.parametrize(
+    ("was", "written", "named"),
+    [
+        ("mu = 0.67", "mu = -1", "line 5: friction.mu = -1.0 is not allowed: "),
+        ("mu = 0.67", 'mu = "a lot"', 'line 5: friction.mu = "a lot" is not allowed: it must be a number'),
+        ("tip_radius = 5.0", "tip_radius = 5.0\nnail = 1", "line 3: finger.nail is not known; "),
+        (
+            "[finger]",
+            "[materials.fat]\nE = 0.03\nnu = 0.5\n[finger]",
+            "line 3: materials.fat.nu = 0.5 is not allowed: ",
+        ),
+        ("indentation = 2.0", "indentation = 15", "line 8: loading.indentation = 15.0 is not allowed: "),
+    ],
+)
+def test_a_wrong_scene_file_is_refused_with_its_line(tmp_path, was, written, named):
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE.replace(was, written))
+    with pytest.raises(SettingsError) as caught:
+        load_toml(path, Scene)
+    assert str(caught.value).startswith(f"{path}, {named}")
+
+
+def test_a_right_scene_file_gives_the_scene(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    assert load_toml(path, Scene).friction.mu == 0.67
