@@ -57,6 +57,10 @@ def after(plan, *events):
     return state, commands
 
 
+def commands_after(plan, *events):
+    return after(plan, *events)[1]
+
+
 def mounted(trial=0):
     return StimulusMounted(CODES[trial])
 
@@ -79,25 +83,25 @@ def test_a_session_waits_for_the_experimenter_and_then_reads_the_first_instructi
 
 
 def test_a_trial_with_forces_goes_mount_zero_stroke_score():
-    assert after(FORCES, Begin(), mounted())[1] == (StartTake(1, 1), MeasureZero())
-    assert after(FORCES, Begin(), mounted(), Zeroed())[1] == (AskStroke(FIRST),)
+    assert commands_after(FORCES, Begin(), mounted()) == (StartTake(1, 1), MeasureZero())
+    assert commands_after(FORCES, Begin(), mounted(), Zeroed()) == (AskStroke(FIRST),)
     assert isinstance(after(FORCES, Begin(), mounted(), Zeroed(), ContactOnset())[0], Stroking)
     state, commands = after(FORCES, Begin(), mounted(), Zeroed(), *STROKE)
     assert isinstance(state, Scoring)
     assert commands == (AskScore(FIRST, FORCES.blocks[0].scale_ends),)
-    state, commands = after(FORCES, Begin(), *done())
+    commands = commands_after(FORCES, Begin(), *done())
     assert commands == (KeepTake(1, 1), AskMount(FORCES.trials[1]))
 
 
 def test_a_trial_without_forces_has_no_zero_and_its_stroke_is_reported():
-    assert after(SCORES, Begin(), mounted())[1] == (StartTake(1, 1), AskStroke(SCORES.trials[0]))
-    _state, commands = after(SCORES, Begin(), mounted(), StrokeDone(), Scored(None))
+    assert commands_after(SCORES, Begin(), mounted()) == (StartTake(1, 1), AskStroke(SCORES.trials[0]))
+    commands = commands_after(SCORES, Begin(), mounted(), StrokeDone(), Scored(None))
     assert commands == (KeepTake(1, 1), AskMount(SCORES.trials[1]))
 
 
 def test_a_new_block_begins_with_its_instruction():
     five = [event for trial in range(5) for event in done(trial)]
-    assert after(FORCES, Begin(), *five)[1][1:] == (ShowInstruction(FORCES.blocks[1]), AskMount(FORCES.trials[5]))
+    assert commands_after(FORCES, Begin(), *five)[1:] == (ShowInstruction(FORCES.blocks[1]), AskMount(FORCES.trials[5]))
 
 
 def test_a_whole_session_visits_every_trial_once_in_the_plans_order_and_ends_complete():
@@ -113,8 +117,8 @@ def test_a_whole_session_visits_every_trial_once_in_the_plans_order_and_ends_com
 
 def test_the_last_trial_can_be_repeated_before_the_session_is_ended():
     all_done = (Begin(), *(event for trial in range(10) for event in done(trial)))
-    assert after(FORCES, *all_done)[1] == (KeepTake(10, 1), AskFinish())
-    state, commands = after(FORCES, *all_done, Redo("finger slipped off"))
+    assert commands_after(FORCES, *all_done) == (KeepTake(10, 1), AskFinish())
+    commands = commands_after(FORCES, *all_done, Redo("finger slipped off"))
     assert commands == (DiscardTake(10, 1, "finger slipped off"), AskMount(FORCES.trials[9]))
     state, commands = after(FORCES, *all_done, Redo("finger slipped off"), *done(9), Finish())
     assert state == Ended("every trial is done", complete=True)
@@ -169,9 +173,9 @@ def test_redo_discards_the_take_and_opens_another_of_the_same_trial(so_far):
 
 
 def test_redo_just_before_a_trial_repeats_the_one_before_and_the_order_goes_on_as_planned():
-    state, commands = after(FORCES, Begin(), *done(0), *done(1), Redo("wrong finger"))
+    commands = commands_after(FORCES, Begin(), *done(0), *done(1), Redo("wrong finger"))
     assert commands == (DiscardTake(2, 1, "wrong finger"), AskMount(FORCES.trials[1]))
-    _state, commands = after(FORCES, Begin(), *done(0), *done(1), Redo("wrong finger"), *done(1))
+    commands = commands_after(FORCES, Begin(), *done(0), *done(1), Redo("wrong finger"), *done(1))
     assert commands == (KeepTake(2, 2), AskMount(FORCES.trials[2]))
 
 
@@ -183,18 +187,18 @@ def test_pressing_redo_twice_does_not_reach_further_back():
 
 
 def test_a_skipped_trial_can_be_taken_up_again():
-    state, commands = after(FORCES, Begin(), mounted(), Skip("surface dirty"))
+    commands = commands_after(FORCES, Begin(), mounted(), Skip("surface dirty"))
     assert commands == (DiscardTake(1, 1, "skipped: surface dirty"), AskMount(FORCES.trials[1]))
-    _state, commands = after(FORCES, Begin(), mounted(), Skip("surface dirty"), Redo("cleaned"))
+    commands = commands_after(FORCES, Begin(), mounted(), Skip("surface dirty"), Redo("cleaned"))
     assert commands == (AskMount(FIRST),)
 
 
 def test_a_pause_before_the_stroke_is_done_discards_the_take_and_mounts_anew():
-    state, commands = after(FORCES, Begin(), mounted(), Zeroed(), Pause())
+    commands = commands_after(FORCES, Begin(), mounted(), Zeroed(), Pause())
     assert [type(command) for command in commands] == [DiscardTake]
-    _state, commands = after(FORCES, Begin(), mounted(), Zeroed(), Pause(), Resume())
+    commands = commands_after(FORCES, Begin(), mounted(), Zeroed(), Pause(), Resume())
     assert commands == (AskMount(FIRST),)
-    assert after(FORCES, Begin(), mounted(), Zeroed(), Pause(), Resume(), mounted())[1][0] == StartTake(1, 2)
+    assert commands_after(FORCES, Begin(), mounted(), Zeroed(), Pause(), Resume(), mounted())[0] == StartTake(1, 2)
 
 
 def test_a_pause_before_the_score_keeps_the_stroke_and_asks_again():
@@ -204,9 +208,9 @@ def test_a_pause_before_the_score_keeps_the_stroke_and_asks_again():
 
 
 def test_a_further_stroke_before_the_score_is_told_and_the_take_stays():
-    state, commands = after(FORCES, Begin(), mounted(), Zeroed(), *STROKE, ContactOnset())
+    commands = commands_after(FORCES, Begin(), mounted(), Zeroed(), *STROKE, ContactOnset())
     assert [type(command) for command in commands] == [Tell]
-    _state, commands = after(FORCES, Begin(), mounted(), Zeroed(), *STROKE, *STROKE, Scored(1.0))
+    commands = commands_after(FORCES, Begin(), mounted(), Zeroed(), *STROKE, *STROKE, Scored(1.0))
     assert commands[0] == KeepTake(1, 1)
 
 
