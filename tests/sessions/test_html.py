@@ -172,7 +172,7 @@ def test_a_report_without_plan_scores_or_predictions_shows_what_it_has():
 
 
 def test_a_report_with_nothing_in_it_is_still_a_page():
-    assert "Nothing was excluded." in Words(page(bare())).words
+    assert "No subject, trial, take or stroke was excluded." in Words(page(bare())).words
 
 
 def test_planted_and_recovered_friction_stand_side_by_side(made):

@@ -51,7 +51,8 @@ def _scores(report: Report) -> Plate:
 def _friction(report: Report) -> Plate:
     caption = (
         "Ratio of tangential to normal force from contact onset on. Thick: the steady window, over which the dynamic "
-        "coefficient is averaged. The ratio is left out where the normal force is too small to divide by."
+        "coefficient is averaged. Dashed: a stroke of which no coefficient is given, the tables say why. The ratio is "
+        "left out where the normal force is too small to divide by."
     )
     panels = [friction_panel(strokes, name, simulated=report.simulated) for name, strokes in _grouped(report)]
     return Plate("friction", caption, tuple(panel for panel in panels if panel is not None))

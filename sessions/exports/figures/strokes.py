@@ -74,7 +74,8 @@ def _draw(
         y = [math.nan if v is None else v for v in values]
         level = levels[stroke.number]
         text = _name(stroke) + (f", {what} {level:.3g} over the steady window" if level is not None else "")
-        axes.plot(trace.time, y, color=shade, linewidth=0.7, gid=drawn.note(text))
+        style = "solid" if level is not None else (0, (3, 2))
+        axes.plot(trace.time, y, color=shade, linewidth=0.7, linestyle=style, gid=drawn.note(text))
         steady = [v if within else math.nan for v, within in zip(y, inside, strict=True)]
         axes.plot(trace.time, steady, color=shade, linewidth=2.2, solid_capstyle="butt")
         drawn_values = [

@@ -12,10 +12,10 @@ def stroke_table(report: Report) -> Table | None:
     if not report.strokes:
         return None
     notes = Notes()
+    planned = any(stroke.trial is not None for stroke in report.strokes)
     columns = (
         Column("stroke"),
-        Column("trial"),
-        Column("index"),
+        *((Column("trial"), Column("index")) if planned else ()),
         Column("onset", "s"),
         Column("µ static"),
         Column("µ dynamic"),
@@ -26,7 +26,7 @@ def stroke_table(report: Report) -> Table | None:
         Column("direction"),
         Column("flaws"),
     )
-    groups = grouped(report, report.strokes, lambda s: s.experiment, lambda s: _stroke_row(s, notes))
+    groups = grouped(report, report.strokes, lambda s: s.experiment, lambda s: _stroke_row(s, notes, planned=planned))
     caption = (
         "Strokes. µ dynamic: mean over the steady window (± half its 95 % interval); µ static: height of the static "
         "peak; µ maximum: greatest above the force floor; τ max: greatest tangential force over the contact area; "
@@ -35,7 +35,7 @@ def stroke_table(report: Report) -> Table | None:
     return Table("table-strokes", caption, columns, groups, notes.listed())
 
 
-def _stroke_row(stroke: StrokeFinding, notes: Notes) -> tuple[Cell, ...]:
+def _stroke_row(stroke: StrokeFinding, notes: Notes, *, planned: bool) -> tuple[Cell, ...]:
     def cell(name: str, value: float | None, shown: Callable[[float], str]) -> Cell:
         return notes.number(value, shown, stroke.reasons.get(name))
 
@@ -44,8 +44,7 @@ def _stroke_row(stroke: StrokeFinding, notes: Notes) -> tuple[Cell, ...]:
     marks = ", ".join(name.replace("_", " ") for name in stroke.flaws)
     return (
         Cell(str(stroke.number)),
-        cell("trial", stroke.trial, places(0)),
-        cell("index", stroke.index, places(0)),
+        *((cell("trial", stroke.trial, places(0)), cell("index", stroke.index, places(0))) if planned else ()),
         cell("onset", stroke.onset, places(3)),
         cell("mu_static", stroke.mu_static, places(3)),
         cell("mu_dynamic", stroke.mu_dynamic, lambda v: with_error(v, half, 3)),
@@ -63,7 +62,8 @@ def planted_table(report: Report) -> Table | None:
     if not report.planted:
         return None
     notes = Notes()
-    found = {stroke.trial: stroke for stroke in report.strokes if stroke.trial is not None}
+    # Of several strokes in a trial the model gets the first.
+    found = {stroke.trial: stroke for stroke in reversed(report.strokes) if stroke.trial is not None}
     given = {prediction.trial: prediction for prediction in report.predictions}
     columns = (
         Column("trial"),
@@ -109,5 +109,8 @@ def planted_table(report: Report) -> Table | None:
 
     names = {p.trial: s.experiment for p in report.planted if (s := found.get(p.trial)) is not None}
     groups = grouped(report, report.planted, lambda p: names.get(p.trial, ""), row)
-    caption = "Planted friction beside what the analysis found. The analysis does not know what was planted."
+    caption = (
+        "Planted friction beside what the analysis found: the µ and τ max that the model gets, and the speed. The "
+        "analysis does not know what was planted."
+    )
     return Table("table-planted", caption, columns, groups, notes.listed())

@@ -1,0 +1,153 @@
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from report_session import CALIBRATION, INFO, PROVENANCE, ToldClock, record
+
+from drivers.readings import ReadingBlock
+from sessions.analysis.analysis import analyse
+from sessions.analysis.scores import Score, ScoreTable, score_table
+from sessions.exports.html import page
+from sessions.plan import Frame, SessionPlan
+from sessions.recording import Recording, SessionWriter
+from sessions.report import Planted, findings
+from sessions.report.strokes import _extremes
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    """A session on the simulated bench, its third trial stroked twice; recording, analysis, what was planted."""
+    folder, planted = record(tmp_path_factory.mktemp("bench") / "P01", discard=3)
+    recording = Recording.open(folder)
+    truth = [Planted(trial, p.mu, p.tau_max, p.speed, p.direction) for trial, p in planted]
+    return recording, analyse(recording), truth
+
+
+@pytest.fixture(scope="module")
+def report(session):
+    recording, analysis, truth = session
+    return findings(recording, analysis, planted=truth)
+
+
+def foreign(folder, *, press=2.0):
+    """Record two strokes without a plan, as wrenches in N and N mm."""
+    time = np.arange(0, 8, 0.005)
+    normal = press * (((time > 2) & (time < 4)) | ((time > 5) & (time < 7)))
+    noise = np.random.default_rng(1).normal(0, 0.003, (len(time), 6))
+    wrench = np.column_stack([0.5 * normal, 0 * time, -normal, 0 * time, 20 * time % 40 * normal, 0 * time]) + noise
+    plan = SessionPlan("import", "", 0, "none", (), True, Frame())
+    info = dataclasses.replace(
+        INFO,
+        simulated=False,
+        model="force plate",
+        calibration=dataclasses.replace(CALIBRATION, raw_unit="N, N mm", matrix=np.eye(6)),
+    )
+    writer = SessionWriter.create(folder, plan, info, PROVENANCE, clock=ToldClock())
+    counter = np.arange(len(time))
+    writer.readings(ReadingBlock(counter, counter, 0 * counter, time, (time * 1e9).astype(np.int64), wrench))
+    writer.event("ended", data={})
+    writer.close()
+    return Recording.open(folder)
+
+
+def visit(subject, value, *, simulated=False):
+    return ScoreTable(f"visit of {subject}", subject, simulated, (Score(subject, "stickiness", 50, value),))
+
+
+def test_findings_are_plain_data_without_numbers_that_json_lacks(report):
+    text = json.dumps(report.to_dict(), allow_nan=False)
+    assert json.loads(text)["strokes"][0]["mu_dynamic"] == report.strokes[0].mu_dynamic
+
+
+def test_every_planted_stroke_comes_back_within_two_per_cent(report):
+    assert [s.trial for s in report.strokes] == [p.trial for p in report.planted]
+    for stroke, planted in zip(report.strokes, report.planted, strict=True):
+        assert stroke.mu_dynamic == pytest.approx(planted.mu, rel=0.02)
+        assert stroke.tau_max == pytest.approx(planted.tau_max, rel=0.03)
+        assert stroke.direction == planted.direction
+
+
+def test_the_course_of_a_stroke_starts_at_its_onset(report):
+    for stroke in report.strokes:
+        assert stroke.trace.origin == stroke.onset
+        assert 0 <= stroke.trace.time[0] < 0.01
+        assert stroke.trace.time[-1] == pytest.approx(stroke.lift - stroke.onset, abs=0.01)
+
+
+def test_a_discarded_take_is_named_among_what_was_excluded(report):
+    assert any("Take 1 of trial 3" in sentence and "slipped off" in sentence for sentence in report.excluded)
+
+
+def test_scores_of_other_visits_are_joined_by_subject(session):
+    recording, analysis, _ = session
+    own = score_table(recording)
+    others = [visit("P02", 40.0), visit("P03", 60.0), visit("P01", 0.0), own]
+    made = findings(recording, analysis, scores=others)
+    (mean,) = [m for m in made.experiments[0].scores if m.index == 50]
+    given_here = next(s.score for s in own.scores if (s.descriptor, s.index) == ("stickiness", 50))
+    assert mean.n == 3
+    assert mean.mean == pytest.approx((given_here / 2 + 40 + 60) / 3)
+    assert [a.subject for a in made.experiments[0].answers] == ["P01", "P02", "P03"]
+
+
+def test_a_simulated_session_says_so_in_its_first_line(report):
+    assert report.simulated
+    assert report.head.startswith("SIMULATED: the transducer and the subject")
+
+
+def test_one_simulated_visit_among_the_scores_makes_the_report_simulated(tmp_path):
+    recording = foreign(tmp_path / "real")
+    real = findings(recording, analyse(recording), scores=[visit("P02", 40.0)])
+    mixed = findings(recording, analyse(recording), scores=[visit("P02", 40.0), visit("P03", 50.0, simulated=True)])
+    assert (real.simulated, real.head) == (False, "")
+    assert mixed.simulated
+    assert mixed.head.startswith("SIMULATED: 1 of the sessions")
+
+
+def test_a_recording_without_a_plan_gives_a_report_of_its_strokes(tmp_path):
+    recording = foreign(tmp_path / "wipes")
+    made = findings(recording, analyse(recording))
+    assert [s.number for s in made.strokes] == [1, 2]
+    assert made.experiments == ()
+    text = page(made)
+    assert "Forces and friction" in text
+    assert "SIMULATED" not in text
+
+
+def test_a_visit_for_scores_only_gives_a_report_of_its_scores(tmp_path):
+    folder, _ = record(tmp_path / "P04", subject="P04", forces=False)
+    recording = Recording.open(folder)
+    made = findings(recording, analyse(recording))
+    assert made.course is None
+    assert made.strokes == ()
+    assert sum(len(e.scores) for e in made.experiments) == 10
+    assert "none: a visit for scores only" in page(made)
+
+
+def test_a_value_that_nobody_set_is_marked(report):
+    marked = {fact.name: fact.remark for fact in report.apparatus}
+    assert marked["contact area"].startswith("default")
+    assert marked["height of the face"] == "measured"
+
+
+def test_a_number_withheld_carries_the_sentence_of_its_flaw(tmp_path):
+    recording = foreign(tmp_path / "light", press=0.2)
+    made = findings(recording, analyse(recording))
+    told = {fact.name: fact.value for fact in made.flaws}
+    assert made.strokes
+    for stroke in made.strokes:
+        assert stroke.mu_dynamic is None
+        assert stroke.reasons["mu_dynamic"] == told["too little force"]
+
+
+@given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=5000))
+def test_thinning_keeps_both_ends_and_the_greatest_and_least_force(values):
+    array = np.array(values)
+    kept = _extremes(array)
+    assert (kept[0], kept[-1]) == (0, len(values) - 1)
+    assert (array[kept].min(), array[kept].max()) == (array.min(), array.max())
+    assert math.isfinite(array[kept].sum())
