@@ -43,7 +43,7 @@ class Filter:
 
     def fits(self, rate: float) -> bool:
         """Say whether readings at `rate` [Hz] are dense enough for it to do anything."""
-        return rate >= 4.0 * self.cut_off * _TWO_PASSES
+        return rate >= 2.5 * self.cut_off * _TWO_PASSES
 
 
 def in_face_frame(wrench: Array, frame: Frame) -> Array:
@@ -76,7 +76,8 @@ def centre_of_pressure(wrench: Array, height: float) -> Array:
     array([[4., 3.]])
     """
     normal = -wrench[:, 2]
-    pressing = np.where(normal > 0.0, normal, np.nan)
+    with np.errstate(invalid="ignore"):
+        pressing = np.where(normal > 0.0, normal, np.nan)
     x = (wrench[:, 4] - height * wrench[:, 0]) / pressing
     y = -(wrench[:, 3] + height * wrench[:, 1]) / pressing
     return np.column_stack([x, y])
@@ -85,5 +86,6 @@ def centre_of_pressure(wrench: Array, height: float) -> Array:
 def friction_ratio(wrench: Array, floor: float) -> Array:
     """Return T/N (n,) [-] of a zeroed wrench (n, 6) in the face frame; nan where N is below `floor` [N]."""
     normal = -wrench[:, 2]
-    tangential = np.hypot(wrench[:, 0], wrench[:, 1])
-    return tangential / np.where(normal >= floor, normal, np.nan)
+    with np.errstate(invalid="ignore"):
+        pressing = np.where(normal >= floor, normal, np.nan)
+    return np.hypot(wrench[:, 0], wrench[:, 1]) / pressing

@@ -23,7 +23,7 @@ class DetectorSettings:
     lift_fraction: float = 0.6  # lifted below this fraction of the onset threshold [-] ...
     lift_hold: float = 0.020  # ... for so long [s]
     baseline: float = 0.3  # unloaded stretch that gives zero and noise [s]
-    baseline_readings: int = 6  # and the fewest readings it may have
+    baseline_readings: int = 12  # and the fewest readings it may have
     quiet_noise: float = 2.0  # it is unloaded when its spread stays within so many times the noise [-] ...
     quiet_floor: float = 0.02  # ... or within this, for readings that were smoothed before they came [N]
 

@@ -1,6 +1,8 @@
 """A stroke: the touching movement inside a trial, with its numbers and what is wrong with them."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,5 +54,12 @@ class Stroke:
     peak_normal: float | None  # [N]
     peak_tangential: float | None  # [N]
     readings: int  # in the steady window
+    zero: str  # where the zero came from
+    zero_drift: float | None  # how far the forces' zero moved from before the stroke to after it [N]
     flaws: tuple[str, ...]
+    reasons: Mapping[str, str]  # for each number withheld, the flaw that forbids it
     curve: StrokeCurve | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the stroke as plain data, without its curve."""
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "curve"}

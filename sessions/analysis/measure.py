@@ -1,0 +1,230 @@
+"""The numbers of one stroke, and what forbids some of them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.analysis.contacts import Contact
+from sessions.analysis.findings import COEFFICIENTS, DIRECTION, EVERYTHING, PEAKS, SPEED, Findings
+from sessions.analysis.flaws import Flaw, FlawName
+from sessions.analysis.settings import AnalysisSettings
+from sessions.analysis.sliding import slide
+from sessions.analysis.span import Span, ZeroInForce
+from sessions.analysis.steady import mean_of
+from sessions.analysis.stroke import Stroke
+from sessions.analysis.track import Track, curve_of, mean_vector, track_of
+from sessions.plan import PROXIMAL_TO_DISTAL, Frame, Trial
+
+Array = NDArray[np.float64]
+
+_AFTER_PEAK = 0.2  # what a static peak is held against [s]
+_LATE_PEAK = 0.1  # a static peak may come so long after break-away began [s]
+
+
+def measured(
+    span: Span,
+    contact: Contact,
+    zero: ZeroInForce,
+    frame: Frame,
+    contact_area: float,
+    settings: AnalysisSettings,
+    trial: Trial | None = None,
+) -> tuple[Stroke, tuple[Flaw, ...]]:
+    """Return a contact's stroke and its flaws. `contact_area` [mm2] is what tau_max is told for."""
+    found = Findings()
+    track = track_of(span, contact, zero, frame.height, settings)
+    _judge_ends(found, contact, track, settings)
+    _judge_zero(found, zero)
+    if zero.flaw is not FlawName.NO_UNLOADED_STRETCH:
+        _judge_gaps(found, span, contact, settings)
+        _judge_loads(found, track, contact_area, settings)
+        window = slide(found, span, track, frame, settings)
+        if window is not None:
+            _friction(found, track, window, zero, settings)
+            _static_peak(found, track, window, zero, settings)
+            _judge_way(found, track, window, settings)
+        _judge_drift(found, zero, settings)
+    if trial is not None:
+        _judge_task(found, trial)
+    numbers = dict(found.allowed(EVERYTHING))
+    stroke = Stroke(
+        trial=None if trial is None else trial.number,
+        onset=contact.onset,
+        lift=contact.lift,
+        readings=numbers.pop("readings") or 0,
+        zero=zero.origin,
+        zero_drift=None if zero.drift is None else float(np.linalg.norm(zero.drift[:3])),
+        flaws=tuple(dict.fromkeys(str(flaw.name) for flaw in found.flaws)),
+        reasons=dict(found.reasons),
+        curve=curve_of(span, contact, zero, frame.height, settings),
+        **numbers,
+    )
+    return stroke, tuple(found.flaws)
+
+
+def _judge_ends(found: Findings, contact: Contact, track: Track, settings: AnalysisSettings) -> None:
+    if contact.onset is None:
+        sentence = "The recording begins in contact: no onset, and what came before is not known."
+        found.flaw(FlawName.BEGINS_IN_CONTACT, sentence, "doubtful")
+    if contact.lift is None:
+        found.flaw(FlawName.ENDS_IN_CONTACT, "The recording ends in contact: no lift.", "doubtful")
+    if contact.valleys:
+        sentence = (
+            "The force did not return to zero between this stroke and its neighbour: there it begins or ends where a "
+            "fifth of its peak is left."
+        )
+        found.flaw(FlawName.NOT_LIFTED, sentence, "doubtful")
+    peak = float(np.nanmax(track.normal, initial=0.0))
+    risen = np.flatnonzero(track.normal >= settings.force_floor_share * peak)
+    if contact.onset is not None and len(risen) and track.time[risen[0]] - contact.onset > settings.slow_onset:
+        sentence = (
+            f"The force crept for {track.time[risen[0]] - contact.onset:.2f} s from leaving its zero to a fifth of its "
+            "peak: the onset marks where it left, which may not be the touch."
+        )
+        found.flaw(FlawName.SLOW_ONSET, sentence, "doubtful")
+
+
+def _judge_zero(found: Findings, zero: ZeroInForce) -> None:
+    if zero.flaw is FlawName.NO_UNLOADED_STRETCH:
+        sentence = (
+            "No stretch around this contact is unloaded, so the zero is unknown: no friction, force or speed is given; "
+            "onset and lift are where the recorded force passes a fifth of its peak."
+        )
+        found.flaw(zero.flaw, sentence, "refused", EVERYTHING)
+    elif zero.flaw is FlawName.ZERO_AFTER_CONTACT:
+        sentence = "No stretch before this contact is unloaded: the zero was taken after it, and drift is not known."
+        found.flaw(zero.flaw, sentence, "doubtful")
+
+
+def _judge_gaps(found: Findings, span: Span, contact: Contact, settings: AnalysisSettings) -> None:
+    """Withhold peaks that missing readings may hide."""
+    first, last = span.time[contact.start], span.time[contact.stop - 1]
+    if ((span.saturated_at >= first) & (span.saturated_at <= last)).any():
+        sentence = "Readings of this stroke are saturated: its peaks are not known."
+        found.flaw(FlawName.SATURATED, sentence, "doubtful", PEAKS)
+    inside = [gap for gap in span.soundness.gaps if first <= gap.start and gap.stop <= last]
+    widest = max(inside, key=lambda gap: gap.stop - gap.start, default=None)
+    if widest is not None and widest.stop - widest.start > settings.longest_gap + 1.0 / span.rate:
+        sentence = (
+            f"No sound readings from {widest.start:.2f} to {widest.stop:.2f} s of this stroke ({widest.cause}), which "
+            "may hide its peaks."
+        )
+        found.flaw(widest.cause, sentence, "doubtful", PEAKS)
+
+
+def _judge_loads(found: Findings, track: Track, contact_area: float, settings: AnalysisSettings) -> None:
+    """Give the greatest forces, and say where they are implausible."""
+    peak = float(np.nanmax(track.normal, initial=0.0))
+    greatest = float(np.nanmax(track.tangential, initial=0.0))
+    found.numbers |= {"peak_normal": peak, "peak_tangential": greatest, "tau_max": greatest / contact_area}
+    found.numbers["mu_max"] = _greatest_ratio(track, track.floor, settings)
+    if peak < settings.force_floor:
+        sentence = f"The normal force reaches {peak:.2g} N: below {settings.force_floor:g} N friction means nothing."
+        found.flaw(FlawName.TOO_LITTLE_FORCE, sentence, "refused", (*COEFFICIENTS, *SPEED, *DIRECTION))
+    if peak > settings.greatest_force:
+        sentence = f"The normal force reaches {peak:.3g} N, which is no finger's: check the units of the forces."
+        found.flaw(FlawName.UNITS_IMPLAUSIBLE, sentence, "doubtful")
+    with np.errstate(invalid="ignore"):
+        light = (track.ratio > 1.0) & (track.normal < 0.5 * peak)
+        pressed = track.ratio[track.normal >= 0.5 * peak]
+    if light.any() and np.isfinite(pressed).any() and np.nanmedian(pressed) < 1.0:
+        sentence = (
+            f"T/N exceeds 1 while N is below half its peak ({peak:.3g} N), and not above: drift or a side load makes "
+            "the ratio there; its maximum is that above half the peak."
+        )
+        found.flaw(FlawName.RATIO_ABOVE_ONE, sentence, "doubtful")
+        found.numbers["mu_max"] = _greatest_ratio(track, 0.5 * peak, settings)
+
+
+def _greatest_ratio(track: Track, floor: float, settings: AnalysisSettings) -> float | None:
+    """Return the greatest T/N of forces averaged over a moving window, wherever N stays above `floor` [N] in it.
+
+    Forces are averaged, not the ratio: noise then raises the maximum far less.
+    """
+    length = max(1, round(settings.smoothing * track.rate))
+    if len(track.time) < length:
+        return None
+    with np.errstate(invalid="ignore"):
+        pressed = track.normal >= floor
+    normal = np.where(pressed, track.normal, np.nan)
+    box = np.ones(length) / length
+    means = np.convolve(track.tangential, box, "valid") / np.convolve(normal, box, "valid")
+    whole = track.time[length - 1 :] - track.time[: len(track.time) - length + 1] < 1.5 * length / track.rate
+    means = means[np.isfinite(means) & whole]
+    return float(means.max()) if len(means) else None
+
+
+def _friction(found: Findings, track: Track, window: slice, zero: ZeroInForce, settings: AnalysisSettings) -> None:
+    """Give the mean of T/N over the steady window; its interval allows for a wrong zero too."""
+    drag = mean_vector(track.wrench[window, :2])
+    sideways = float(np.linalg.norm(drag / np.linalg.norm(drag) * zero.error[:2]))
+    ratio = float(np.nanmean(track.ratio[window]))
+    lightness = float(np.nanmean(1.0 / track.normal[window]))
+    from_zero = float(np.hypot(sideways, ratio * zero.error[2])) * lightness
+    mean = mean_of(track.ratio[window], track.rate, from_zero, settings)
+    found.numbers |= {
+        "mu_dynamic": mean.value,
+        "mu_dynamic_sd": mean.sd,
+        "mu_dynamic_interval": mean.interval,
+        "readings": mean.readings,
+        "normal_force": float(np.nanmean(track.normal[window])),
+        "tangential_force": float(np.nanmean(track.tangential[window])),
+    }
+
+
+def _judge_drift(found: Findings, zero: ZeroInForce, settings: AnalysisSettings) -> None:
+    """Say how far a zero that moves may have changed mu, and withhold the numbers where that is too much."""
+    sideways, pressing = zero.unsure
+    tangential = found.numbers.get("tangential_force", found.numbers["peak_tangential"])
+    normal = found.numbers.get("normal_force", found.numbers["peak_normal"])
+    share = sideways / tangential + pressing / normal if tangential > 0.0 and normal > 0.0 else float("inf")
+    if share <= settings.drift_doubted:
+        return
+    refused = share > settings.drift_refused
+    sentence = (
+        f"With nothing pressing, the forces around this stroke lie {sideways:.2g} N sideways and {pressing:.2g} N "
+        f"along the normal from its zero: mu may be wrong by {100 * share:.0f} %"
+        f"{', so no numbers are given' if refused else ''}."
+    )
+    found.flaw(FlawName.DRIFT, sentence, "refused" if refused else "doubtful", EVERYTHING if refused else ())
+
+
+def _judge_task(found: Findings, trial: Trial) -> None:
+    direction = found.allowed(("direction",))["direction"]
+    if direction is not None and direction != trial.direction:
+        asked = "proximal to distal" if trial.direction == PROXIMAL_TO_DISTAL else "distal to proximal"
+        sentence = f"The finger moved the other way than the trial asks ({asked})."
+        found.flaw(FlawName.WRONG_DIRECTION, sentence, "doubtful")
+
+
+def _static_peak(found: Findings, track: Track, window: slice, zero: ZeroInForce, settings: AnalysisSettings) -> None:
+    """Give the static peak where one stands out of what follows it by its noise and by a share."""
+    broken = found.numbers.get("break_away", track.time[window.start])
+    last = int(np.searchsorted(track.time, float(broken + _LATE_PEAK)))
+    before = track.ratio[:last]
+    found.reasons.setdefault("mu_static", "no static peak stands out")
+    if not np.isfinite(before).any():
+        return
+    top = int(np.nanargmax(before))
+    end = int(np.searchsorted(track.time, float(track.time[top] + _AFTER_PEAK)))
+    follows = track.ratio[top : end + 1]
+    level = float(np.nanmedian(follows))
+    noise = float(np.hypot(*zero.noise[:2])) / np.sqrt(2.0)
+    sd = np.hypot(noise, level * float(zero.noise[2])) / float(track.normal[top])
+    if before[top] - level > max(settings.static_noise * sd, settings.static_share * level):
+        found.numbers["mu_static"] = float(before[top])
+        if found.reasons["mu_static"] == "no static peak stands out":
+            del found.reasons["mu_static"]
+
+
+def _judge_way(found: Findings, track: Track, window: slice, settings: AnalysisSettings) -> None:
+    """Say where the tangential force turns: then there is no one direction, or this is not one stroke."""
+    held = np.isfinite(track.ratio)
+    way = track.wrench[:, :2] / np.where(held, track.tangential, np.nan)[:, None]
+    inside = float(np.linalg.norm(mean_vector(way[window])))
+    overall = float(np.linalg.norm(mean_vector(way)))
+    if inside < settings.one_way:
+        sentence = "The tangential force turns within the steady window: no one direction, no speed along it."
+        found.flaw(FlawName.DIRECTION_TURNS, sentence, "doubtful", (*SPEED, *DIRECTION))
+    elif overall < settings.one_way:
+        sentence = "The tangential force turns during the contact: speed and direction are those of the steady window."
+        found.flaw(FlawName.DIRECTION_TURNS, sentence, "doubtful")

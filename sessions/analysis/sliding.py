@@ -1,0 +1,134 @@
+"""Where a stroke slides steadily, how fast and which way; and what forbids saying so."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.analysis.findings import COEFFICIENTS, DIRECTION, SPEED, Findings
+from sessions.analysis.flaws import FlawName
+from sessions.analysis.settings import AnalysisSettings
+from sessions.analysis.span import Span
+from sessions.analysis.steady import Movement, displacement, movement, steady_window
+from sessions.analysis.track import Track, mean_vector
+from sessions.plan import Frame
+
+Array = NDArray[np.float64]
+
+
+def slide(found: Findings, span: Span, track: Track, frame: Frame, settings: AnalysisSettings) -> slice | None:
+    """Find the steady window and the speed in it; None, with the reason, where nothing slides steadily."""
+    window = None
+    if np.isfinite(track.speed).any():
+        limit = settings.sliding_share * float(np.nanpercentile(track.speed, 90))
+        with np.errstate(invalid="ignore"):
+            sliding = np.where(track.speed >= limit, track.ratio, np.nan)
+        window = steady_window(sliding, track.rate, len(track.time), settings)
+    moved, trouble = _speed(span, track, window, frame, settings)
+    if trouble is not None:  # the centre of pressure does not tell when the finger slides
+        window = steady_window(track.ratio, track.rate, len(track.time), settings)
+        moved, trouble = _speed(span, track, window, frame, settings)
+    at_rest = _rest(span, track, window, settings)
+    if window is None or at_rest is not None:
+        sentence = at_rest or "T/N holds steady over no long enough part of the stroke."
+        forbidden = (*COEFFICIENTS, *SPEED, *DIRECTION, "normal_force", "tangential_force")
+        found.flaw(FlawName.NO_STEADY_SLIDING, sentence, "refused", forbidden)
+        return None
+    found.numbers["steady"] = (float(track.time[window.start]), float(track.time[window.stop - 1]))
+    if trouble is not None:
+        found.flaw(trouble[0], trouble[1], "doubtful", SPEED)
+    elif moved is not None:
+        found.numbers |= {"speed": moved.speed, "speed_error": moved.error}
+        _break_away(found, track, moved, settings)
+    _direction(found, track, window, moved if trouble is None else None)
+    return window
+
+
+def _rest(span: Span, track: Track, window: slice | None, settings: AnalysisSettings) -> str | None:
+    """Say why nothing shows that the contact slides over a window, or None where it does."""
+    if window is None:
+        return None
+    way = displacement(track.position[window])
+    step = span.torque_step / float(np.nanmean(track.normal[window]))
+    if way > max(settings.shear, settings.shear_steps * step):
+        return None
+    moves = f"moves by {way:.2g} mm" if np.isfinite(way) else "is not known"
+    return (
+        f"T/N holds steady for a while, but the centre of pressure {moves} meanwhile: nothing shows that the contact "
+        "slides, and a ratio at rest is no coefficient of friction; torques in a wrong unit would look so too."
+    )
+
+
+def _speed(
+    span: Span, track: Track, window: slice | None, frame: Frame, settings: AnalysisSettings
+) -> tuple[Movement | None, tuple[FlawName, str] | None]:
+    """Return the movement over a window, and what forbids taking it for a speed."""
+    if window is None:
+        return None, (FlawName.SPEED_NOT_MEASURABLE, "")
+    moved = movement(track.time[window], track.position[window], track.rate, settings)
+    return moved, _speed_trouble(span, track, window, moved, frame, settings)
+
+
+def _speed_trouble(
+    span: Span, track: Track, window: slice, moved: Movement | None, frame: Frame, settings: AnalysisSettings
+) -> tuple[FlawName, str] | None:
+    """Say why the centre of pressure gives no speed over a window, or None where it does."""
+    name = FlawName.SPEED_NOT_MEASURABLE
+    if moved is None:
+        return name, "The centre of pressure is known at too few instants of the steady window for a speed."
+    way = moved.speed * float(track.time[window.stop - 1] - track.time[window.start])
+    position = track.position[window]
+    normal = float(np.nanmean(track.normal[window]))
+    step = span.torque_step / normal
+    if np.nanmedian(np.abs(position)) > settings.farthest:
+        where = float(np.nanmedian(np.abs(position)))
+        return FlawName.UNITS_IMPLAUSIBLE, (
+            f"The centre of pressure lies {where:.3g} mm from the axis, where no finger is: check the units of the "
+            "torques and the face's height; no speed is given."
+        )
+    if step > settings.speed_step * way:
+        return name, f"The torques come in steps that move the centre of pressure by {step:.2g} mm: no speed is told."
+    if moved.error > settings.speed_error * moved.speed:
+        return name, f"The centre of pressure moves at {moved.speed:.2g} ± {moved.error:.2g} mm/s: no speed is told."
+    if moved.explained < settings.speed_line:
+        share = 100 * moved.explained
+        return name, f"A straight line explains {share:.0f} % of the centre of pressure's movement: no speed is told."
+    if frame.height_origin == "default":
+        lever = movement(
+            track.time[window], -track.wrench[window, :2] / track.normal[window, None], track.rate, settings
+        )
+        wrong = settings.height_doubt * (lever.speed if lever else 0.0)
+        if wrong > settings.speed_error * moved.speed:
+            return FlawName.HEIGHT_UNKNOWN, (
+                f"Nobody stated the face's height: were it wrong by {settings.height_doubt:g} mm the speed of "
+                f"{moved.speed:.3g} mm/s would change by {wrong:.2g} mm/s, so none is given."
+            )
+    return None
+
+
+def _break_away(found: Findings, track: Track, moved: Movement, settings: AnalysisSettings) -> None:
+    """Give the first instant from which the centre of pressure keeps a share of its steady speed."""
+    start = int(np.searchsorted(track.time, float(found.numbers["steady"][0])))
+    with np.errstate(invalid="ignore"):
+        slow = ~(track.speed[: start + 1] >= settings.break_away_share * moved.speed)
+    last_slow = np.flatnonzero(slow)
+    first = int(last_slow[-1]) + 1 if len(last_slow) else 0
+    if first <= start:
+        found.numbers["break_away"] = float(track.time[first])
+
+
+def _direction(found: Findings, track: Track, window: slice, moved: Movement | None) -> None:
+    """Give the direction along x: from the movement, else from the drag, which points the way the finger moves."""
+    drag = mean_vector(track.wrench[window, :2])
+    by_drag = int(np.sign(drag[0])) if abs(drag[0]) >= 0.5 * np.hypot(*drag) else None
+    by_movement = None
+    if moved is not None and abs(moved.along[0]) >= 0.5 * moved.speed:
+        by_movement = int(np.sign(moved.along[0]))
+    if by_movement is not None and by_drag is not None and by_movement != by_drag:
+        sentence = (
+            "The centre of pressure moved one way and the drag points the other: the frame, its normal or its height "
+            "is wrong, so neither speed nor direction is given."
+        )
+        found.flaw(FlawName.DIRECTION_DISAGREES, sentence, "doubtful", (*SPEED, *DIRECTION))
+    elif by_movement is not None:
+        found.numbers |= {"direction": by_movement, "direction_from": "centre of pressure"}
+    elif by_drag is not None:
+        found.numbers |= {"direction": by_drag, "direction_from": "tangential force"}

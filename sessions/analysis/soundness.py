@@ -1,0 +1,179 @@
+"""Which readings of a block can be used: what was lost, froze, saturated, or came at uneven times."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.calibration import Calibration
+from drivers.readings import ReadingBlock
+from sessions.analysis.flaws import FlawName, Grade
+from sessions.analysis.settings import AnalysisSettings
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_AXIS_NAMES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Where readings are missing or cannot be used."""
+
+    start: float  # last sound reading before it [s, device time]
+    stop: float  # first one after it
+    cause: FlawName
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Soundness:
+    """What a block's readings are worth; n of them."""
+
+    rate: float  # readings a second, from the median time step [Hz]
+    even: bool  # the time steps are equal
+    good: Mask  # (n,) readings that can be used
+    saturated: Mask  # (n,)
+    gaps: tuple[Gap, ...]
+    segments: tuple[slice, ...]  # stretches of good readings without a gap
+    dead: tuple[str, ...]  # axes that never moved
+    frozen_share: float
+    flaws: tuple[tuple[FlawName, str, Grade], ...]
+
+    @property
+    def refused(self) -> bool:
+        """Say whether nothing of the block may be analysed."""
+        return any(grade == "refused" for _, _, grade in self.flaws)
+
+
+def soundness(block: ReadingBlock, calibration: Calibration, settings: AnalysisSettings) -> Soundness:
+    """Judge a block of at least two readings."""
+    steps = np.diff(block.time)
+    forward = steps[steps > 0.0]
+    step = float(np.median(forward)) if len(forward) else np.nan
+    frozen = _frozen(block, settings)
+    saturated = _saturated(block, calibration)
+    stalled = np.concatenate([[False], steps <= 0.0])
+    good = ~(frozen | saturated | stalled)
+    broken = (np.diff(block.sequence) != 1) | (steps > 1.8 * step) | (steps <= 0.0)
+    neighbours = steps[~broken]
+    even = bool(len(neighbours) and np.ptp(np.percentile(neighbours, [2, 98])) <= settings.uneven * step)
+    segments = _segments(good, broken)
+    dead = tuple(
+        name for name, column in zip(_AXIS_NAMES, block.raw[good].T, strict=True) if len(column) and np.ptp(column) == 0
+    )
+    missing = np.diff(block.sequence) - 1
+    lost = int(missing[missing > 0].sum())
+    flaws = [
+        *_loss_flaws(lost, len(block)),
+        *_frozen_flaws(frozen, block.time, settings),
+        *_saturation_flaws(saturated, block.time),
+        *_dead_flaws(dead, all_frozen=not good.any()),
+        *_time_flaws(step, even, int(stalled.sum())),
+    ]
+    return Soundness(
+        1.0 / step if step > 0 else np.nan,
+        even,
+        good,
+        saturated,
+        tuple(_gap(a, b, block.time, frozen, saturated) for a, b in pairwise(segments)),
+        segments,
+        dead,
+        float(frozen.mean()),
+        tuple(flaws),
+    )
+
+
+def _frozen(block: ReadingBlock, settings: AnalysisSettings) -> Mask:
+    """Mark every repeat of the same six numbers in a run that noise cannot explain."""
+    same = np.concatenate([[False], (np.diff(block.raw, axis=0) == 0.0).all(axis=1), [False]])
+    edges = np.flatnonzero(np.diff(same.astype(np.int8)))
+    frozen = np.zeros(len(block), np.bool_)
+    for start, stop in edges.reshape(-1, 2):  # repeats of the reading at `start`
+        last = stop
+        if last - start >= settings.frozen_readings and (
+            block.time[last] - block.time[start] >= settings.frozen_shortest
+        ):
+            frozen[start + 1 : last + 1] = True
+    return frozen
+
+
+def _saturated(block: ReadingBlock, calibration: Calibration) -> Mask:
+    """Mark readings the device called invalid, and those outside the rated range, where one is stated."""
+    wrench = calibration.wrench(block.raw, np.zeros(6))
+    with np.errstate(invalid="ignore"):
+        beyond = (np.abs(wrench) > calibration.rated).any(axis=1)
+    return (block.status != 0) | beyond
+
+
+def _segments(good: Mask, broken: Mask) -> tuple[slice, ...]:
+    """Return the stretches of good readings between which `broken` (n - 1,) marks no step."""
+    starts = good & ~np.concatenate([[False], good[:-1] & ~broken])
+    stops = good & ~np.concatenate([good[1:] & ~broken, [False]])
+    return tuple(
+        slice(int(start), int(stop) + 1)
+        for start, stop in zip(np.flatnonzero(starts), np.flatnonzero(stops), strict=True)
+    )
+
+
+def _gap(before: slice, after: slice, time: Array, frozen: Mask, saturated: Mask) -> Gap:
+    hole = slice(before.stop, after.start)
+    cause = FlawName.LOST_READINGS
+    if frozen[hole].any():
+        cause = FlawName.FROZEN
+    elif saturated[hole].any():
+        cause = FlawName.SATURATED
+    return Gap(float(time[before.stop - 1]), float(time[after.start]), cause)
+
+
+_Found = list[tuple[FlawName, str, Grade]]
+
+
+def _loss_flaws(lost: int, arrived: int) -> _Found:
+    if not lost:
+        return []
+    share = 100 * lost / (lost + arrived)
+    sentence = f"{lost} readings were lost ({share:.2g} %); nothing was filled in and no filter reaches across a gap."
+    return [(FlawName.LOST_READINGS, sentence, "note")]
+
+
+def _frozen_flaws(frozen: Mask, time: Array, settings: AnalysisSettings) -> _Found:
+    if not frozen.any():
+        return []
+    share = float(frozen.mean())
+    where = f"{100 * share:.0f} % of the readings repeat the six numbers before them, first at {time[frozen][0]:.2f} s"
+    if share >= settings.frozen_refused:
+        return [(FlawName.FROZEN, f"{where}: the sensor was frozen, and nothing is analysed.", "refused")]
+    return [(FlawName.FROZEN, f"{where}: the sensor was frozen there, and these readings are left out.", "doubtful")]
+
+
+def _saturation_flaws(saturated: Mask, time: Array) -> _Found:
+    if not saturated.any():
+        return []
+    sentence = (
+        f"{int(saturated.sum())} readings are saturated or marked invalid by the device, first at "
+        f"{time[saturated][0]:.2f} s; they are left out, and a peak that they may hide is not given."
+    )
+    return [(FlawName.SATURATED, sentence, "doubtful")]
+
+
+def _dead_flaws(dead: tuple[str, ...], *, all_frozen: bool) -> _Found:
+    if not dead or all_frozen:
+        return []
+    names = ", ".join(dead)
+    if any(name.startswith("F") for name in dead):
+        return [(FlawName.DEAD, f"{names} never changed: a dead sensor, and nothing is analysed.", "refused")]
+    return [(FlawName.DEAD, f"{names} never changed: no centre of pressure, hence no speed.", "doubtful")]
+
+
+def _time_flaws(step: float, even: bool, stalled: int) -> _Found:
+    if not step > 0.0:
+        return [(FlawName.UNKNOWN_RATE, "The device's time does not advance: nothing can be timed.", "refused")]
+    found: _Found = []
+    if stalled:
+        sentence = f"At {stalled} readings the device's time did not advance; they are left out."
+        found.append((FlawName.IRREGULAR_TIME, sentence, "doubtful"))
+    if not even:
+        sentence = f"The time steps are uneven about {1000 * step:.3g} ms: forces are not filtered."
+        found.append((FlawName.IRREGULAR_TIME, sentence, "doubtful"))
+    return found

@@ -1,0 +1,130 @@
+"""The steady part of a stroke: its window, the mean and its interval there, and the speed of the centre of pressure."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from sessions.analysis.settings import AnalysisSettings
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_EDGES = 121  # windows begin and end on a grid of so many instants
+_FEWEST = 5  # readings in a window
+_HELD = 0.95  # share of a window's readings that must have a ratio
+_QUARTERS = 4
+_FEWEST_BLOCKS = 4  # of which a standard error is told
+
+
+def steady_window(ratio: Array, rate: float, whole: int, settings: AnalysisSettings) -> slice | None:
+    """Return the longest stretch over which T/N is steady, or None.
+
+    `ratio` (n,) [-] is nan where the finger does not slide or T/N means nothing; `whole` is how many readings the
+    stroke has. Steady: the standard deviation is below 10 % of the mean and no quarter's mean lies more than 5 % from
+    it (settings), beyond what the scatter of few readings explains.
+    """
+    shortest = max(settings.steady_share * whole, settings.steady_shortest * rate, _FEWEST)
+    edges = np.unique(np.linspace(0, len(ratio), _EDGES).round().astype(int))
+    held = np.isfinite(ratio)
+    value = np.where(held, ratio, 0.0)
+    count, total, squares = (np.concatenate([[0.0], np.cumsum(each)]) for each in (held, value, value**2))
+    first, last = (edges[index] for index in np.triu_indices(len(edges), 1))
+    long_enough = last - first >= shortest
+    first, last = first[long_enough], last[long_enough]
+    n = count[last] - count[first]
+    full = n >= _HELD * (last - first)
+    first, last, n = first[full], last[full], n[full]
+    if not len(first):
+        return None
+    mean = (total[last] - total[first]) / n
+    variance = np.maximum((squares[last] - squares[first]) / n - mean**2, 0.0)
+    allowed = settings.steady_trend * mean + 2.0 * np.sqrt(_QUARTERS * variance / n) * (n < _QUARTERS * _FEWEST)
+    steady = np.sqrt(variance) < settings.steady_spread * mean
+    for quarter in range(_QUARTERS):
+        a = first + (last - first) * quarter // _QUARTERS
+        b = first + (last - first) * (quarter + 1) // _QUARTERS
+        here = (total[b] - total[a]) / np.maximum(count[b] - count[a], 1.0)
+        steady &= np.abs(here - mean) <= allowed
+    if not steady.any():
+        return None
+    length = np.where(steady, last - first, 0)
+    best = np.lexsort((variance, -length))[0]
+    inside = np.flatnonzero(held[first[best] : last[best]]) + first[best]
+    return slice(int(inside[0]), int(inside[-1]) + 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Mean:
+    """A mean over a window."""
+
+    value: float
+    sd: float  # standard deviation of the readings
+    readings: int
+    interval: tuple[float, float] | None  # t interval from block means; None where there are too few blocks
+
+
+def mean_of(values: Array, rate: float, common: float, settings: AnalysisSettings) -> Mean:
+    """Return the mean of values (n,), leaving out nan, with an interval that allows for neighbours being alike.
+
+    `common` is the standard uncertainty that all values share.
+    """
+    held = values[np.isfinite(values)]
+    mean = float(held.mean())
+    blocks = _block_means(values[:, None], rate, settings)[:, 0]
+    interval = None
+    if len(blocks) >= _FEWEST_BLOCKS:
+        error = float(blocks.std(ddof=1)) / len(blocks) ** 0.5
+        half = float(stdtrit(len(blocks) - 1, 0.5 + settings.confidence / 2) * np.hypot(error, common))
+        interval = (mean - half, mean + half)
+    return Mean(mean, float(held.std(ddof=1)), len(held), interval)
+
+
+@dataclass(frozen=True, slots=True)
+class Movement:
+    """Straight movement over a window."""
+
+    along: tuple[float, float]  # velocity along x and y [mm/s]
+    speed: float  # [mm/s]
+    error: float  # standard error of the speed [mm/s]
+    explained: float  # share of the movement's variance that the straight line explains [-]
+
+
+def movement(time: Array, position: Array, rate: float, settings: AnalysisSettings) -> Movement | None:
+    """Return the regression of position (n, 2) [mm] on time (n,) [s] over block means; None where there are too few."""
+    blocks = _block_means(np.column_stack([time, position]), rate, settings)
+    if len(blocks) < _FEWEST_BLOCKS:
+        return None
+    t = blocks[:, 0] - blocks[:, 0].mean()
+    moved = blocks[:, 1:] - blocks[:, 1:].mean(axis=0)
+    spread = float(t @ t)
+    slope = t @ moved / spread
+    rest = moved - t[:, None] * slope
+    speed = float(np.hypot(*slope))
+    # Scatter along the path is what makes the speed uncertain.
+    direction = slope / speed if speed > 0.0 else np.array([1.0, 0.0])
+    error = float(np.sqrt(((rest @ direction) ** 2).sum() / (len(blocks) - 2) / spread))
+    variance = float((moved**2).sum())
+    explained = 1.0 - float((rest**2).sum()) / variance if variance > 0.0 else 0.0
+    return Movement((float(slope[0]), float(slope[1])), speed, error, explained)
+
+
+def displacement(position: Array) -> float:
+    """Return how far position (n, 2) [mm] lies apart between the first and the last fifth of its readings.
+
+    nan where it is not known.
+    """
+    held = position[np.isfinite(position).all(axis=1)]
+    fifth = max(1, len(held) // 5)
+    if len(held) < 2 * fifth:
+        return float("nan")
+    return float(np.hypot(*(held[-fifth:].mean(axis=0) - held[:fifth].mean(axis=0))))
+
+
+def _block_means(values: Array, rate: float, settings: AnalysisSettings) -> Array:
+    """Return the means (k, m) of values (n, m) over whole blocks, leaving out readings with nan."""
+    held = values[np.isfinite(values).all(axis=1)]
+    length = max(1, round(settings.block * rate))
+    whole = len(held) // length
+    return held[: whole * length].reshape(whole, length, -1).mean(axis=1)
