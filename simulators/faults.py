@@ -63,6 +63,8 @@ class Faults:
         leaving = [hurt for datagram in datagrams for hurt in self._hurt(time, datagram)]
         while self._delayed and self._delayed[0][0] <= time:
             leaving.append(heapq.heappop(self._delayed)[2])
+        if self.active("unplug", time):
+            leaving.clear()
         if self.delivered is not None:
             self.delivered += leaving
         return leaving

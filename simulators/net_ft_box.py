@@ -119,13 +119,12 @@ class NetFtBox:
             if not self._has_power(now):
                 self._closing.wait(_NAP)
                 continue
-            plugged = not self._faults.active("unplug", now)
-            self._send_due(now, plugged)
-            if plugged:
-                for key, _ in self._selector.select(self._until_due()):
-                    key.data(key.fileobj)
-            else:
+            self._send_due(now)
+            if self._faults.active("unplug", now):  # it hears nothing either
                 self._closing.wait(self._until_due())
+                continue
+            for key, _ in self._selector.select(self._until_due()):
+                key.data(key.fileobj)
 
     def _until_due(self) -> float:
         """Return how long nothing has to be sent [real s]."""
@@ -145,7 +144,7 @@ class NetFtBox:
         self._on = on
         return on
 
-    def _send_due(self, now: float, plugged: bool) -> None:
+    def _send_due(self, now: float) -> None:
         """Send the records that are due, at most a burst of them, and whatever was delayed until now."""
         stream = self._stream
         if stream is None:
@@ -167,9 +166,8 @@ class NetFtBox:
                 datagrams += [b"".join(stream.waiting)] if stream.waiting else []
                 self._stream = None
         for datagram in self._faults.route(now, datagrams):
-            if plugged:
-                with contextlib.suppress(BlockingIOError, ConnectionError):  # a network drops what it cannot carry
-                    self._bound[0].sendto(datagram, stream.to)
+            with contextlib.suppress(BlockingIOError, ConnectionError):  # a network drops what it cannot carry
+                self._bound[0].sendto(datagram, stream.to)
 
     def _heard(self) -> tuple[bytes, tuple[str, int]] | None:
         """Return the next request and who asked, if there is one."""

@@ -94,7 +94,9 @@ def test_a_file_in_newton_metres_gives_newton_millimetres_and_agrees_with_its_ow
 
 
 def test_a_file_that_contradicts_its_own_product_is_refused():
-    with pytest.raises(SetupError, match=r"UserAxis Ty says 834\.93000 for gauge 0 where its Axis rows give 833\.92971"):
+    with pytest.raises(
+        SetupError, match=r"UserAxis Ty says 834\.93000 for gauge 0 where its Axis rows give 833\.92971"
+    ):
         parsed(GAMMA.replace("0.83393", "0.83493"))
     with pytest.raises(SetupError, match="UserAxis"):
         parsed(GAMMA.replace("0.0120142", "0.0134355"))

@@ -1,0 +1,95 @@
+"""A serial line as a link, and the part of a device address that names its port."""
+
+import errno
+from typing import Literal
+from urllib.parse import unquote, urlsplit
+
+import serial
+
+from drivers.address import Address
+from drivers.transducer import LinkLost, SetupError
+
+Parity = Literal["none", "even"]
+
+_PARITY = {"none": serial.PARITY_NONE, "even": serial.PARITY_EVEN}
+_WRITE_PATIENCE = 0.1  # for the system to take what is sent [real s]
+
+
+class SerialLink:
+    """Eight data bits and one stop bit over one serial port, which nobody else can open meanwhile."""
+
+    def __init__(self, port: str, baud: int, parity: Parity = "none") -> None:
+        """Open `port` at `baud` bits a second. Raises SetupError when it is missing, busy or not permitted."""
+        self._where = port
+        self._timeout = 0.0
+        try:
+            self._port = serial.Serial(
+                port,
+                baud,
+                bytesize=serial.EIGHTBITS,
+                parity=_PARITY[parity],
+                stopbits=serial.STOPBITS_ONE,
+                timeout=0.0,
+                write_timeout=_WRITE_PATIENCE,
+                xonxoff=False,  # binary records may hold those very bytes
+                exclusive=True,
+            )
+        except (OSError, ValueError) as error:
+            raise SetupError(f"{port} cannot be opened: {_reason(error, baud)}") from None
+
+    def send(self, data: bytes) -> None:
+        """Send `data`. Raises LinkLost when the port is gone or takes nothing any more."""
+        try:
+            self._port.write(data)
+        except (OSError, serial.SerialException):
+            raise LinkLost(f"{self._where} takes no bytes any more; check that its plug is in") from None
+
+    def receive(self, timeout: float) -> bytes | None:
+        """Return what has arrived, or None when nothing came within `timeout` real seconds."""
+        try:
+            if timeout != self._timeout:
+                self._port.timeout = timeout
+                self._timeout = timeout
+            first = self._port.read(1)
+            waiting = self._port.in_waiting if first else 0
+            return (first + self._port.read(waiting) if waiting else first) or None
+        except (OSError, serial.SerialException):
+            raise LinkLost(f"{self._where} is gone; check that its plug is in") from None
+
+    def close(self) -> None:
+        """Give the port back, dropping what was not sent yet. Harmless when repeated."""
+        if self._port.is_open:
+            try:
+                self._port.reset_output_buffer()
+            except (OSError, serial.SerialException):
+                pass  # it was pulled out
+            self._port.close()
+
+
+def port_of(address: Address) -> str:
+    """Return the serial port an address names. Raises SetupError when it names none.
+
+    >>> from drivers.address import parse_address
+    >>> port_of(parse_address("serial-ft:///dev/ttyUSB0?baud=38400")), port_of(parse_address("serial-ft://COM3"))
+    ('/dev/ttyUSB0', 'COM3')
+    """
+    parts = urlsplit(address.uri)
+    port = unquote(parts.netloc + parts.path if parts.path != "/" else parts.netloc)
+    if not port:
+        raise SetupError(f"{address.uri} names no port; write for example {address.scheme}:///dev/ttyUSB0")
+    return port
+
+
+def _reason(error: Exception, baud: int) -> str:
+    """Return why a port did not open and what to do."""
+    number = getattr(error, "errno", None)
+    text = str(error)
+    if number in (errno.EAGAIN, errno.EBUSY) or "exclusively lock" in text:
+        return "another program has it; end that program"
+    if number in (errno.EACCES, errno.EPERM) or "PermissionError" in text:
+        return "you may not use it, or another program has it; join the group that owns it, or end that program"
+    if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO) or "FileNotFoundError" in text:
+        return "there is no such port; check the plug and the name"
+    if isinstance(error, ValueError):
+        return f"it cannot be set to {baud} baud; choose another baud rate"
+    return "it is no serial port or cannot be set as asked; check the name, the baud rate and the parity"

@@ -1,0 +1,26 @@
+"""Simulated boxes that are switched off when a test ends."""
+
+import threading
+
+import pytest
+
+from drivers.clock import PacedClock
+from simulators.bench import Bench
+from simulators.net_ft_box import NetFtBox
+
+
+@pytest.fixture
+def box():
+    """Return a function that starts a networked box, by default told that time runs ten times as fast."""
+    boxes = []
+
+    def started(bench=None, *, clock=None, **settings):
+        boxes.append(NetFtBox(bench or Bench(1), clock or PacedClock(10.0), **settings))
+        boxes[-1].start()
+        return boxes[-1]
+
+    yield started
+    for one in boxes:
+        one.close()
+    left = [t.name for t in threading.enumerate() if t is not threading.main_thread() and "execnet" not in repr(t)]
+    assert not left, f"threads left running: {left}"

@@ -1,0 +1,71 @@
+"""Datagrams of the networked box. Expected bytes are typed from the maker's layout, not made by the codec."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.net_ft.wire import RECORD, START, STOP, decode, status_words
+
+RECORD_BYTES = bytes.fromhex("00000001 00000023 00000000 000F4240 FFE17B80 004C4B40 0001E848 FFFFFFFF 00000000")
+
+
+def test_requests_are_the_makers_bytes():
+    assert bytes.fromhex("1234 0002 00000000") == START
+    assert bytes.fromhex("1234 0000 00000000") == STOP
+
+
+def test_a_record_typed_by_hand_is_read():
+    (record,) = decode([RECORD_BYTES]).records
+    assert (record["number"], record["counter"], record["status"]) == (1, 35, 0)
+    assert record["counts"].tolist() == [1_000_000, -2_000_000, 5_000_000, 125_000, -1, 0]
+
+
+def test_extremes_of_every_field_are_read():
+    low, high = bytes.fromhex("80000000") * 9, bytes.fromhex("7FFFFFFF") * 9
+    records = decode([b"\xff" * 36, low, high]).records
+    assert records["number"].tolist() == [2**32 - 1, 2**31, 2**31 - 1]
+    assert records["counts"].tolist() == [[-1] * 6, [-(2**31)] * 6, [2**31 - 1] * 6]
+
+
+@given(st.lists(st.one_of(st.binary(max_size=80), st.binary(min_size=36, max_size=36))))
+def test_any_datagrams_are_either_records_or_malformed(datagrams):
+    decoded = decode(datagrams)
+    assert len(decoded.records) + decoded.malformed == len(datagrams)
+    assert [datagrams[i] for i in decoded.origin] == [d for d in datagrams if len(d) == 36]
+    assert decoded.records.tobytes() == b"".join(d for d in datagrams if len(d) == 36)
+
+
+@given(st.integers(0, 36))
+def test_a_cut_record_is_malformed(length):
+    assert decode([RECORD_BYTES[:length]]).malformed == (length != 36)
+
+
+def test_a_record_is_36_bytes():
+    assert RECORD.itemsize == 36
+
+
+@pytest.mark.parametrize(
+    ("status", "words"),
+    [
+        (0, ()),
+        (0x80020000, ("transducer saturated or converter error",)),
+        (0x80010000, ("monitor condition latched",)),
+        (0x00010000, ("monitor condition latched",)),
+        (0x80000000, ("unnamed error",)),
+        (0xC0000004, ("processor or memory fault", "internal temperature error")),
+        (0x00008001, ("unknown bit 15", "unknown bit 0")),
+    ],
+)
+def test_a_status_word_is_told_in_words(status, words):
+    assert status_words(status) == words
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_every_status_word_but_0_has_words(status):
+    assert bool(status_words(status)) == (status != 0)
+
+
+def test_counts_come_as_numbers_numpy_can_hold_exactly():
+    counts = decode([RECORD_BYTES]).records["counts"].astype(np.float64)
+    assert counts.tolist() == [[1e6, -2e6, 5e6, 125e3, -1.0, 0.0]]

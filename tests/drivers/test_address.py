@@ -1,0 +1,79 @@
+"""Device addresses as people type them."""
+
+import contextlib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.address import check_options, parse_address
+from drivers.catalog import open_transducer
+from drivers.clock import RealClock
+from drivers.transducer import LinkLost, SetupError
+
+
+def test_an_address_is_cut_into_its_parts():
+    address = parse_address("net-ft://127.0.0.1?rdt=49152&tcp=49151&http=8080")
+    assert (address.scheme, address.host) == ("net-ft", "127.0.0.1")
+    assert address.options == {"rdt": "49152", "tcp": "49151", "http": "8080"}
+    assert address.number("http", 80, 1, 65535) == 8080
+    assert address.number("rate", 200, 1, 7000) == 200
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        "",
+        "192.168.1.1",
+        "net-ft",
+        "://x",
+        "net-ft://a b",
+        "net-ft://host:99",
+        "net-ft://h:99999",
+        "net-ft://[::1",
+        "net-ft://u@host",
+        "net-ft://h#f",
+        "net-ft://h?rdt=1&rdt=2",
+    ],
+)
+def test_what_is_no_address_is_refused_in_a_sentence(uri):
+    with pytest.raises(SetupError):
+        parse_address(uri)
+
+
+@pytest.mark.parametrize("value", ["0", "65536", "-1", "1.5", "x", "", "٣", "9" * 5000])
+def test_an_option_out_of_range_is_refused_by_name(value):
+    with pytest.raises(SetupError, match="rdt"):
+        parse_address(f"net-ft://h?rdt={value}").number("rdt", 1, 1, 65535)
+
+
+def test_an_unknown_option_is_refused_with_those_that_are_allowed():
+    with pytest.raises(SetupError, match=r"'port'.*http, rdt"):
+        check_options(parse_address("net-ft://h?port=1"), frozenset({"rdt", "http"}))
+
+
+@given(st.one_of(st.text(max_size=30), st.text(max_size=20).map(lambda text: "net-ft://" + text)))
+def test_any_text_is_an_address_or_refused_in_a_sentence(text):
+    with contextlib.suppress(SetupError):
+        parse_address(text)
+
+
+@pytest.mark.parametrize(
+    ("uri", "reason"),
+    [
+        ("usb://x", "no driver 'usb'"),
+        ("net-ft://", "names no host"),
+        ("net-ft://127.0.0.1?http=0", "http=0"),
+        ("net-ft://127.0.0.1?rate=8000", "rate=8000"),
+        ("net-ft://127.0.0.1?baud=1", "'baud'"),
+        ("net-ft://no.such.host.invalid", "cannot be found"),
+    ],
+)
+def test_an_address_that_cannot_be_opened_is_refused_in_a_sentence(uri, reason):
+    with pytest.raises(SetupError, match=reason):
+        open_transducer(uri, RealClock())
+
+
+def test_nothing_at_an_address_is_a_lost_link():
+    with pytest.raises(LinkLost, match=r"nothing answers.*check power"):
+        open_transducer("net-ft://127.0.0.1?http=1", RealClock())
