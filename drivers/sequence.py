@@ -174,7 +174,7 @@ class SequenceAccount:
             return
         ahead, ticks = _signed(record.number - last.number), _signed(record.counter - last.counter)
         step = self.step or 1
-        # A device that reboots before its counter has passed what it will show on its return looks as if it had gone on.
+        # A device that had only just been switched on before it rebooted looks here as if it had gone on.
         if ticks <= 0:  # the counter began anew: only the host's clock knows for how long the device was away
             self.restarted += 1
             away = (record.received_ns - last.received_ns) * 1e-9 * self._counter_rate

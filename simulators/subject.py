@@ -12,7 +12,8 @@ from simulators.surface import Surface
 class SubjectSettings:
     """How subjects differ from one another and from themselves. Scores are on the 0 to 100 line."""
 
-    gain_spread: float = 0.06  # standard deviation between subjects of how far they spread their scores [-]
+    gain: float = 0.94  # how far they spread their scores on average: few use the whole line [-]
+    gain_spread: float = 0.06  # standard deviation between subjects of that [-]
     offset_spread: float = 3.0  # and of where they put the middle
     judgement_noise: float = 4.0  # standard deviation between judgements of the same surface
     friction_weight: float = 0.0  # share of a judgement that follows friction instead of the maker's index [-]
@@ -26,7 +27,7 @@ class SimulatedSubject:
         self.seed = seed
         self.settings = settings or SubjectSettings()
         draw = np.random.default_rng([seed, 2])
-        self._gain = float(draw.normal(1.0, self.settings.gain_spread))
+        self._gain = float(draw.normal(self.settings.gain, self.settings.gain_spread))
         self._offset = float(draw.normal(0.0, self.settings.offset_spread))
         self._stick = float(draw.uniform(0.4, 0.6))
         self._pace = float(draw.uniform(0.9, 1.1))
