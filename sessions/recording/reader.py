@@ -31,6 +31,15 @@ from sessions.recording.schema import (
 )
 from sessions.recording.torn import log_tail
 
+# What the counts in a "losses" event mean for whoever uses the readings; repeated ones were dropped without harm.
+LOSS_SENTENCES = {
+    "lost": "{} readings never arrived",
+    "malformed": "{} records were malformed and left out",
+    "stalled": "{} readings came while the device's counter stood still",
+    "restarted": "the device began to count anew {} times",
+    "saturated": "the device called {} readings invalid, as when it is saturated",
+}
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -88,7 +97,11 @@ class Recording:
     @property
     def flaws(self) -> tuple[str, ...]:
         """Name what went wrong while recording, as the event log tells it, a sentence each."""
-        trouble = [f"{event.data['sentence']}" for event in self.events if event.kind == "readings_lost"]
+        trouble: list[str] = []
+        for name, sentence in LOSS_SENTENCES.items():
+            count = sum(event.data.get(name, 0) for event in self.events if event.kind == "losses")
+            if count:
+                trouble.append(sentence.format(count))
         for record in self.trials:
             if record.take and record.take.strokes > 1:
                 trouble.append(

@@ -1,0 +1,46 @@
+"""Ctrl-C and a request to terminate, taken as a wish that is answered at a safe moment."""
+
+import signal
+import threading
+from collections.abc import Generator
+from contextlib import contextmanager
+from types import FrameType
+
+
+class Interruptions:
+    """Whether somebody wants the program to stop."""
+
+    def __init__(self) -> None:
+        """Start with nobody wanting it."""
+        self.heard = False
+        self._at_once = False
+
+    def hear(self, _signal: int, _frame: FrameType | None) -> None:
+        """Be the signal handler."""
+        self.heard = True
+        if self._at_once:
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def raised(self) -> Generator[None]:
+        """Let a signal raise KeyboardInterrupt at once while inside, where nothing can be left half written."""
+        self._at_once = True
+        try:
+            yield
+        finally:
+            self._at_once = False
+
+
+@contextmanager
+def interruptions() -> Generator[Interruptions]:
+    """Listen while inside. Signals reach the main thread only: elsewhere nothing is ever heard."""
+    listening = Interruptions()
+    if threading.current_thread() is not threading.main_thread():
+        yield listening
+        return
+    before = {number: signal.signal(number, listening.hear) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield listening
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,304 @@
+"""Runs a session: carries out the machine's commands with a transducer, a writer and a clock, and feeds events back."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any, Literal, Protocol
+
+from drivers.clock import Clock
+from drivers.readings import ReadingBlock
+from drivers.transducer import DeviceFault, Health, LinkLost, Transducer
+from sessions.analysis.onset import ContactDetector, DetectorSettings
+from sessions.event_log import kind_of, line_of
+from sessions.interruptions import Interruptions, interruptions
+from sessions.live import Detector, TakeWatch
+from sessions.machine import advance, start, trial_in_hand
+from sessions.plan import SessionPlan
+from sessions.recording import Acknowledged, RecordingError, SessionWriter
+from sessions.steps import (
+    Abort,
+    Command,
+    Ended,
+    Event,
+    MeasureZero,
+    Ready,
+    Refuse,
+    Scoring,
+    Stroking,
+    Taring,
+    Tell,
+)
+
+Cause = Literal["finished", "aborted", "stopped", "device", "program"]
+STOPPED = "stopped by the user"
+LOSSES = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated")  # counts of Health
+
+
+class Operator(Protocol):
+    """Experimenter and subject, as the runner sees them: a terminal, a window, or simulated ones. No call waits."""
+
+    def show(self, command: Command) -> None:
+        """Take a command; those that ask for something are answered through `poll` when it is done."""
+        ...
+
+    def poll(self) -> Sequence[Event]:
+        """Return what has happened since the last call, in order."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class RunnerSettings:
+    """How a session is run; written into its log."""
+
+    tick: float = 0.02  # between two looks at transducer and operator [s, session clock]
+    zero_duration: float = 0.5  # unloaded stretch before each take [s, device time]
+    zero_patience: float = 5.0  # waiting for it, until somebody is told [s, session clock]
+    losses_every: float = 1.0  # least time between two reports of lost readings [s, session clock]
+    status_every: float = 0.1  # between two calls of `progress` [s, session clock]
+    detection: DetectorSettings = field(default_factory=DetectorSettings)  # of the live detector, and of a quiet zero
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """How far a running session is, for a lamp or a line of progress."""
+
+    state: str  # name of the machine's state
+    trial: int | None  # number of the trial in hand
+    trials: int  # in the plan
+    readings: int  # handed to the recording
+    lost: int  # readings that never arrived
+    lag_ms: float  # age of the newest reading when it was handed over
+    safe: Acknowledged  # what the recording has acknowledged
+
+
+@dataclass(frozen=True, slots=True)
+class SessionEnd:
+    """How a session ended; the same stands in its log."""
+
+    reason: str
+    cause: Cause
+    complete: bool  # True when every trial was done or skipped
+    readings: int
+    health: Health
+
+
+def run_session(
+    plan: SessionPlan,
+    writer: SessionWriter,
+    operator: Operator,
+    transducer: Transducer | None,
+    clock: Clock,
+    *,
+    detector: Callable[[DetectorSettings], Detector] = ContactDetector,
+    settings: RunnerSettings | None = None,
+    stop: Callable[[], bool] = lambda: False,
+    progress: Callable[[Status], None] = lambda _: None,
+) -> SessionEnd:
+    """Run the session to its end, record all of it, and close the writer.
+
+    The session ends when the machine does, when `stop` says so or Ctrl-C is pressed, and when the transducer is lost:
+    each time with a written end that names the reason. The transducer is started and stopped, not closed. Raises
+    RecordingError when the disk takes no more; any other error of ours is raised again after the end was written.
+    """
+    if plan.forces != (transducer is not None):
+        raise ValueError("a visit with forces needs a transducer, and one without has none")
+    with interruptions() as interrupted:
+        run = _Run(plan, writer, operator, transducer, clock, detector, settings or RunnerSettings(), progress)
+        return run.to_the_end(interrupted, stop)
+
+
+class _Run:
+    """The one thing that changes while a session runs."""
+
+    def __init__(
+        self,
+        plan: SessionPlan,
+        writer: SessionWriter,
+        operator: Operator,
+        transducer: Transducer | None,
+        clock: Clock,
+        detector: Callable[[DetectorSettings], Detector],
+        settings: RunnerSettings,
+        progress: Callable[[Status], None],
+    ) -> None:
+        self._plan = plan
+        self._writer = writer
+        self._operator = operator
+        self._transducer = transducer
+        self._clock = clock
+        self._detector = detector
+        self._settings = settings
+        self._progress = progress
+        self._state, self._first_commands = start(plan)
+        self._watch: TakeWatch | None = None
+        self._readings = 0
+        self._reported = Health()
+        self._due_ns: dict[str, int] = dict.fromkeys(("losses", "status", "zero"), clock.now_ns())
+
+    def to_the_end(self, interrupted: Interruptions, stop: Callable[[], bool]) -> SessionEnd:
+        """Run, and write the end whatever it was."""
+        try:
+            self._writer.event("started", data={"settings": _with_origin(self._settings)})
+            if self._transducer is not None:
+                with interrupted.raised():  # a device that does not answer may take its time
+                    self._transducer.start()
+            cause, reason = self._go_round(lambda: interrupted.heard or stop())
+        except (LinkLost, DeviceFault) as error:
+            cause, reason = "device", str(error)
+        except KeyboardInterrupt:
+            cause, reason = "stopped", STOPPED
+        except RecordingError:
+            if self._transducer is not None:
+                self._transducer.stop()
+            self._writer.close()
+            raise
+        except BaseException as error:
+            self._end("program", f"{type(error).__name__}: {error}")
+            raise
+        return self._end(cause, reason)
+
+    def _go_round(self, stop: Callable[[], bool]) -> tuple[Cause, str]:
+        """Look at transducer and operator again and again, until there is a reason to end."""
+        self._carry_out(self._first_commands)
+        while True:
+            began_ns = self._clock.now_ns()
+            if stop():
+                return "stopped", STOPPED
+            self._listen()
+            for event in self._operator.poll():
+                self._take(event)
+            if isinstance(self._state, Ended):
+                return ("finished" if self._state.complete else "aborted"), self._state.reason
+            self._tell_status()
+            self._clock.sleep(max(self._settings.tick - (self._clock.now_ns() - began_ns) * 1e-9, 0.0))
+
+    def _listen(self) -> None:
+        """Record what the transducer gives, and let the machine know what it tells."""
+        if self._transducer is None:
+            return
+        block = self._transducer.read(self._settings.tick)
+        self._keep(block)
+        if self._watch is not None:
+            for event in self._watch.feed(block):
+                self._take(event)
+        if isinstance(self._state, Taring) and self._due("zero", self._settings.zero_patience):
+            self._show(Tell("the zero cannot be measured while something moves or touches; take hands off"))
+        self._report_losses()
+
+    def _keep(self, block: ReadingBlock) -> None:
+        self._writer.readings(block)
+        self._readings += len(block)
+
+    def _take(self, event: Event) -> None:
+        """Let the machine decide about an event, write both down, then show what it asks for."""
+        before = self._state
+        self._state, commands = advance(before, event)
+        refusals = [command for command in commands if isinstance(command, Refuse)]
+        if refusals:
+            data = {"event": kind_of(event), "sentence": refusals[0].sentence}
+            self._writer.event("refused", trial_in_hand(before), data)
+            self._operator.show(refusals[0])
+            return
+        self._writer.event(kind_of(event), trial_in_hand(before), asdict(event), commit=False)
+        if not isinstance(self._state, Taring | Ready | Stroking | Scoring):
+            self._watch = None
+        self._carry_out(commands)
+
+    def _carry_out(self, commands: Sequence[Command]) -> None:
+        """Write commands down, make that safe, and only then let anybody see them."""
+        for command in commands:
+            if (line := line_of(command)) is not None:
+                self._writer.event(*line, commit=False)
+        self._writer.commit()
+        for command in commands:
+            if isinstance(command, MeasureZero):
+                self._begin_watch()
+            self._operator.show(command)
+        self._due_ns["status"] = self._clock.now_ns()
+
+    def _begin_watch(self) -> None:
+        transducer = self._transducer
+        if transducer is None:
+            raise AssertionError("a zero is measured only where there is a transducer")
+        settings = self._settings
+        self._watch = TakeWatch(
+            transducer.info, self._plan.frame, settings.zero_duration, settings.detection, self._detector
+        )
+        self._due_ns["zero"] = self._clock.now_ns() + round(settings.zero_patience * 1e9)
+
+    def _show(self, command: Tell) -> None:
+        self._writer.event("told", trial_in_hand(self._state), {"sentence": command.sentence})
+        self._operator.show(command)
+
+    def _report_losses(self, *, now: bool = False) -> None:
+        """Write down what the driver lost, repeated or found wrong since the last report."""
+        if self._transducer is None:
+            return
+        health = self._transducer.health
+        counts = {name: getattr(health, name) - getattr(self._reported, name) for name in LOSSES}
+        if any(counts.values()) and (now or self._due("losses", self._settings.losses_every)):
+            told = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+            self._writer.event("losses", trial_in_hand(self._state), {**counts, "sentence": f"readings: {told}"})
+            self._reported = health
+
+    def _due(self, what: str, every: float) -> bool:
+        """Say whether it is time for something, and when it is, set the next time."""
+        now_ns = self._clock.now_ns()
+        if now_ns < self._due_ns[what]:
+            return False
+        self._due_ns[what] = now_ns + round(every * 1e9)
+        return True
+
+    def _tell_status(self) -> None:
+        if not self._due("status", self._settings.status_every):
+            return
+        health = self._transducer.health if self._transducer is not None else Health()
+        self._progress(
+            Status(
+                type(self._state).__name__.lower(),
+                trial_in_hand(self._state),
+                len(self._plan.trials),
+                self._readings,
+                health.lost,
+                health.lag_ms,
+                self._writer.acknowledged,
+            )
+        )
+
+    def _end(self, cause: Cause, reason: str) -> SessionEnd:
+        """Stop the stream, keep its last readings, and write the end."""
+        health = self._last_readings()
+        if not isinstance(self._state, Ended):
+            self._state, commands = advance(self._state, Abort(reason))
+            for command in commands:
+                if (line := line_of(command)) is not None:
+                    self._writer.event(*line, commit=False)
+        complete = isinstance(self._state, Ended) and self._state.complete
+        self._report_losses(now=True)
+        end = SessionEnd(reason, cause, complete, self._readings, health)
+        self._writer.event("ended", data=asdict(end))
+        self._writer.close()
+        return end
+
+    def _last_readings(self) -> Health:
+        """Stop the transducer and take what had still arrived."""
+        if self._transducer is None:
+            return Health()
+        self._transducer.stop()
+        try:
+            while len(block := self._transducer.read(0.0)):
+                self._keep(block)
+        except (LinkLost, DeviceFault):
+            pass  # all that had arrived was handed over before it says so
+        return self._transducer.health
+
+
+def _with_origin(settings: RunnerSettings) -> dict[str, Any]:
+    """Return the settings as plain data, each marked as set or as the default."""
+    default, chosen = asdict(RunnerSettings()), asdict(settings)
+    return {
+        setting.name: {
+            "value": chosen[setting.name],
+            "origin": "default" if chosen[setting.name] == default[setting.name] else "set",
+        }
+        for setting in fields(settings)
+    }

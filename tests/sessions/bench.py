@@ -1,0 +1,136 @@
+"""Stand-ins for the runner's world: a clock that is told the time, a transducer, an experimenter with a subject."""
+
+import numpy as np
+
+from drivers.calibration import Calibration
+from drivers.readings import ReadingBlock
+from drivers.transducer import Health, LinkLost, TransducerInfo
+from sessions.steps import (
+    AskBegin,
+    AskFinish,
+    AskMount,
+    AskScore,
+    AskStroke,
+    Begin,
+    Finish,
+    Scored,
+    StimulusMounted,
+    StrokeDone,
+)
+
+RATE = 200.0
+CALIBRATION = Calibration(
+    "FT1", "counts", np.diag([1e-6] * 3 + [1e-3] * 3), np.array([50.0, 50, 70, 500, 500, 500]), "typed in"
+)
+INFO = TransducerInfo(
+    "test://", "test", "stand-in", "FT1", True, RATE, 7000.0, CALIBRATION, {"filter": "none", "bias": "off"}
+)
+
+
+class ToldClock:
+    """A clock that moves when slept on, and by one microsecond at every look."""
+
+    factor = 1.0
+
+    def __init__(self, now_ns=1_000_000_000):
+        self.ns = now_ns
+
+    def now_ns(self):
+        self.ns += 1000
+        return self.ns
+
+    def sleep(self, seconds):
+        assert seconds >= 0
+        self.ns += int(seconds * 1e9)
+
+
+class StandIn:
+    """A transducer at 200 Hz on a told clock, pressed where `touches` say: (from, to, newtons), session clock [ns]."""
+
+    def __init__(self, clock, *, seed=0, lost=(), link_lost_after=None):
+        self.clock = clock
+        self.info = INFO
+        self.touches = []
+        self.sent = 0
+        self.lost = set(lost)  # sequence numbers that never arrive
+        self.link_lost_after = link_lost_after  # readings
+        self.streaming = False
+        self.began_ns = None
+        self._noise = np.random.default_rng(seed)
+        self._lost_so_far = 0
+
+    @property
+    def health(self):
+        return Health(received=self.sent - self._lost_so_far, lost=self._lost_so_far)
+
+    def start(self):
+        self.began_ns = self.clock.now_ns()
+        self.streaming = True
+
+    def stop(self):
+        self.streaming = False
+
+    def close(self):
+        self.stop()
+
+    def read(self, timeout):
+        due = int((self.clock.ns - self.began_ns) * 1e-9 * RATE) if self.streaming else self.sent
+        if due == self.sent and timeout:
+            self.clock.sleep(timeout)
+        if self.link_lost_after is not None:
+            due = min(due, self.link_lost_after)
+            if self.sent >= self.link_lost_after:
+                raise LinkLost("the cable was pulled")
+        numbers = np.array([i for i in range(self.sent, due) if i not in self.lost], np.int64)
+        self._lost_so_far += due - self.sent - len(numbers)
+        self.sent = max(due, self.sent)
+        received = self.began_ns + (numbers * (1e9 / RATE)).astype(np.int64)
+        force = self._noise.normal(0.1, 0.004, len(numbers))  # a bias of 0.1 N, noise 4 mN
+        for begin, end, newtons in self.touches:
+            force += newtons * ((received >= begin) & (received < end))
+        raw = np.zeros((len(numbers), 6))
+        raw[:, 2] = np.round(-force * 1e6)
+        return ReadingBlock(numbers, numbers * 35, numbers * 0, numbers / RATE, received, raw)
+
+
+class Hands:
+    """Does what is asked, a little later; `instead` maps the type of a command to a function that makes the events."""
+
+    def __init__(self, clock, transducer=None, instead=None):
+        self.clock = clock
+        self.transducer = transducer
+        self.instead = instead or {}
+        self.shown = []
+        self.events = []  # (due, event)
+
+    def show(self, command):
+        self.shown.append(command)
+        now = self.clock.ns
+        make = self.instead.get(type(command))
+        events = make(command) if make else None
+        for event in self.answers(command, now) if events is None else events:
+            self.events.append((now + 200_000_000, event))
+
+    def answers(self, command, now):
+        match command:
+            case AskBegin():
+                return [Begin()]
+            case AskMount(trial):
+                return [StimulusMounted(trial.stimulus.code)]
+            case AskStroke():
+                if self.transducer is None:
+                    return [StrokeDone()]
+                self.stroke(now)
+            case AskScore(trial):
+                return [Scored(float(trial.stimulus.index))]
+            case AskFinish():
+                return [Finish()]
+        return []
+
+    def stroke(self, now, newtons=2.0):
+        self.transducer.touches.append((now + 300_000_000, now + 900_000_000, newtons))
+
+    def poll(self):
+        due = [event for at, event in self.events if at <= self.clock.ns]
+        self.events = [(at, event) for at, event in self.events if at > self.clock.ns]
+        return due

@@ -1,0 +1,399 @@
+import os
+import signal
+
+import numpy as np
+import pytest
+from bench import INFO, RATE, Hands, StandIn, ToldClock
+
+from sessions.protocols import plan, protocol
+from sessions.recording import Recording, SessionWriter, provenance
+from sessions.runner import RunnerSettings, run_session
+from sessions.steps import (
+    Abort,
+    AskMount,
+    AskScore,
+    AskStroke,
+    MeasureZero,
+    Pause,
+    Redo,
+    Refuse,
+    Resume,
+    Scored,
+    Skip,
+    StimulusMounted,
+    Tell,
+)
+
+PAPER = protocol("sensotact-friction")
+
+
+class Session:
+    """A session in told time, run when called."""
+
+    def __init__(self, folder, *, forces=True, instead=None, **transducer):
+        self.clock = ToldClock()
+        self.plan = plan(PAPER, "S01", 3, forces=forces)
+        info = INFO if forces else None
+        self.writer = SessionWriter.create(
+            folder, self.plan, info, provenance(self.clock), subject_simulated=True, clock=self.clock
+        )
+        self.transducer = StandIn(self.clock, **transducer) if forces else None
+        self.hands = Hands(self.clock, self.transducer, instead)
+        self.folder = folder
+
+    def run(self, **options):
+        self.end = run_session(self.plan, self.writer, self.hands, self.transducer, self.clock, **options)
+        return Recording.open(self.folder)
+
+
+def kinds(recording, trial=None):
+    return [event.kind for event in recording.events if trial is None or event.trial == trial]
+
+
+def once(events):
+    """Answer with `events` the first time, as usual afterwards."""
+    left = [events]
+    return lambda _: left.pop() if left else None
+
+
+# ---- a session as it should go
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    session = Session(tmp_path_factory.mktemp("runner") / "whole")
+    return session, session.run()
+
+
+def test_a_whole_session_ends_complete_with_every_trial_scored(whole):
+    session, recording = whole
+    assert (session.end.cause, session.end.complete, session.end.reason) == ("finished", True, "every trial is done")
+    assert [record.score for record in recording.trials] == [t.stimulus.index for t in session.plan.trials]
+    assert all(record.outcome == "scored" and not record.other_takes for record in recording.trials)
+    assert recording.losses == ()
+    assert recording.flaws == ()
+
+
+def test_every_reading_from_start_to_end_is_recorded_and_accounted_for(whole):
+    session, recording = whole
+    block = recording.readings()
+    assert block.sequence.tolist() == list(range(session.transducer.sent))
+    ended = recording.events[-1]
+    assert (ended.kind, ended.readings, ended.data["readings"]) == ("ended", len(block), len(block))
+    assert ended.data["health"]["received"] == len(block)
+
+
+def test_a_take_holds_its_unloaded_stretch_its_stroke_and_what_follows_up_to_the_score(whole):
+    session, recording = whole
+    for record, (begin, end, _) in zip(recording.trials, session.transducer.touches, strict=True):
+        assert record.start_ns + 500_000_000 <= begin
+        assert end < record.stop_ns
+        block = recording.readings(record.trial.number)
+        pressed = block.raw[:, 2] < -1e6
+        assert pressed.sum() == pytest.approx(0.6 * RATE, abs=1)
+        assert not pressed[: int(0.5 * RATE)].any()
+        assert not pressed[-5:].any()
+
+
+def test_the_events_of_a_trial_come_in_their_order(whole):
+    _, recording = whole
+    assert kinds(recording, 1) == [
+        "mount_asked",
+        "stimulus_mounted",
+        "take_started",
+        "zeroed",
+        "stroke_asked",
+        "contact_onset",
+        "finger_lifted",
+        "score_asked",
+        "scored",
+        "take_kept",
+    ]
+
+
+def test_the_zero_is_recorded_with_mean_spread_and_duration_and_nothing_is_subtracted(whole):
+    _, recording = whole
+    zero = next(event.data for event in recording.events if event.kind == "zeroed")
+    # Planted: a bias of 0.1 N on Fz, hence -1e5 counts, with noise of 4e3 counts over 100 readings.
+    assert zero["mean"][2] == pytest.approx(-1e5, abs=5 * 4e3 / 10)
+    assert zero["spread"][2] == pytest.approx(4e3, rel=0.3)
+    assert zero["normal_force"] == pytest.approx(0.1, abs=0.002)
+    assert zero["duration"] == pytest.approx(0.5, abs=0.02)
+    block = recording.readings()
+    stretch = (block.sequence >= zero["first_sequence"]) & (block.sequence <= zero["last_sequence"])
+    assert stretch.sum() == zero["readings"]
+    assert block.raw[stretch, 2].mean() == pytest.approx(zero["mean"][2], abs=1e-6)
+    untouched = block.raw[:, 2] > -1e6
+    assert block.raw[untouched, 2].mean() == pytest.approx(-1e5, abs=1e3)
+
+
+def test_onset_and_lift_are_seen_at_the_readings_where_they_were_planted(whole):
+    session, recording = whole
+    onsets = [event.data["time"] for event in recording.events if event.kind == "contact_onset"]
+    lifts = [event.data["time"] for event in recording.events if event.kind == "finger_lifted"]
+    for onset, lift, (begin, end, _) in zip(onsets, lifts, session.transducer.touches, strict=True):
+        assert onset == pytest.approx((begin - session.transducer.began_ns) * 1e-9, abs=2 / RATE)
+        assert lift == pytest.approx((end - session.transducer.began_ns) * 1e-9, abs=2 / RATE)
+
+
+def test_the_settings_in_force_are_logged_and_marked_as_default_or_set(tmp_path):
+    recording = Session(tmp_path / "s").run(settings=RunnerSettings(zero_duration=0.4))
+    told = recording.events[0].data["settings"]
+    assert told["zero_duration"] == {"value": 0.4, "origin": "set"}
+    assert told["tick"]["origin"] == "default"
+
+
+def test_the_same_plan_and_the_same_happenings_give_the_same_log(tmp_path, whole):
+    _, first = whole
+    assert Session(tmp_path / "again").run().events == first.events
+
+
+def test_nothing_is_shown_before_it_is_safe(tmp_path):
+    session = Session(tmp_path / "s")
+    show = session.hands.show
+
+    def watched(command):
+        if not isinstance(command, MeasureZero):
+            assert session.writer.acknowledged.readings == session.writer._readings
+            assert session.writer.acknowledged.events == session.writer._event_count
+        show(command)
+
+    session.hands.show = watched
+    assert session.run().events[-1].kind == "ended"
+
+
+# ---- visits without forces
+
+
+def test_a_visit_for_scores_only_has_no_readings_and_no_zero(tmp_path):
+    recording = Session(tmp_path / "s", forces=False).run()
+    assert recording.info is None
+    assert len(recording.readings()) == 0
+    assert [record.outcome for record in recording.trials] == ["scored"] * 10
+    assert kinds(recording, 1)[2:] == [
+        "take_started",
+        "stroke_asked",
+        "stroke_done",
+        "score_asked",
+        "scored",
+        "take_kept",
+    ]
+
+
+def test_a_visit_with_forces_is_not_run_without_a_transducer(tmp_path):
+    session = Session(tmp_path / "s")
+    with pytest.raises(ValueError, match="needs a transducer"):
+        run_session(session.plan, session.writer, session.hands, None, session.clock)
+    session.writer.close()
+
+
+# ---- redo, skip, pause, refusals, no answer
+
+
+def test_a_discarded_take_stays_in_the_file_and_the_next_one_counts(tmp_path):
+    recording = Session(tmp_path / "s", instead={AskScore: once([Redo("finger slipped")])}).run()
+    record = recording.trials[0]
+    assert record.outcome == "scored"
+    assert (record.take.number, [take.number for take in record.other_takes]) == (2, [1])
+    assert record.other_takes[0].discarded == "finger slipped"
+    spoiled = recording.readings_between(record.other_takes[0].start_ns, record.other_takes[0].stop_ns)
+    assert (spoiled.raw[:, 2] < -1e6).sum() == pytest.approx(0.6 * RATE, abs=1)
+    assert [r.trial.number for r in recording.trials if r.outcome == "scored"] == list(range(1, 11))
+
+
+def test_a_trial_done_again_after_its_score_has_only_its_new_score(tmp_path):
+    answers = iter([[Scored(11.0)]])
+    mounts = iter([None, [Redo("wrong hand")], None])
+    instead = {AskScore: lambda _: next(answers, None), AskMount: lambda _: next(mounts, None)}
+    session = Session(tmp_path / "s", instead=instead)
+    recording = session.run()
+    record = recording.trials[0]
+    assert record.score == session.plan.trials[0].stimulus.index != 11.0
+    assert (record.take.number, record.other_takes[0].discarded) == (2, "wrong hand")
+    assert record.other_takes[0].stop_ns < record.start_ns
+
+
+def test_a_skipped_trial_is_recorded_as_skipped(tmp_path):
+    recording = Session(tmp_path / "s", instead={AskStroke: once([Skip("surface torn")])}).run()
+    record = recording.trials[0]
+    assert (record.outcome, record.take, record.score) == ("skipped", None, None)
+    assert record.other_takes[0].discarded == "skipped: surface torn"
+    assert len(recording.readings(1)) == 0
+    assert recording.trials[1].outcome == "scored"
+
+
+def test_not_answered_is_an_outcome_of_its_own_and_its_stroke_counts(tmp_path):
+    recording = Session(tmp_path / "s", instead={AskScore: once([Scored(None)])}).run()
+    record = recording.trials[0]
+    assert (record.outcome, record.score, record.answered) == ("not answered", None, False)
+    assert len(recording.readings(1)) > 0
+
+
+def test_a_pause_and_its_end_are_recorded_and_the_trial_is_done_anew(tmp_path):
+    recording = Session(tmp_path / "s", instead={AskStroke: once([Pause(), Resume()])}).run()
+    assert [kind for kind in kinds(recording, 1) if kind in ("pause", "resume")] == ["pause", "resume"]
+    assert recording.trials[0].take.number == 2
+
+
+def test_an_event_that_is_not_meant_is_refused_shown_and_logged(tmp_path):
+    session = Session(tmp_path / "s", instead={AskMount: once([StimulusMounted("A00"), StimulusMounted("X")])})
+    calls = []
+
+    def poll():
+        calls.append(1)
+        if len(calls) == 60:  # nobody mounts the right one otherwise
+            return [StimulusMounted(session.plan.trials[0].stimulus.code)]
+        return Hands.poll(session.hands)
+
+    session.hands.poll = poll
+    recording = session.run()
+    wanted = session.plan.trials[0].stimulus.code
+    assert [event.data["sentence"] for event in recording.events if event.kind == "refused"] == [
+        f"trial 1 needs the stimulus {wanted}, not A00",
+        f"trial 1 needs the stimulus {wanted}, not X",
+    ]
+    assert sum(isinstance(command, Refuse) for command in session.hands.shown) == 2
+
+
+def test_a_further_stroke_before_the_score_is_recorded_and_flagged(tmp_path):
+    session = Session(tmp_path / "s")
+    left = [True]
+
+    def answer_late(_):
+        if left:
+            left.pop()
+            now = session.clock.ns
+            session.hands.stroke(now)
+            session.hands.events.append((now + 1_500_000_000, Scored(50.0)))
+            return []
+        return None
+
+    session.hands.instead[AskScore] = answer_late
+    recording = session.run()
+    assert recording.trials[0].take.strokes == 2
+    assert recording.flaws == ("trial 1 holds 2 strokes where one was asked for",)
+
+
+def test_no_zero_is_taken_while_something_touches_and_somebody_is_told(tmp_path):
+    session = Session(tmp_path / "s")
+
+    def leaning(_):
+        if not session.transducer.touches:  # a hand that comes and goes for 8 s
+            at = session.clock.ns
+            for i in range(20):
+                begin = at + i * 400_000_000
+                session.transducer.touches.append((begin, begin + 200_000_000, 1.0))
+            session.leaning_until = session.transducer.touches[-1][1]
+
+    session.hands.instead[MeasureZero] = leaning
+    recording = session.run()
+    zeroed = next(event for event in recording.events if event.kind == "zeroed")
+    assert zeroed.time_ns > session.leaning_until
+    assert any(isinstance(command, Tell) and "take hands off" in command.sentence for command in session.hands.shown)
+
+
+# ---- every end is written
+
+
+def assert_ended(recording, reason, cause):
+    assert recording.events[-1].kind == "ended"
+    assert recording.events[-1].data["reason"] == reason
+    assert recording.events[-1].data["cause"] == cause
+    assert recording.losses == ()
+
+
+COMMANDS = [AskMount, MeasureZero, AskStroke, AskScore]
+
+
+@pytest.mark.parametrize("at", COMMANDS)
+def test_an_abort_in_any_state_ends_the_session_with_its_reason(tmp_path, at):
+    session = Session(tmp_path / "s", instead={at: once([Abort("fire alarm")])})
+    assert_ended(session.run(), "fire alarm", "aborted")
+    assert not session.end.complete
+    assert not session.transducer.streaming
+
+
+@pytest.mark.parametrize("at", COMMANDS)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_and_termination_in_any_state_end_the_session_and_keep_all_of_it(tmp_path, at, number):
+    session = Session(tmp_path / "s")
+    before = signal.getsignal(number)
+
+    def interrupt(_):
+        os.kill(os.getpid(), number)
+        session.heard_ns = session.clock.ns
+
+    session.hands.instead[at] = interrupt
+    recording = session.run()
+    assert_ended(recording, "stopped by the user", "stopped")
+    assert len(recording.readings()) == session.transducer.sent
+    assert recording.events[-1].time_ns - session.heard_ns < 200_000_000
+    assert signal.getsignal(number) == before
+
+
+def test_a_stop_request_is_answered_within_a_fifth_of_a_second_of_session_time(tmp_path):
+    session = Session(tmp_path / "s")
+    asked = session.clock.ns + 3_123_000_000
+    recording = session.run(stop=lambda: session.clock.ns >= asked)
+    assert_ended(recording, "stopped by the user", "stopped")
+    assert recording.events[-1].time_ns - asked < 200_000_000
+
+
+def test_ctrl_c_while_a_device_does_not_answer_is_heard_at_once(tmp_path):
+    session = Session(tmp_path / "s")
+    session.transducer.start = lambda: os.kill(os.getpid(), signal.SIGINT)
+    session.transducer.began_ns = session.clock.ns
+    assert_ended(session.run(), "stopped by the user", "stopped")
+
+
+def test_a_lost_link_ends_the_session_and_keeps_what_had_come(tmp_path):
+    session = Session(tmp_path / "s", link_lost_after=1000)
+    recording = session.run()
+    assert_ended(recording, "the cable was pulled", "device")
+    assert len(recording.readings()) == 1000
+    assert recording.trials[0].outcome == "scored"
+
+
+def test_an_error_in_the_operators_program_is_written_down_and_raised(tmp_path):
+    def broken(_):
+        raise RuntimeError("no screen")
+
+    session = Session(tmp_path / "s", instead={AskStroke: broken})
+    with pytest.raises(RuntimeError, match="no screen"):
+        session.run()
+    assert_ended(Recording.open(session.folder), "RuntimeError: no screen", "program")
+
+
+def test_an_interrupted_take_is_kept_as_one_that_does_not_count(tmp_path):
+    recording = Session(tmp_path / "s", instead={AskScore: once([Abort("ill")])}).run()
+    record = recording.trials[0]
+    assert (record.outcome, record.take) == ("open", None)
+    assert record.other_takes[0].discarded == "ill"
+
+
+# ---- losses and status
+
+
+def test_lost_readings_are_logged_with_their_number_and_named_as_a_flaw(tmp_path):
+    recording = Session(tmp_path / "s", lost=range(300, 307)).run()
+    assert sum(event.data["lost"] for event in recording.events if event.kind == "losses") == 7
+    assert recording.flaws == ("7 readings never arrived",)
+    assert not np.isin(np.arange(300, 307), recording.readings().sequence).any()
+
+
+def test_losses_are_reported_at_most_once_a_second(tmp_path):
+    recording = Session(tmp_path / "s", lost=range(100, 1000, 3)).run()
+    times = [event.time_ns for event in recording.events if event.kind == "losses"]
+    assert len(times) >= 3
+    assert min(np.diff(times[:-1])) >= 1e9
+    assert sum(event.data["lost"] for event in recording.events if event.kind == "losses") == 300
+
+
+def test_progress_tells_what_the_recording_has_acknowledged(tmp_path):
+    told = []
+    session = Session(tmp_path / "s")
+    session.run(progress=told.append)
+    assert {status.state for status in told} >= {"mounting", "taring", "ready", "stroking", "scoring"}
+    assert all(status.safe.readings <= status.readings for status in told)
+    # A commit a second: never more than one second and one look are not yet safe.
+    assert max(status.readings - status.safe.readings for status in told) <= 1.1 * RATE
