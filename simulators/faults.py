@@ -46,9 +46,8 @@ class Faults:
         self._timetable = tuple(timetable)
         self._seed = seed
         self._repeat = repeat
-        self._count = 0  # datagrams so far
         self._swapped: bytes | None = None
-        self._delayed: list[tuple[float, int, bytes]] = []
+        self._delayed: list[tuple[float, bytes]] = []  # when each leaves
         self.made: list[bytes] | None = [] if remember else None  # every datagram the box made
         self.delivered: list[bytes] | None = [] if remember else None  # every datagram that left, in that order
 
@@ -56,27 +55,38 @@ class Faults:
         """Tell whether a fault of the box itself is on at `time` [s]."""
         return self._at(kind, time) is not None
 
-    def route(self, time: float, datagrams: list[bytes]) -> list[bytes]:
-        """Return what really leaves at `time` [s] when the box sends `datagrams`: those, hurt, and what is overdue."""
-        if self.made is not None:
-            self.made += datagrams
-        leaving = [hurt for datagram in datagrams for hurt in self._hurt(time, datagram)]
-        while self._delayed and self._delayed[0][0] <= time:
-            leaving.append(heapq.heappop(self._delayed)[2])
-        if self.active("unplug", time):
-            leaving.clear()
+    def route(self, now: float, datagrams: Iterable[tuple[float, bytes]]) -> list[bytes]:
+        """Return what really leaves by `now` [s] when the box sends `datagrams`, each at its time [s].
+
+        That is those, hurt, and what was held back until now.
+        """
+        leaving: list[bytes] = []
+        for time, datagram in datagrams:
+            if self.made is not None:
+                self.made.append(datagram)
+            leaving += self._overdue(time)
+            hurt = self._hurt(time, datagram)
+            leaving += [] if self.active("unplug", time) else hurt
+        leaving += self._overdue(now)
         if self.delivered is not None:
             self.delivered += leaving
         return leaving
 
+    def _overdue(self, time: float) -> list[bytes]:
+        """Return what was delayed until `time`."""
+        leaving: list[bytes] = []
+        while self._delayed and self._delayed[0][0] <= time:
+            leaves, datagram = heapq.heappop(self._delayed)
+            leaving += [] if self.active("unplug", leaves) else [datagram]
+        return leaving
+
     def _hurt(self, time: float, datagram: bytes) -> list[bytes]:
         """Return what becomes of one datagram, in the order it leaves."""
-        self._count += 1
         for kind in _ON_THE_WAY:
             fault = self._at(kind, time)
             if fault is None:
                 continue
-            draw = np.random.default_rng([self._seed, self._count, KINDS.index(kind)])
+            draw = np.random.default_rng([self._seed, round(time * 1e6), KINDS.index(kind)])
             if draw.uniform() < fault.share:
                 return self._carried_out(fault, time, datagram, draw)
         return [datagram, *self._take_swapped()]
@@ -93,7 +103,7 @@ class Faults:
             case "shorten":
                 return [datagram[: int(draw.integers(0, len(datagram)))], *self._take_swapped()]
             case "delay":
-                heapq.heappush(self._delayed, (time + fault.delay, self._count, datagram))
+                heapq.heappush(self._delayed, (time + fault.delay, datagram))
                 return []
             case "lose":
                 return []

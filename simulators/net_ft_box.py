@@ -72,12 +72,7 @@ class NetFtBox:
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
         self._origin_ns = 0
-
-    @property
-    def uri(self) -> str:
-        """The address to open it at; known once it is started."""
-        rdt, tcp, http = (bound.getsockname()[1] for bound in self._bound)
-        return f"net-ft://{HOST}?rdt={rdt}&tcp={tcp}&http={http}"
+        self.uri = ""  # the address to open it at; known once it is started
 
     def now(self) -> float:
         """Return the box's and the bench's time [s]: 0 when it was started."""
@@ -93,6 +88,8 @@ class NetFtBox:
             raise
         for bound, serve in zip(self._bound, (self._on_datagram, self._on_caller, self._on_caller), strict=True):
             self._selector.register(bound, selectors.EVENT_READ, serve)
+        rdt, tcp, http = (bound.getsockname()[1] for bound in self._bound)
+        self.uri = f"net-ft://{HOST}?rdt={rdt}&tcp={tcp}&http={http}"
         self._origin_ns = self._clock.now_ns()
         self._thread = threading.Thread(target=self._serve, name="simulated net-ft box")
         self._thread.start()
@@ -152,19 +149,19 @@ class NetFtBox:
         step = self._inside.pages.step
         due = (self._inside.tick(now) - stream.tick) // step + 1
         count = min(max(due, 0), _BURST if stream.left is None else stream.left)
-        datagrams: list[bytes] = []
-        for reading in self._inside.readings([stream.tick + step * i for i in range(count)]):
-            stream.waiting.append(struct.pack(">I", stream.number % 2**32) + reading)
-            stream.number += 1
-            if len(stream.waiting) == stream.in_datagram:
-                datagrams.append(b"".join(stream.waiting))
-                stream.waiting.clear()
-        stream.tick += count * step
         if stream.left is not None:
             stream.left -= count
-            if stream.left == 0:
-                datagrams += [b"".join(stream.waiting)] if stream.waiting else []
-                self._stream = None
+        datagrams: list[tuple[float, bytes]] = []
+        for reading in self._inside.readings([stream.tick + step * i for i in range(count)]):
+            stream.waiting.append(struct.pack(">I", stream.number % 2**32) + reading)
+            if len(stream.waiting) == stream.in_datagram:
+                datagrams.append((self._inside.time(stream.tick), b"".join(stream.waiting)))
+                stream.waiting.clear()
+            stream.number += 1
+            stream.tick += step
+        if stream.left == 0:
+            datagrams += [(now, b"".join(stream.waiting))] if stream.waiting else []
+            self._stream = None
         for datagram in self._faults.route(now, datagrams):
             with contextlib.suppress(BlockingIOError, ConnectionError):  # a network drops what it cannot carry
                 self._bound[0].sendto(datagram, stream.to)
@@ -189,7 +186,8 @@ class NetFtBox:
             self._stream = None
         elif command in (0x0002, 0x0003) and pages.streams:
             size = pages.buffered if command == 0x0003 else 1
-            self._stream = _Stream(asker, self._inside.tick(self.now()) + 1, self._first_record, count or None, size)
+            tick = (self._inside.tick(self.now()) // pages.step + 1) * pages.step  # the same ticks whenever it is asked
+            self._stream = _Stream(asker, tick, self._first_record, count or None, size)
             self._first_record = 1
         elif command == 0x0042:
             self._inside.set_bias(self.now())

@@ -142,7 +142,7 @@ def test_every_reading_is_received_or_named_as_lost_whatever_befalls_it(timetabl
     faults = Faults(timetable, seed=seed, remember=True)
     box = Electronics(Bench(seed), faults, rate=200, rate_error=0.0, first_tick=0)
     for k in range(200):
-        faults.route(k / 200, [struct.pack(">I", k + 1) + box.readings([35 * k])[0]])
+        faults.route(k / 200, [(k / 200, struct.pack(">I", k + 1) + box.readings([35 * k])[0])])
     faults.route(2.0, [])
     link = MemoryLink(faults.delivered)
     transducer = opened(link)

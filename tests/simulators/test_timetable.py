@@ -1,0 +1,146 @@
+"""A box served for anybody's client, and the file that says what happens on it."""
+
+import contextlib
+import socket
+
+import numpy as np
+import pytest
+
+from drivers.catalog import open_transducer
+from drivers.clock import PacedClock
+from drivers.transducer import SetupError
+from simulators.faults import Fault
+from simulators.serving import serve_net_ft
+from simulators.surface import Surface, paper_surfaces
+from simulators.timetable import ScriptedBench, Timetable, TimetableError, load_timetable, usual_timetable
+
+SCRIPT = """
+repeat = 20.0
+
+[[stroke]]
+at = 8
+mu = 0.5
+peak_normal_force = 4.0
+speed = 25
+direction = -1
+holds = false
+
+[[stroke]]
+at = 2.0
+descriptor = "stickiness"
+index = 100
+
+[[fault]]
+kind = "lose"
+from = 3
+to = 4.5
+share = 0.25
+"""
+
+
+@pytest.fixture
+def script(tmp_path):
+    def written(text):
+        path = tmp_path / "script.toml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return written
+
+
+def test_a_script_gives_strokes_in_order_and_faults(script):
+    timetable = load_timetable(script(SCRIPT))
+    assert timetable.strokes == (
+        (2.0, paper_surfaces()["stickiness", 100]),
+        (8.0, Surface(0.5, "scripted", 0, 0.02, 25.0, -1, holds=False)),
+    )
+    assert timetable.faults == (Fault("lose", 3.0, 4.5, 0.25),)
+    assert timetable.repeat == 20.0
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("repeat = ", "not TOML"),
+        ("strokes = 1", "strokes"),
+        ("[[stroke]]\nat = -1\nmu = 0.5", "at"),
+        ("[[stroke]]\nat = 1\nmu = nan", "mu"),
+        ("[[stroke]]\nat = 1\nmu = '0.5'", "mu"),
+        ("[[stroke]]\nat = 1", "needs mu"),
+        ("[[stroke]]\nat = 1\ndescriptor = 'stickiness'\nindex = 55", "slipperiness 55"),
+        ("[[stroke]]\nat = 1\nindex = 20\nmu = 0.5", "either"),
+        ("[[stroke]]\nat = 1\nmu = 0.5\ncolour = 'red'", "colour"),
+        ("[[stroke]]\nat = 1\nmu = 0.5\n[[stroke]]\nat = 3\nmu = 0.5", "apart"),
+        ("repeat = 4\n[[stroke]]\nat = 1\nmu = 0.5", "apart"),
+        ("repeat = 10\n[[fault]]\nkind = 'lose'\nfrom = 9\nto = 11", "repeat"),
+        ("[[fault]]\nkind = 'explode'\nfrom = 1\nto = 2", "explode"),
+        ("[[fault]]\nkind = 'lose'\nfrom = 2\nto = 1", "start < stop"),
+        ("[[fault]]\nkind = 'lose'\nfrom = 1", "to"),
+        ("\ufeff\x00", "not TOML"),
+    ],
+)
+def test_a_wrong_script_is_refused_in_a_sentence_that_names_file_and_value(script, text, reason):
+    with pytest.raises(TimetableError, match=rf"script\.toml.*{reason}"):
+        load_timetable(script(text))
+
+
+def test_a_missing_script_is_refused_in_a_sentence(tmp_path):
+    with pytest.raises(SetupError, match=r"none\.toml cannot be read"):
+        load_timetable(tmp_path / "none.toml")
+
+
+def test_a_bench_is_stroked_as_its_timetable_says_again_and_again():
+    surface = paper_surfaces()["stickiness", 100]
+    bench = ScriptedBench(1, Timetable(((1.0, surface),), repeat=10.0))
+    normal = -bench.wrench(np.arange(0.0, 30.0, 0.01))[:, 2]
+    touched = [p.touch for p in bench.planted()]
+    assert [int(t // 10) for t in touched] == [0, 1, 2]
+    assert all(normal[int(100 * p.peak)] == pytest.approx(p.peak_normal_force, abs=0.1) for p in bench.planted())
+
+
+def test_a_timetable_without_repeat_ends():
+    bench = ScriptedBench(1, Timetable(((1.0, paper_surfaces()["stickiness", 0]),)))
+    bench.wrench(np.arange(0.0, 100.0, 1.0))
+    assert len(bench.planted()) == 1
+
+
+def test_strokes_that_nobody_asked_about_in_their_time_are_skipped():
+    bench = ScriptedBench(1, usual_timetable())
+    bench.wrench(np.array([6000.5]))
+    assert [p.touch > 5990.0 for p in bench.planted()] == [True]
+
+
+def test_without_a_script_the_papers_ten_surfaces_are_stroked():
+    assert [surface for _, surface in usual_timetable().strokes] == list(paper_surfaces().values())
+
+
+def test_a_served_box_is_opened_by_its_address_and_carries_out_its_script(script):
+    served = serve_net_ft(rdt_port=0, tcp_port=0, http_port=0, rate=1000, seed=4, factor=20.0, script=script(SCRIPT))
+    try:
+        transducer = open_transducer(served.uri, PacedClock(20.0))
+        assert (transducer.info.rate, transducer.info.serial) == (1000.0, "SIM00004")
+        transducer.start()
+        while transducer.health.lost == 0:
+            assert len(transducer.read(1.0))
+        transducer.close()
+    finally:
+        served.close()
+
+
+def test_where_port_80_is_refused_a_free_one_is_taken():
+    with contextlib.ExitStack() as stack:
+        taken = stack.enter_context(socket.socket())
+        with contextlib.suppress(OSError):  # somebody else may hold it already
+            taken.bind(("127.0.0.1", 80))
+            taken.listen()
+        served = serve_net_ft(rdt_port=0, tcp_port=0)
+        served.close()
+    assert "http=80" not in served.uri.split("&")
+
+
+def test_a_port_in_use_is_refused_in_one_sentence():
+    served = serve_net_ft(rdt_port=0, tcp_port=0, http_port=0)
+    port = int(served.uri.split("rdt=")[1].split("&")[0])
+    with pytest.raises(SetupError, match=f"UDP port {port}"):
+        serve_net_ft(rdt_port=port, tcp_port=0)
+    served.close()
