@@ -18,7 +18,7 @@ class Row:
     """The same ending at arc positions along the skin, the reference ending being the one at 0."""
 
     arc: Array  # (r,) from first touch, positive towards the tip, on the undeformed skin [mm]
-    sed: Array  # (r,) SED averaged over each ending [MPa]
+    sed: Array  # (r,) SED averaged over each ending [MPa]; nan where the finger ends before it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,8 +60,9 @@ class Prediction:
     error_estimate: float  # of sed_ending, relative [-]
     dofs: int  # unknown displacements
     newton_iterations: int  # solutions of a linear system with trial contact states
-    wall_s: float  # the solve alone, of this scene [s]
+    wall_s: float  # the solve alone: this scene's, and its part of what scenes solved together share [s]
     setup_s: float  # mesh and tables; shared by scenes solved together [s]
+    estimate_s: float  # what the error estimate took beside the solve, likewise [s]
     row: Row
     model: Mapping[str, Any]  # what was modelled, what was left out, and the evidence that it could be
     audits: Mapping[str, float]  # checks; residuals relative unless their name says otherwise
@@ -86,10 +87,11 @@ class Prediction:
                 "newton_iterations",
                 "wall_s",
                 "setup_s",
+                "estimate_s",
             )
         }
         plain["title"] = self.scene.title
-        plain["row"] = {"arc": self.row.arc.tolist(), "sed": self.row.sed.tolist()}
+        plain["row"] = {"arc": self.row.arc.tolist(), "sed": [None if s != s else s for s in self.row.sed.tolist()]}
         plain["model"] = dict(self.model)
         plain["audits"] = dict(self.audits)
         plain["warnings"] = list(self.warnings)

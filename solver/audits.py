@@ -1,0 +1,77 @@
+"""Checks that a result carries with it: what must balance, and what must not be exceeded. Perfect is 0."""
+
+import numpy as np
+
+from solver.contact import Contact
+from solver.finger import FingerModel
+from solver.friction import FrictionLaw
+from solver.mesh import Array
+from solver.stepping import March
+
+
+def audits(
+    model: FingerModel, law: FrictionLaw, contact: Contact, depth: float, displacement: Array
+) -> dict[str, float]:
+    """Return the checks of one state of contact; `displacement` (nodes, 2) relative to the bone [mm].
+
+    `equilibrium_x`, `equilibrium_y`: bone reaction plus contact force, by the contact force.
+    `inner_forces`: largest unbalanced force on a node that is neither held nor touching, by the contact force.
+    `work_balance`: work of the contact forces against the elements' stored energy (Clapeyron), relative.
+    `penetration`: of any skin node, by the indentation. `tension`: largest pull on a touching point, by the largest
+    push. `cone_violation`: |t| beyond min(mu p, tau_max), by the largest push. `smallest_det_F`: of the displacements.
+    """
+    mesh, body = model.geometry.mesh, model.body
+    inner = body.reactions(displacement[:, :, None])[:, :, 0]
+    total = max(float(contact.normal.sum()), np.finfo(float).tiny)
+    bone = inner[mesh.held].sum(axis=0)
+    free = np.ones(len(mesh.nodes), bool)
+    free[mesh.held] = free[mesh.skin] = False
+    forces = np.stack([contact.tangential, contact.normal], axis=1)
+    work = 0.5 * float(np.sum(forces * displacement[mesh.skin]))
+    stored = 0.5 * float(np.sum(inner * displacement))
+    whole = model.geometry.whole
+    height = mesh.nodes[whole, 1] + displacement[whole, 1] - depth
+    push = max(float(contact.normal.max(initial=0.0)), np.finfo(float).tiny)
+    beyond = np.abs(contact.tangential) - law.limit(contact.normal, body.touchable.length)
+    return {
+        "equilibrium_x": abs(float(bone[0] + contact.tangential.sum())) / total,
+        "equilibrium_y": abs(float(bone[1] + contact.normal.sum())) / total,
+        "inner_forces": float(np.abs(inner[free]).max()) / total,
+        "work_balance": abs(work - stored) / max(stored, np.finfo(float).tiny),
+        "penetration": max(-float(height.min()), 0.0) / depth,
+        "tension": max(-float(contact.normal.min(initial=0.0)), 0.0) / push,
+        "cone_violation": max(float(beyond.max(initial=0.0)), 0.0) / push,
+        "smallest_det_F": float(np.prod(model.stretches(displacement), axis=0).min()),
+    }
+
+
+def course_audits(model: FingerModel, way: March) -> dict[str, float]:
+    """Return the checks of a whole march, relative to the bone's work.
+
+    `course_work_balance`: bone work less stored energy less dissipation. `course_step_work`: the part of it that points
+    did on their way to the surface within a step, which vanishes with the step. `course_least_dissipation`: the least
+    work that friction took in a step (never negative).
+    """
+    touch = model.body.touchable
+    normal = np.array([i.contact.normal for i in way.instants])
+    tangential = np.array([i.contact.tangential for i in way.instants])
+    gap = np.array([i.contact.gap for i in way.instants])
+    shift = np.array([i.contact.shift for i in way.instants])
+    depth = np.array([i.depth for i in way.instants])
+    travel = np.array([i.travel for i in way.instants])
+    last = np.concatenate([normal[-1], tangential[-1]])
+    k = len(touch.gap)
+    skin = model.body.skin_displacement(last[:, None])[:, 0]
+    stored = 0.5 * float(last @ skin)
+    mean_n, mean_t = (normal[1:] + normal[:-1]) / 2.0, (tangential[1:] + tangential[:-1]) / 2.0
+    bone = float(np.sum(mean_n.sum(axis=1) * np.diff(depth)) - np.sum(mean_t.sum(axis=1) * np.diff(travel)))
+    lost = -float(np.sum(mean_t * np.diff(shift, axis=0)))
+    closing = -float(np.sum(mean_n * np.diff(gap, axis=0)))
+    friction = -np.sum(tangential[1:] * np.diff(shift, axis=0), axis=1)
+    scale = max(abs(bone), np.finfo(float).tiny)
+    assert len(skin) == 2 * k
+    return {
+        "course_work_balance": abs(bone - stored - lost - closing) / scale,
+        "course_step_work": abs(closing) / scale,
+        "course_least_dissipation": float(friction.min()) / scale,
+    }

@@ -1,0 +1,148 @@
+"""A body of any shape: a mesh with its materials and loads, reduced to what the surface feels of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.linalg import LinAlgError
+
+from solver.contact import Touchable
+from solver.dissection import Reduced, Tree
+from solver.elements import line
+from solver.materials import Hooke
+from solver.mesh import Array, Indices, Mesh
+from solver.stiffness import Elastic
+
+Motion = Literal["x", "y", "turn"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """An elastic body whose skin may touch a flat rigid surface that lies below it along y = 0."""
+
+    mesh: Mesh
+    elastic: Elastic
+    reduced: Reduced
+    touchable: Touchable
+    prescribed: Array  # (nodes, 2) displacement of the held nodes relative to the drive, 0 elsewhere [mm]
+
+    @staticmethod
+    def of(
+        mesh: Mesh,
+        materials: Sequence[Hooke],
+        loads: Array | None = None,
+        prescribed: Array | None = None,
+        free: Sequence[Motion] = (),
+        tree: Tree | None = None,
+    ) -> "Body":
+        """Reduce a body of `materials` by region under dead `loads` (nodes, 2) [N/mm].
+
+        Held nodes move with the drive, and by `prescribed` (held, 2) [mm] relative to it. A body that nothing holds
+        names in `free` the motions along which the surface alone balances the loads. `tree` is the `elimination` of the
+        mesh, where it was made before. Raises LinAlgError where the body is not held and not free.
+        """
+        elastic = Elastic.of(mesh, materials)
+        moved = np.zeros(mesh.nodes.shape)
+        force = np.zeros(mesh.nodes.size) if loads is None else loads.ravel().copy()
+        if prescribed is not None:
+            moved[mesh.held] = prescribed
+            unknowns = _unknowns(mesh)
+            pushed = elastic.stiffness @ moved.ravel()[unknowns][:, :, None]
+            np.subtract.at(force, unknowns.ravel(), pushed.ravel())
+        tree = elimination(mesh) if tree is None else tree
+        reduced = Reduced.of(tree, elastic.stiffness, force[:, None] if force.any() else None)
+        return Body(mesh, elastic, reduced, _touchable(mesh, reduced, free), moved)
+
+    @property
+    def dofs(self) -> int:
+        """Return the number of unknown displacements."""
+        return 2 * (len(self.mesh.nodes) - len(self.mesh.held))
+
+    def skin_displacement(self, forces: Array) -> Array:
+        """Return the displacement (2 k, c) of the skin, normal first, by surface forces (2 k, c); held bodies only."""
+        k = len(self.mesh.skin)
+        t = self.touchable
+        up = t.normal_by_normal @ forces[:k] + t.normal_by_tangential @ forces[k:] + t.normal_free[:, None]
+        along = t.normal_by_tangential.T @ forces[:k] + t.tangential_by_tangential @ forces[k:]
+        return np.concatenate([up, along + t.tangential_free[:, None]])
+
+    def displacement(self, skin: Array, only: Indices | None = None) -> Array:
+        """Return the displacement (nodes, 2, c) of all nodes for that of the skin (2 k, c), normal first.
+
+        With `only` (node numbers), other nodes may be left at 0.
+        """
+        unknowns = None if only is None else np.concatenate([2 * only, 2 * only + 1])
+        loaded = self.reduced.load.shape[1] > 0
+        out = self.reduced.all_unknowns(skin, loaded, unknowns).reshape(*self.mesh.nodes.shape, -1)
+        out += self.prescribed[:, :, None]
+        return out
+
+    def reactions(self, displacement: Array) -> Array:
+        """Return the forces (nodes, 2, c) that hold all nodes where they are: the elements' inner forces [N/mm]."""
+        count = len(self.mesh.elements)
+        local = displacement[self.mesh.elements].reshape(count, 18, -1)
+        out = np.zeros(displacement.shape)
+        np.add.at(out, self.mesh.elements, (self.elastic.stiffness @ local).reshape(count, 9, 2, -1))
+        return out
+
+
+def _unknowns(mesh: Mesh) -> Indices:
+    """Return the numbers (e, 18) of the elements' unknowns: x of node n is 2 n, y is 2 n + 1."""
+    return (2 * mesh.elements[:, :, None] + np.arange(2)).reshape(len(mesh.elements), 18)
+
+
+def elimination(mesh: Mesh) -> Tree:
+    """Return the order in which the body's unknowns are eliminated: all but the skin's, normal ones first."""
+    kept = np.concatenate([2 * mesh.skin + 1, 2 * mesh.skin])
+    fixed = np.concatenate([2 * mesh.held, 2 * mesh.held + 1])
+    return Tree.of(_unknowns(mesh), mesh.nodes[mesh.elements[:, 8]], fixed, kept)
+
+
+def _touchable(mesh: Mesh, reduced: Reduced, free: Sequence[Motion]) -> Touchable:
+    """Turn the skin's stiffness into its compliance, split by direction."""
+    k = len(mesh.skin)
+    x, y = mesh.nodes[mesh.skin].T
+    one, zero = np.ones(k), np.zeros(k)
+    stiffness = reduced.stiffness
+    if not len(mesh.held):
+        # Rigid motions cost no energy: a spring on each makes the matrix invertible, and stays unloaded, since the
+        # surface's forces are asked to balance the loads along every motion that anything drives.
+        rigid = np.linalg.qr(np.stack([np.r_[zero, one], np.r_[one, zero], np.r_[x, -y]], axis=1))[0]
+        stiffness = stiffness + np.trace(stiffness) / (2 * k) * rigid @ rigid.T
+    if np.linalg.matrix_rank(stiffness) < 2 * k:
+        raise LinAlgError("the body is neither held nor balanced")
+    compliance = np.linalg.inv(stiffness)
+    compliance = (compliance + compliance.T) / 2.0
+    load = reduced.load.sum(axis=1)
+    moved = compliance @ load
+    shapes = {"x": np.r_[zero, one], "y": np.r_[one, zero], "turn": np.r_[x, -y]}
+    motions = np.stack([shapes[name] for name in free], axis=1) if free else np.zeros((2 * k, 0))
+    return Touchable(
+        gap=y,
+        length=skin_lengths(mesh),
+        normal_by_normal=compliance[:k, :k],
+        normal_by_tangential=compliance[:k, k:],
+        tangential_by_tangential=compliance[k:, k:],
+        normal_free=moved[:k],
+        tangential_free=moved[k:],
+        motions=motions,
+        resultants=-motions.T @ load,
+    )
+
+
+def skin_lengths(mesh: Mesh) -> Array:
+    """Return the length of skin (k,) [mm] that each point of it stands for: 1/6, 4/6, 1/6 of a straight edge."""
+    return edge_load(mesh, mesh.skin, np.ones((len(mesh.skin), 1)))[mesh.skin, 0]
+
+
+def edge_load(mesh: Mesh, chain: Indices, traction: Array) -> Array:
+    """Return the nodal forces (nodes, c) of a traction (2 k + 1, c) [MPa] along a chain of edges (2 k + 1,)."""
+    out = np.zeros((len(mesh.nodes), traction.shape[1]))
+    points, weights = np.polynomial.legendre.leggauss(4)
+    values, slopes = line(points)  # (4, 3)
+    edges = np.stack([np.arange(0, len(chain) - 2, 2) + n for n in range(3)], axis=1)
+    stretch = np.linalg.norm(np.einsum("qn,enc->eqc", slopes, mesh.nodes[chain[edges]]), axis=2)
+    local = np.einsum("q,eq,qn,qm,emc->enc", weights, stretch, values, values, traction[edges])
+    np.add.at(out, chain[edges], local)
+    return out

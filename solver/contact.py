@@ -1,0 +1,247 @@
+"""Contact of a reduced body with a flat rigid surface: which points touch, stick, slip or slip at the bound.
+
+Unknown are the normal forces of the touching points, the tangential forces of the sticking ones and, for a body that
+is free to move as a whole, its motion. For one guess of every point's state they follow from one small dense linear
+system; states that contradict its solution are changed, and again, until none does (primal-dual active set: Alart and
+Curnier 1991; Hüeber and Wohlmuth 2005). No penalty: what touches has a gap of zero, what slips has exactly the force
+of the law.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dgetrf, dgetrs
+
+from solver.friction import FrictionLaw
+
+Array = NDArray[np.float64]
+States = NDArray[np.int8]
+OPEN, STICK, SLIP, CAP = 0, 1, 2, 3
+NAMES = ("open", "stick", "slip", "cap")
+SMALL = 1e-11  # a contradiction smaller than this, relative to the largest of its kind, is round-off
+
+
+class ContactLost(Exception):
+    """No set of states was found that contradicts nothing; the message says what was tried."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Touchable:
+    """What the surface feels of a body: k points that may touch, and r free motions of the body as a whole.
+
+    Displacements [mm] are relative to the driven part of the body; forces [N/mm] are those of the surface on the body.
+    """
+
+    gap: Array  # (k,) height over the surface before any motion [mm]
+    length: Array  # (k,) skin each point stands for [mm]
+    normal_by_normal: Array  # (k, k) compliance: displacement along +y by forces along +y [mm per N/mm]
+    normal_by_tangential: Array  # (k, k) displacement along +y by forces along +x
+    tangential_by_tangential: Array  # (k, k) displacement along +x by forces along +x
+    normal_free: Array  # (k,) displacement along +y by the dead loads alone [mm]
+    tangential_free: Array  # (k,)
+    motions: Array  # (2 k, r) displacement of the points, normal ones first, by each free motion
+    resultants: Array  # (r,) what the surface's forces must amount to along each free motion [N/mm]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contact:
+    """A state of contact that contradicts nothing."""
+
+    state: States  # (k,)
+    sense: Array  # (k,) direction of the friction force on a slipping point: +1 along +x, -1 along -x
+    normal: Array  # (k,) force on the body along +y [N/mm]
+    tangential: Array  # (k,) along +x [N/mm]
+    shift: Array  # (k,) position along the surface relative to where it would be undeformed and not driven [mm]
+    gap: Array  # (k,) [mm]
+    motion: Array  # (r,) free motion
+    iterations: int  # linear systems solved
+
+    @property
+    def touching(self) -> NDArray[np.bool_]:
+        """Return which points touch, (k,)."""
+        return self.state != OPEN
+
+
+class _System:
+    """The linear system of one guess of states, factorised."""
+
+    def __init__(self, body: Touchable, law: FrictionLaw, state: States, sense: Array) -> None:
+        self.key = state.tobytes() + sense.tobytes()
+        self.on = np.flatnonzero(state != OPEN)
+        self.stuck = np.flatnonzero(state == STICK)
+        self.capped = np.flatnonzero(state == CAP)
+        on, stuck, free = self.on, self.stuck, body.motions.shape[1]
+        drag = np.where(state == SLIP, sense * law.mu, 0.0)[on]  # tangential by normal force
+        self.drag = drag
+        count = len(on) + len(stuck)
+        matrix = np.zeros((count + free, count + free))
+        touch = body.normal_by_normal[np.ix_(on, on)] + body.normal_by_tangential[np.ix_(on, on)] * drag
+        matrix[: len(on), : len(on)] = touch
+        if len(stuck):
+            coupling = body.normal_by_tangential[np.ix_(on, stuck)]
+            inside = body.tangential_by_tangential[np.ix_(stuck, on)]
+            matrix[: len(on), len(on) : count] = coupling
+            matrix[len(on) : count, : len(on)] = coupling.T + inside * drag
+            matrix[len(on) : count, len(on) : count] = body.tangential_by_tangential[np.ix_(stuck, stuck)]
+        if free:
+            normal, tangential = np.split(body.motions, 2)
+            matrix[: len(on), count:], matrix[len(on) : count, count:] = normal[on], tangential[stuck]
+            matrix[count:, : len(on)] = (normal[on] + tangential[on] * drag[:, None]).T
+            matrix[count:, len(on) : count] = tangential[stuck].T
+        self._factors = dgetrf(matrix) if len(matrix) else None
+        self.singular = self._factors is not None and bool(self._factors[2])
+
+    def solve(self, right: Array) -> Array:
+        """Return the solution for the right-hand side `right`."""
+        return right if self._factors is None else dgetrs(self._factors[0], self._factors[1], right)[0]
+
+
+class Course:
+    """Contact of one body under one law, step after step; keeps the last factorisation, since most steps reuse it."""
+
+    def __init__(self, body: Touchable, law: FrictionLaw) -> None:
+        """Start with nothing known."""
+        self.body = body
+        self.law = law
+        self._system: _System | None = None
+
+    def sliding(self, depth: float, direction: int, guess: States | None = None) -> Contact:
+        """Return the settled sliding state of a body driven `depth` [mm] into the surface and along +x or -x.
+
+        Every touching point slips, so nothing is left of how it came there. Raises ContactLost where no such state
+        was found.
+        """
+        count = len(self.body.gap)
+        sense = np.full(count, -float(direction))
+        low = self.body.gap + self.body.normal_free < depth
+        guesses = [np.where(low, SLIP, OPEN)] if guess is None else [guess]
+        if np.isfinite(self.law.tau_max):
+            guesses.append(np.where(low, CAP, OPEN))
+        for number, first in enumerate(guesses):
+            try:
+                return self._consistent(depth, 0.0, np.zeros(count), first.astype(np.int8), sense, free=False)
+            except ContactLost:
+                if number == len(guesses) - 1:
+                    raise
+        raise AssertionError  # there is always a guess
+
+    def step(self, before: Contact, depth: float, travel: float) -> Contact:
+        """Return the state after the body was driven to `depth` and `travel` along +x [mm], coming from `before`.
+
+        Backward Euler: a point sticks where it was, or slips from there against its friction force.
+        """
+        return self._consistent(depth, travel, before.shift, before.state, before.sense, free=True)
+
+    def _consistent(
+        self, depth: float, travel: float, anchor: Array, state: States, sense: Array, *, free: bool
+    ) -> Contact:
+        """Change states until none contradicts the solution; with `free`, points may stick and turn round."""
+        seen: set[bytes] = set()
+        one_by_one = False
+        limit = 20 + 4 * len(state)
+        for iteration in range(1, limit + 1):
+            if self._system is None or self._system.key != state.tobytes() + sense.tobytes():
+                self._system = _System(self.body, self.law, state, sense)
+            if self._system.singular:
+                raise ContactLost("the touching points have no unique forces")
+            found = self._solved(self._system, depth, travel, anchor, state, sense, iteration)
+            wanted, turned, badness = self._corrected(found, anchor, free=free)
+            changed = np.flatnonzero((wanted != state) | (turned != sense))
+            if not len(changed):
+                return found
+            if one_by_one:
+                worst = changed[np.argmax(badness[changed])]
+                keep = np.arange(len(state)) != worst
+                wanted, turned = np.where(keep, state, wanted), np.where(keep, sense, turned)
+            state, sense = wanted.astype(np.int8), turned
+            key = state.tobytes() + sense.tobytes()
+            if key in seen:
+                one_by_one = True
+                seen.clear()
+            seen.add(key)
+        raise ContactLost(f"the states of the touching points still contradicted each other after {limit} corrections")
+
+    def _solved(
+        self,
+        system: _System,
+        depth: float,
+        travel: float,
+        anchor: Array,
+        state: States,
+        sense: Array,
+        iteration: int,
+    ) -> Contact:
+        body, on, stuck = self.body, system.on, system.stuck
+        tangential = np.zeros(len(state))
+        tangential[system.capped] = sense[system.capped] * self.law.bound(body.length[system.capped])
+        lifted = body.gap + body.normal_free - depth + body.normal_by_tangential @ tangential
+        moved = body.tangential_free + travel + body.tangential_by_tangential @ tangential
+        missing = body.resultants - body.motions[len(state) :].T @ tangential
+        answer = system.solve(np.concatenate([-lifted[on], (anchor - moved)[stuck], missing]))
+        normal = np.zeros(len(state))
+        normal[on] = answer[: len(on)]
+        rest = np.zeros(len(state))
+        rest[on] = system.drag * normal[on]
+        rest[stuck] = answer[len(on) : len(on) + len(stuck)]
+        motion = answer[len(on) + len(stuck) :]
+        up, along = np.split(body.motions @ motion, 2)
+        gap = lifted + up + body.normal_by_normal @ normal + body.normal_by_tangential @ rest
+        shift = moved + along + body.normal_by_tangential.T @ normal + body.tangential_by_tangential @ rest
+        return Contact(state, sense, normal, tangential + rest, shift, gap, motion, iteration)
+
+    def _corrected(self, found: Contact, anchor: Array, *, free: bool) -> tuple[States, Array, Array]:
+        """Return the states and senses that the solution calls for, and how badly each point contradicts its own."""
+        body, law = self.body, self.law
+        state, sense = found.state.copy(), found.sense.copy()
+        force = np.abs(found.normal).max(initial=0.0)
+        lengths = np.concatenate([body.gap, found.gap, found.shift])
+        height = max(float(np.abs(lengths).max(initial=0.0)), np.finfo(float).tiny)
+        badness = np.zeros(len(state))
+
+        def change(where: NDArray[np.bool_], to: int, how_bad: Array) -> None:
+            state[where] = to
+            badness[where] = how_bad[where]
+
+        touching = found.state != OPEN
+        slack = SMALL * force
+        bound = law.bound(body.length)
+        change((found.state == SLIP) & (law.mu * found.normal > bound + slack), CAP, found.normal)
+        change((found.state == CAP) & (law.mu * found.normal < bound - slack), SLIP, found.normal)
+        if free and not law.frictionless:
+            over = np.abs(found.tangential) - law.limit(found.normal, body.length)
+            loose = (found.state == STICK) & (over > slack)
+            sense[loose] = np.sign(found.tangential[loose])
+            capped = law.mu * found.normal > bound
+            change(loose & ~capped, SLIP, over)
+            change(loose & capped, CAP, over)
+            # a point that slips along its friction force sticks; one whose force is about to change is asked later
+            forward = (found.shift - anchor) * found.sense
+            stops = (found.state >= SLIP) & (state == found.state) & (forward > SMALL * height)
+            change(stops, STICK, forward * force / height)
+        change(touching & (found.normal < -slack), OPEN, -found.normal)
+        enters = ~touching & (found.gap < -SMALL * height)
+        if free:
+            sense[enters] = np.where(found.shift > anchor, -1.0, 1.0)[enters]
+        change(enters, SLIP, -found.gap * force / height)
+        return state, sense, badness
+
+
+def untouched(body: Touchable, depth: float = 0.0) -> Contact:
+    """Return the state before first touch."""
+    count = len(body.gap)
+    zero = np.zeros(count)
+    state = np.full(count, OPEN, np.int8)
+    gap = body.gap + body.normal_free - depth
+    return Contact(state, np.ones(count), zero, zero, body.tangential_free, gap, np.zeros(0), 0)
+
+
+def forced(body: Touchable, normal_force: float) -> Touchable:
+    """Return the body free to move along y under a given normal force [N/mm] instead of being driven to a depth."""
+    count = len(body.gap)
+    up = np.concatenate([np.ones(count), np.zeros(count)])[:, None]
+    return replace(
+        body,
+        motions=np.concatenate([body.motions, up], axis=1),
+        resultants=np.append(body.resultants, normal_force),
+    )

@@ -1,0 +1,149 @@
+"""What a result leaves out, each with a number computed for its scene: how much that could have changed."""
+
+from typing import Any
+
+import numpy as np
+
+from solver.contact import STICK, Contact
+from solver.finger import FingerModel
+from solver.mesh import Array
+from solver.scene import Scene
+
+DENSITY = 1.1e-9  # of soft tissue [t/mm3 = N s2/mm4]
+# Relaxation of the fingerpad under load: times from Pawluk and Howe 1999 (J. Biomech. Eng. 121, 178); their weights are
+# not in the abstract, so a fifth of the instantaneous stiffness is assumed for each, and two fifths stay.
+RELAXATION = ((0.004, 0.2), (0.07, 0.2), (1.4, 0.2))
+STAYS = 0.4
+LARGE_STRAIN = 0.1  # a strain from which finite strain ought to be considered [-]
+
+
+def model(scene: Scene, finger: FingerModel, contact: Contact, displacement: Array) -> dict[str, Any]:
+    """Return what was modelled and what was left out, as plain data.
+
+    Every entry of `left_out` has `estimate`, the relative change of the SED (or a lower bound of it) that leaving it
+    out may have caused, `from`, the numbers of this scene that it rests on, and `how` they make the estimate.
+    """
+    return {
+        "kinematics": "small strain, plane strain",
+        "material": "Hooke, per layer",
+        "element": "Q2/P-1: nine nodes, three pressure modes condensed in the element",
+        "contact": "unilateral, Coulomb with |t| <= min(mu p, tau_max), open, stick, slip or cap at every skin node",
+        "course": _course(scene),
+        "bone": "driven as a whole",
+        "width": "forces are per mm of width",
+        "left_out": {
+            "finite strain": _finite_strain(finger, displacement),
+            "bone compliance": _bone(scene, finger, displacement),
+            "inertia": _inertia(scene, contact, finger),
+            "viscosity": _viscosity(scene, displacement, finger),
+            "history": _history(scene, contact, finger, displacement),
+            "the third dimension": _width(scene, contact, finger),
+        },
+    }
+
+
+def warnings(left_out: dict[str, Any]) -> tuple[str, ...]:
+    """Return a sentence for everything left out that this scene would have needed."""
+    strains = left_out["finite strain"]["from"]
+    if strains["largest_strain"] <= LARGE_STRAIN:
+        return ()
+    return (
+        f"Strains reach {100 * strains['largest_strain']:.0f} % in the skin and "
+        f"{100 * strains['strain_at_ending']:.0f} % at the ending, beyond what small strain is meant for: "
+        "finite strain would give another answer.",
+    )
+
+
+def _course(scene: Scene) -> str:
+    if scene.loading.direction == 0:
+        return "pre-indentation, marched with stick and slip"
+    if scene.solve.course == "history":
+        return "pre-indentation, stick, partial slip and slide, marched until settled"
+    return "settled sliding, solved directly"
+
+
+def _finite_strain(finger: FingerModel, displacement: Array) -> dict[str, Any]:
+    small, large = finger.stretches(displacement)
+    mesh, elastic = finger.geometry.mesh, finger.body.elastic
+    probes, weights = finger.ending.probes, finger.ending.weights
+    gradient = probes.displacement_gradient(mesh, displacement)
+    f = gradient + np.eye(2)
+    det = f[:, 0, 0] * f[:, 1, 1] - f[:, 0, 1] * f[:, 1, 0]
+    shear, lame = elastic.shear[probes.element], elastic.lame[probes.element]
+    estimate = None
+    if det.min() > 0.0:
+        log = np.log(det)
+        finite = shear / 2.0 * (np.sum(f * f, axis=(1, 2)) - 2.0 - 2.0 * log) + lame / 2.0 * log**2
+        hooke = probes.energy(mesh, elastic, displacement[:, :, None])[:, 0]
+        estimate = abs(float(weights @ finite) / float(weights @ hooke) - 1.0)
+    strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2.0
+    at_ending = float(np.abs(np.linalg.eigvalsh(strain)).max())
+    return {
+        "estimate": estimate,
+        "from": {"largest_strain": float(max(1.0 - small.min(), large.max() - 1.0)), "strain_at_ending": at_ending},
+        "how": "change of the ending's SED when these displacements enter the neo-Hookean law; contact and forces "
+        "would change too, so it is no bound",
+    }
+
+
+def _bone(scene: Scene, finger: FingerModel, displacement: Array) -> dict[str, Any]:
+    force = finger.body.reactions(displacement[:, :, None])[finger.geometry.mesh.held, :, 0].sum(axis=0)
+    bone = scene.materials.bone
+    pressure = float(np.hypot(*force)) / (2.0 * scene.finger.bone_radius)
+    yields = pressure * (1.0 - bone.nu**2) / bone.E * 2.0 * scene.finger.bone_radius
+    return {
+        "estimate": 2.0 * yields / scene.loading.indentation,
+        "from": {"bone_pressure_MPa": pressure, "bone_shortening_mm": yields},
+        "how": "the bone's own shortening under the force on it, as part of the indentation, twice for an energy",
+    }
+
+
+def _inertia(scene: Scene, contact: Contact, finger: FingerModel) -> dict[str, Any]:
+    length = float(finger.body.touchable.length[contact.touching].sum())
+    pressure = float(contact.normal.sum()) / length if length else 0.0
+    speed = max(scene.loading.speed if scene.loading.direction else 0.0, scene.loading.indentation)
+    return {
+        "estimate": DENSITY * speed**2 / pressure if pressure else None,
+        "from": {"mean_pressure_MPa": pressure, "speed_mm_s": speed},
+        "how": "pressure of moving tissue (density times speed squared, 1.1 g/cm3) by the mean contact pressure",
+    }
+
+
+def _viscosity(scene: Scene, displacement: Array, finger: FingerModel) -> dict[str, Any]:
+    slide = 2.0 * _elastic_slide(finger, displacement) / scene.loading.speed if scene.loading.direction else 0.0
+    after = sum(g * tau * (np.exp(-slide / tau) - np.exp(-(slide + 1.0) / tau)) for tau, g in RELAXATION)
+    return {
+        "estimate": float(after) / STAYS,
+        "from": {"slide_s": slide, "relaxation_s": [tau for tau, _ in RELAXATION]},
+        "how": "stress above its relaxed value when sliding has settled, all layers relaxing alike with the times of "
+        "Pawluk and Howe (1999) and assumed weights of a fifth each; it would scale all surfaces alike",
+    }
+
+
+def _elastic_slide(finger: FingerModel, displacement: Array) -> float:
+    """Return the largest sideways displacement of the skin that may touch [mm]."""
+    return float(np.abs(displacement[finger.geometry.mesh.skin, 0]).max())
+
+
+def _history(scene: Scene, contact: Contact, finger: FingerModel, displacement: Array) -> dict[str, Any]:
+    marched = scene.solve.course == "history" or scene.loading.direction == 0
+    touching = int(contact.touching.sum())
+    sticking = int((contact.state == STICK).sum()) / touching if touching else 0.0
+    return {
+        "estimate": 0.0,
+        "from": {"sticking_part": sticking, "elastic_slide_mm": _elastic_slide(finger, displacement)},
+        "how": "the history was marched"
+        if marched
+        else "no touching point sticks, so nothing of the way here is left once the bone has slid a few times the "
+        "skin's own sideways displacement",
+    }
+
+
+def _width(scene: Scene, contact: Contact, finger: FingerModel) -> dict[str, Any]:
+    skin = finger.skin_displacement(contact)[:, 0]
+    width = finger.contact_width(contact, skin)
+    return {
+        "estimate": width / scene.width,
+        "from": {"contact_width_mm": width, "finger_width_mm": scene.width},
+        "how": "plane strain asks for a finger much wider than its contact: contact width by finger width",
+    }

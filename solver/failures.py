@@ -1,0 +1,46 @@
+"""How a solve ends when there is no answer: with a sentence, and with what is known of the limit."""
+
+from typing import Any
+
+
+class SolveFailure(Exception):
+    """A scene without an answer. `kind` tells scripts which failure it is."""
+
+    kind = "failed"
+
+    def __init__(self, message: str, *, limit_mu: float | None = None, limit_indentation: float | None = None) -> None:
+        """Say at which load, why and what was tried; limits where they are known.
+
+        `limit_mu` is the largest coefficient of friction at this depth with this bound, `limit_indentation` [mm] the
+        largest depth at this coefficient and bound.
+        """
+        super().__init__(message)
+        self.limit_mu = limit_mu
+        self.limit_indentation = limit_indentation
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `daq-app solve --json` prints instead of a prediction."""
+        return {
+            "error": {
+                "kind": self.kind,
+                "limit_mu": self.limit_mu,
+                "limit_indentation": self.limit_indentation,
+                "message": str(self),
+            }
+        }
+
+
+class NoSteadyState(SolveFailure):
+    """The finger cannot slide steadily: its drag wedges it into the surface faster than it yields."""
+
+    kind = "no_steady_state"
+
+
+class NotConverged(SolveFailure):
+    """The equations have not been solved; whether they have a solution is not known."""
+
+    kind = "not_converged"
+
+
+class Cancelled(Exception):
+    """The caller asked to stop."""

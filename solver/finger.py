@@ -1,0 +1,113 @@
+"""The finger as the solver sees it: meshed, reduced to its skin, with its endings placed. One serves many surfaces."""
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from solver.body import Body, elimination
+from solver.contact import Contact
+from solver.elements import Q2P1
+from solver.materials import Hooke
+from solver.mesh import Array, Mesh
+from solver.mesher import FingerMesh, Sizing, finger_mesh
+from solver.receptor import ROW, Endings, endings, middle
+from solver.scene import Scene
+from solver.stiffness import Probes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FingerModel:
+    """A finger on one mesh. Bone frame: the bone stays, the surface comes up by the indentation."""
+
+    geometry: FingerMesh
+    body: Body
+    ending: Endings  # the reference ending alone
+    point: Endings  # its middle
+    row: Endings  # the row of receptors
+    corners: Probes  # every corner of every element: strains are largest at corners
+    solve_s: float  # what assembling and reducing took, beside mesh and tables [s]
+
+    @staticmethod
+    def of(scene: Scene, sizing: Sizing) -> "FingerModel":
+        """Mesh and reduce the finger of `scene`, whose friction and loading do not matter here.
+
+        Raises MeshError where the outline cannot be meshed.
+        """
+        geometry = finger_mesh(scene.finger, scene.receptor, sizing)
+        tree = elimination(geometry.mesh)
+        tissues = (scene.materials.epidermis, scene.materials.dermis, scene.materials.fat)
+        begun = perf_counter()
+        body = Body.of(geometry.mesh, [Hooke(t.E, t.nu) for t in tissues], tree=tree)
+        took = perf_counter() - begun
+        at_touch = endings(geometry, body.elastic, scene.receptor, np.zeros(1))
+        return FingerModel(
+            geometry,
+            body,
+            at_touch,
+            middle(geometry, body.elastic, scene.receptor),
+            endings(geometry, body.elastic, scene.receptor, ROW),
+            _corners(geometry.mesh, body),
+            took,
+        )
+
+    def skin_displacement(self, contact: Contact) -> Array:
+        """Return the displacement (2 k, 1) of the skin that may touch, normal first [mm]."""
+        return self.body.skin_displacement(np.concatenate([contact.normal, contact.tangential])[:, None])
+
+    def displacement(self, contact: Contact) -> Array:
+        """Return the displacement (nodes, 2) of all nodes relative to the bone [mm]."""
+        return self.body.displacement(self.skin_displacement(contact))[:, :, 0]
+
+    def sed_ending(self, displacement: Array) -> float:
+        """Return the SED averaged over the reference ending [MPa] for displacements (nodes, 2)."""
+        return float(self.ending.average(self.geometry.mesh, self.body.elastic, displacement[:, :, None])[0, 0])
+
+    def sed_point(self, displacement: Array) -> float:
+        """Return the SED in the middle of the reference ending [MPa]."""
+        return float(self.point.average(self.geometry.mesh, self.body.elastic, displacement[:, :, None])[0, 0])
+
+    def sed_row(self, displacement: Array) -> Array:
+        """Return the SED averaged over each ending of the row (r,) [MPa]; nan where the finger ends before it."""
+        return self.row.average(self.geometry.mesh, self.body.elastic, displacement[:, :, None])[:, 0]
+
+    def stretches(self, displacement: Array) -> Array:
+        """Return the smallest and largest in-plane stretch (2, p) at every corner of every element.
+
+        They are the singular values of F = 1 + du/dX; a folded place has a negative smallest one.
+        """
+        f = self.corners.displacement_gradient(self.geometry.mesh, displacement) + np.eye(2)
+        det = f[:, 0, 0] * f[:, 1, 1] - f[:, 0, 1] * f[:, 1, 0]
+        total = np.sum(f * f, axis=(1, 2))
+        plus, minus = np.sqrt(total + 2.0 * det), np.sqrt(np.maximum(total - 2.0 * det, 0.0))
+        return np.stack([(plus - minus) / 2.0, (plus + minus) / 2.0])
+
+    def contact_width(self, contact: Contact, skin: Array) -> float:
+        """Return the distance along the surface from the first to the last touching point [mm], 0 where none touches.
+
+        A touching point stands for half the way to its open neighbours.
+        """
+        touching = np.flatnonzero(contact.touching)
+        if not len(touching):
+            return 0.0
+        k = len(contact.state)
+        mesh = self.geometry.mesh
+        x = mesh.nodes[mesh.skin, 0] + skin[k:]
+        first, last = int(touching[0]), int(touching[-1])
+        low = (x[first] + x[max(first - 1, 0)]) / 2.0
+        high = (x[last] + x[min(last + 1, k - 1)]) / 2.0
+        return float(high - low)
+
+    def reaches_out(self, contact: Contact, displacement: Array, indentation: float) -> bool:
+        """Return whether skin outside the part that may touch would, so that the part must be made larger."""
+        whole = self.geometry.whole
+        below = self.geometry.mesh.nodes[whole, 1] + displacement[whole, 1] < indentation * (1.0 - 1e-9)
+        may = np.isin(whole, self.geometry.mesh.skin)
+        ends = bool(contact.touching[0] and may[0] == 0) or bool(contact.touching[-1] and may[-1] == 0)
+        return ends or bool((below & ~may).any())
+
+
+def _corners(mesh: Mesh, body: Body) -> Probes:
+    """Return a probe in every corner of every element."""
+    element = np.repeat(np.arange(len(mesh.elements)), 4)
+    return Probes.at(mesh, body.elastic, element, np.tile(Q2P1.corners, (len(mesh.elements), 1)))

@@ -1,0 +1,145 @@
+"""The finger's mesh: a half-O from the bone to the skin, fine along the skin where it may touch."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import ceil
+
+import numpy as np
+
+from solver.grid import grid_mesh
+from solver.mesh import Array, Indices, Mesh
+from solver.outline import Outline
+from solver.scene import Finger, Receptor
+
+EPIDERMIS, DERMIS, FAT = 0, 1, 2  # numbers of the regions
+GROWTH = 0.2  # of the elements' size with the distance from where the skin may touch [-]
+TALL = 1.4  # size of elements across the skin by that along it [-]
+COARSEST = 10.0  # elements far from the contact by those in the bulk of the pulp [-]
+
+
+@dataclass(frozen=True, slots=True)
+class Sizing:
+    """How fine the mesh is, and where."""
+
+    fineness: float  # elements across half the skin that may touch, and in 1.25 tip radii of the pulp
+    indentation: float  # the skin that lies lower than this may touch [mm]
+    shift: bool = False  # move the mesh along the skin by half an element
+    margin: float = 1.0  # contact is looked for where undeformed skin lies lower than (1 + margin/4) indentation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FingerMesh:
+    """The mesh of a finger, with the lines it was made of."""
+
+    mesh: Mesh
+    outline: Outline
+    arcs: Array  # (a + 1,) arc positions of the lines between elements [mm]
+    depths: Array  # (b + 1,) depths of the lines between the elements of the skin, outermost last; bone not included
+    fat: int  # elements from bone to dermis
+    whole: Indices  # (2 a + 1,) nodes of all the skin, those that may touch and those that may not
+
+
+def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMesh:
+    """Return the mesh of `finger`, its bone left out and its bone's surface held.
+
+    Lines between elements frame the reference ending: averages over whole elements converge faster than over parts.
+    Raises MeshError where the outline cannot be meshed.
+    """
+    outline = Outline.of(finger)
+    overlap = _lower_than(outline, sizing.indentation)
+    bulk = 1.25 * finger.tip_radius / sizing.fineness
+    fine = min(bulk, (overlap[1] - overlap[0]) / (2.0 * sizing.fineness))
+    half = receptor.ending[1] / 2.0
+    frame = outline.along(0.0, receptor.depth, np.array([-half, half]))
+    arcs = _stations(outline, overlap, fine, bulk, frame, shift=sizing.shift)
+    lines, fat = _layers(finger, fine, bulk, receptor)
+    every_arc = _with_middles(arcs)
+    depths = _with_middles(lines)
+    core = outline.tissue(every_arc, np.asarray(lines[0]))[:, None]
+    bone = outline.bone(every_arc)[:, None]
+    inner = bone + (core - bone) * _with_middles(fat)[:-1, None]
+    points = np.concatenate([inner, outline.tissue(every_arc[:, None], depths[None, :])], axis=1)
+    skin = np.where(_middles(lines) > finger.epidermis, DERMIS, EPIDERMIS)
+    layers = np.concatenate([np.full(len(fat) - 1, FAT), skin])
+    touching = _lower_than(outline, sizing.indentation * (1.0 + 0.25 * sizing.margin))
+    low = max(int(np.searchsorted(arcs, touching[0])) - 1, 0)
+    high = min(int(np.searchsorted(arcs, touching[1])), len(arcs) - 1)
+    held: Indices = np.arange(len(every_arc)) * points.shape[1]
+    mesh = grid_mesh(points, layers, slice(2 * low, 2 * high + 1), held)
+    return FingerMesh(mesh, outline, arcs, lines, len(fat) - 1, held + points.shape[1] - 1)
+
+
+def _lower_than(outline: Outline, height: float) -> tuple[float, float]:
+    """Return the arc positions between which the undeformed skin lies lower than `height` [mm]."""
+    side = np.geomspace(1e-9, 1.0, 2001)
+    ends: list[float] = []
+    for end in (outline.palmar_cut, outline.dorsal):
+        rise = outline.tissue(end * side, np.asarray(0.0))[:, 1]
+        ends.append(float(end * np.interp(height, np.maximum.accumulate(rise), side)))
+    return ends[0], ends[1]
+
+
+def _middles(lines: Array) -> Array:
+    return (lines[1:] + lines[:-1]) / 2.0
+
+
+def _with_middles(lines: Array) -> Array:
+    """Return the lines with one more in the middle of each gap."""
+    out = np.empty(2 * len(lines) - 1)
+    out[::2], out[1::2] = lines, _middles(lines)
+    return out
+
+
+def _spaced(place: Array, size: Array, ends: tuple[float, ...], least: tuple[int, ...], *, shift: bool) -> list[Array]:
+    """Return lines between each two of `ends`, spaced as `size` at `place` asks, at least so many gaps in each.
+
+    With `shift` they lie half a gap further, the ends excepted.
+    """
+    number = np.concatenate([[0.0], np.cumsum((1.0 / size[1:] + 1.0 / size[:-1]) / 2.0 * np.diff(place))])
+    out: list[Array] = []
+    for start, stop, few in zip(ends[:-1], ends[1:], least, strict=True):
+        first, last = np.interp([start, stop], place, number)
+        count = max(few, ceil(last - first - 0.02))
+        steps = np.arange(count + 1.0)
+        if shift:
+            steps = np.concatenate([[0.0], steps[:-1] + 0.5, [float(count)]])
+        lines = np.interp(first + (last - first) * steps / count, number, place)
+        lines[0], lines[-1] = start, stop
+        out.append(lines)
+    return out
+
+
+def _layers(finger: Finger, fine: float, bulk: float, receptor: Receptor) -> tuple[Array, Array]:
+    """Return the depths of the lines in the skin, from the fat outwards, and those in the fat from 0 (bone) to 1."""
+    skin = finger.epidermis + finger.dermis
+    thick = finger.pulp_thickness() - skin
+    depth = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 1000)]) * (skin + thick)
+    size = TALL * np.minimum(bulk, fine + GROWTH * depth)
+    half = receptor.ending[0] / 2.0
+    ends = _distinct(0.0, finger.epidermis, skin, skin + thick, receptor.depth - half, receptor.depth + half)
+    *inside, fat = _spaced(depth, size, ends, (*[1] * (len(ends) - 2), 2), shift=False)
+    lines = np.concatenate([inside[0], *(lines[1:] for lines in inside[1:])])
+    return lines[::-1].copy(), (1.0 - (fat - skin) / thick)[::-1].copy()
+
+
+def _distinct(*ends: float) -> tuple[float, ...]:
+    """Return the ends in order, leaving out those that repeat another to a thousandth of a millimetre."""
+    ordered = sorted(ends)
+    return (ordered[0], *(b for a, b in pairwise(ordered) if b - a > 1e-3))
+
+
+def _stations(
+    outline: Outline, overlap: tuple[float, float], fine: float, bulk: float, frame: Array, *, shift: bool
+) -> Array:
+    """Return the arc positions of the lines across the mesh: fine in the overlap, coarser with the distance from it.
+
+    Lines always lie where straight edge and arc meet, since an element cannot follow a jump in curvature.
+    """
+    low, high = overlap
+    away = np.concatenate([[0.0], np.geomspace(1e-9, 1.0, 1000)])
+    arc = np.concatenate([(low + (outline.palmar_cut - low) * away)[::-1], high + (outline.dorsal_cut - high) * away])
+    distance = np.maximum(low - arc, 0.0) + np.maximum(arc - high, 0.0)
+    size = np.minimum(fine + GROWTH * distance, COARSEST * bulk)
+    ends = _distinct(outline.palmar_cut, outline.palmar, *frame.tolist(), outline.dorsal, outline.dorsal_cut)
+    lines = _spaced(arc, size, ends, (2,) * (len(ends) - 1), shift=shift)
+    return np.concatenate([lines[0], *(more[1:] for more in lines[1:])])

@@ -1,0 +1,96 @@
+"""The endings as patches of tissue: where the strain energy is probed, and with which weights it is averaged."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.mesh import Array, Indices, Mesh
+from solver.mesher import FingerMesh
+from solver.scene import Receptor
+from solver.stiffness import Elastic, Probes, local_coordinates
+
+ROW: Array = 0.25 * np.arange(-32.0, 25.0)  # arc positions of the row of receptors [mm]
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+_ASIDE = 1e-7  # [mm]: a point on a line between elements is probed on both sides
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Endings:
+    """Probes of several patches: r of them, p probes in all."""
+
+    probes: Probes
+    weights: Array  # (p,) areas [mm2]
+    patch: Indices  # (p,) number of the patch each probe belongs to
+    count: int
+
+    def average(self, mesh: Mesh, elastic: Elastic, displacement: Array) -> Array:
+        """Return the SED averaged over each patch (r, c) [MPa] for displacements (nodes, 2, c); nan where no patch."""
+        sed = self.probes.energy(mesh, elastic, displacement)
+        total = np.zeros((self.count, sed.shape[1]))
+        np.add.at(total, self.patch, sed * self.weights[:, None])
+        area = np.bincount(self.patch, self.weights, self.count)
+        return total / np.where(area > 0.0, area, np.nan)[:, None]
+
+    def nodes(self, mesh: Mesh) -> Indices:
+        """Return the numbers of the nodes that the probes need."""
+        return np.unique(mesh.elements[np.unique(self.probes.element)])
+
+
+def endings(finger: FingerMesh, elastic: Elastic, receptor: Receptor, arcs: Array) -> Endings:
+    """Return the patches of `receptor` at positions `arcs` (r,) [mm], integrated exactly over the pieces of elements.
+
+    A patch reaches half the ending's length to both sides, measured along its own middle line.
+    """
+    across, along = receptor.ending
+    outline = finger.outline
+    depth_lines = np.unique(np.concatenate([finger.depths, [receptor.depth - across / 2, receptor.depth + across / 2]]))
+    inside = np.abs(depth_lines - receptor.depth) <= across / 2 * (1 + 1e-12)
+    depth_lines = depth_lines[inside]
+    places: list[Array] = []
+    for number, arc in enumerate(arcs):
+        low, high = outline.along(float(arc), receptor.depth, np.array([-along / 2, along / 2]))
+        if outline.palmar_cut + 1e-9 < low and high < outline.dorsal_cut - 1e-9:
+            lines = np.concatenate([[low], finger.arcs[(finger.arcs > low) & (finger.arcs < high)], [high]])
+            places.append(_pieces(lines, depth_lines, number))
+    if not places:
+        places = [np.zeros((0, 4))]
+    arc, depth, area, patch = np.concatenate(places).T
+    # a length on the tip's arc shrinks with the depth
+    curved = (arc > outline.palmar) & (arc < outline.dorsal)
+    area = area * np.where(curved, 1.0 - depth / outline.finger.tip_radius, 1.0)
+    return Endings(_probes(finger, elastic, arc, depth), area, patch.astype(np.int64), len(arcs))
+
+
+def middle(finger: FingerMesh, elastic: Elastic, receptor: Receptor) -> Endings:
+    """Return the point in the middle of the reference ending: the mean of its limits from the elements around it."""
+    arc = _ASIDE * np.array([-1.0, 1.0, -1.0, 1.0])
+    depth = receptor.depth + _ASIDE * np.array([-1.0, -1.0, 1.0, 1.0])
+    return Endings(_probes(finger, elastic, arc, depth), np.full(4, 0.25), np.zeros(4, np.int64), 1)
+
+
+def _pieces(arc_lines: Array, depth_lines: Array, number: int) -> Array:
+    """Return Gauss points (q, 4) of a patch cut along the lines: arc, depth, weight, number of the patch."""
+    arc, arc_weight = _gauss(arc_lines)
+    depth, depth_weight = _gauss(depth_lines)
+    a, d = np.meshgrid(arc, depth, indexing="ij")
+    weight = arc_weight[:, None] * depth_weight
+    return np.stack([a.ravel(), d.ravel(), weight.ravel(), np.full(a.size, number)], axis=1)
+
+
+def _gauss(lines: Array) -> tuple[Array, Array]:
+    """Return the Gauss points and weights of each interval between `lines`."""
+    half = np.diff(lines)[:, None] / 2.0
+    return (lines[:-1, None] + half * (1.0 + _POINTS)).ravel(), (half * _WEIGHTS).ravel()
+
+
+def _probes(finger: FingerMesh, elastic: Elastic, arc: Array, depth: Array) -> Probes:
+    """Find the elements that hold the places at `arc` and `depth` (p,) and the local coordinates in them."""
+    mesh = finger.mesh
+    station = np.clip(np.searchsorted(finger.arcs, arc) - 1, 0, len(finger.arcs) - 2)
+    layer = np.clip(np.searchsorted(-finger.depths, -depth) - 1, 0, len(finger.depths) - 2)
+    element = station * (finger.fat + len(finger.depths) - 1) + finger.fat + layer
+    out = (finger.depths[layer] - depth) / (finger.depths[layer] - finger.depths[layer + 1]) * 2.0 - 1.0
+    side = (arc - finger.arcs[station]) / np.diff(finger.arcs)[station] * 2.0 - 1.0
+    corners = mesh.nodes[mesh.elements[element]]
+    local = local_coordinates(corners, finger.outline.tissue(arc, depth), np.stack([out, side], axis=1))
+    return Probes.at(mesh, elastic, element, local)

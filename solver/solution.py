@@ -1,0 +1,280 @@
+"""From scenes to predictions: one mesh for all that share a finger, and an error estimate with every answer."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+from scipy.linalg import LinAlgError
+
+from solver.audits import audits, course_audits
+from solver.contact import NAMES, SLIP, Contact, ContactLost, Course
+from solver.evidence import model, warnings
+from solver.failures import Cancelled, NoSteadyState, NotConverged
+from solver.finger import FingerModel
+from solver.friction import FrictionLaw
+from solver.grid import MeshError
+from solver.mesh import Array
+from solver.mesher import Sizing
+from solver.prediction import History, Prediction, Row, Skin
+from solver.receptor import ROW
+from solver.scene import Scene, SceneError
+from solver.stepping import March, march
+
+FINENESS = (4, 6, 8, 12, 16, 24, 32, 48)  # the meshes that can be asked for
+DEFAULT = 12
+SAFETY = 0.6  # chosen so that the estimate lay above the true error in 95 of 100 random scenes
+# coarsest mesh worth trying for a tolerance
+START = ((0.008, 6), (0.004, 8), (0.002, 12), (0.001, 16), (0.0004, 24), (0.0, 32))
+
+Progress = Callable[[float], bool]  # told the part done, 0 to 1; returns False to stop the work (Cancelled is raised)
+
+
+def solve(scene: Scene, progress: Progress | None = None) -> Prediction:
+    """Return the prediction of one scene.
+
+    Raises NoSteadyState where the scene has no settled sliding, NotConverged where none was found, SceneError where
+    its finger cannot be meshed, Cancelled where `progress` says so.
+    """
+    return solve_together((scene,), progress)[0]
+
+
+def solve_together(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction, ...]:
+    """Return the predictions of several scenes, in their order.
+
+    Scenes with the same finger, materials and receptor share one mesh, fine enough for the strictest tolerance among
+    them, so that differences between them are more accurate than each of them. Raises as `solve` does.
+    """
+    out: dict[int, Prediction] = {}
+    for group in _groups(scenes):
+        for number, prediction in zip(group, _solve_group([scenes[i] for i in group], progress), strict=True):
+            out[number] = prediction
+    return tuple(out[i] for i in range(len(scenes)))
+
+
+def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
+    groups: dict[object, list[int]] = {}
+    for number, scene in enumerate(scenes):
+        groups.setdefault((scene.finger, scene.materials, scene.receptor), []).append(number)
+    return list(groups.values())
+
+
+def _solve_group(scenes: list[Scene], progress: Progress | None) -> list[Prediction]:
+    """Refine until every scene's estimate meets its tolerance, or the finest mesh is reached."""
+    asked = min((s.solve.tolerance for s in scenes if s.solve.tolerance is not None), default=None)
+    fineness = DEFAULT if asked is None else next(n for least, n in START if asked >= least)
+    while True:
+        done = _solve_on(scenes, fineness, progress)
+        finer = [n for n in FINENESS if n > fineness]
+        if asked is None or not finer or all(p.error_estimate <= asked for p in done):
+            break
+        fineness = finer[0]
+    if asked is None:
+        return done
+    missed = "The finest mesh leaves an error estimate above the tolerance asked for."
+    return [replace(p, warnings=(*p.warnings, missed)) if p.error_estimate > asked else p for p in done]
+
+
+def _solve_on(scenes: list[Scene], fineness: float, progress: Progress | None) -> list[Prediction]:
+    """Solve all scenes on one mesh, and on two coarser ones for the estimate; look wider where contact reaches out."""
+    depth = max(scene.loading.indentation for scene in scenes)
+    for margin in (1.0, 4.0, 16.0):
+        begun = perf_counter()
+        fine = _meshed(scenes[0], Sizing(fineness, depth, margin=margin))
+        setup = perf_counter() - begun - fine.solve_s
+        begun = perf_counter()
+        coarse = tuple(
+            _meshed(scenes[0], Sizing(fineness / 2.0, depth, shift, margin=margin)) for shift in (False, True)
+        )
+        shared = _Shared(fine, coarse, setup, fine.solve_s / len(scenes), (perf_counter() - begun) / len(scenes))
+        done: list[Prediction] = []
+        for number, scene in enumerate(scenes):
+            _report(progress, number / len(scenes))
+            predicted = _predicted(scene, shared, progress)
+            if predicted is None:
+                break
+            done.append(predicted)
+        if len(done) == len(scenes):
+            return done
+    raise NotConverged("The skin touched the surface beyond every part of it where contact was looked for.")
+
+
+def _report(progress: Progress | None, part: float) -> None:
+    if progress is not None and not progress(part):
+        raise Cancelled
+
+
+def _meshed(scene: Scene, sizing: Sizing) -> FingerModel:
+    try:
+        return FingerModel.of(scene, sizing)
+    except (MeshError, LinAlgError) as bad:
+        raise SceneError("finger", scene.finger, f"no mesh fits it ({bad})") from bad
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shared:
+    """What scenes solved together share, and each one's part of what it took [s]."""
+
+    fine: FingerModel
+    coarse: tuple[FingerModel, ...]
+    setup_s: float
+    solve_s: float
+    estimate_s: float
+
+
+def _law(scene: Scene) -> FrictionLaw:
+    return FrictionLaw(float(scene.friction.mu), scene.friction.cap)
+
+
+def _settled(scene: Scene, finger: FingerModel) -> Contact:
+    """Return the settled state, without its history where it has none left. Raises ContactLost, NotConverged."""
+    law, touch = _law(scene), finger.body.touchable
+    if scene.loading.direction == 0 and not law.frictionless:
+        return march(touch, law, scene.loading).instants[-1].contact
+    return Course(touch, law).sliding(scene.loading.indentation, scene.loading.direction or 1)
+
+
+def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Prediction | None:
+    """Return the prediction of one scene; None where contact reached the end of the skin that may touch."""
+    finger, law = shared.fine, _law(scene)
+    begun = perf_counter()
+    way: March | None = None
+    try:
+        contact = _settled(scene, finger)
+        if scene.solve.course == "history":
+            way = march(finger.body.touchable, law, scene.loading, progress)
+            direct, contact = contact, way.instants[-1].contact
+        else:
+            direct = contact
+    except ContactLost as lost:
+        raise _no_answer(scene, shared.coarse[0], lost) from lost
+    skin = finger.skin_displacement(contact)
+    displacement = finger.body.displacement(skin)[:, :, 0]
+    if finger.reaches_out(contact, displacement, scene.loading.indentation):
+        return None
+    sed = finger.sed_ending(displacement)
+    checks = audits(finger, law, contact, scene.loading.indentation, displacement)
+    if way is not None:
+        checks |= course_audits(finger, way)
+        checks["course_against_direct"] = abs(finger.sed_ending(finger.displacement(direct)) / sed - 1.0)
+    left = model(scene, finger, contact, displacement)
+    history = None if way is None else _history(scene, finger, way)
+    row = Row(ROW, finger.sed_row(displacement))
+    solved = perf_counter()
+    estimate = _error_estimate(scene, shared.coarse, sed)
+    return Prediction(
+        scene=scene,
+        sed_ending=sed,
+        sed_point=finger.sed_point(displacement),
+        normal_force=float(contact.normal.sum()),
+        tangential_force=_drag(scene, contact.tangential.sum()),
+        contact_width=finger.contact_width(contact, skin[:, 0]),
+        error_estimate=estimate,
+        dofs=finger.body.dofs,
+        newton_iterations=contact.iterations if way is None else way.iterations,
+        wall_s=solved - begun + shared.solve_s,
+        setup_s=shared.setup_s,
+        estimate_s=perf_counter() - solved + shared.estimate_s,
+        row=row,
+        model=left,
+        audits=checks,
+        skin=_skin(finger, contact, skin[:, 0]),
+        mesh=finger.geometry.mesh,
+        displacement=displacement,
+        history=history,
+        warnings=warnings(left["left_out"]),
+    )
+
+
+def _drag(scene: Scene, tangential: float) -> float:
+    """Return the drag opposing the slide [N/mm]; without a slide, the size of the tangential force."""
+    return abs(float(tangential)) if scene.loading.direction == 0 else -scene.loading.direction * float(tangential)
+
+
+def _error_estimate(scene: Scene, coarse: Sequence[FingerModel], sed: float) -> float:
+    """Return how far `sed` may be off, relative.
+
+    The same scene on a mesh with elements twice as long, and on that mesh moved along the skin by half an element, so
+    that the edges of contact fall differently between nodes: the larger difference from `sed` plus the difference of
+    the two, times a factor found on random scenes.
+    """
+    try:
+        seds = [finger.sed_ending(finger.displacement(_settled(scene, finger))) for finger in coarse]
+    except (ContactLost, NotConverged):
+        return 1.0  # so near a limit that a coarser mesh has no state: nothing is known of the error
+    differences = [abs(other - sed) for other in seds]
+    return SAFETY * (max(differences) + abs(seds[0] - seds[1])) / sed
+
+
+def _skin(finger: FingerModel, contact: Contact, skin: Array) -> Skin:
+    mesh, k = finger.geometry.mesh, len(contact.state)
+    length = finger.body.touchable.length
+    return Skin(
+        x=mesh.nodes[mesh.skin, 0] + skin[k:],
+        gap=np.where(contact.touching, 0.0, contact.gap),
+        pressure=contact.normal / length,
+        traction=contact.tangential / length,
+        state=tuple(NAMES[int(s)] for s in contact.state),
+    )
+
+
+def _history(scene: Scene, finger: FingerModel, way: March) -> History:
+    """Return the course as arrays; all its states are unfolded together, and only where the ending is."""
+    mesh = finger.geometry.mesh
+    contacts = [instant.contact for instant in way.instants]
+    forces = np.stack([np.concatenate([c.normal, c.tangential]) for c in contacts], axis=1)
+    skin = finger.body.skin_displacement(forces)
+    nodes = np.union1d(finger.ending.nodes(mesh), finger.point.nodes(mesh))
+    displacement = finger.body.displacement(skin, only=nodes)
+    touching = np.array([c.touching.sum() for c in contacts])
+    slipping = np.array([(c.state >= SLIP).sum() for c in contacts])
+    return History(
+        time=np.array([i.time for i in way.instants]),
+        bone_x=np.array([i.travel for i in way.instants]),
+        bone_y=np.array([-i.depth for i in way.instants]),
+        sed_ending=finger.ending.average(mesh, finger.body.elastic, displacement)[0],
+        sed_point=finger.point.average(mesh, finger.body.elastic, displacement)[0],
+        normal_force=forces[: len(forces) // 2].sum(axis=0),
+        tangential_force=np.array([_drag(scene, c.tangential.sum()) for c in contacts]),
+        contact_width=np.array([finger.contact_width(c, skin[:, n]) for n, c in enumerate(contacts)]),
+        slipping=slipping / np.maximum(touching, 1),
+    )
+
+
+def _no_answer(scene: Scene, finger: FingerModel, lost: ContactLost) -> NoSteadyState | NotConverged:
+    """Return the failure that says what is known: the limits, looked for on a coarse mesh."""
+    depth, mu = scene.loading.indentation, float(scene.friction.mu)
+    at = f"{depth:g} mm indentation, mu = {mu:g}" + (
+        "" if scene.friction.tau_max is None else f" and tau_max = {scene.friction.tau_max:g} MPa"
+    )
+    limit_mu = _largest(lambda m: _exists(scene, finger, depth, m), mu)
+    limit_depth = _largest(lambda d: _exists(scene, finger, d, mu), depth)
+    if limit_mu is None or limit_mu >= mu or scene.loading.direction == 0:
+        message = f"No settled sliding was found at {at}: {lost}, from every first guess tried."
+        return NotConverged(message, limit_mu=limit_mu, limit_indentation=limit_depth)
+    message = (
+        f"There is no steady sliding at {at}: the drag presses the finger against the surface faster than it yields, "
+        f"so it wedges; at this depth steady sliding ends at mu = {limit_mu:.3g}"
+    )
+    if limit_depth is not None:
+        message += f", and at this friction at {limit_depth:.3g} mm"
+    return NoSteadyState(message + ".", limit_mu=limit_mu, limit_indentation=limit_depth)
+
+
+def _exists(scene: Scene, finger: FingerModel, depth: float, mu: float) -> bool:
+    try:
+        Course(finger.body.touchable, FrictionLaw(mu, scene.friction.cap)).sliding(depth, scene.loading.direction or 1)
+    except ContactLost:
+        return False
+    return True
+
+
+def _largest(exists: Callable[[float], bool], asked: float) -> float | None:
+    """Return the largest value below `asked` that still exists, to 1 %; None where even a thousandth does not."""
+    low, high = 1e-3 * asked, asked
+    if not exists(low):
+        return None
+    while high - low > 0.01 * high:
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if exists(middle) else (low, middle)
+    return low

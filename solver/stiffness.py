@@ -1,0 +1,110 @@
+"""Small-strain stiffness of all elements at once, with the pressure condensed, and what follows from displacements."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.elements import Q2P1
+from solver.materials import Hooke
+from solver.mesh import Array, Indices, Mesh
+
+_VALUES, _GRADIENTS = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Elastic:
+    """Elements made of Hooke materials: e of them, displacements ordered x, y, x, y, ... within each."""
+
+    stiffness: Array  # (e, 18, 18) [N/mm per mm]
+    dilatation: Array  # (e, 3, 18): displacements to the volume strain's modes 1, x - xc, y - yc
+    centre: Array  # (e, 2) xc, yc of the modes [mm]
+    shear: Array  # (e,) [MPa]
+    lame: Array  # (e,) [MPa]
+
+    @staticmethod
+    def of(mesh: Mesh, materials: Sequence[Hooke]) -> "Elastic":
+        """Integrate the stiffness of every element with 3 x 3 Gauss points.
+
+        K = integral of 2 G eps:eps + lambda theta^2, where theta is the best fit of the volume strain by 1, x, y. That
+        is the mixed form with pressure lambda theta, its three pressure modes eliminated (exact for Hooke).
+        """
+        corners = mesh.nodes[mesh.elements]  # (e, 9, 2)
+        count = len(corners)
+        jacobian = np.swapaxes(corners, 1, 2)[:, None] @ _GRADIENTS  # (e, q, 2, 2) dx/dxi
+        det = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
+        inverse = np.empty_like(jacobian)
+        inverse[..., 0, 0], inverse[..., 1, 1] = jacobian[..., 1, 1] / det, jacobian[..., 0, 0] / det
+        inverse[..., 0, 1], inverse[..., 1, 0] = -jacobian[..., 0, 1] / det, -jacobian[..., 1, 0] / det
+        gradient = (_GRADIENTS @ inverse).reshape(count, 9, 18)  # (e, q, node and direction)
+        weight = det * Q2P1.weights  # (e, q)
+
+        shear = np.array([m.shear for m in materials])[mesh.region]
+        lame = np.array([m.lame for m in materials])[mesh.region]
+        weighted = np.swapaxes(gradient * weight[:, :, None], 1, 2)
+        products = (weighted @ gradient).reshape(count, 9, 2, 9, 2)  # integral of dN_i/da dN_j/db
+        laplace = products[:, :, 0, :, 0] + products[:, :, 1, :, 1]
+        stiff = products.transpose(0, 1, 4, 3, 2).copy()  # K_ia,jb gets dN_i/db dN_j/da
+        stiff[:, :, 0, :, 0] += laplace
+        stiff[:, :, 1, :, 1] += laplace
+        stiff = stiff.reshape(count, 18, 18) * shear[:, None, None]
+
+        place = _VALUES @ corners  # (e, q, 2)
+        centre = place.mean(axis=1)
+        modes = np.concatenate([np.ones((count, 9, 1)), place - centre[:, None]], axis=2)  # (e, q, 3)
+        loaded = np.swapaxes(modes * weight[:, :, None], 1, 2)  # (e, 3, q)
+        moments = loaded @ gradient  # (e, 3, 18): integral of mode times divergence
+        fit: Array = np.linalg.inv(loaded @ modes).astype(np.float64)
+        dilatation = fit @ moments
+        stiff += lame[:, None, None] * (np.swapaxes(moments, 1, 2) @ dilatation)
+        return Elastic(stiff, dilatation, centre, shear, lame)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Probes:
+    """Places inside elements where the strain energy is wanted; p of them."""
+
+    element: Indices  # (p,)
+    gradient: Array  # (p, 9, 2) of the shape functions there [1/mm]
+    modes: Array  # (p, 3) volume-strain modes there
+
+    @staticmethod
+    def at(mesh: Mesh, elastic: Elastic, element: Indices, local: Array) -> "Probes":
+        """Place probes at `local` (p, 2) coordinates of `element` (p,)."""
+        values, slopes = Q2P1.shape(local)
+        corners = mesh.nodes[mesh.elements[element]]
+        jacobian = np.swapaxes(corners, 1, 2) @ slopes
+        place = (values[:, None] @ corners)[:, 0] - elastic.centre[element]
+        modes = np.concatenate([np.ones((len(element), 1)), place], axis=1)
+        return Probes(element, slopes @ np.linalg.inv(jacobian), modes)
+
+    def displacement_gradient(self, mesh: Mesh, displacement: Array) -> Array:
+        """Return du_a/dx_b (p, 2, 2, ...) for displacements (nodes, 2, ...)."""
+        return np.einsum("pna...,pnb->pab...", displacement[mesh.elements[self.element]], self.gradient)
+
+    def energy(self, mesh: Mesh, elastic: Elastic, displacement: Array) -> Array:
+        """Return the SED (p, ...) [MPa] for displacements (nodes, 2, ...): G eps:eps + lambda/2 theta^2."""
+        strain = self.displacement_gradient(mesh, displacement)
+        strain = (strain + np.swapaxes(strain, 1, 2)) / 2.0
+        moved = displacement[mesh.elements[self.element]]  # (p, 9, 2, ...)
+        flat = moved.reshape(len(self.element), 18, *moved.shape[3:])
+        row = (self.modes[:, None] @ elastic.dilatation[self.element])[:, 0]  # (p, 18)
+        theta = np.einsum("pi,pi...->p...", row, flat)
+        wide = (slice(None), *([None] * (theta.ndim - 1)))
+        shear, lame = elastic.shear[self.element][wide], elastic.lame[self.element][wide]
+        return shear * np.sum(strain * strain, axis=(1, 2)) + lame / 2.0 * theta**2
+
+
+def local_coordinates(corners: Array, points: Array, start: Array) -> Array:
+    """Return the local coordinates (p, 2) of `points` (p, 2) in elements with nodes `corners` (p, 9, 2), by Newton."""
+    local: NDArray[np.float64] = start.copy()
+    for _ in range(8):
+        values, slopes = Q2P1.shape(local)
+        missing = points - (values[:, None] @ corners)[:, 0]
+        jacobian = np.swapaxes(corners, 1, 2) @ slopes
+        step = np.linalg.solve(jacobian, missing[..., None])[..., 0]
+        local += step
+        if np.abs(step).max(initial=0.0) < 1e-13:
+            break
+    return local
