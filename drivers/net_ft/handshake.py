@@ -51,8 +51,9 @@ def prepare(place: Where) -> TransducerInfo:
         path = f"/comm.cgi?comrdtrate={place.rate}"
         answer = http_get(place.address.host, place.http_port, path, PATIENCE)
         if answer.status not in (200, 302) or not _is_rate(found := _configuration(place, PATIENCE), place.rate):
+            shown = "shows no rate at all" if math.isnan(found.rate) else f"stays at {found.rate:g} Hz"
             raise SetupError(
-                f"{place.address.uri}: the box was asked for {place.rate} Hz but stays at {found.rate:g} Hz; "
+                f"{place.address.uri}: the box was asked for {place.rate} Hz but {shown}; "
                 "set the rate on its Communications page"
             )
     return _info(place, found)

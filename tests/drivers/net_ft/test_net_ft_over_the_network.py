@@ -1,0 +1,222 @@
+"""The driver against the simulated box, over real ports of this computer."""
+
+import re
+import socket
+import struct
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from drivers.catalog import open_transducer, reachable
+from drivers.clock import PacedClock, RealClock
+from drivers.readings import ReadingBlock
+from drivers.transducer import LinkLost, SetupError
+from simulators.bench import Bench
+from simulators.faults import Fault, Faults
+
+
+def read_until(transducer, enough):
+    """Return all readings up to when `enough()` says so, and the rest after a stop."""
+    blocks = []
+    while not enough():
+        blocks.append(transducer.read(0.05))
+    transducer.stop()
+    return ReadingBlock.joined([*blocks, transducer.read(0.0)])
+
+
+def port(uri, name):
+    return int(re.search(rf"{name}=(\d+)", uri)[1])
+
+
+@pytest.mark.parametrize("rate", [200, 1000, 7000])
+def test_a_stream_in_real_time_arrives_whole(box, rate):
+    bench = Bench(2)
+    one = box(bench, clock=RealClock(), rate=rate)
+    clock = RealClock()
+    transducer = open_transducer(one.uri, clock)
+    transducer.start()
+    block = read_until(transducer, lambda: transducer.health.received >= rate // 2)
+    transducer.close()
+    health = transducer.health
+    assert (health.received, health.lost) == (len(block), 0)
+    assert np.diff(block.sequence).tolist() == [1] * (len(block) - 1)
+    np.testing.assert_allclose(np.diff(block.time), 1 / rate, rtol=1e-9)
+    felt = bench.wrench(block.counter / 7000.0) * 1e6 / np.repeat([1.0, 1000.0], 3)
+    assert np.array_equal(block.raw, np.rint(felt))
+
+
+def test_7000_readings_a_second_are_each_received_or_named_as_lost_over_a_bad_network(box):
+    timetable = [Fault("lose", 0.3, 0.6, 0.1), Fault("reorder", 0.3, 1.0, 0.05), Fault("repeat", 0.3, 0.8, 0.1)]
+    timetable += [Fault("corrupt", 0.4, 0.9, 0.05), Fault("shorten", 0.4, 0.9, 0.05), Fault("unplug", 1.2, 1e6)]
+    faults = Faults(timetable, seed=3, remember=True)
+    one = box(clock=RealClock(), rate=7000, faults=faults)
+    transducer = open_transducer(one.uri, RealClock())
+    transducer.start()
+    block = read_until(transducer, lambda: one.now() > 1.3)
+    one.close()
+
+    made = {d[4:8]: d for d in faults.made}  # a box asked twice to start numbers anew; its counter goes on
+    whole = [d for d in faults.delivered if len(d) == 36 and made.get(d[4:8]) == d]
+    ticks = [int.from_bytes(d[4:8], "big") for d in whole]
+    kept, greatest, repeated, late = [], -1, 0, 0
+    for tick in ticks:
+        repeated += tick == greatest
+        late += tick < greatest
+        if tick > greatest:
+            kept.append(tick)
+            greatest = tick
+    health = transducer.health
+    assert block.counter.tolist() == kept
+    assert (health.received, health.repeated, health.late) == (len(kept), repeated, late)
+    assert health.malformed == len(faults.delivered) - len(whole)
+    assert health.received + health.lost == kept[-1] - int.from_bytes(faults.made[0][4:8], "big") + 1
+
+
+def test_the_rate_asked_for_is_set_and_read_back(box):
+    one = box(rate=7000)
+    transducer = open_transducer(f"{one.uri}&rate=150", PacedClock(10.0))
+    assert transducer.info.rate == pytest.approx(7000 / 46)
+    transducer.start()
+    block = read_until(transducer, lambda: transducer.health.received > 20)
+    transducer.close()
+    assert np.diff(block.counter).tolist() == [46] * (len(block) - 1)
+
+
+def test_without_a_rate_the_box_is_left_as_it_is(box):
+    assert open_transducer(box(rate=1000).uri, PacedClock(10.0)).info.rate == 1000.0
+
+
+@pytest.mark.parametrize("units", ["cfgfu=1&cfgtu=1", "cfgfu=4&cfgtu=6", "cfgfu=6&cfgtu=5", "cfgfu=5&cfgtu=2"])
+def test_a_wrench_is_the_same_in_whatever_units_the_box_counts(box, units):
+    bench = Bench(2)
+    one = box(bench)
+    with socket.create_connection(("127.0.0.1", port(one.uri, "http"))) as tcp:
+        tcp.sendall(f"GET /config.cgi?{units} HTTP/1.0\r\n\r\n".encode())
+        tcp.recv(100)
+    transducer = open_transducer(one.uri, PacedClock(10.0))
+    transducer.start()
+    block = read_until(transducer, lambda: transducer.health.received > 20)
+    transducer.close()
+    info = transducer.info
+    wrench = info.calibration.wrench(block.raw, np.zeros(6))
+    resolution = np.diag(info.calibration.matrix)
+    assert np.all(np.abs(wrench - bench.wrench(block.counter / 7000.0)) <= 0.51 * resolution)
+    np.testing.assert_allclose(info.calibration.rated, [36.0] * 3 + [500.0] * 3, rtol=1e-6)
+
+
+def test_two_programs_that_take_the_stream_from_each_other_are_told(box):
+    one = box(clock=RealClock())
+    first, second = (open_transducer(one.uri, RealClock()) for _ in range(2))
+    first.start()
+    second.start()
+    sentences = []
+    while not sentences:
+        for transducer in (first, second):
+            try:
+                transducer.read(0.01)
+            except LinkLost as error:
+                sentences.append(str(error))
+    first.close()
+    second.close()
+    assert "another program" in sentences[0]
+
+
+def test_a_box_with_its_output_disabled_is_refused(box):
+    one = box()
+    with socket.create_connection(("127.0.0.1", port(one.uri, "http"))) as tcp:
+        tcp.sendall(b"GET /comm.cgi?comrdte=0 HTTP/1.0\r\n\r\n")
+        tcp.recv(100)
+    with pytest.raises(SetupError, match="disabled"):
+        open_transducer(one.uri, PacedClock(10.0))
+
+
+@pytest.fixture
+def web():
+    """Serve the same answer to every page of a web server that is no simulated box."""
+    ends = []
+
+    def serve(status, body):
+        listener = socket.create_server(("127.0.0.1", 0))
+
+        def answer():
+            while True:
+                try:
+                    connection, _ = listener.accept()
+                except OSError:
+                    return
+                with connection:
+                    connection.recv(4096)
+                    connection.sendall(f"HTTP/1.0 {status} X\r\n\r\n".encode() + body)
+
+        thread = threading.Thread(target=answer)
+        thread.start()
+        ends.append((listener, thread))
+        return f"net-ft://127.0.0.1?http={listener.getsockname()[1]}"
+
+    yield serve
+    for listener, thread in ends:
+        listener.shutdown(socket.SHUT_RDWR)
+        listener.close()
+        thread.join(5)
+
+
+PAGE = (
+    b"<netft><prodname>%s</prodname><cfgcpf>1</cfgcpf><cfgcpt>1</cfgcpt><scfgfu>N</scfgfu><scfgtu>Nm</scfgtu>%s</netft>"
+)
+
+
+@pytest.mark.parametrize(
+    ("status", "body", "options", "reason"),
+    [
+        (404, b"", "", "answers 404"),
+        (302, b"", "", "answers 302"),
+        (200, b"<html/>", "", "<html> and not <netft>"),
+        (200, PAGE % (b"Ethernet Axia80", b""), "", "Axia"),
+        (200, PAGE % (b"Net F/T", b"<comrdtrate>7000</comrdtrate>"), "&rate=200", "stays at 7000 Hz"),
+        (200, PAGE % (b"Net F/T", b""), "&rate=200", "shows no rate"),
+    ],
+)
+def test_a_box_that_is_not_as_asked_is_refused_with_its_address_and_the_reason(web, status, body, options, reason):
+    uri = web(status, body) + options
+    with pytest.raises(SetupError, match=reason) as refused:
+        open_transducer(uri, RealClock())
+    assert uri in str(refused.value)
+
+
+def test_what_is_not_simulated_does_not_say_so(web):
+    info = open_transducer(web(200, PAGE % (b"Net F/T", b"")), RealClock()).info
+    assert not info.simulated
+    assert info.serial == ""
+    assert np.isnan(info.rate)
+
+
+def test_whoever_can_be_reached_is_named_and_whoever_cannot_has_a_reason(box):
+    here = box().uri
+    found = {one.uri: one for one in reachable([here, "net-ft://127.0.0.1?http=1", "nonsense"], patience=2.0)}
+    assert found[here].info.serial == "SIM00001"
+    assert found["net-ft://127.0.0.1?http=1"].problem.startswith("nothing answers")
+    assert "not a device address" in found["nonsense"].problem
+
+
+def test_a_closed_transducer_tells_the_box_to_stop(box):
+    one = box(clock=RealClock())
+    transducer = open_transducer(one.uri, RealClock())
+    transducer.start()
+    transducer.close()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+        udp.connect(("127.0.0.1", port(one.uri, "rdt")))
+        udp.send(struct.pack(">HHI", 0x1234, 2, 2))  # a stopped box serves whoever asks next
+        udp.settimeout(5)
+        assert [struct.unpack(">I", udp.recv(100)[:4])[0] for _ in range(2)] == [1, 2]
+
+
+def test_health_counts_even_when_nobody_reads(box):
+    transducer = open_transducer(box().uri, PacedClock(10.0))
+    transducer.start()
+    before = transducer.health.received
+    while transducer.health.received < before + 100:
+        time.sleep(0.001)
+    assert len(transducer.read(0.0)) >= before + 100
+    transducer.close()
