@@ -63,13 +63,14 @@ class Recording:
         path = folder / LIVE_FILE
         if not path.is_file():
             raise RecordingError(f"{folder} holds no recording: there is no {LIVE_FILE}; give a session folder")
-        losses = list(_torn_log(path))
+        losses = list(torn_log(path))
         try:
             with _connected(path) as connection:
                 head = _head(path, connection)
                 events = _events(connection, losses)
         except sqlite3.Error as error:
             raise RecordingError(f"{path} cannot be read ({error}); restore the folder from a copy") from error
+        losses += [event.data["sentence"] for event in events if event.kind == "log_torn"]
         if not any(event.kind == "ended" for event in events):
             losses.append("the session has no end: it was cut short, or is still running")
         try:
@@ -223,8 +224,8 @@ def _events(connection: sqlite3.Connection, losses: list[str]) -> tuple[LoggedEv
     return tuple(found)
 
 
-def _torn_log(path: Path) -> Iterator[str]:
-    """Name what a crash tore off the end of the write-ahead log."""
+def torn_log(path: Path) -> Iterator[str]:
+    """Name what a crash tore off the end of the live file's write-ahead log."""
     log = _beside(path, "-wal")
     if log.is_file():
         torn = log_tail(log.read_bytes()).torn_bytes

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.readings import ReadingBlock
+from sessions.recording.head import json_text
 from sessions.recording.log import LoggedEvent
 
 FORMAT = "daq-app session"
@@ -26,7 +27,7 @@ TABLES = (
         name TEXT NOT NULL UNIQUE,  -- simulated, format, plan, transducer, provenance
         value TEXT NOT NULL,        -- a sentence or a JSON document
         crc32 INTEGER NOT NULL      -- of the value's UTF-8 bytes
-    ) STRICT""",
+    )""",
     """CREATE TABLE blocks (
         number INTEGER PRIMARY KEY,         -- from 1 without gaps
         readings INTEGER NOT NULL,          -- n, readings in this block
@@ -40,7 +41,7 @@ TABLES = (
         received_ns BLOB NOT NULL, -- n x int64 [ns]
         raw BLOB NOT NULL,         -- n x 6 float64, reading after reading
         crc32 INTEGER NOT NULL     -- of the six blobs, one after the other in this order
-    ) STRICT""",
+    )""",
     """CREATE TABLE events (
         number INTEGER PRIMARY KEY, -- from 1 without gaps
         time_ns INTEGER NOT NULL,   -- session clock
@@ -49,7 +50,7 @@ TABLES = (
         readings INTEGER NOT NULL,  -- readings handed to the recording before it
         data TEXT NOT NULL,         -- JSON object
         crc32 INTEGER NOT NULL      -- of the UTF-8 text of the six values before it, joined by line feeds
-    ) STRICT""",
+    )""",
 )
 
 # Columns of a ReadingBlock in the order of the blobs, with the type of one number.
@@ -65,6 +66,12 @@ def event_crc(event: LoggedEvent, data: str) -> int:
     """Return the CRC-32 of an event whose data is written as the JSON text `data`."""
     trial = "" if event.trial is None else str(event.trial)
     return text_crc("\n".join([str(event.number), str(event.time_ns), event.kind, trial, str(event.readings), data]))
+
+
+def event_row(event: LoggedEvent) -> tuple[int, int, str, int | None, int, str, int]:
+    """Return the row of an event. Raises ValueError for nan or an infinity in its data: JSON has none."""
+    data = json_text(event.data)
+    return event.number, event.time_ns, event.kind, event.trial, event.readings, data, event_crc(event, data)
 
 
 def blobs(block: ReadingBlock) -> tuple[bytes, ...]:

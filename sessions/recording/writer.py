@@ -1,6 +1,5 @@
 """The one writer of a session: a commit a second, and at once for every event and score."""
 
-import os
 import sqlite3
 from collections.abc import Mapping
 from contextlib import suppress
@@ -23,9 +22,10 @@ from sessions.recording.schema import (
     TABLES,
     blobs,
     blobs_crc,
-    event_crc,
+    event_row,
     text_crc,
 )
+from sessions.recording.whole_file import sync_folder
 
 COMMIT_EVERY_NS = 1_000_000_000
 LARGEST_BLOCK = 65_536  # readings: about 6 MB, far below what one SQLite row may hold
@@ -71,16 +71,6 @@ class SessionWriter:
         `info` is None for a scores-only visit. `clock` times events and commits (the machine's when None).
         Raises RecordingError when the folder holds something or cannot be written.
         """
-        path = folder / LIVE_FILE
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            if any(folder.iterdir()):
-                raise RecordingError(f"{folder} is not empty; give a new folder, for nothing is written over")
-            os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
-        except OSError as error:
-            raise RecordingError(
-                f"{folder} cannot hold a recording ({error.strerror}); give a folder that can be written"
-            ) from error
         simulated = simulated_sentence(info, subject_simulated)
         head = {
             "simulated": simulated or "no",
@@ -89,14 +79,25 @@ class SessionWriter:
             "transducer": json_text(info_to_dict(info) if info else None),
             "provenance": json_text(dict(provenance)),
         }
+        path = folder / LIVE_FILE
         try:
-            connection = sqlite3.connect(path, isolation_level=None)
+            folder.mkdir(parents=True, exist_ok=True)
+            if any(folder.iterdir()):
+                raise RecordingError(f"{folder} is not empty; give a new folder, for nothing is written over")
+            path.touch(exist_ok=False)
+        except OSError as error:
+            raise RecordingError(
+                f"{folder} cannot hold a recording ({error.strerror}); give a folder that can be written"
+            ) from error
+        connection = sqlite3.connect(path, isolation_level=None)
+        try:
             _prepare(connection, head)
         except sqlite3.Error as error:
+            connection.close()
             raise RecordingError(
                 f"{path} cannot be begun ({error}); free space, or give a folder on a local disk"
             ) from error
-        _sync_folder(folder)
+        sync_folder(folder)
         return SessionWriter(connection, path, clock or RealClock())
 
     @property
@@ -195,17 +196,7 @@ class SessionWriter:
     def _insert_events(self) -> None:
         """Insert the waiting events."""
         for event in self._events:
-            data = json_text(event.data)
-            values = (
-                event.number,
-                event.time_ns,
-                event.kind,
-                event.trial,
-                event.readings,
-                data,
-                event_crc(event, data),
-            )
-            self._connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", values)
+            self._connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", event_row(event))
 
     def _fail(self, error: sqlite3.Error) -> None:
         """Undo the half-written commit, and refuse everything from now on."""
@@ -238,14 +229,3 @@ def _prepare(connection: sqlite3.Connection, head: Mapping[str, str]) -> None:
         connection.execute("INSERT INTO head VALUES (?,?,?,?)", (number, name, value, text_crc(value)))
     connection.execute(f"PRAGMA user_version={FORMAT_VERSION}")
     connection.execute("COMMIT")
-
-
-def _sync_folder(folder: Path) -> None:
-    """Make the new names in `folder` survive a power cut, where the system lets a folder be synced."""
-    if os.name != "posix":
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

@@ -3,7 +3,7 @@ import signal
 
 import numpy as np
 import pytest
-from bench import INFO, RATE, Hands, StandIn, ToldClock
+from stand_ins import INFO, RATE, Hands, StandIn, ToldClock
 
 from sessions.protocols import plan, protocol
 from sessions.recording import Recording, SessionWriter, provenance

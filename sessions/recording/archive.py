@@ -1,0 +1,128 @@
+"""Seals an ended session: an HDF5 copy for any reader, a description, a manifest; compared before it counts."""
+
+import json
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from sessions.recording.errors import RecordingError
+from sessions.recording.head import info_to_dict, plan_to_dict
+from sessions.recording.log import LoggedEvent, TrialRecord
+from sessions.recording.manifest import changed_files, is_sealed, list_in_manifest
+from sessions.recording.reader import Recording, torn_log
+from sessions.recording.schema import (
+    DESCRIPTION_FILE,
+    FORMAT,
+    FORMAT_VERSION,
+    LIVE_FILE,
+    MANIFEST_FILE,
+    SEALED_FILE,
+    event_row,
+)
+from sessions.recording.sealed_copy import differences, write_copy
+from sessions.recording.whole_file import put_in_place, write_whole
+
+SEALED = (LIVE_FILE, SEALED_FILE, DESCRIPTION_FILE)
+
+
+def seal(folder: Path) -> None:
+    """Write the sealed copy, the description and the manifest of an ended session beside its live file.
+
+    The live file becomes read-only, and what a crash left in its log is folded in. Nothing counts as sealed before the
+    copy was read again and found equal, reading by reading. Raises RecordingError.
+    """
+    if is_sealed(folder):
+        raise RecordingError(f"{folder} is sealed already: {MANIFEST_FILE} lists its files")
+    _fold_log(Recording.open(folder))
+    recording = Recording.open(folder)
+    new = folder / f".{SEALED_FILE}.part"
+    try:
+        write_copy(recording, new)
+        put_in_place(new, folder / SEALED_FILE)
+        unequal = next(differences(recording), None)
+        if unequal is not None:
+            raise RecordingError(f"{folder} could not be sealed: {unequal}; the live file is untouched, seal it again")
+        write_whole(folder / DESCRIPTION_FILE, json.dumps(_description(recording), indent=1).encode() + b"\n")
+        for name in SEALED:
+            (folder / name).chmod(0o444)
+        list_in_manifest(folder, SEALED, recording.simulated_sentence)
+    except (OSError, RuntimeError) as error:  # h5py raises either when the disk is full
+        new.unlink(missing_ok=True)
+        raise RecordingError(
+            f"{folder} could not be sealed ({error}); the live file is untouched: free space on the disk, seal it again"
+        ) from error
+
+
+def problems(folder: Path) -> tuple[str, ...]:
+    """Return a sentence for each thing wrong with a session's files; none for a whole, sealed session.
+
+    Checks the SHA-256 of each file, the CRC-32 of each block and event, and each number of the HDF5 copy against the
+    live file. Raises RecordingError where the recording cannot be read at all.
+    """
+    recording = Recording.open(folder)
+    if not is_sealed(folder):
+        return (*recording.losses, f"the session was never sealed: there is no {MANIFEST_FILE}")
+    return (*changed_files(folder), *recording.losses, *differences(recording))
+
+
+def _fold_log(crashed: Recording) -> None:
+    """Fold a log that a crash left into the live file. Raises RecordingError while somebody still writes.
+
+    Folding loses sight of a torn tail, so that an event is added to tell of it.
+    """
+    live = crashed.folder / LIVE_FILE
+    if not live.with_name(f"{live.name}-wal").exists():
+        return
+    number, time_ns, readings = (
+        (last.number, last.time_ns, last.readings) if (last := next(reversed(crashed.events), None)) else (0, 0, 0)
+    )
+    torn = [
+        LoggedEvent(number + i, time_ns, "log_torn", None, readings, {"sentence": sentence})
+        for i, sentence in enumerate(torn_log(live), 1)
+    ]
+    try:
+        with closing(sqlite3.connect(live, timeout=0.5, isolation_level=None)) as connection:
+            for event in torn:
+                connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", event_row(event))
+            connection.execute("PRAGMA journal_mode=DELETE")
+    except sqlite3.Error as error:
+        raise RecordingError(f"{live} cannot be sealed ({error}); end the program that still writes it") from error
+
+
+def _description(recording: Recording) -> dict[str, Any]:
+    """Return what `session.json` says: all but the readings and the events."""
+    ended = next((event.data for event in recording.events if event.kind == "ended"), None)
+    return {
+        **({"SIMULATED": recording.simulated_sentence} if recording.simulated_sentence else {}),
+        "format": {"name": FORMAT, "version": FORMAT_VERSION},
+        "plan": plan_to_dict(recording.plan),
+        "transducer": info_to_dict(recording.info) if recording.info else None,
+        "provenance": dict(recording.provenance),
+        "trials": [_trial(record) for record in recording.trials],
+        "readings": sum(len(block) for block in recording.blocks()),
+        "events": len(recording.events),
+        "ended": ended,
+        "losses": list(recording.losses),
+        "flaws": list(recording.flaws),
+    }
+
+
+def _trial(record: TrialRecord) -> dict[str, Any]:
+    """Return a trial as `session.json` tells it."""
+    return {
+        "number": record.trial.number,
+        "block": record.trial.block,
+        "descriptor": record.trial.stimulus.descriptor,
+        "index": record.trial.stimulus.index,
+        "code": record.trial.stimulus.code,
+        "outcome": record.outcome,
+        "score": record.score,
+        "take": record.take.number if record.take else None,
+        "start_ns": record.start_ns,
+        "stop_ns": record.stop_ns,
+        "other_takes": [
+            {"number": take.number, "start_ns": take.start_ns, "stop_ns": take.stop_ns, "discarded": take.discarded}
+            for take in record.other_takes
+        ],
+    }

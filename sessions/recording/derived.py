@@ -1,0 +1,57 @@
+"""Numbers made from a recording, kept beside it: replaced as a whole, never in part, and listed in the manifest."""
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from sessions.recording.errors import RecordingError
+from sessions.recording.manifest import is_sealed, list_in_manifest
+from sessions.recording.provenance import software_versions
+from sessions.recording.reader import Recording
+from sessions.recording.schema import DESCRIPTION_FILE, LIVE_FILE, MANIFEST_FILE, SEALED_FILE
+from sessions.recording.whole_file import write_whole
+
+RECORDED = (LIVE_FILE, SEALED_FILE, DESCRIPTION_FILE, MANIFEST_FILE)
+
+
+def store_derived(folder: Path, name: str, data: Mapping[str, Any]) -> Path:
+    """Store `data` as the JSON file `name` (e.g. "analysis.json") with the versions of what made it; return its path.
+
+    Raises ValueError where `data` holds nan or an infinity: what is not known is None.
+    """
+    simulated = Recording.open(folder).simulated_sentence
+    head: dict[str, Any] = {"SIMULATED": simulated} if simulated else {}
+    document = {**head, "made_by": software_versions(), **data}
+    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+    return _store(folder, name, text.encode() + b"\n", simulated)
+
+
+def store_page(folder: Path, name: str, page: str) -> Path:
+    """Store a page such as "report.html", which itself says where it was simulated; return its path."""
+    return _store(folder, name, page.encode(), Recording.open(folder).simulated_sentence)
+
+
+def load_derived(folder: Path, name: str) -> dict[str, Any] | None:
+    """Return what `store_derived` stored under `name`; None where nothing was. Raises RecordingError when damaged."""
+    path = folder / name
+    if not path.is_file():
+        return None
+    try:
+        return json.loads(path.read_bytes())
+    except ValueError as error:
+        raise RecordingError(f"{path} is damaged ({error}); make it anew from the recording") from error
+
+
+def _store(folder: Path, name: str, content: bytes, simulated: str | None) -> Path:
+    if name in RECORDED or not re.fullmatch(r"[a-z0-9][a-z0-9_-]*\.[a-z0-9]+", name):
+        raise ValueError(f"{name} is no name for a file made from a recording")
+    path = folder / name
+    try:
+        write_whole(path, content)
+        if is_sealed(folder):
+            list_in_manifest(folder, (name,), simulated)
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be written ({error.strerror}); free space or permit writing") from error
+    return path

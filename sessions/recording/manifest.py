@@ -1,0 +1,57 @@
+"""The manifest of a sealed session: the SHA-256 of each of its files."""
+
+import hashlib
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from sessions.recording.errors import RecordingError
+from sessions.recording.schema import FORMAT, FORMAT_VERSION, MANIFEST_FILE
+from sessions.recording.whole_file import write_whole
+
+
+def is_sealed(folder: Path) -> bool:
+    """Say whether a session was sealed: the manifest is the last thing that sealing writes."""
+    return (folder / MANIFEST_FILE).exists()
+
+
+def list_in_manifest(folder: Path, names: Iterable[str], simulated: str | None) -> None:
+    """Take the files called `names` into the manifest as they are now; the others stay as listed."""
+    files: dict[str, Any] = _files(folder) if is_sealed(folder) else {}
+    for name in names:
+        path = folder / name
+        files[name] = {"sha256": _sha256(path), "bytes": path.stat().st_size}
+    document = {
+        **({"SIMULATED": simulated} if simulated else {}),
+        "format": {"name": FORMAT, "version": FORMAT_VERSION},
+        "files": dict(sorted(files.items())),
+    }
+    write_whole(folder / MANIFEST_FILE, json.dumps(document, indent=1).encode() + b"\n")
+
+
+def changed_files(folder: Path) -> tuple[str, ...]:
+    """Return a sentence for each listed file that is gone or not what it was when it was listed."""
+    found: list[str] = []
+    for name, told in _files(folder).items():
+        path = folder / name
+        if not path.is_file():
+            found.append(f"{name} is listed in {MANIFEST_FILE} and missing")
+        elif _sha256(path) != told["sha256"]:
+            found.append(f"{name} is not what it was when it was listed: its SHA-256 differs from {MANIFEST_FILE}")
+    return tuple(found)
+
+
+def _files(folder: Path) -> dict[str, Any]:
+    """Return what the manifest lists. Raises RecordingError when it cannot be read."""
+    path = folder / MANIFEST_FILE
+    try:
+        files = json.loads(path.read_bytes())["files"]
+        return {str(name): {"sha256": str(told["sha256"]), "bytes": told["bytes"]} for name, told in files.items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise RecordingError(f"{path} cannot be read ({error}); restore the folder from a copy") from error
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

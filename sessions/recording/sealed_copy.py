@@ -1,0 +1,188 @@
+"""The HDF5 copy of a recording: what it holds, how it is written, and whether it equals the live file.
+
+`docs/session-format.md` tells each data set and unit to someone without this program; keep the two together.
+"""
+
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false, reportAttributeAccessIssue=false, reportIndexIssue=false
+# h5py brings no types; every array is given its type where it leaves this file.
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.recording.head import calibration_hash, info_to_dict, json_text, plan_to_dict
+from sessions.recording.reader import Recording
+from sessions.recording.schema import COLUMNS, FORMAT, FORMAT_VERSION, SEALED_FILE
+
+# Superblock 2 and nothing that HDF5 1.8 does not know: older MATLAB cannot read later files.
+LIBVER = ("v108", "v108")
+CHUNK = 4096  # readings a chunk
+READING_NOTES = {
+    "sequence": ("", "record number given by the device; missing numbers are lost readings"),
+    "counter": ("ticks of the device", "the device's own clock"),
+    "status": ("", "status word as the device sent it; 0 is healthy"),
+    "time": ("s", "device clock, 0 at the first reading"),
+    "received_ns": ("ns", "session clock when the reading arrived"),
+    "raw": ("see raw_unit of /calibration", "wrench [N, N mm] = matrix (raw - bias), matrix in /calibration"),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DataSet:
+    """One data set of the copy, other than the readings."""
+
+    name: str
+    values: NDArray[Any]  # numbers, or UTF-8 text as fixed-length bytes
+    unit: str
+    note: str
+
+
+def write_copy(recording: Recording, path: Path) -> None:
+    """Write the copy of a recording to a new file at `path`. Raises OSError."""
+    with h5py.File(path, "w", libver=LIBVER) as file:
+        if recording.simulated_sentence:
+            file.attrs["SIMULATED"] = _attribute(recording.simulated_sentence)
+        file.attrs["format"] = _attribute(FORMAT)
+        file.attrs["format_version"] = FORMAT_VERSION
+        file.attrs["description"] = _attribute("every table, data set, unit and byte: docs/session-format.md")
+        readings = _empty_readings(file)
+        for block in recording.blocks():
+            for name, column in readings.items():
+                values = getattr(block, name)
+                column.resize(len(column) + len(values), axis=0)
+                column[-len(values) :] = values
+        for made in data_sets(recording):
+            kind = made.values.dtype
+            if kind.kind == "S":
+                kind = h5py.string_dtype("utf-8", kind.itemsize)
+            # An empty data set has no chunks, and so nothing to protect.
+            protected = {"chunks": made.values.shape, "fletcher32": True} if made.values.size else {}
+            written = file.create_dataset(made.name, data=made.values.astype(kind), **protected)
+            written.attrs["unit"] = _attribute(made.unit)
+            written.attrs["note"] = _attribute(made.note)
+
+
+def differences(recording: Recording) -> Iterator[str]:
+    """Yield a sentence for each way in which the copy differs from the live file."""
+    try:
+        with h5py.File(recording.folder / SEALED_FILE, "r") as file:
+            yield from _different_readings(recording, file)
+            for made in data_sets(recording):
+                if not _same(np.asarray(file[made.name]), made.values):
+                    yield f"{made.name} of {SEALED_FILE} differs from the live file"
+            if file.attrs.get("SIMULATED") != _attribute(recording.simulated_sentence):
+                yield f"{SEALED_FILE} does not say of itself what the live file says: {recording.simulated_sentence}"
+    except (OSError, KeyError, RuntimeError) as error:
+        yield f"{SEALED_FILE} cannot be read ({error})"
+
+
+def data_sets(recording: Recording) -> tuple[DataSet, ...]:
+    """Return everything the copy holds besides the readings."""
+    return (*_head(recording), *_calibration(recording), *_events(recording), *_trials(recording))
+
+
+def _head(recording: Recording) -> Iterator[DataSet]:
+    info = recording.info
+    yield DataSet("head/plan", _texts([json_text(plan_to_dict(recording.plan))]), "", "JSON")
+    yield DataSet("head/transducer", _texts([json_text(info_to_dict(info) if info else None)]), "", "JSON")
+    yield DataSet("head/provenance", _texts([json_text(dict(recording.provenance))]), "", "JSON")
+    yield DataSet("head/losses", _texts(recording.losses), "", "what storage lost, a sentence each")
+    yield DataSet("head/flaws", _texts(recording.flaws), "", "what went wrong while recording, a sentence each")
+
+
+def _calibration(recording: Recording) -> Iterator[DataSet]:
+    if recording.info is None:
+        return
+    calibration = recording.info.calibration
+    unit = f"N (rows 1 to 3) and N mm (rows 4 to 6) for {calibration.raw_unit}"
+    yield DataSet("calibration/matrix", calibration.matrix.astype("<f8"), unit, "wrench = matrix (raw - bias)")
+    yield DataSet("calibration/rated", calibration.rated.astype("<f8"), "N and N mm", "rated range; NaN where unknown")
+    yield DataSet("calibration/raw_unit", _texts([calibration.raw_unit]), "", "unit of /readings/raw")
+    yield DataSet("calibration/serial", _texts([calibration.serial]), "", "serial number the matrix is true for")
+    yield DataSet("calibration/sha256", _texts([calibration_hash(calibration)]), "", "of the matrix's 36 float64")
+
+
+def _events(recording: Recording) -> Iterator[DataSet]:
+    events = recording.events
+    yield DataSet("events/number", _whole([e.number for e in events]), "", "from 1")
+    yield DataSet("events/time_ns", _whole([e.time_ns for e in events]), "ns", "session clock")
+    yield DataSet("events/kind", _texts([e.kind for e in events]), "", "what happened")
+    yield DataSet("events/trial", _whole([e.trial or 0 for e in events]), "", "number of the trial; 0 for none")
+    yield DataSet("events/readings", _whole([e.readings for e in events]), "", "readings recorded before it")
+    yield DataSet("events/data", _texts([json_text(e.data) for e in events]), "", "what else is known, as JSON")
+
+
+def _trials(recording: Recording) -> Iterator[DataSet]:
+    records = recording.trials
+    trials = [record.trial for record in records]
+    stimuli = [trial.stimulus for trial in trials]
+    scores = np.array([math.nan if r.score is None else r.score for r in records], "<f8")
+    yield DataSet("trials/number", _whole([t.number for t in trials]), "", "from 1, in the planned order")
+    yield DataSet("trials/block", _texts([t.block for t in trials]), "", "name of the block")
+    yield DataSet("trials/descriptor", _texts([s.descriptor for s in stimuli]), "", "what was judged")
+    yield DataSet(
+        "trials/index", _whole([s.index for s in stimuli]), "", "the maker's number of the stimulus, 0 to 100"
+    )
+    yield DataSet("trials/code", _texts([s.code for s in stimuli]), "", "label on the stimulus")
+    yield DataSet("trials/direction", _whole([t.direction for t in trials]), "", "+1 proximal to distal, -1 back")
+    yield DataSet("trials/repetition", _whole([t.repetition for t in trials]), "", "from 1")
+    yield DataSet("trials/outcome", _texts([r.outcome for r in records]), "", "scored, not answered, skipped or open")
+    yield DataSet("trials/score", scores, "", "0 to 100; NaN unless the outcome is scored")
+    yield DataSet(
+        "trials/take", _whole([r.take.number if r.take else 0 for r in records]), "", "that counts; 0 for none"
+    )
+    yield DataSet("trials/start_ns", _whole([r.start_ns or 0 for r in records]), "ns", "of that take, session clock")
+    yield DataSet("trials/stop_ns", _whole([r.stop_ns or 0 for r in records]), "ns", "of that take, session clock")
+
+
+def _empty_readings(file: h5py.File) -> dict[str, h5py.Dataset]:
+    """Make the data sets of the readings, which grow block by block."""
+    made: dict[str, h5py.Dataset] = {}
+    for name, kind in COLUMNS.items():
+        width = (6,) if name == "raw" else ()
+        made[name] = file.create_dataset(
+            f"readings/{name}", (0, *width), kind, maxshape=(None, *width), chunks=(CHUNK, *width), fletcher32=True
+        )
+        made[name].attrs["unit"], made[name].attrs["note"] = map(_attribute, READING_NOTES[name])
+    return made
+
+
+def _different_readings(recording: Recording, file: h5py.File) -> Iterator[str]:
+    """Compare every reading, block by block."""
+    start = 0
+    for block in recording.blocks():
+        stop = start + len(block)
+        for name in COLUMNS:
+            # NaN never equals itself: the bytes are compared, not the numbers.
+            if np.asarray(file["readings"][name][start:stop]).tobytes() != getattr(block, name).tobytes():
+                yield f"{name} of the readings {start} to {stop - 1} in {SEALED_FILE} differs from the live file"
+        start = stop
+    for name in COLUMNS:
+        length = int(file["readings"][name].shape[0])
+        if length != start:
+            yield f"{SEALED_FILE} holds {length} of {name}, the live file {start}"
+
+
+def _same(found: NDArray[Any], expected: NDArray[Any]) -> bool:
+    return found.shape == expected.shape and found.astype(expected.dtype).tobytes() == expected.tobytes()
+
+
+def _whole(values: Sequence[int]) -> NDArray[np.int64]:
+    return np.array(values, "<i8")
+
+
+def _texts(values: Sequence[str]) -> NDArray[np.bytes_]:
+    """Return texts as UTF-8 of the longest one's length."""
+    return np.array([value.encode() for value in values], "S") if values else np.empty(0, "S1")
+
+
+def _attribute(text: str | None) -> np.bytes_ | None:
+    """Return a text as HDF5 attributes hold it: fixed length, plain."""
+    return None if text is None else np.bytes_(text.encode())
