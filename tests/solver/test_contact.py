@@ -1,0 +1,121 @@
+"""Contact problems whose answer is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.body import Body
+from solver.contact import CAP, OPEN, SLIP, STICK, ContactLost, Course, forced, untouched
+from solver.friction import FrictionLaw
+from solver.materials import Hooke
+from solver.shapes import block
+
+RADIUS = 5.0
+
+
+def cylinder(half_width: float, finest: float, nu: float = 0.48, zone: float = 0.9) -> Body:
+    """A soft round body, wide and deep against its contact, fine where it touches."""
+    steps = [0.0]
+    while steps[-1] < half_width:
+        steps.append(steps[-1] + max(finest, 0.25 * (steps[-1] - zone)))
+    right = np.array(steps) * half_width / steps[-1]
+    lines = np.concatenate([-right[:0:-1], right])
+    up = [0.0]
+    while up[-1] < 14.0:
+        up.append(up[-1] + finest + 0.25 * up[-1])
+    return Body.of(block(lines, np.array(up) * 14.0 / up[-1], RADIUS), [Hooke(0.08, nu)])
+
+
+@pytest.fixture(scope="module")
+def pressed():
+    """P = 0.01 N/mm on R = 5, E = 0.08, nu = 0.48: a = 0.782578 mm, p0 = 0.008135 MPa (Johnson 1985, ch. 4)."""
+    body = cylinder(4.5, 0.06)
+    found = Course(forced(body.touchable, 0.01), FrictionLaw(0.0, np.inf)).sliding(0.0, 1, start_state(body))
+    return body, found
+
+
+def start_state(body, half_width=0.7):
+    return np.where(np.abs(body.mesh.nodes[body.mesh.skin, 0]) < half_width, SLIP, OPEN).astype(np.int8)
+
+
+def test_a_pressed_cylinder_touches_and_presses_as_hertz_says(pressed):
+    body, found = pressed
+    x = body.mesh.nodes[body.mesh.skin, 0]
+    assert found.normal.sum() == pytest.approx(0.01, rel=1e-12)
+    touching = x[found.touching]
+    assert np.ptp(touching) / 2 == pytest.approx(0.782578, abs=0.031)  # half an element
+    pressure = found.normal / body.touchable.length
+    inside = np.abs(x) < 0.7
+    hertz = 0.008135 * np.sqrt(1 - (x[inside] / 0.782578) ** 2)
+    assert np.abs(pressure[inside] - hertz).max() < 0.02 * 0.008135
+    assert pressure[len(x) // 2] == pytest.approx(0.008135, rel=0.01)
+
+
+@pytest.mark.parametrize("k", [0.8, 0.6, 0.4])
+def test_friction_with_a_bound_on_a_hertz_pressure_carries_the_closed_form(pressed, k):
+    """t = min(mu p, tau_max), k = tau_max/(mu p0): Q/(mu P) = 0.895912, 0.715243, 0.495368."""
+    body, frictionless = pressed
+    mu = 0.02  # so small that the drag does not move the pressure
+    law = FrictionLaw(mu, k * mu * 0.008135)
+    found = Course(forced(body.touchable, 0.01), law).sliding(0.0, 1, frictionless.state)
+    exact = {0.8: 0.895912, 0.6: 0.715243, 0.4: 0.495368}[k]
+    assert -found.tangential.sum() / (mu * 0.01) == pytest.approx(exact, rel=0.005)
+    x = body.mesh.nodes[body.mesh.skin, 0]
+    capped = x[found.state == CAP]
+    assert np.ptp(capped) / 2 == pytest.approx(0.782578 * np.sqrt(1 - k**2), abs=0.035)
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.4])
+def test_what_slides_without_a_bound_drags_by_mu_times_the_normal_force(mu):
+    body = cylinder(4.5, 0.2)
+    found = Course(body.touchable, FrictionLaw(mu, np.inf)).sliding(0.1, 1)
+    assert -found.tangential.sum() / found.normal.sum() == pytest.approx(mu, rel=1e-13)
+
+
+def test_sliding_the_other_way_mirrors_the_forces_of_a_mirrored_body():
+    body = cylinder(4.5, 0.2)
+    one = Course(body.touchable, FrictionLaw(0.3, np.inf)).sliding(0.1, 1)
+    other = Course(body.touchable, FrictionLaw(0.3, np.inf)).sliding(0.1, -1)
+    assert np.allclose(one.normal, other.normal[::-1], atol=1e-15)
+    assert np.allclose(one.tangential, -other.tangential[::-1], atol=1e-15)
+
+
+@pytest.mark.parametrize("part", [0.25, 0.5, 0.75])
+def test_partial_slip_sticks_inside_as_cattaneo_and_mindlin_say(part):
+    """Constant P, then Q < mu P: stick for |x| < c, c/a = sqrt(1 - Q/(mu P)), q(0) = mu p0 (1 - c/a).
+
+    Exact for an incompressible body on a rigid surface, where normal and shear do not couple.
+    """
+    mu, load, nu = 0.005, 0.001, 0.4999  # so light that the body hardly rolls and its slope is small
+    stiffness = 0.08 / (1 - nu**2)
+    a = np.sqrt(4 * load * RADIUS / (np.pi * stiffness))
+    p0 = 2 * load / (np.pi * a)
+    body = cylinder(4.5, 0.02, nu, zone=0.3)
+    free = forced(body.touchable, load)
+    law = FrictionLaw(mu, np.inf)
+    now = Course(free, FrictionLaw(0.0, np.inf)).sliding(0.0, 1, start_state(body, 0.2))
+    # all that touches sticks where it is; then the drive moves along until the drag is the part asked for
+    now = replace(now, state=np.where(now.touching, STICK, OPEN).astype(np.int8))
+    course, travel = Course(free, law), 0.0
+    while -now.tangential.sum() < part * mu * load:
+        travel += 2e-6
+        now = course.step(now, 0.0, travel)
+    reached = -now.tangential.sum() / (mu * load)
+    x = body.mesh.nodes[body.mesh.skin, 0]
+    assert np.ptp(x[now.state == STICK]) / 2 == pytest.approx(a * np.sqrt(1 - reached), abs=0.02)
+    traction = -(now.tangential / body.touchable.length)[np.abs(x) < 0.03].mean()
+    assert traction == pytest.approx(mu * p0 * (1 - np.sqrt(1 - reached)), rel=0.02)
+
+
+def test_a_tyre_that_cannot_slide_is_reported_lost():
+    body = cylinder(4.5, 0.4)
+    with pytest.raises(ContactLost):
+        Course(body.touchable, FrictionLaw(50.0, np.inf)).sliding(0.2, 1)
+
+
+def test_before_first_touch_nothing_is_felt():
+    body = cylinder(4.5, 0.4)
+    before = untouched(body.touchable)
+    assert not before.normal.any()
+    assert before.gap.min() == pytest.approx(0.0, abs=1e-12)

@@ -1,0 +1,96 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from solver.elements import ELEMENTS, Q2P1
+from solver.grid import MeshError, grid_mesh, quality
+from solver.mesher import DERMIS, EPIDERMIS, FAT, Sizing, finger_mesh
+from solver.outline import Outline
+from solver.scene import Finger, Receptor
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_shape_functions_are_one_at_their_node_and_sum_to_one(element):
+    values, _ = element.shape(element.positions)
+    assert np.allclose(values, np.eye(len(element.positions)), atol=1e-15)
+    rng = np.random.default_rng(1)
+    values, slopes = element.shape(rng.uniform(-1, 1, (20, 2)))
+    assert np.allclose(values.sum(axis=1), 1.0)
+    assert np.allclose(slopes.sum(axis=1), 0.0, atol=1e-14)
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_gradients_of_shape_functions_are_their_differences(element):
+    at = np.random.default_rng(2).uniform(-1, 1, (10, 2))
+    _, slopes = element.shape(at)
+    for axis in range(2):
+        step = np.eye(2)[axis] * 1e-6
+        difference = (element.shape(at + step)[0] - element.shape(at - step)[0]) / 2e-6
+        assert np.allclose(slopes[..., axis], difference, atol=1e-9)
+
+
+def areas(made):
+    """Area of each region by quadrature."""
+    mesh = made.mesh
+    jacobian = np.swapaxes(mesh.nodes[mesh.elements], 1, 2)[:, None] @ Q2P1.shape(Q2P1.points)[1]
+    det = np.linalg.det(jacobian)
+    return np.bincount(mesh.region, (det * Q2P1.weights).sum(axis=1))
+
+
+@pytest.mark.parametrize("shift", [False, True])
+def test_the_mesh_has_the_areas_of_the_outline(shift):
+    made = finger_mesh(Finger(), Receptor(), Sizing(12, 2.0, shift))
+    skin = np.pi / 2 * (5.0**2 - 4.25**2) + 2 * 15 * 0.75
+    dermis = np.pi / 2 * (4.25**2 - 3.0**2) + 2 * 15 * 1.25
+    bone = np.pi / 2 * 1.5**2 + 14 * 3.0
+    fat = np.pi / 2 * 3.0**2 + 15 * 6.0 - bone
+    found = areas(made)
+    assert found[EPIDERMIS] == pytest.approx(skin, rel=1e-4)
+    assert found[DERMIS] == pytest.approx(dermis, rel=1e-4)
+    assert found[FAT] == pytest.approx(fat, rel=1e-4)
+
+
+def test_lines_between_elements_frame_the_ending_and_lie_on_the_layers():
+    made = finger_mesh(Finger(), Receptor(), Sizing(6, 2.0))
+    for depth in (0.0, 0.75, 1.8, 2.0):
+        assert np.abs(made.depths - depth).min() < 1e-12
+    for arc in (-0.5 / 3.1 * 5, 0.5 / 3.1 * 5, -np.pi / 4 * 5):
+        assert np.abs(made.arcs - arc).min() < 1e-9
+
+
+def test_the_lowest_point_of_the_skin_touches_the_surface():
+    for angle in (10.0, 45.0, 85.0):
+        outline = Outline.of(Finger(contact_angle=angle))
+        arc = np.linspace(outline.palmar_cut, outline.dorsal_cut, 2001)
+        height = outline.tissue(arc, np.asarray(0.0))[:, 1]
+        assert height.min() == pytest.approx(0.0, abs=1e-4)
+        assert abs(arc[height.argmin()]) < 0.03
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    angle=st.floats(15, 85),
+    epidermis=st.floats(0.05, 1.2),
+    dermis=st.floats(0.3, 1.2),
+    bone=st.floats(0.8, 1.7),
+    depth=st.floats(1e-3, 2.5),
+    fineness=st.sampled_from([3, 6, 12]),
+    shift=st.booleans(),
+)
+def test_every_finger_that_a_scene_allows_can_be_meshed_without_a_folded_element(
+    angle, epidermis, dermis, bone, depth, fineness, shift
+):
+    finger = Finger(epidermis=epidermis, dermis=dermis, bone_radius=bone, bone_centre=(-1.0, 0.3), contact_angle=angle)
+    receptor = Receptor(depth=epidermis + dermis - 0.1)
+    made = finger_mesh(finger, receptor, Sizing(fineness, depth, shift))
+    found = quality(made.mesh)
+    assert found["jacobian_ratio"] > 0.02
+    assert np.isin(made.mesh.skin, made.whole).all()
+
+
+def test_a_folded_element_is_refused():
+    points = np.stack(np.meshgrid(np.arange(3.0), -np.arange(3.0), indexing="ij"), axis=-1)
+    points[2, 2] = [0.2, -0.2]
+    with pytest.raises(MeshError, match="folded"):
+        grid_mesh(points, np.zeros(1, np.int64), slice(0, 3), np.zeros(0, np.int64))

@@ -1,0 +1,69 @@
+import math
+from dataclasses import fields, replace
+
+import pytest
+
+from solver.reference import SLIPPERINESS, STICKINESS, scene, scenes
+from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, SceneError, Solve
+
+
+@pytest.mark.parametrize(
+    ("make", "key"),
+    [
+        (lambda: Finger(tip_radius=-1.0), "finger.tip_radius"),
+        (lambda: Finger(epidermis=math.nan), "finger.epidermis"),
+        (lambda: Finger(contact_angle=95.0), "finger.contact_angle"),
+        (lambda: Finger(bone_radius=2.9), "finger.bone_centre"),
+        (lambda: Finger(bone_centre=(-1.0, 1.6)), "finger.bone_centre"),
+        (lambda: Materials(fat=Material(0.034, 0.5)), "materials.fat.nu"),
+        (lambda: Materials(dermis=Material(0.0, 0.48)), "materials.dermis.E"),
+        (lambda: Friction(-0.1), "friction.mu"),
+        (lambda: Friction(0.3, -1.0), "friction.tau_max"),
+        (lambda: Friction(math.inf), "friction.mu"),
+        (lambda: Loading(0.0), "loading.indentation"),
+        (lambda: Loading(2.0, "sideways"), "loading.slide"),
+        (lambda: Loading(2.0, "+x", 0.0), "loading.speed"),
+        (lambda: Receptor(ending=(0.2, 0.0)), "receptor.ending"),
+        (lambda: Solve(kinematics="huge"), "solve.kinematics"),
+        (lambda: Solve(course="backwards"), "solve.course"),
+        (lambda: Solve(tolerance=0.0), "solve.tolerance"),
+        (lambda: Scene(friction=Friction(0.3), loading=Loading(4.8)), "loading.indentation"),
+        (lambda: Scene(friction=Friction(0.3), loading=Loading(2.0), receptor=Receptor(depth=2.5)), "receptor.depth"),
+        (lambda: Scene(friction=Friction(0.3), loading=Loading(2.0), width=0.0), "width"),
+    ],
+)
+def test_what_cannot_be_run_is_refused_in_one_sentence_that_names_key_value_and_what_is_allowed(make, key):
+    with pytest.raises(SceneError) as refused:
+        make()
+    assert refused.value.key == key
+    message = str(refused.value)
+    assert message.startswith(f"{key} = ")
+    assert message.endswith(".")
+    assert "\n" not in message
+
+
+def test_the_defaults_are_the_published_finger():
+    default = Scene(friction=Friction(0.67, 0.05255), loading=Loading(2.0, "+x", 15.0), title="stickiness 100")
+    assert default == scene(STICKINESS[-1])
+    assert [getattr(default.materials, f.name).E for f in fields(Materials)] == [0.136, 0.08, 0.034, 200.0]
+
+
+def test_the_ten_published_scenes_are_those_of_the_tables():
+    ten = scenes()
+    assert [s.title for s in ten[::4]] == ["stickiness 0", "stickiness 100", "slipperiness 75"]
+    assert [s.loading.indentation for s in ten] == [2.0] * 5 + [1.5] * 5
+    assert [s.loading.slide for s in ten] == ["+x"] * 5 + ["-x"] * 5
+    # tau_max [kPa] of the tables, computed as force by 1 cm2
+    kilopascals = [8.033, 15.478, 19.038, 49.998, 52.55, 47.07, 42.404, 30.09, 26.0, 8.77]
+    assert [1e3 * s.friction.cap for s in ten] == pytest.approx(kilopascals)
+
+
+def test_the_bound_as_printed_is_a_hundredth_of_the_computed_one_and_never_a_silent_default():
+    for surface in STICKINESS + SLIPPERINESS:
+        assert scene(surface, "as-printed").friction.cap == pytest.approx(0.01 * scene(surface).friction.cap)
+
+
+def test_a_scene_can_be_changed_and_is_checked_again():
+    published = scene(STICKINESS[0])
+    with pytest.raises(SceneError, match="indentation"):
+        replace(published, loading=replace(published.loading, indentation=-1.0))

@@ -1,0 +1,109 @@
+import numpy as np
+import pytest
+
+from solver.body import Body, elimination
+from solver.dissection import Reduced, Tree
+from solver.elements import Q2P1
+from solver.materials import MATERIALS, Hooke
+from solver.mesher import Sizing, finger_mesh
+from solver.scene import Finger, Receptor
+from solver.shapes import block
+from solver.stiffness import Elastic, Probes, local_coordinates
+
+TISSUES = [Hooke(0.136, 0.48), Hooke(0.08, 0.48), Hooke(0.034, 0.48)]
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.48])
+def test_stress_is_the_slope_of_the_energy(material, nu):
+    law = material(0.08, nu)
+    gradient = np.random.default_rng(3).normal(0, 0.1, (2, 2))
+    for a in range(2):
+        for b in range(2):
+            step = np.zeros((2, 2))
+            step[a, b] = 1e-6
+            slope = (law.energy(gradient + step) - law.energy(gradient - step)) / 2e-6
+            assert slope == pytest.approx(law.stress(gradient)[a, b], rel=1e-7)
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+def test_a_small_rotation_stores_nothing(material):
+    spin = np.array([[0.0, -1e-3], [1e-3, 0.0]])
+    assert material(0.08, 0.48).energy(spin) == 0.0
+
+
+def test_rigid_motion_of_an_element_needs_no_force():
+    made = finger_mesh(Finger(), Receptor(), Sizing(4, 2.0))
+    elastic = Elastic.of(made.mesh, TISSUES)
+    x = made.mesh.nodes[made.mesh.elements]
+    for motion in (np.ones_like(x) * [1, 0], np.ones_like(x) * [0, 1], np.stack([-x[..., 1], x[..., 0]], axis=-1)):
+        force = elastic.stiffness @ motion.reshape(len(x), 18, 1)
+        assert np.abs(force).max() < 1e-12
+
+
+def test_energy_of_probes_adds_up_to_that_of_the_stiffness():
+    mesh = block(np.array([0.0, 0.7, 2.0]), np.array([0.0, 1.0, 1.5]))
+    elastic = Elastic.of(mesh, [Hooke(0.08, 0.48)])
+    moved = np.random.default_rng(4).normal(0, 0.1, (len(mesh.nodes), 2))
+    local = moved[mesh.elements].reshape(-1, 18)
+    stored = 0.5 * np.einsum("ei,eij,ej->", local, elastic.stiffness, local)
+    points, weights = np.polynomial.legendre.leggauss(4)
+    across, up = np.meshgrid(points, points)
+    at = np.stack([across.ravel(), up.ravel()], axis=1)
+    total = 0.0
+    for element, corners in enumerate(mesh.elements[:, :4]):
+        probes = Probes.at(mesh, elastic, np.full(16, element), at)
+        area = np.prod(np.ptp(mesh.nodes[corners], axis=0)) / 4.0
+        total += area * (np.outer(weights, weights).ravel() @ probes.energy(mesh, elastic, moved[:, :, None])[:, 0])
+    assert total == pytest.approx(stored, rel=1e-12)
+
+
+def test_places_are_found_again_in_curved_elements():
+    made = finger_mesh(Finger(), Receptor(), Sizing(4, 2.0))
+    corners = made.mesh.nodes[made.mesh.elements]
+    at = np.random.default_rng(5).uniform(-1, 1, (len(corners), 2))
+    places = (Q2P1.shape(at)[0][:, None] @ corners)[:, 0]
+    assert np.abs(local_coordinates(corners, places, np.zeros_like(at)) - at).max() < 1e-11
+
+
+def test_elimination_gives_what_one_dense_solve_gives():
+    made = finger_mesh(Finger(), Receptor(), Sizing(4, 2.0))
+    mesh = made.mesh
+    elastic = Elastic.of(mesh, TISSUES)
+    tree = elimination(mesh)
+    load = np.random.default_rng(6).normal(size=(mesh.nodes.size, 1))
+    reduced = Reduced.of(tree, elastic.stiffness, load)
+    whole = np.zeros((mesh.nodes.size,) * 2)
+    unknowns = (2 * mesh.elements[:, :, None] + np.arange(2)).reshape(-1, 18)
+    for mine, stiffness in zip(unknowns, elastic.stiffness, strict=True):
+        whole[np.ix_(mine, mine)] += stiffness
+    fixed = np.concatenate([2 * mesh.held, 2 * mesh.held + 1])
+    inner = np.setdiff1d(np.arange(mesh.nodes.size), np.concatenate([fixed, tree.kept]))
+    kept = tree.kept
+    follow = np.linalg.solve(whole[np.ix_(inner, inner)], np.hstack([whole[np.ix_(inner, kept)], load[inner]]))
+    stiffness = whole[np.ix_(kept, kept)] - whole[np.ix_(kept, inner)] @ follow[:, :-1]
+    assert np.abs(reduced.stiffness - stiffness).max() < 1e-13
+    assert np.allclose(reduced.load, load[kept] - whole[np.ix_(kept, inner)] @ follow[:, -1:], atol=1e-12)
+    moved = np.random.default_rng(7).normal(size=(len(kept), 2))
+    found = reduced.all_unknowns(moved, loaded=True)
+    assert np.allclose(found[inner], follow[:, -1:] - follow[:, :-1] @ moved, atol=1e-10)
+    some = inner[::17]
+    assert np.array_equal(reduced.all_unknowns(moved, loaded=True, only=some)[some], found[some])
+
+
+def test_elimination_of_a_single_part_works_too():
+    mesh = block(np.array([0.0, 1.0]), np.array([0.0, 1.0]))
+    assert len(elimination(mesh).parts) == 1
+    tree = Tree.of(mesh.elements, mesh.nodes[mesh.elements[:, 8]], mesh.held, mesh.skin)
+    assert set(tree.parts[0].inner) == set(range(9)) - set(mesh.held) - set(mesh.skin)
+
+
+def test_a_held_block_that_is_sheared_answers_as_the_closed_form():
+    """A wide flat layer under shear traction q: its underside moves by q h / G."""
+    mesh = block(np.linspace(-40, 40, 81), np.array([0.0, 0.5, 1.0]))
+    law = Hooke(0.08, 0.48)
+    body = Body.of(mesh, [law])
+    k = len(mesh.skin)
+    forces = np.concatenate([np.zeros(k), 0.001 * body.touchable.length])[:, None]
+    moved = body.skin_displacement(forces)[:, 0]
+    assert moved[k + k // 2] == pytest.approx(0.001 * 1.0 / law.shear, rel=1e-6)
