@@ -81,11 +81,11 @@ class NetFtTransducer:
         self._thread = threading.Thread(target=self._drain, args=(link,), name=f"net-ft {self._info.serial}")
         self._thread.start()
         patience = _PATIENCE + 4.0 * self._period
-        deadline = time.monotonic() + patience
+        waited = 0.0
         while self.health.received == 0:
-            self._arrived.wait(_TICK)
+            waited += 0.0 if self._arrived.wait(_TICK) else _TICK
             self._arrived.clear()
-            if self._ended is not None or time.monotonic() > deadline:
+            if self._ended is not None or waited > patience:
                 self.stop()
                 raise LinkLost(self._ended or self._never_came(patience))
         if self._step is not None and self._account.step not in (None, self._step):
@@ -160,31 +160,32 @@ class NetFtTransducer:
         """Take datagrams until told to stop, or until the box has been silent for too long."""
         receive, keep, now_ns = link.receive, self._pending.append, self._clock.now_ns
         link.send(START)
-        heard = asked = time.monotonic()
-        silent = True
+        # Silence is counted in waits that brought nothing, so that a computer too busy to look is not taken for it.
+        silence = asked = 0.0
+        streaming = False
         returns: deque[float] = deque(maxlen=_THEFTS)
         while not self._stopping.is_set():
             datagram = receive(_TICK)
-            now = time.monotonic()
             if datagram is not None:
                 keep((datagram, now_ns()))
                 if not self._arrived.is_set():
                     self._arrived.set()
-                heard, silent = now, False
+                silence, asked, streaming = 0.0, 0.0, True
                 continue
-            if now - heard > _SILENCE + 4.0 * self._period:
-                raise LinkLost(self._fell_silent(now - heard))
-            if now - asked > _ASK_EVERY + 2.0 * self._period and (silent or now - heard > _QUIET + 2.0 * self._period):
-                if not silent:
-                    returns.append(now)
-                    silent = True
-                    if len(returns) == _THEFTS and now - returns[0] < _THEFT_SPAN:
-                        raise LinkLost(
-                            f"{self._info.uri} stopped sending {_THEFTS} times within {_THEFT_SPAN:g} s; "
-                            "another program on the network probably takes its stream: end that program"
-                        )
-                link.send(START)
-                asked = now
+            silence += _TICK
+            if silence > _SILENCE + 4.0 * self._period:
+                raise LinkLost(self._fell_silent(silence))
+            if silence - asked < (_QUIET if streaming else _ASK_EVERY) + 2.0 * self._period:
+                continue
+            if streaming:
+                returns.append(time.monotonic())
+                if len(returns) == _THEFTS and returns[-1] - returns[0] < _THEFT_SPAN:
+                    raise LinkLost(
+                        f"{self._info.uri} stopped sending {_THEFTS} times within {_THEFT_SPAN:g} s; "
+                        "another program on the network probably takes its stream: end that program"
+                    )
+            link.send(START)
+            asked, streaming = silence, False
 
     def _digest(self, *, end: bool = False) -> None:
         """Turn pending datagrams into accounted readings. The lock is held."""

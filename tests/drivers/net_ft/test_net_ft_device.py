@@ -48,7 +48,7 @@ class MemoryLink:
 
     def receive(self, timeout):
         if not self._coming:
-            time.sleep(min(timeout, 0.005))
+            time.sleep(timeout)
             return None
         datagram = self._coming.popleft()
         if isinstance(datagram, Exception):
