@@ -109,7 +109,7 @@ def _unit(heading: str) -> str | None:
     """Return the unit a heading names, without blanks and dots, or None."""
     match = _HEADING.match(heading.strip())
     unit = match and (match[2] or match[3])
-    return re.sub(r"[\s·.*_]", "", unit) if unit else None
+    return re.sub(r"[\s·.*_]", "", unit)[:20] if unit else None
 
 
 def _agreed(what: str, headed: set[str | None], stated: str | None, known: Mapping[str, float]) -> str:

@@ -197,11 +197,16 @@ def _row(path: Path, line: int, cells: Sequence[str], width: int, used: dict[int
         value = _number(cells[position])
         if value is None or not math.isfinite(value):
             raise ImportRefused(
-                f'{path}, line {line}: {name} is "{cells[position].strip()}", which is no number; '
+                f'{path}, line {line}: {name} is "{_shown(cells[position])}", which is no number; '
                 "mend or remove the row"
             )
         row[position] = value
     return row
+
+
+def _shown(cell: str) -> str:
+    """Return what a cell holds, on one line and not too long."""
+    return " ".join(cell.split())[:40]
 
 
 def _number(cell: str) -> float | None:
@@ -235,7 +240,8 @@ def _times(
         if float(np.ptp(np.percentile(steps, [2, 98]))) * rate > UNEVEN:
             raise SettingsError(
                 f"{path}: --rate {stated.rate:g} is refused, for the file's time steps are uneven "
-                f"({1e3 * steps.min():.3g} to {1e3 * steps.max():.3g} ms); leave --rate out, and its times are taken as they are"
+                f"({1e3 * steps.min():.3g} to {1e3 * steps.max():.3g} ms); leave --rate out and its times are taken as "
+                "they are"
             )
         if abs(stated.rate / rate - 1.0) > RATE_TOLERANCE:
             raise SettingsError(

@@ -11,7 +11,7 @@ from sessions.plan import Frame
 Array = NDArray[np.float64]
 
 _AXES = {"x": 0, "y": 1, "z": 2}
-# -3 dB of a second-order Butterworth run forwards and backwards lies at its design frequency divided by this.
+# -3 dB of a second-order Butterworth run forwards and backwards lies at its own -3 dB frequency divided by this.
 _TWO_PASSES = (np.sqrt(2.0) - 1.0) ** -0.25
 _SHORTEST_SEGMENT = 12  # readings; fewer have no filtered value
 
@@ -33,7 +33,9 @@ class Filter:
     def applied(self, values: Array, rate: float, segments: list[slice]) -> Array:
         """Return values (n, k) filtered within each segment [positions]; nan outside them and in the shortest ones."""
         filtered = np.full_like(values, np.nan)
-        sections = signal.butter(2, self.cut_off * _TWO_PASSES, fs=rate, output="sos")
+        # The bilinear transform bends frequencies as the tangent does: the factor belongs to the bent ones.
+        design = rate / np.pi * np.arctan(_TWO_PASSES * np.tan(np.pi * self.cut_off / rate))
+        sections = signal.butter(2, design, fs=rate, output="sos")
         for segment in segments:
             length = segment.stop - segment.start
             if length >= _SHORTEST_SEGMENT:

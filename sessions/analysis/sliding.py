@@ -78,8 +78,8 @@ def _speed_trouble(
     position = track.position[window]
     normal = float(np.nanmean(track.normal[window]))
     step = span.torque_step / normal
-    if np.nanmedian(np.abs(position)) > settings.farthest:
-        where = float(np.nanmedian(np.abs(position)))
+    where = float(np.nanmedian(np.hypot(position[:, 0], position[:, 1])))
+    if where > settings.farthest:
         return FlawName.UNITS_IMPLAUSIBLE, (
             f"The centre of pressure lies {where:.3g} mm from the axis, where no finger is: check the units of the "
             "torques and the face's height; no speed is given."

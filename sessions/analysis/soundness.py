@@ -60,7 +60,9 @@ def soundness(block: ReadingBlock, calibration: Calibration, settings: AnalysisS
     even = bool(len(neighbours) and np.ptp(np.percentile(neighbours, [2, 98])) <= settings.uneven * step)
     segments = _segments(good, broken)
     dead = tuple(
-        name for name, column in zip(_AXIS_NAMES, block.raw[good].T, strict=True) if len(column) and np.ptp(column) == 0
+        name
+        for name, column in zip(_AXIS_NAMES, block.raw[good].T, strict=True)
+        if len(column) > settings.frozen_readings and np.ptp(column) == 0.0
     )
     missing = np.diff(block.sequence) - 1
     lost = int(missing[missing > 0].sum())
@@ -68,7 +70,7 @@ def soundness(block: ReadingBlock, calibration: Calibration, settings: AnalysisS
         *_loss_flaws(lost, len(block)),
         *_frozen_flaws(frozen, block.time, settings),
         *_saturation_flaws(saturated, block.time),
-        *_dead_flaws(dead, all_frozen=not good.any()),
+        *_dead_flaws(dead),
         *_time_flaws(step, even, int(stalled.sum())),
     ]
     return Soundness(
@@ -157,8 +159,8 @@ def _saturation_flaws(saturated: Mask, time: Array) -> _Found:
     return [(FlawName.SATURATED, sentence, "doubtful")]
 
 
-def _dead_flaws(dead: tuple[str, ...], *, all_frozen: bool) -> _Found:
-    if not dead or all_frozen:
+def _dead_flaws(dead: tuple[str, ...]) -> _Found:
+    if not dead:
         return []
     names = ", ".join(dead)
     if any(name.startswith("F") for name in dead):

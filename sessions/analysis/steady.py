@@ -51,8 +51,17 @@ def steady_window(ratio: Array, rate: float, whole: int, settings: AnalysisSetti
         return None
     length = np.where(steady, last - first, 0)
     best = np.lexsort((variance, -length))[0]
-    inside = np.flatnonzero(held[first[best] : last[best]]) + first[best]
-    return slice(int(inside[0]), int(inside[-1]) + 1)
+    return _trimmed(ratio, slice(int(first[best]), int(last[best])), settings)
+
+
+def _trimmed(ratio: Array, window: slice, settings: AnalysisSettings) -> slice:
+    """Return the window without ends that lie off its median: a quarter's mean hides the end of a ramp."""
+    part = ratio[window]
+    level = float(np.nanmedian(part))
+    scatter = 1.4826 * float(np.nanmedian(np.abs(part - level)))
+    with np.errstate(invalid="ignore"):
+        inside = np.flatnonzero(np.abs(part - level) <= max(settings.steady_trend * level, 2.0 * scatter))
+    return slice(window.start + int(inside[0]), window.start + int(inside[-1]) + 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,4 +136,4 @@ def _block_means(values: Array, rate: float, settings: AnalysisSettings) -> Arra
     held = values[np.isfinite(values).all(axis=1)]
     length = max(1, round(settings.block * rate))
     whole = len(held) // length
-    return held[: whole * length].reshape(whole, length, -1).mean(axis=1)
+    return held[: whole * length].reshape(whole, length, values.shape[1]).mean(axis=1)

@@ -1,0 +1,374 @@
+"""Friction of a stroke and what forbids it: every flaw, from strokes in closed form."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_strokes import (
+    CALIBRATION,
+    COUNTS,
+    HEIGHT,
+    analysed,
+    block,
+    felt,
+    names,
+    stroke,
+    times,
+    trapezium,
+    trial,
+    with_info,
+    wrench,
+)
+
+from sessions.analysis import ZERO_SETTING, ZERO_STATED, FlawName
+from sessions.analysis.friction import rule_for
+from sessions.analysis.measure import EVERYTHING
+from sessions.plan import Frame
+
+T = times()
+PLAIN = stroke(T)
+N = trapezium(T, 1.0, 3.0, 0.1, 2.0)
+
+
+def sticking(mu=0.6, peak=None, stick=0.5):
+    """Return T/N and the path of a finger that sticks from 1.0 to 1.5 s, then slides; `peak` is a static peak."""
+    ratio = mu * np.clip((T - 1.0) / stick, 0, 1)
+    if peak is not None:
+        ratio += (peak - mu) * np.exp(-(((T - 1.0 - stick) / 0.03) ** 2))
+    return wrench(T, N, ratio, 20.0 * np.maximum(T - 1.0 - stick, 0.0) - 15.0)
+
+
+# Numbers
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.24, 0.67, 1.8])
+def test_mu_dynamic_is_the_ratio_and_lies_in_its_interval(mu):
+    (one,) = analysed(block(T, felt(stroke(T, mu=mu)))).strokes
+    assert one.mu_dynamic == pytest.approx(mu, rel=0.005)
+    low, high = one.mu_dynamic_interval
+    assert low < one.mu_dynamic < high
+    assert high - low < 0.02 * mu
+
+
+def test_tau_max_is_the_peak_tangential_force_over_the_contact_area():
+    n = N + 1.5 * np.exp(-(((T - 2.0) / 0.25) ** 2))
+    (one,) = analysed(block(T, felt(wrench(T, n * (N > 0), 0.4 * np.ones_like(T), 25.0 * (T - 2.0))))).strokes
+    assert one.peak_tangential == pytest.approx(0.4 * 3.5, rel=0.01)
+    assert one.tau_max == pytest.approx(0.4 * 3.5 / 100.0, rel=0.01)  # MPa over 100 mm2
+
+
+def test_a_static_peak_is_given_where_one_stands_out():
+    (one,) = analysed(block(T, felt(sticking(peak=0.85)))).strokes
+    assert one.mu_static == pytest.approx(0.85, rel=0.05)
+    assert one.mu_dynamic == pytest.approx(0.6, rel=0.01)
+
+
+def test_without_a_static_peak_there_is_none_and_the_reason_says_so():
+    (one,) = analysed(block(T, felt(sticking()))).strokes
+    assert one.mu_static is None
+    assert one.reasons["mu_static"] == "no static peak stands out"
+
+
+def test_break_away_is_where_the_finger_begins_to_move():
+    (one,) = analysed(block(T, felt(sticking()))).strokes
+    assert one.break_away == pytest.approx(1.5, abs=0.05)
+    assert one.steady[0] >= 1.45
+
+
+def test_the_maximum_is_hardly_raised_by_noise():
+    for seed in range(20):
+        (one,) = analysed(block(T, felt(sticking(mu=0.28), seed=seed))).strokes
+        assert one.mu_max == pytest.approx(0.28, rel=0.01)
+
+
+# What the model gets
+
+
+def test_stickiness_gets_the_maximum_and_slipperiness_the_mean():
+    raw = block(T, felt(sticking(peak=0.9)))
+    (sticky,) = analysed(raw, of=trial("stickiness")).friction
+    (slippery,) = analysed(raw, of=trial("slipperiness")).friction
+    assert (sticky.rule, slippery.rule) == ("maximum", "mean over steady window")
+    assert sticky.mu > slippery.mu
+    assert slippery.mu == pytest.approx(0.6, rel=0.01)
+    assert slippery.mu_interval is not None
+
+
+def test_another_descriptor_is_judged_by_direction_and_no_plan_gets_the_mean():
+    assert rule_for(trial("roughness", direction=1)) == "maximum"
+    assert rule_for(trial("roughness", direction=-1)) == "mean over steady window"
+    assert rule_for(None) == "mean over steady window"
+
+
+# Flaws of the readings
+
+
+def test_lost_readings_are_counted_and_cost_nothing_where_they_are_few():
+    kept = np.ones(len(T), bool)
+    kept[[300, 301, 450]] = False
+    found = analysed(block(T[kept], felt(PLAIN)[kept], sequence=np.flatnonzero(kept)))
+    assert names(found) == {"lost_readings"}
+    assert "3 readings" in found.flaws[0].sentence
+    assert found.strokes[0].tau_max == pytest.approx(0.01, rel=0.01)
+
+
+def test_a_long_gap_in_the_stroke_withholds_its_peaks_but_not_its_mean():
+    kept = np.ones(len(T), bool)
+    kept[400:430] = False
+    (one,) = analysed(block(T[kept], felt(PLAIN)[kept], sequence=np.flatnonzero(kept))).strokes
+    assert one.tau_max is None
+    assert one.mu_max is None
+    assert one.reasons["tau_max"] == "lost_readings"
+    assert one.mu_dynamic == pytest.approx(0.5, rel=0.01)
+
+
+def test_saturation_withholds_the_peaks():
+    t = times()
+    n = trapezium(t, 1.0, 3.0, 0.1, 30.0) + 10.0 * np.exp(-(((t - 2.0) / 0.2) ** 2))
+    raw = felt(wrench(t, n * (n > 0.01), 0.2 * np.ones_like(t), 25.0 * (t - 2.0)))
+    raw[:, 2] = np.clip(raw[:, 2], -36.001, 36.001)
+    (one,) = analysed(block(t, raw)).strokes
+    assert "saturated" in one.flaws
+    assert one.tau_max is None
+    assert one.peak_normal is None
+
+
+def test_readings_the_device_calls_invalid_are_left_out():
+    status = np.zeros(len(T), np.int64)
+    status[400:404] = 1 << 17
+    raw = felt(PLAIN)
+    raw[400:404] = 0.0
+    found = analysed(block(T, raw, status=status))
+    assert len(found.strokes) == 1
+    assert "saturated" in names(found)
+
+
+def test_a_frozen_stretch_is_left_out_and_named():
+    raw = felt(PLAIN)
+    raw[420:460] = raw[419]
+    found = analysed(block(T, raw))
+    assert "frozen_sensor" in names(found)
+    assert found.strokes[0].tau_max is None
+    assert found.strokes[0].mu_dynamic == pytest.approx(0.5, rel=0.01)
+
+
+def test_a_sensor_frozen_most_of_the_time_is_refused():
+    raw = felt(PLAIN)
+    raw[200:] = raw[199]
+    found = analysed(block(T, raw))
+    assert found.strokes == ()
+    assert names(found, "refused") == {"frozen_sensor"}
+
+
+def test_a_dead_force_axis_is_refused():
+    raw = felt(PLAIN)
+    raw[:, 0] = 0.0
+    found = analysed(block(T, raw))
+    assert found.strokes == ()
+    assert names(found, "refused") == {"dead_sensor"}
+
+
+def test_a_dead_torque_axis_gives_no_speed_and_hence_no_proof_of_sliding():
+    raw = felt(PLAIN)
+    raw[:, 4] = 0.0
+    (one,) = analysed(block(T, raw)).strokes
+    assert one.speed is None
+    assert one.mu_dynamic is None
+
+
+def test_time_that_stands_still_is_refused():
+    found = analysed(block(np.zeros(len(T)), felt(PLAIN)))
+    assert found.strokes == ()
+    assert names(found, "refused") == {"unknown_rate"}
+
+
+def test_uneven_time_is_named_and_nothing_is_filtered():
+    uneven = T + np.random.default_rng(3).uniform(0, 0.002, len(T))
+    found = analysed(block(uneven, felt(PLAIN)))
+    assert "irregular_time" in names(found)
+    assert found.filtered.startswith("not filtered")
+    assert found.strokes[0].mu_dynamic == pytest.approx(0.5, rel=0.01)
+
+
+def test_too_few_readings_are_no_stroke():
+    assert names(analysed(block(T[:5], felt(PLAIN)[:5])), "refused") == {"no_stroke"}
+
+
+# Flaws of zero, frame and units
+
+
+def test_without_an_unloaded_stretch_there_are_no_numbers():
+    inside = (T > 1.3) & (T < 2.8)
+    n = 2.0 + 0.5 * np.sin(2 * np.pi * 2.0 * T)
+    raw = felt(wrench(T, n, 0.5 * np.ones_like(T), 20.0 * (T - 2.0)))[inside]
+    found = analysed(block(T[inside], raw))
+    assert "no_unloaded_stretch" in names(found, "refused")
+    (one,) = found.strokes
+    assert all(getattr(one, name) is None for name in EVERYTHING if name != "readings")
+
+
+def test_without_an_unloaded_stretch_counts_do_not_even_show_a_contact():
+    inside = (T > 1.3) & (T < 2.8)
+    n = 2.0 + 0.5 * np.sin(2 * np.pi * 2.0 * T)
+    raw = felt(wrench(T, n, 0.5 * np.ones_like(T), 20.0 * (T - 2.0)))[inside] / np.diag(COUNTS.matrix)
+    found = analysed(block(T[inside], raw), info=with_info(calibration=COUNTS))
+    assert found.strokes == ()
+    assert names(found, "refused") == {"no_unloaded_stretch"}
+
+
+def test_a_zero_that_somebody_stated_is_used():
+    inside = (T > 1.3) & (T < 2.8)
+    raw = felt(PLAIN)[inside]
+    found = analysed(block(T[inside], raw), info=with_info(settings={ZERO_SETTING: ZERO_STATED}))
+    (one,) = found.strokes
+    assert one.mu_dynamic == pytest.approx(0.5, rel=0.01)
+    assert one.zero == ZERO_STATED
+
+
+def test_a_zero_that_moves_during_the_stroke_is_named_and_at_last_forbids_the_numbers():
+    def with_step(newtons):
+        step = np.zeros((len(T), 6))
+        step[T > 2.0, 0] = newtons
+        return analysed(block(T, felt(PLAIN + step)))
+
+    assert names(with_step(0.02)) == set()
+    assert names(with_step(0.07)) == {"drift"}
+    assert with_step(0.07).strokes[0].mu_dynamic is not None
+    assert names(with_step(0.3), "refused") == {"drift"}
+    assert with_step(0.3).strokes[0].mu_dynamic is None
+
+
+def test_a_normal_axis_along_which_the_finger_pulls_is_refused():
+    n = N * (1.0 + 0.2 * np.sin(2 * np.pi * 1.7 * T))
+    raw = felt(wrench(T, n, 0.5 * np.ones_like(T), 25.0 * (T - 2.0)))
+    found = analysed(block(T, raw), frame=Frame("+z", "set", HEIGHT, "set"))
+    assert found.strokes == ()
+    assert names(found, "refused") == {"normal_axis_implausible"}
+
+
+def test_torques_in_the_wrong_unit_give_no_speed():
+    raw = felt(PLAIN)
+    raw[:, 3:] *= 1000.0
+    (one,) = analysed(block(T, raw), info=with_info(calibration=wide())).strokes
+    assert one.speed is None
+    raw = felt(PLAIN)
+    raw[:, 3:] /= 1000.0
+    (one,) = analysed(block(T, raw)).strokes
+    assert one.speed is None
+
+
+def wide():
+    return replace(CALIBRATION, rated=np.full(6, math.nan))
+
+
+def test_a_height_nobody_stated_forbids_a_speed_that_depends_on_it():
+    ratio = 0.5 + 0.03 * (T - 2.0)  # rises by 6 % a second
+    raw = felt(wrench(T, N, ratio, 2.0 * (T - 2.0)))
+    (stated,) = analysed(block(T, raw)).strokes
+    (unknown,) = analysed(block(T, raw), frame=Frame("-z", "default", HEIGHT, "default")).strokes
+    assert stated.speed == pytest.approx(2.0, rel=0.05)
+    assert unknown.speed is None
+    assert unknown.reasons["speed"] == "height_unknown"
+
+
+def test_a_height_nobody_stated_leaves_a_speed_that_hardly_depends_on_it():
+    (one,) = analysed(block(T, felt(PLAIN)), frame=Frame("-z", "default", 0.0, "default")).strokes
+    assert one.speed == pytest.approx(25.0, rel=0.01)
+
+
+# Flaws of the stroke
+
+
+def test_too_little_force_gives_no_friction():
+    found = analysed(block(T, felt(stroke(T, newtons=0.2))))
+    assert "too_little_force" in names(found, "refused")
+    assert found.strokes[0].mu_dynamic is None
+    assert found.strokes[0].tau_max is None
+
+
+def test_a_press_that_does_not_slide_gives_no_friction():
+    found = analysed(block(T, felt(wrench(T, N, 0.3 * np.ones_like(T), np.zeros_like(T)))))
+    assert names(found, "refused") == {"no_steady_sliding"}
+    assert found.strokes[0].mu_dynamic is None
+    assert found.strokes[0].peak_normal == pytest.approx(2.0, rel=0.01)
+
+
+def test_a_ratio_that_never_settles_gives_no_friction():
+    ratio = 0.4 + 0.2 * np.sin(2 * np.pi * 1.3 * T)
+    found = analysed(block(T, felt(wrench(T, N, ratio, 25.0 * (T - 2.0)))))
+    assert names(found, "refused") == {"no_steady_sliding"}
+    assert found.strokes[0].tau_max is None
+
+
+def test_a_side_load_at_low_force_is_named_and_does_not_make_the_maximum():
+    n = trapezium(T, 1.0, 3.0, 0.4, 3.0)
+    ratio = np.where(T < 1.12, 1.6, 0.5)  # up to 0.9 N of 3 N
+    found = analysed(block(T, felt(wrench(T, n, ratio, 25.0 * (T - 2.0)))))
+    assert "ratio_above_one_at_low_force" in names(found)
+    assert found.strokes[0].mu_max == pytest.approx(0.5, rel=0.02)
+
+
+def test_a_sticky_surface_with_a_ratio_above_one_throughout_is_no_flaw():
+    assert names(analysed(block(T, felt(stroke(T, mu=1.4))))) == set()
+
+
+def test_coarse_torques_give_no_speed():
+    raw = felt(stroke(T, speed=10.0))
+    raw[:, 3:] = np.round(raw[:, 3:] / 20.0) * 20.0  # 20 N mm: 10 mm at 2 N
+    (one,) = analysed(block(T, raw)).strokes
+    assert one.speed is None
+    assert {"speed_not_measurable", "no_steady_sliding"} & set(one.flaws)
+
+
+def test_a_finger_that_goes_the_wrong_way_is_named():
+    found = analysed(block(T, felt(stroke(T, direction=-1))), of=trial(direction=1))
+    assert "wrong_direction" in names(found)
+    assert found.strokes[0].direction == -1
+    assert "wrong_direction" in found.friction[0].flaws
+
+
+def test_a_drag_against_the_movement_shows_a_wrong_frame():
+    raw = felt(wrench(T, N, -0.5 * np.ones_like(T), 25.0 * (T - 2.0)))
+    (one,) = analysed(block(T, raw)).strokes
+    assert "direction_disagrees" in one.flaws
+    assert one.direction is None
+    assert one.speed is None
+
+
+def test_a_drag_that_turns_is_named():
+    angle = np.pi * np.clip(T - 1.0, 0, 2)  # a full turn while rubbing
+    raw = wrench(T, N, np.zeros_like(T), 10.0 * (T - 2.0))
+    raw[:, 0], raw[:, 1] = 0.5 * N * np.cos(angle), 0.5 * N * np.sin(angle)
+    (one,) = analysed(block(T, felt(raw))).strokes
+    assert "direction_turns" in one.flaws
+    assert one.direction is None
+
+
+def test_a_force_that_creeps_in_is_named():
+    n = np.where((T > 1.0) & (T < 3.0), 2.0 * np.clip((T - 1.8) / 0.1, 0.1, 1.0), 0.0)
+    found = analysed(block(T, felt(wrench(T, n, 0.5 * np.ones_like(T), 25.0 * (T - 2.0)))))
+    assert "slow_onset" in names(found)
+
+
+# What is handed on
+
+
+def test_the_document_is_plain_json_with_the_promised_keys():
+    found = analysed(block(T, felt(PLAIN)), of=trial())
+    document = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    promised = {"trial", "onset", "lift", "steady", "mu_static", "mu_dynamic", "tau_max", "speed", "direction", "flaws"}
+    assert promised <= set(document["strokes"][0])
+    assert document["flaws"] == []
+    assert document["simulated"] == "SIMULATED"
+    assert "20 Hz" in document["filter"]
+
+
+def test_every_withheld_number_has_its_reason_and_no_other():
+    raw = felt(stroke(T, newtons=0.2))
+    (one,) = analysed(block(T, raw)).strokes
+    for name in EVERYTHING:
+        if name in one.reasons and name != "readings":
+            assert getattr(one, name) is None
+    assert set(one.reasons.values()) <= {str(flaw) for flaw in FlawName} | {"no static peak stands out"}
