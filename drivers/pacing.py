@@ -98,7 +98,10 @@ class Pacing:
         span = count * self._period
         share = min(_LEAD * span, 0.5)
         step = (span + max(-0.3 * span, min(0.3 * span, 2.0 * share * late))) / count
-        sequence, time = self._sequence + slots, self._time + slots * step
+        sequence = self._sequence + slots
+        time: NDArray[np.float64] = self._time + slots * np.float64(step)
+        if self._sequence == 0:
+            time -= time[0]
         self._sequence, self._time = int(sequence[-1]), float(time[-1])
         self.lost += int(damaged.sum())
         change = 1.0 + max(-0.002, min(0.002, _LEAD * share * late))

@@ -1,5 +1,6 @@
 """A serial line as a link, and the part of a device address that names its port."""
 
+import contextlib
 import errno
 from typing import Literal
 from urllib.parse import unquote, urlsplit
@@ -59,10 +60,8 @@ class SerialLink:
     def close(self) -> None:
         """Give the port back, dropping what was not sent yet. Harmless when repeated."""
         if self._port.is_open:
-            try:
+            with contextlib.suppress(OSError, serial.SerialException):  # it was pulled out
                 self._port.reset_output_buffer()
-            except (OSError, serial.SerialException):
-                pass  # it was pulled out
             self._port.close()
 
 

@@ -58,7 +58,7 @@ def test_a_pause_followed_by_the_lump_that_was_kept_back_is_no_loss():
     sequence, time = paced(pacing, zip(times.tolist(), counts.tolist(), strict=True))
     assert pacing.lost == 0
     np.testing.assert_array_equal(sequence, np.arange(1, len(made) + 1))
-    np.testing.assert_allclose(time, made, atol=0.05)
+    np.testing.assert_allclose(time, made, atol=0.07)  # half of the lump came late by GAP
 
 
 def test_broken_records_take_their_numbers_with_them():

@@ -1,0 +1,1 @@
+"""The stand-alone force/torque controller on a serial line."""

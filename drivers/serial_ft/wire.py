@@ -1,0 +1,190 @@
+"""Records and commands of the stand-alone force/torque controller (manuals 9620-05-CTL and 9610-05-1001).
+
+The manuals themselves were not at hand: layouts are those that four published drivers agree on. What the error
+digits mean beyond 0 (good), and the exact text of the start-up banner, is not verified.
+"""
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.records import Records
+
+WARM_START = b"\x17"  # ^W
+ASCII_OUTPUT = b"CD A"
+BINARY_OUTPUT = b"CD B"
+ONE_RECORD = b"QR"
+STREAM = b"QS"  # until any CR
+SETTINGS = (  # beside the output format
+    b"CD R",  # resolved forces and torques
+    b"CD U",  # no checksum: its algorithm is not verified
+    b"CV 3F",  # all six axes
+    b"SA 0",  # no moving average
+    b"SM 1",  # sensor errors are monitored
+    b"SZ",  # every bias dropped: raw stays raw
+)
+PROMPT = b">"
+RETURN = b"\r"
+
+ASCII_SIZE = 45  # bytes of a record: error digit, six integers of width 6 after a comma each, CR, LF
+BINARY_SIZE = 13  # error byte, six integers Fx Fy Fz Tx Ty Tz
+
+_BINARY = np.dtype([("error", "u1"), ("values", ">i2", 6)])
+_WIDTH = 6  # characters of an integer in text
+_ASCII_RECORD = re.compile(rb"([0-9])" + rb",( *-?[0-9]+)" * 6)
+_MOST_ERROR = 9  # of an error byte: it stands for one digit
+_ACKNOWLEDGED = b"\x06\r\n>"  # after the record of an answer to QR in binary
+_NEAR = 4  # records that are looked at together where all is steady
+_STEADY = 160  # summed change of their values below which no further proof is asked [counts]
+_WINDOW = 9 * BINARY_SIZE - 1  # bytes that are looked at otherwise: eight records in any place
+_BREAK = 6.0  # what a break between records must gain at the least, see _best_shift
+
+
+class AsciiDecoder:
+    """Records as lines of text. A line of any other form is a broken record."""
+
+    def __init__(self) -> None:
+        """Start with nothing received."""
+        self.malformed = 0
+        self._buffer = bytearray()
+        self._damaged = 0  # records broken since the last good one
+
+    def feed(self, data: bytes) -> Records:
+        """Take what arrived and return every record it completes."""
+        self._buffer += data
+        raw: list[tuple[int, ...]] = []
+        status: list[int] = []
+        damaged: list[int] = []
+        *lines, rest = self._buffer.split(b"\n")
+        for line in lines:
+            values = _ascii_values(bytes(line) + b"\n")
+            if values is None:
+                self._spoil(len(line) + 1)
+                continue
+            status.append(values[0])
+            raw.append(values[1:])
+            damaged.append(self._damaged)
+            self._damaged = 0
+        while len(rest) > 2 * ASCII_SIZE:  # garbage without any line end
+            del rest[:ASCII_SIZE]
+            self._spoil(ASCII_SIZE)
+        self._buffer = rest
+        return Records.of(raw, status, damaged)
+
+    def _spoil(self, size: int) -> None:
+        """Count `size` bytes that are no record as the records they were at the least."""
+        count = -(-size // ASCII_SIZE)
+        self.malformed += count
+        self._damaged += count
+
+
+class BinaryDecoder:
+    """Records as bytes without any mark or checksum, so that their place must be kept with care.
+
+    Among all ways to cut the bytes into records, with few breaks, the one is believed whose error bytes are digits
+    and whose values go on best from the last reading. Where that begins with a break, bytes were lost: they and the
+    records next to them are broken. Changed bytes in a record, or the loss of exactly as many bytes as a record has,
+    cannot be seen: the format has no means.
+    """
+
+    def __init__(self) -> None:
+        """Expect the first record to begin with the first byte."""
+        self.malformed = 0
+        self._buffer = bytearray()
+        self._at = 0  # where the next record is expected in it
+        self._wary = False  # bytes have just been skipped
+        self._skipped = 0  # bytes since the last good record that belong to none
+        self._last: NDArray[np.int64] | None = None  # values of the last good record
+
+    def feed(self, data: bytes) -> Records:
+        """Take what arrived and return every record that can be judged: one that three to eight more follow."""
+        self._buffer += data
+        found: list[tuple[int, ...]] = []
+        status: list[int] = []
+        damaged: list[int] = []
+        self._at = 0
+        while (shift := self._shift()) is not None:
+            if shift or self._wary:  # the first record behind a break may have been pieced together from two
+                self._wary = shift > 0
+                shift = shift or BINARY_SIZE
+                self._skipped += shift
+                self._at += shift
+                continue
+            record = np.frombuffer(bytes(self._buffer[self._at : self._at + BINARY_SIZE]), _BINARY)
+            self._last = record["values"][0].astype(np.int64)
+            broken = -(-self._skipped // BINARY_SIZE)
+            self.malformed += broken
+            self._skipped = 0
+            found.append(tuple(record["values"][0].tolist()))
+            status.append(int(record["error"][0]))
+            damaged.append(broken)
+            self._at += BINARY_SIZE
+        del self._buffer[: self._at]
+        return Records.of(found, status, damaged)
+
+    def _shift(self) -> int | None:
+        """Return how many bytes at the head belong to no record; None while more bytes must come to tell."""
+        window = bytes(self._buffer[self._at : self._at + _WINDOW])
+        if len(window) < _NEAR * BINARY_SIZE:
+            return None
+        near = np.frombuffer(window, _BINARY, _NEAR)
+        digits = int(near["error"].max()) <= _MOST_ERROR
+        if digits and self._last is not None and int(np.abs(near["values"] - self._last).sum()) <= _STEADY:
+            return 0
+        return _best_shift(self._gains(window)) if len(window) == _WINDOW else None
+
+    def _gains(self, window: bytes) -> list[float]:
+        """Return how well a record at each byte of `window` goes on from the last good one; -inf where none is."""
+        bytes_ = np.lib.stride_tricks.sliding_window_view(np.frombuffer(window, np.uint8), BINARY_SIZE)
+        values = bytes_[:, 1::2].astype(np.int8) * np.int64(256) + bytes_[:, 2::2]
+        away = np.abs(values - (values if self._last is None else self._last)).sum(axis=1)
+        return np.where(bytes_[:, 0] <= _MOST_ERROR, 16.0 - np.log2(1.0 + away / 64.0), -np.inf).tolist()
+
+
+def _best_shift(gains: list[float]) -> int:
+    """Return how many bytes to skip for the greatest sum of `gains` over records that follow each other.
+
+    Whenever bytes are skipped between records, _BREAK is taken off. A record always gains more than nothing, so that
+    one in its place is never thrown away for being unlike the others; the last one before a break is, for its own end
+    may be among the bytes that were lost.
+    """
+    size = len(gains)
+    value = [0.0] * (size + BINARY_SIZE)  # the best that can be made of all from a byte on
+    after = [0.0] * (size + 1)  # the same, with that byte skipped
+    for at in range(size - 1, -1, -1):
+        after[at] = max(after[at + 1], gains[at + 1] + value[at + 1 + BINARY_SIZE] if at + 1 < size else 0.0)
+        value[at] = max(gains[at] + value[at + BINARY_SIZE], after[at] - _BREAK)
+
+    def breaks(at: int) -> bool:
+        return gains[at] + value[at + BINARY_SIZE] < after[at] - _BREAK
+
+    if not breaks(0):
+        return BINARY_SIZE if breaks(BINARY_SIZE) else 0
+    shift = 1
+    while shift < BINARY_SIZE and gains[shift] + value[shift + BINARY_SIZE] < after[shift - 1]:
+        shift += 1
+    return shift
+
+
+def answered_record(answer: bytes, *, binary: bool) -> bool:
+    """Tell whether `answer` to QR holds one whole record of the expected form and ends with the prompt."""
+    if binary:
+        record = answer[: -len(_ACKNOWLEDGED)][-BINARY_SIZE:]
+        return answer.endswith(_ACKNOWLEDGED) and len(record) == BINARY_SIZE and record[0] <= _MOST_ERROR
+    return answer.rstrip().endswith(PROMPT) and any(_ascii_values(line) for line in answer.splitlines(keepends=True))
+
+
+def _ascii_values(line: bytes) -> tuple[int, ...] | None:
+    r"""Return error digit and six values of a line, or None where it is no record.
+
+    >>> _ascii_values(b"0,  -102,   -99,  -225,   -20,    39,   -39\r\n")
+    (0, -102, -99, -225, -20, 39, -39)
+    """
+    if len(line) != ASCII_SIZE or not line.endswith(b"\r\n"):
+        return None
+    match = _ASCII_RECORD.fullmatch(line[:-2])
+    if match is None or any(len(group) != _WIDTH for group in match.groups()[1:]):
+        return None
+    values = tuple(int(group) for group in match.groups())
+    return values if all(-32768 <= value <= 32767 for value in values) else None

@@ -1,0 +1,308 @@
+"""A transducer that streams unnumbered records over a line: thread, times, loss and return. Its wire is told to it."""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from drivers.clock import Clock
+from drivers.links import Link
+from drivers.pacing import Paced, Pacing
+from drivers.readings import ReadingBlock
+from drivers.records import RecordDecoder, Records
+from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, TransducerInfo
+
+# All in real seconds.
+_TICK = 0.03  # longest wait for bytes, and so for a stop
+_GATHER = 0.002  # at fast rates bytes are let gather for so long before they are taken
+_FIRST = 3.0  # until a device that never sent a record is given up, beyond what bringing it to stream takes
+_QUIET = 0.3  # without a whole record, after which the device is asked to stream again
+_SILENCE = 5.0  # without a whole record, after which it is given up
+_BACK_OFF = (0.05, 0.1, 0.2, 0.4)  # between two tries to bring it back; the last one again and again
+
+
+class Conversation(Protocol):
+    """What is said over one kind of line around a stream."""
+
+    @property
+    def saturated(self) -> int:
+        """Bits of a record's status that make its six values invalid."""
+        ...
+
+    def begin(self, link: Link) -> bytes:
+        """Bring the device to stream, whatever it was doing; return what it streamed already.
+
+        Raises LinkLost when it does not answer, DeviceFault when it must not be read: the message says why.
+        """
+        ...
+
+    def end(self, link: Link) -> None:
+        """Bring the stream to an end within 0.1 s."""
+        ...
+
+    def decoder(self) -> RecordDecoder:
+        """Return a decoder for a stream about to begin."""
+        ...
+
+
+def measured_rate(link: Link, conversation: Conversation, clock: Clock, seconds: float) -> float:
+    """Return how many records a second of the session's clock come [Hz], from `seconds` of streaming [real s].
+
+    Good to a few per cent. Raises LinkLost when hardly any come, and what `conversation.begin` raises.
+    """
+    decoder = conversation.decoder()
+    data: bytes | None = conversation.begin(link)
+    counted, first_ns, last_ns = 0, 0, 0
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        count = len(decoder.feed(data).status) if data else 0
+        if count:
+            last_ns = clock.now_ns()
+            first_ns, counted = (first_ns, counted + count) if first_ns else (last_ns, 0)
+        data = link.receive(_TICK)
+    conversation.end(link)
+    if counted < 2 or last_ns == first_ns:
+        raise LinkLost("it sends no readings when asked to stream; switch it off and on, and check the cable")
+    return counted / (last_ns - first_ns) * 1e9
+
+
+class _Stopped(Exception):
+    """The user stopped the stream while the device was being brought to stream."""
+
+
+class _StoppableLink:
+    """A link whose use ends as soon as the stream is to be stopped."""
+
+    def __init__(self, link: Link, stopping: threading.Event) -> None:
+        self._link = link
+        self._stopping = stopping
+
+    def send(self, data: bytes) -> None:
+        self._refuse()
+        self._link.send(data)
+
+    def receive(self, timeout: float) -> bytes | None:
+        deadline = time.monotonic() + timeout
+        while True:
+            self._refuse()
+            remaining = deadline - time.monotonic()
+            data = self._link.receive(max(min(remaining, _TICK), 0.0))
+            if data is not None or remaining <= _TICK:
+                return data
+
+    def close(self) -> None:
+        self._link.close()
+
+    def _refuse(self) -> None:
+        if self._stopping.is_set():
+            raise _Stopped
+
+
+@dataclass(frozen=True, slots=True)
+class _Arrived:
+    """Records that arrived together, or the beginning of the stream anew where there are none."""
+
+    records: Records | None
+    received_ns: int
+
+
+class StreamingTransducer:
+    """One device at the end of a line that is opened at each start. A thread takes and decodes what comes.
+
+    The records carry neither number nor time: both are made here (see `drivers.pacing`). `counter` is the number.
+    A loss is named by missing numbers; so is the time in which the line was pulled or the device was off.
+    """
+
+    def __init__(
+        self, info: TransducerInfo, connect: Callable[[], Link], conversation: Conversation, clock: Clock
+    ) -> None:
+        """Take an identified device whose `info.rate` [Hz] is known within a few per cent."""
+        self._info = info
+        self._connect = connect
+        self._conversation = conversation
+        self._clock = clock
+        self._period = 1.0 / info.rate / clock.factor  # between two records [real s]
+        self._gather = _GATHER if self._period < _GATHER else 0.0
+        self._lock = threading.Lock()  # over all that _digest touches
+        self._arrived = threading.Event()  # something is pending, or the stream has ended
+        self._stopping = threading.Event()
+        self._pending: deque[_Arrived] = deque()
+        self._thread: threading.Thread | None = None
+        self._reset()
+
+    @property
+    def info(self) -> TransducerInfo:
+        """Identity, calibration and settings, as found at opening."""
+        return self._info
+
+    @property
+    def health(self) -> Health:
+        """Totals since start. `restarted` counts how often the stream was lost and came back."""
+        with self._lock:
+            self._digest()
+            return Health(
+                received=self._received,
+                lost=self._pacing.lost,
+                malformed=self._malformed_before + self._decoder.malformed,
+                restarted=self._restarted,
+                saturated=self._saturated,
+                lag_ms=self._lag_ms,
+            )
+
+    def start(self) -> None:
+        """Bring the device to stream. Raises LinkLost, SetupError or DeviceFault when no record comes."""
+        if self._thread is not None:
+            raise SetupError(f"{self._info.uri} is streaming already; stop it before starting it again")
+        self._reset()
+        self._thread = threading.Thread(target=self._run, name=f"{self._info.driver} {self._info.serial}".strip())
+        self._thread.start()
+        while not self._ever:
+            self._arrived.wait(_TICK)
+            self._arrived.clear()
+            if self._ended is not None:
+                ended = self._ended
+                self.stop()
+                raise ended
+
+    def read(self, timeout: float) -> ReadingBlock:
+        """Return all readings not yet handed over, waiting up to `timeout` session seconds for the first."""
+        deadline = time.monotonic() + timeout / self._clock.factor
+        while True:
+            self._arrived.clear()
+            streaming = self._thread is not None and self._thread.is_alive()
+            with self._lock:
+                self._digest(end=not streaming)
+                blocks, self._ready = self._ready, []
+            if blocks:
+                block = ReadingBlock.joined(blocks)
+                self._lag_ms = (self._clock.now_ns() - int(block.received_ns[-1])) * 1e-6
+                return block
+            if not streaming and self._ended is not None:
+                raise LinkLost(str(self._ended))
+            remaining = deadline - time.monotonic()
+            if not streaming or remaining <= 0.0:
+                return ReadingBlock.empty()
+            self._arrived.wait(min(remaining, _TICK))
+
+    def stop(self) -> None:
+        """End streaming; what had arrived can still be read. Harmless when repeated."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+
+    def close(self) -> None:
+        """Stop; port and thread are given back. Harmless when repeated."""
+        self.stop()
+
+    def _reset(self) -> None:
+        """Forget what an earlier stream left."""
+        self._pending.clear()
+        self._arrived.clear()
+        self._stopping.clear()
+        self._ended: LinkLost | SetupError | DeviceFault | None = None
+        self._pacing = Pacing(self._info.rate, self._clock.factor)
+        self._unpaced: list[_Arrived] = []  # arrivals that pacing keeps back
+        self._ready: list[ReadingBlock] = []
+        self._received = self._restarted = self._saturated = 0
+        self._malformed_before = 0  # by decoders that have had their day
+        self._decoder = self._conversation.decoder()
+        self._lag_ms = 0.0
+        self._ever = False  # a record has come
+        self._heard = time.monotonic()  # when the last one did
+
+    def _run(self) -> None:
+        """Be the receiving thread: bring the device to stream, take what comes, and bring it back when it is lost."""
+        tries = 0
+        while not self._stopping.is_set():
+            try:
+                self._stream()
+            except _Stopped:
+                break
+            except (LinkLost, SetupError, DeviceFault) as error:
+                silent = time.monotonic() - self._heard
+                if not self._ever or isinstance(error, DeviceFault) or silent > _SILENCE + 4.0 * self._period:
+                    self._ended = error if self._info.uri in str(error) else type(error)(f"{self._info.uri}: {error}")
+                    break
+                tries = 0 if silent < 2.0 * _QUIET else tries + 1
+                self._stopping.wait(_BACK_OFF[min(tries, len(_BACK_OFF) - 1)])
+        self._arrived.set()
+
+    def _stream(self) -> None:
+        """Stream over one opening of the line until told to stop. Raises LinkLost when no records come any more."""
+        link = self._connect()
+        try:
+            first = self._conversation.begin(_StoppableLink(link, self._stopping))
+            if self._ever:
+                self._pending.append(_Arrived(None, self._clock.now_ns()))
+            with self._lock:
+                self._malformed_before += self._decoder.malformed
+                self._decoder = self._conversation.decoder()
+            try:
+                self._listen(link, self._decoder, first)
+            finally:
+                self._conversation.end(link)
+        finally:
+            link.close()
+
+    def _listen(self, link: Link, decoder: RecordDecoder, data: bytes | None) -> None:
+        """Decode what comes. A pause of the device is waited out as long as it may be one."""
+        begun = time.monotonic()
+        quiet = (_QUIET if self._ever else _FIRST) + 4.0 * self._period
+        while True:
+            received_ns = self._clock.now_ns()
+            records = decoder.feed(data) if data else None
+            now = time.monotonic()
+            if records is not None and len(records.status):
+                self._pending.append(_Arrived(records, received_ns))
+                self._heard, self._ever = now, True
+                quiet = _QUIET + 4.0 * self._period
+                if not self._arrived.is_set():
+                    self._arrived.set()
+            if self._stopping.is_set():
+                return
+            if now - max(self._heard, begun) > quiet:
+                raise LinkLost(
+                    f"{self._info.uri} has sent no reading for {now - self._heard:.1f} s; check its power and cable"
+                )
+            if self._gather and data:
+                time.sleep(self._gather)
+            data = link.receive(_TICK)
+
+    def _digest(self, *, end: bool = False) -> None:
+        """Turn pending records into readings. The lock is held."""
+        while self._pending:
+            arrived = self._pending.popleft()
+            if arrived.records is None:
+                self._hand_on(self._pacing.release())
+                self._pacing.bridge(arrived.received_ns)
+                self._restarted += 1
+            else:
+                self._unpaced.append(arrived)
+                self._hand_on(self._pacing.take(arrived.records.damaged, arrived.received_ns))
+        if end:
+            self._hand_on(self._pacing.release())
+
+    def _hand_on(self, paced: Paced) -> None:
+        """Make a block of all arrivals pacing has placed."""
+        if not len(paced.sequence):
+            return
+        arrivals, self._unpaced = self._unpaced, []
+        parts = [(a.records, a.received_ns) for a in arrivals if a.records is not None]
+        status = np.concatenate([records.status for records, _ in parts])
+        self._received += len(status)
+        self._saturated += int(np.count_nonzero(status & self._conversation.saturated))
+        self._ready.append(
+            ReadingBlock(
+                sequence=paced.sequence,
+                counter=paced.sequence,
+                status=status,
+                time=paced.time,
+                received_ns=np.concatenate([np.full(len(records.status), at, np.int64) for records, at in parts]),
+                raw=np.concatenate([records.raw for records, _ in parts]),
+            )
+        )

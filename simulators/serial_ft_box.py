@@ -1,0 +1,214 @@
+"""The stand-alone force/torque controller on a pseudo-terminal.
+
+Behaviour and bytes after the command list of its manual (9620-05-CTL) as published drivers give it, packed here and
+nowhere else. The wording of the banner and of refusals, and the error digit of a saturated transducer (1), are ours.
+"""
+
+import struct
+import threading
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import Clock
+from simulators.bench import Bench
+from simulators.faults import Faults
+from simulators.pseudo_terminal import PseudoTerminal
+
+Array = NDArray[np.float64]
+
+COUNTS_PER_N = 800.0
+COUNTS_PER_NM = 60_000.0
+BANNER = b"\r\nSIMULATED F/T Controller\r\nsimulated transducer %s\r\nready\r\n"
+
+_NAP = 0.01  # longest wait, and so for an end [real s]
+_SHORTEST_NAP = 0.0005
+_BURST = 400  # records at one go after the computer was busy
+_START_UP = 0.2  # from power to prompt [s]
+_TAKEN = (b"CV", b"CL", b"CR", b"CP", b"SM", b"SP", b"SR", b"CF", b"SF", b"CS", b"CE", b"RS", b"RL", b"%")
+
+
+class SerialFtBox:
+    """A controller with a simulated bench behind it. Its time, and the bench's, begins when it is started.
+
+    A pseudo-terminal carries bytes at any speed; here they leave no faster than the line would carry them, and come
+    as garbage where the reader has set another speed.
+    """
+
+    def __init__(self, bench: Bench, clock: Clock, *, baud: int = 38400, faults: Faults | None = None) -> None:
+        """Set up a controller whose line runs at `baud` bits a second."""
+        self._bench = bench
+        self._clock = clock
+        self._baud = baud
+        self._faults = faults or Faults()
+        self._rated = np.array(bench.settings.rated)
+        self._counts = np.repeat([COUNTS_PER_N, COUNTS_PER_NM / 1000.0], 3)  # in one N or N mm
+        self._closing = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._port: PseudoTerminal | None = None
+        self._origin_ns = 0
+        self._power_up(0.0)
+
+    @property
+    def uri(self) -> str:
+        """The address to open it at; known once it is started."""
+        assert self._port is not None
+        force, torque = self._rated[0], self._rated[3] / 1000.0
+        return (
+            f"serial-ft://{self._port.path}?baud={self._baud}&counts_per_N={COUNTS_PER_N:g}"
+            f"&counts_per_Nm={COUNTS_PER_NM:g}&range_N={force:g}&range_Nm={torque:g}"
+            f"&serial={self._serial}&simulated=1"
+        )
+
+    def now(self) -> float:
+        """Return the box's and the bench's time [s]: 0 when it was started."""
+        return (self._clock.now_ns() - self._origin_ns) * 1e-9
+
+    def start(self) -> None:
+        """Make the port and begin to serve."""
+        self._port = PseudoTerminal("ttyFT")
+        self._origin_ns = self._clock.now_ns()
+        self._thread = threading.Thread(target=self._serve, args=(self._port,), name="simulated serial-ft box")
+        self._thread.start()
+
+    def close(self) -> None:
+        """Switch the box off and remove its port. Harmless when repeated."""
+        self._closing.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        if self._port is not None:
+            self._port.close()
+
+    @property
+    def _serial(self) -> str:
+        return f"SIM{self._bench.seed:05d}"
+
+    def _power_up(self, now: float) -> None:
+        """Forget what is not kept over power-off."""
+        self._on = True
+        self._binary = False
+        self._mask = 0x3F
+        self._biases: list[Array] = []
+        self._line = bytearray()
+        self._streaming_since: float | None = None  # when the stream's first record leaves [s]
+        self._sent = 0  # records of this stream
+        self._last = (0, [0] * 6)
+        self._ready_at: float | None = now + _START_UP  # when the banner comes, after power-up
+
+    def _serve(self, port: PseudoTerminal) -> None:
+        """Be the controller until closed."""
+        while not self._closing.is_set():
+            now = self.now()
+            if self._faults.active("unplug", now):
+                port.unplug()
+                self._closing.wait(_NAP)
+                continue
+            port.plug_in()
+            if self._faults.active("reboot", now):
+                self._on = False
+                port.heard(_NAP)
+                continue
+            if not self._on:
+                self._power_up(now)
+            if self._ready_at is not None and now >= self._ready_at:
+                self._ready_at = None
+                self._say(port, BANNER % self._serial.encode() + b">")
+            self._send_due(port, now)
+            for byte in port.heard(self._until_due()):
+                if self._ready_at is None:
+                    self._on_byte(port, byte if port.baud == self._baud else byte ^ 0x55)
+
+    def _say(self, port: PseudoTerminal, data: bytes) -> None:
+        """Send `data`, garbled where the reader listens at another speed."""
+        port.say(data if port.baud == self._baud else bytes(byte ^ 0xA5 for byte in data))
+
+    @property
+    def _period(self) -> float:
+        """Time a record takes on the line: ten bits a byte [s]."""
+        return (13 if self._binary else 45) * 10 / self._baud
+
+    def _until_due(self) -> float:
+        """Return how long nothing has to be sent [real s]."""
+        if self._streaming_since is None:
+            return _NAP
+        due = self._streaming_since + (self._sent + 1) * self._period
+        return min(max((due - self.now()) / self._clock.factor, _SHORTEST_NAP), _NAP)
+
+    def _send_due(self, port: PseudoTerminal, now: float) -> None:
+        """Send the records whose last byte would be through by now, and whatever was delayed until now."""
+        if self._streaming_since is None:
+            return
+        count = int((now - self._streaming_since) / self._period) - self._sent
+        if count > _BURST:  # the computer was busy for long: a line would have carried on meanwhile
+            self._sent += count - _BURST
+            count = _BURST
+        first = self._streaming_since + self._sent * self._period
+        times: Array = first + np.arange(max(count, 0), dtype=np.float64) * self._period
+        self._sent += len(times)
+        for record in self._faults.route(now, zip(times.tolist(), self._records(times), strict=True)):
+            self._say(port, record)
+
+    def _on_byte(self, port: PseudoTerminal, byte: int) -> None:
+        """Take one byte from the line."""
+        if byte == 0x17:
+            self._power_up(self.now())
+        elif byte == 0x14:
+            self._say(port, self._one())
+        elif byte == 0x0D:
+            command = bytes(self._line).strip().upper()
+            self._line.clear()
+            if self._streaming_since is not None:
+                self._streaming_since = None
+                self._say(port, b"\r\n>")
+            else:
+                self._say(port, command + b"\r\n" + self._answer(command))
+        elif byte != 0x0A and len(self._line) < 80:
+            self._line.append(byte)
+
+    def _answer(self, command: bytes) -> bytes:
+        """Carry out one command and return what follows its echo."""
+        name, _, argument = command.partition(b" ")
+        if command == b"QS":
+            self._streaming_since, self._sent = self.now(), 0
+            return b""
+        if command == b"QR":
+            return self._one() + (b"\x06\r\n>" if self._binary else b">")
+        if name == b"CD":
+            if argument not in (b"A", b"B", b"R", b"U"):
+                return b"not simulated\r\n>"
+            self._binary = {b"A": False, b"B": True}.get(argument, self._binary)
+        elif name == b"SB":
+            self._biases = [*self._biases, self._bench.wrench(np.array([self.now()]))[0]][-3:]
+        elif name == b"SU":
+            self._biases = self._biases[:-1]
+        elif name == b"SZ":
+            self._biases = []
+        elif name == b"SA" and argument != b"0":
+            return b"not simulated\r\n>"
+        elif name and name not in _TAKEN and name != b"SA":
+            return b"not a command\r\n>"
+        return b"\r\n>"
+
+    def _one(self) -> bytes:
+        return self._records(np.array([self.now()]))[0]
+
+    def _records(self, times: Array) -> list[bytes]:
+        """Return a record as bytes for each of `times` (n,) [s]."""
+        if not len(times):
+            return []
+        wrench = self._bench.wrench(times)
+        packed: list[bytes] = []
+        over = np.any(np.abs(wrench) > self._rated, axis=1)
+        bias = self._biases[-1] if self._biases else np.zeros(6)
+        counts = np.rint((np.clip(wrench, -self._rated, self._rated) - bias) * self._counts)
+        counts = np.clip(counts, -32768, 32767).astype(int)
+        for time, above, six in zip(times.tolist(), over.tolist(), counts.tolist(), strict=True):
+            if not self._faults.active("stall", time):
+                self._last = (int(above or self._faults.active("saturate", time)), six)
+            error, values = self._last
+            if self._binary:
+                packed.append(struct.pack(">B6h", error, *values))
+            else:
+                packed.append((f"{error}" + "".join(f",{value:6d}" for value in values) + "\r\n").encode())
+        return packed

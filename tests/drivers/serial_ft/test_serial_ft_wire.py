@@ -1,0 +1,158 @@
+"""Records of the controller. Golden bytes: the reading that published drivers quote, in text and as bytes."""
+
+import itertools
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from drivers.serial_ft.wire import AsciiDecoder, BinaryDecoder, answered_record
+
+GOLDEN = (-102, -99, -225, -20, 39, -39)
+GOLDEN_ASCII = b"0,  -102,   -99,  -225,   -20,    39,   -39\r\n"
+GOLDEN_BINARY = bytes.fromhex("00 FF93 FF98 FE69 FFBB 0006 FFDB")
+GOLDEN_BINARY_VALUES = (-109, -104, -407, -69, 6, -37)  # the bytes as signed big-endian integers
+
+DECODERS = {"ascii": AsciiDecoder, "binary": BinaryDecoder}
+
+
+def record(form, values, error=0):
+    if form == "binary":
+        return struct.pack(">B6h", error, *values)
+    return (str(error) + "".join(f",{value:6d}" for value in values) + "\r\n").encode()
+
+
+def course(count, seed=0, size=300.0):
+    """Values (count, 6) that wander as those of a hand on a surface do."""
+    draw = np.random.default_rng(seed)
+    steps = draw.normal(0.0, 8.0, (count, 6))
+    return np.clip(np.rint(np.cumsum(steps, axis=0) + draw.normal(0.0, size, 6)), -32000, 32000).astype(int)
+
+
+def decoded(form, chunks):
+    decoder = DECODERS[form]()
+    parts = [decoder.feed(chunk) for chunk in chunks]
+    raw = np.concatenate([part.raw for part in parts] or [np.empty((0, 6))])
+    status = [s for part in parts for s in part.status.tolist()]
+    damaged = [d for part in parts for d in part.damaged.tolist()]
+    return raw, status, damaged, decoder.malformed
+
+
+def sent(form, values):
+    """The bytes of all values, and enough after them that every one can be judged."""
+    tail = [values[-1]] * 9 if form == "binary" else []
+    return b"".join(record(form, v) for v in [*values, *tail])
+
+
+def test_the_golden_line_of_text_is_its_reading():
+    raw, status, damaged, malformed = decoded("ascii", [GOLDEN_ASCII])
+    assert raw.tolist() == [list(GOLDEN)]
+    assert (status, damaged, malformed) == ([0], [0], 0)
+
+
+def test_the_golden_bytes_are_signed_and_big_endian():
+    raw, status, _, malformed = decoded("binary", [GOLDEN_BINARY * 9 + bytes(12)])
+    assert raw.tolist()[0] == list(GOLDEN_BINARY_VALUES)
+    assert (status[0], malformed) == (0, 0)
+
+
+def test_the_golden_answers_to_one_request_are_whole():
+    assert answered_record(b"QR\r\n" + GOLDEN_BINARY + bytes.fromhex("06 0D 0A 3E"), binary=True)
+    assert answered_record(b"QR\r\n" + GOLDEN_ASCII + b"\r\n>", binary=False)
+    assert not answered_record(b"QR\r\n" + GOLDEN_ASCII + b"\r\n>", binary=True)
+    assert not answered_record(b"QR\r\n" + GOLDEN_BINARY + b"\x06\r\n>", binary=False)
+
+
+@pytest.mark.parametrize("form", DECODERS)
+@given(cuts=st.lists(st.integers(0, 45 * 40), max_size=30).map(sorted), seed=st.integers(0, 20), hurt=st.booleans())
+def test_readings_do_not_depend_on_how_the_stream_was_cut(form, cuts, seed, hurt):
+    stream = bytearray(sent(form, course(40, seed)))
+    if hurt:
+        del stream[200:205]
+        stream[400:413] = b"Power on.\r\n>\xff"
+    chunks = [bytes(stream[a:b]) for a, b in itertools.pairwise([0, *cuts, len(stream)])]
+    cut, whole = decoded(form, chunks), decoded(form, [bytes(stream)])
+    assert cut[0].tolist() == whole[0].tolist()
+    assert cut[1:] == whole[1:]
+
+
+@pytest.mark.parametrize("form", DECODERS)
+@given(garbage=st.lists(st.binary(max_size=200), max_size=8))
+def test_no_garbage_raises(form, garbage):
+    raw, status, damaged, malformed = decoded(form, garbage)
+    assert len(raw) == len(status) == len(damaged)
+    assert malformed >= sum(damaged)
+
+
+@pytest.mark.parametrize("form", DECODERS)
+@given(lost=st.integers(1, 60), at=st.integers(300, 900), seed=st.integers(0, 50))
+@settings(max_examples=60)
+def test_lost_bytes_cost_the_records_they_belonged_to_and_no_wrong_reading_comes_out(form, lost, at, seed):
+    values = course(80, seed, size=3000.0)
+    stream = sent(form, values)
+    raw, _, damaged, malformed = decoded(form, [stream[:at], stream[at + lost :]])
+    size = 13 if form == "binary" else 45
+    assume(lost % size)  # else one reading is pieced together from two, which no reader can see
+    right = {tuple(v) for v in values.tolist()}
+    assert all(tuple(int(x) for x in v) in right for v in raw.tolist())
+    assert len(raw) >= len(values) - lost // size - 4
+    assert malformed == sum(damaged)
+
+
+def test_binary_keeps_its_place_through_a_blow_that_no_smooth_course_has():
+    values = course(60, 3)
+    values[30:34] += np.array([4000, -9000, 20000, 12000, -7000, 3000])
+    raw, _, damaged, malformed = decoded("binary", [sent("binary", values)])
+    np.testing.assert_array_equal(raw[:60], values)
+    assert malformed == sum(damaged) == 0
+
+
+def test_binary_finds_its_place_though_the_values_stand_still():
+    values = [(5, -2, 0, 300, -1, 7)] * 40
+    stream = sent("binary", values)
+    raw, _, damaged, _ = decoded("binary", [stream[:201], stream[202:]])
+    assert {tuple(int(x) for x in v) for v in raw.tolist()} == {values[0]}
+    assert sum(damaged) == 3  # the one that lost a byte, and both beside it, which might be the ones that did
+
+
+@pytest.mark.parametrize("form", DECODERS)
+def test_an_error_digit_is_the_status_of_its_reading_which_is_kept(form):
+    values = course(6, 1)
+    stream = b"".join(record(form, v, error=int(i == 2)) for i, v in enumerate(values)) + sent(form, values[-1:])
+    raw, status, _, malformed = decoded(form, [stream])
+    assert status[:6] == [0, 0, 1, 0, 0, 0]
+    np.testing.assert_array_equal(raw[:6], values)
+    assert malformed == 0
+
+
+def test_a_banner_in_mid_stream_is_broken_records_and_nothing_else():
+    values = course(30, 2)
+    text = b"\r\nF/T Controller\r\nall rights reserved, ready\r\n>"
+    stream = sent("ascii", values[:15]) + text + sent("ascii", values[15:])
+    raw, _, damaged, _ = decoded("ascii", [stream])
+    assert len(raw) >= 29
+    assert sum(damaged) >= 1
+    stream = sent("binary", values[:15]) + text + sent("binary", values[15:])
+    raw, _, damaged, _ = decoded("binary", [stream])
+    right = {tuple(v) for v in values.tolist()}
+    assert all(tuple(int(x) for x in v) in right for v in raw.tolist())
+    assert sum(damaged) >= len(text) // 13
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"0,  -102,   -99,  -225,   -20,    39,   -3\r\n",  # a digit is missing
+        b"0,  -102,   -99,  -225,   -20,    39\r\n",
+        b"0, 40000,   -99,  -225,   -20,    39,   -39\r\n",  # not in 16 bits
+        b"0,  -1-2,   -99,  -225,   -20,    39,   -39\r\n",
+        b"x,  -102,   -99,  -225,   -20,    39,   -39\r\n",
+        b"0,  -102,   -99,  -225,   -20,    39,   -39\n\n",
+    ],
+)
+def test_a_line_of_another_form_is_a_broken_record(line):
+    raw, _, damaged, malformed = decoded("ascii", [line, GOLDEN_ASCII])
+    assert raw.tolist() == [list(GOLDEN)]
+    assert damaged[0] == malformed >= 1
