@@ -1,0 +1,75 @@
+"""Small recordings for tests, and an independent reader of the live file: sqlite3 and struct alone."""
+
+import sqlite3
+import struct
+from contextlib import closing
+
+import numpy as np
+from stand_ins import INFO, ToldClock
+
+from drivers.readings import ReadingBlock
+from sessions.plan import Block, Frame, SessionPlan, Stimulus, Trial
+from sessions.recording import SessionWriter, provenance
+
+TRIAL = Trial(1, "stickiness", Stimulus("stickiness", 20, "K07"), 1, 1)
+PLAN = SessionPlan(
+    protocol="made-up",
+    subject="S01",
+    seed=7,
+    order_rule="shuffled",
+    blocks=(Block("stickiness", "Stroke °once°.", 1, 2.0, ("not at all", "äußerst"), (TRIAL,)),),
+    forces=True,
+    frame=Frame("-z", "set", 12.5, "measured"),
+)
+
+
+def begun(folder, *, info=INFO, plan=PLAN, clock=None, subject_simulated=False):
+    clock = clock or ToldClock()
+    return SessionWriter.create(folder, plan, info, provenance(clock), subject_simulated=subject_simulated, clock=clock)
+
+
+def readings(first, count, received_ns=0):
+    """Readings whose numbers all follow from their sequence number."""
+    i = np.arange(first, first + count)
+    raw = np.column_stack([i * (axis + 1) for axis in range(6)]).astype(float)
+    return ReadingBlock(i, i * 35 + 2**33, i % 3, i / 200.0, np.full(count, received_ns, np.int64), raw)
+
+
+def ended(folder, *, blocks=3, **options):
+    """A recording of 100 readings a block, with one scored trial, ended as it should."""
+    writer = begun(folder, **options)
+    writer.event("started")
+    writer.event("take_started", 1, {"take": 1}, time_ns=50)
+    for i in range(blocks):
+        writer.readings(readings(100 * i, 100, received_ns=100 * (i + 1)))
+        writer.commit()
+    writer.event("scored", 1, {"score": 42.5})
+    writer.event("take_kept", 1, {"take": 1}, time_ns=100 * blocks)
+    writer.event("ended", data={"reason": "every trial is done"})
+    writer.close()
+    return folder
+
+
+def rows(folder, query):
+    with closing(sqlite3.connect(folder / "session.sqlite")) as connection:
+        return connection.execute(query).fetchall()
+
+
+def change(folder, query, values=()):
+    (folder / "session.sqlite").chmod(0o644)
+    with closing(sqlite3.connect(folder / "session.sqlite")) as connection:
+        connection.execute(query, values)
+        connection.commit()
+
+
+def plainly_read(folder):
+    """Every (sequence, counter, status, time, received_ns, raw 1..6), read with nothing of ours."""
+    found = []
+    for n, *columns in rows(
+        folder, "SELECT readings, sequence, counter, status, time, received_ns, raw FROM blocks ORDER BY number"
+    ):
+        kinds = ("q", "q", "q", "d", "q")
+        plain = [struct.unpack(f"<{n}{kind}", column) for kind, column in zip(kinds, columns, strict=False)]
+        raw = list(struct.iter_unpack("<6d", columns[5]))
+        found += [(*(column[i] for column in plain), *raw[i]) for i in range(n)]
+    return found

@@ -1,0 +1,369 @@
+import hashlib
+import json
+import math
+import shutil
+import sqlite3
+import stat
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pytest
+from recordings import PLAN, begun, change, ended, readings
+from stand_ins import CALIBRATION, INFO
+
+from sessions.recording import Recording, RecordingError
+from sessions.recording.archive import problems, seal
+from sessions.recording.derived import load_derived, store_derived, store_page
+from sessions.recording.manifest import list_in_manifest
+
+REAL = replace(INFO, simulated=False)
+
+
+@pytest.fixture
+def sealed(tmp_path):
+    folder = ended(tmp_path / "s", blocks=5, subject_simulated=True)
+    seal(folder)
+    return folder
+
+
+def writable(path):
+    path.chmod(0o644)
+    return path
+
+
+# ---- what sealing makes
+
+
+def test_a_sealed_session_has_no_problems_and_its_files_are_read_only(sealed):
+    assert problems(sealed) == ()
+    assert sorted(path.name for path in sealed.iterdir()) == [
+        "MANIFEST.json",
+        "session.h5",
+        "session.json",
+        "session.sqlite",
+    ]
+    for name in ("session.h5", "session.json", "session.sqlite"):
+        assert not (sealed / name).stat().st_mode & (stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH)
+
+
+def test_the_copy_can_be_opened_by_hdf5_1_8(sealed):
+    content = (sealed / "session.h5").read_bytes()
+    assert content[:8] == b"\x89HDF\r\n\x1a\n"
+    assert content[8] == 2  # superblock version; 1.8 reads up to 2
+    # Fixed and extensible arrays of chunks came with 1.10; before that chunks were found by a B-tree of version 1.
+    assert b"TREE" in content
+    assert not any(signature in content for signature in (b"FAHD", b"EAHD"))
+
+
+def test_the_copy_holds_every_reading_with_units_and_check_sums(sealed):
+    live = Recording.open(sealed).readings()
+    with h5py.File(sealed / "session.h5") as copy:
+        for name in ("sequence", "counter", "status", "time", "received_ns", "raw"):
+            column = copy["readings"][name]
+            assert column[...].tobytes() == getattr(live, name).tobytes()
+            assert column.fletcher32
+            assert "note" in column.attrs
+        assert copy["readings/time"].attrs["unit"] == b"s"
+        assert copy["readings/received_ns"].attrs["unit"] == b"ns"
+        assert copy["calibration/matrix"][...].tolist() == CALIBRATION.matrix.tolist()
+        assert copy["calibration/raw_unit"][...].tolist() == [b"counts"]
+
+
+def test_the_copy_holds_events_trials_and_the_plan(sealed):
+    recording = Recording.open(sealed)
+    with h5py.File(sealed / "session.h5") as copy:
+        assert copy["events/kind"][...].tolist() == [event.kind.encode() for event in recording.events]
+        assert [json.loads(data) for data in copy["events/data"]] == [event.data for event in recording.events]
+        assert copy["trials/score"][...].tolist() == [42.5]
+        assert copy["trials/index"][...].tolist() == [20]
+        plan = json.loads(copy["head/plan"][0])
+        assert plan["blocks"][0]["scale_ends"][1] == "äußerst"
+        assert plan["frame"] == {
+            "normal": "-z",
+            "normal_origin": "set",
+            "height": 12.5,
+            "height_origin": "measured",
+        }
+
+
+def test_a_score_that_was_not_given_is_not_a_number_in_the_copy(tmp_path):
+    writer = begun(tmp_path / "s")
+    writer.event("take_started", 1, {"take": 1})
+    writer.event("scored", 1, {"score": None})
+    writer.event("take_kept", 1, {"take": 1})
+    writer.event("ended", data={"reason": "every trial is done"})
+    writer.close()
+    seal(tmp_path / "s")
+    with h5py.File(tmp_path / "s" / "session.h5") as copy:
+        assert math.isnan(copy["trials/score"][0])
+        assert copy["trials/outcome"][0] == b"not answered"
+    assert json.loads((tmp_path / "s" / "session.json").read_bytes())["trials"][0]["score"] is None
+    assert problems(tmp_path / "s") == ()
+
+
+def test_the_manifest_lists_the_sha_256_of_each_file(sealed):
+    listed = json.loads((sealed / "MANIFEST.json").read_bytes())["files"]
+    assert set(listed) == {"session.h5", "session.json", "session.sqlite"}
+    for name, told in listed.items():
+        assert told["sha256"] == hashlib.sha256((sealed / name).read_bytes()).hexdigest()
+        assert told["bytes"] == (sealed / name).stat().st_size
+
+
+def test_the_description_tells_plan_device_trials_and_end(sealed):
+    told = json.loads((sealed / "session.json").read_bytes())
+    assert told["plan"]["subject"] == "S01"
+    assert told["transducer"]["calibration"]["matrix"] == CALIBRATION.matrix.tolist()
+    matrix = np.array(told["transducer"]["calibration"]["matrix"], "<f8").tobytes()
+    assert told["transducer"]["calibration"]["sha256"] == hashlib.sha256(matrix).hexdigest()
+    assert told["readings"] == 500
+    assert told["trials"][0]["score"] == 42.5
+    assert told["ended"] == {"reason": "every trial is done"}
+    assert told["losses"] == []
+
+
+def test_what_was_simulated_says_so_at_the_head_of_every_file(sealed):
+    for name in ("session.json", "MANIFEST.json"):
+        assert (sealed / name).read_text().startswith('{\n "SIMULATED": "SIMULATED: the transducer and the subject')
+    with h5py.File(sealed / "session.h5") as copy:
+        assert copy.attrs["SIMULATED"].startswith(b"SIMULATED: the transducer and the subject")
+
+
+def test_what_was_real_says_nothing_of_the_kind(tmp_path):
+    folder = ended(tmp_path / "s", info=REAL)
+    seal(folder)
+    for name in ("session.json", "MANIFEST.json"):
+        assert "SIMULATED" not in (folder / name).read_text()
+    with h5py.File(folder / "session.h5") as copy:
+        assert "SIMULATED" not in copy.attrs
+
+
+def test_a_visit_for_scores_only_is_sealed_without_readings_or_calibration(tmp_path):
+    folder = ended(tmp_path / "s", info=None, blocks=0, plan=replace(PLAN, forces=False))
+    seal(folder)
+    assert problems(folder) == ()
+    with h5py.File(folder / "session.h5") as copy:
+        assert copy["readings/raw"].shape == (0, 6)
+        assert "calibration" not in copy
+
+
+def test_a_recording_without_trials_is_sealed(tmp_path):
+    writer = begun(tmp_path / "s", plan=replace(PLAN, blocks=()))
+    writer.readings(readings(0, 10))
+    writer.close()
+    seal(tmp_path / "s")
+    with h5py.File(tmp_path / "s" / "session.h5") as copy:
+        assert copy["trials/number"].shape == (0,)
+    assert problems(tmp_path / "s") == ("the session has no end: it was cut short, or is still running",)
+
+
+# ---- what is refused
+
+
+def test_a_session_is_sealed_once(sealed):
+    with pytest.raises(RecordingError, match="is sealed already"):
+        seal(sealed)
+
+
+def test_a_session_that_is_still_written_is_not_sealed(tmp_path):
+    writer = begun(tmp_path / "s")
+    writer.event("started")
+    with pytest.raises(RecordingError, match="end the program that still writes it"):
+        seal(tmp_path / "s")
+    writer.event("ended")
+    writer.close()
+    seal(tmp_path / "s")
+    assert problems(tmp_path / "s") == ()
+
+
+def test_a_copy_that_came_out_different_is_never_called_sealed(tmp_path, monkeypatch):
+    folder = ended(tmp_path / "s")
+    from sessions.recording import archive
+
+    def wrong_copy(recording, path):
+        write_copy(recording, path)
+        with h5py.File(path, "r+") as copy:
+            copy["readings/raw"][7, 2] += 1.0
+
+    write_copy = archive.write_copy
+    monkeypatch.setattr(archive, "write_copy", wrong_copy)
+    with pytest.raises(RecordingError, match=r"could not be sealed: raw of the readings 0 to 99 .* differs"):
+        seal(folder)
+    assert problems(folder) == ("the session was never sealed: there is no MANIFEST.json",)
+    monkeypatch.undo()
+    seal(folder)
+    assert problems(folder) == ()
+
+
+def test_a_disk_that_is_full_while_sealing_leaves_the_live_file_whole(tmp_path, monkeypatch):
+    folder = ended(tmp_path / "s")
+    before = (folder / "session.sqlite").read_bytes()
+    from sessions.recording import archive
+
+    def full(_, path):
+        path.write_bytes(b"half a file")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(archive, "write_copy", full)
+    with pytest.raises(RecordingError, match=r"No space left on device.*free space on the disk, seal it again"):
+        seal(folder)
+    assert [path.name for path in folder.iterdir()] == ["session.sqlite"]
+    assert (folder / "session.sqlite").read_bytes() == before
+
+
+# ---- what checking finds
+
+
+@pytest.mark.parametrize("name", ["session.h5", "session.json", "session.sqlite"])
+def test_one_changed_byte_in_any_file_is_named(sealed, name):
+    path = writable(sealed / name)
+    content = bytearray(path.read_bytes())
+    place = content.rfind(b"42.5") if b"42.5" in content else len(content) // 2
+    content[place] ^= 1
+    path.write_bytes(content)
+    assert any(problem.startswith(f"{name} is not what it was") for problem in problems(sealed))
+
+
+def test_a_missing_file_is_named(sealed):
+    (sealed / "session.json").unlink()
+    assert problems(sealed) == ("session.json is listed in MANIFEST.json and missing",)
+
+
+def test_a_reading_changed_in_the_copy_is_named_even_when_the_manifest_was_changed_to_match(sealed):
+    with h5py.File(writable(sealed / "session.h5"), "r+") as copy:
+        copy["readings/raw"][250, 3] = 0.0
+    list_in_manifest(sealed, ("session.h5",), "SIMULATED")
+    assert problems(sealed) == ("raw of the readings 200 to 299 in session.h5 differs from the live file",)
+
+
+def test_a_score_changed_in_the_copy_is_named_even_when_the_manifest_was_changed_to_match(sealed):
+    with h5py.File(writable(sealed / "session.h5"), "r+") as copy:
+        copy["trials/score"][0] = 99.0
+    list_in_manifest(sealed, ("session.h5",), "SIMULATED")
+    assert problems(sealed) == ("trials/score of session.h5 differs from the live file",)
+
+
+def test_a_reading_changed_in_the_live_file_is_named_by_its_block_too(sealed):
+    change(sealed, "UPDATE blocks SET raw = zeroblob(4800) WHERE number = 4")
+    found = problems(sealed)
+    assert any(problem.startswith("session.sqlite is not what it was") for problem in found)
+    assert any(problem.startswith("block 4 of the readings is damaged") for problem in found)
+
+
+def test_a_copy_whose_bytes_rotted_is_named_by_its_own_check_sum(sealed):
+    path = writable(sealed / "session.h5")
+    content = bytearray(path.read_bytes())
+    place = content.index(np.float64(6 * 321).tobytes())  # a torque of reading 321
+    content[place + 6] ^= 1
+    path.write_bytes(content)
+    list_in_manifest(sealed, ("session.h5",), "SIMULATED")
+    assert any(problem.startswith("session.h5 cannot be read") for problem in problems(sealed))
+
+
+def test_a_session_that_was_never_sealed_is_named(tmp_path):
+    assert problems(ended(tmp_path / "s")) == ("the session was never sealed: there is no MANIFEST.json",)
+
+
+def test_a_manifest_that_cannot_be_read_is_refused_with_a_sentence(sealed):
+    (sealed / "MANIFEST.json").write_text('{"files": [1]}')
+    with pytest.raises(RecordingError, match=r"MANIFEST\.json cannot be read"):
+        problems(sealed)
+
+
+# ---- sealing what a crash left
+
+
+def test_a_session_cut_short_by_a_crash_is_sealed_with_all_that_was_safe_and_its_loss_stays_named(tmp_path):
+    writer = begun(tmp_path / "live")
+    for i in range(3):
+        writer.readings(readings(100 * i, 100))
+        writer.commit()
+    folder = tmp_path / "crashed"
+    folder.mkdir()
+    for name in ("session.sqlite", "session.sqlite-wal"):
+        shutil.copy(tmp_path / "live" / name, folder)
+    writer.close()
+    log = folder / "session.sqlite-wal"
+    log.write_bytes(log.read_bytes()[:-100])
+    seal(folder)
+    recording = Recording.open(folder)
+    assert recording.readings().sequence.tolist() == list(range(200))
+    losses = json.loads((folder / "session.json").read_bytes())["losses"]
+    assert "hold no whole commit" in losses[0]
+    assert losses[1].startswith("the session has no end")
+    assert problems(folder) == tuple(losses)
+    assert not log.exists()
+
+
+# ---- numbers made from a recording
+
+
+def test_derived_numbers_come_back_with_the_versions_that_made_them(sealed):
+    path = store_derived(sealed, "analysis.json", {"strokes": [{"mu": 0.1 + 0.2, "speed": None}]})
+    assert path == sealed / "analysis.json"
+    told = load_derived(sealed, "analysis.json")
+    assert told["strokes"] == [{"mu": 0.1 + 0.2, "speed": None}]
+    assert told["made_by"]["numpy"] == np.__version__
+    assert path.read_text().startswith('{\n "SIMULATED": ')
+    assert problems(sealed) == ()
+
+
+def test_derived_numbers_are_listed_so_that_a_change_is_named(sealed):
+    path = store_derived(sealed, "analysis.json", {"mu": 0.5})
+    path.write_text(path.read_text().replace("0.5", "0.6"))
+    assert problems(sealed)[0].startswith("analysis.json is not what it was")
+
+
+def test_derived_numbers_made_anew_replace_the_old_ones_as_a_whole(sealed, monkeypatch):
+    store_derived(sealed, "analysis.json", {"mu": 0.5})
+    store_derived(sealed, "analysis.json", {"mu": 0.7})
+    assert load_derived(sealed, "analysis.json")["mu"] == 0.7
+    assert problems(sealed) == ()
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("sessions.recording.whole_file.os.fsync", full)
+    with pytest.raises(RecordingError, match="No space left on device"):
+        store_derived(sealed, "analysis.json", {"mu": 0.9})
+    assert load_derived(sealed, "analysis.json")["mu"] == 0.7
+    assert problems(sealed) == ()
+
+
+def test_derived_numbers_are_stored_beside_a_session_that_is_not_sealed_yet(tmp_path):
+    folder = ended(tmp_path / "s", info=REAL)
+    store_derived(folder, "analysis.json", {"mu": 0.5})
+    assert "SIMULATED" not in (folder / "analysis.json").read_text()
+    assert load_derived(folder, "prediction.json") is None
+
+
+def test_a_page_is_stored_and_listed(sealed):
+    store_page(sealed, "report.html", "<p>SIMULATED</p>")
+    assert "report.html" in json.loads((sealed / "MANIFEST.json").read_bytes())["files"]
+    assert problems(sealed) == ()
+
+
+def test_a_number_that_is_none_is_refused(sealed):
+    with pytest.raises(ValueError, match="JSON"):
+        store_derived(sealed, "analysis.json", {"mu": math.nan})
+    assert not (sealed / "analysis.json").exists()
+
+
+@pytest.mark.parametrize("name", ["session.json", "MANIFEST.json", "../analysis.json", "a/b.json", ".hidden", ""])
+def test_what_was_recorded_and_what_lies_elsewhere_is_never_written_over(sealed, name):
+    with pytest.raises(ValueError, match="is no name for a file made from a recording"):
+        store_derived(sealed, name, {})
+
+
+def test_a_damaged_derived_file_is_named(sealed):
+    (sealed / "analysis.json").write_text("{")
+    with pytest.raises(RecordingError, match=r"analysis\.json is damaged .*make it anew"):
+        load_derived(sealed, "analysis.json")
+
+
+def test_a_sealed_session_is_opened_without_side_files(sealed):
+    Recording.open(sealed).readings()
+    assert not list(sealed.glob("session.sqlite-*"))
+    with sqlite3.connect(f"file:{sealed / 'session.sqlite'}?mode=ro", uri=True) as connection:
+        assert connection.execute("SELECT count(*) FROM blocks").fetchone() == (5,)
+    connection.close()

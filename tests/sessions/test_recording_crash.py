@@ -1,0 +1,161 @@
+"""A recording whose writer is killed, or whose disk is full: nothing that was acknowledged is lost."""
+
+import json
+import os
+import random
+import resource
+import shutil
+import signal
+import time
+
+import numpy as np
+import pytest
+from recordings import begun, readings
+from test_runner import Session
+
+from sessions.recording import Recording, RecordingError
+from sessions.recording.torn import log_tail
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="kills a process of its own, which needs fork")
+
+
+def forked(work):
+    """Start `work(report)` in a process of its own; what it reports comes down the pipe that is returned."""
+    reading, writing = os.pipe()
+    process = os.fork()
+    if process == 0:
+        try:
+            os.close(reading)
+            work(lambda *numbers: os.write(writing, (json.dumps(numbers) + "\n").encode()))
+        finally:
+            os._exit(0)
+    os.close(writing)
+    return process, reading
+
+
+def reported(reading):
+    """Return everything reported in whole lines."""
+    with os.fdopen(reading, "rb") as pipe:
+        lines = pipe.read().split(b"\n")[:-1]
+    return [json.loads(line) for line in lines]
+
+
+def kill(process):
+    os.kill(process, signal.SIGKILL)
+    os.waitpid(process, 0)
+
+
+def test_nothing_acknowledged_is_lost_when_the_writer_is_killed_and_when_its_log_is_cut_as_well(tmp_path):
+    chance = random.Random(1)
+    most = 0
+    for run in range(20):
+        folder = tmp_path / str(run)
+
+        def write(report, folder=folder):
+            writer = begun(folder)
+            for i in range(100_000):
+                writer.readings(readings(50 * i, 50))
+                if i % 3 == 0:
+                    writer.event("scored", 1, {"score": float(i)})
+                safe = writer.acknowledged
+                report(safe.readings, safe.events)
+
+        process, reading = forked(write)
+        time.sleep(chance.uniform(0.02, 0.15))
+        kill(process)
+        safe_readings, safe_events = (reported(reading) or [[0, 0]])[-1]
+        most = max(most, safe_readings)
+        if safe_events == 0 and not (folder / "session.sqlite").exists():
+            continue
+        try:
+            recording = Recording.open(folder)
+        except RecordingError:
+            assert safe_events == 0
+            continue
+        block = recording.readings()
+        assert len(block) >= safe_readings
+        np.testing.assert_array_equal(block.raw, readings(0, len(block)).raw)
+        assert len(recording.events) >= safe_events
+        assert [event.data["score"] for event in recording.events] == [3.0 * i for i in range(len(recording.events))]
+
+        cut = folder / "session.sqlite-wal"
+        if cut.exists():
+            content = cut.read_bytes()
+            cut.write_bytes(content[: len(content) - min(chance.randrange(1, 200_000), len(content))])
+            if log_tail(cut.read_bytes()).commits == 0 and (folder / "session.sqlite").stat().st_size < 8192:
+                continue  # the cut reached back to before the tables were there
+            left = Recording.open(folder)
+            sequence = left.readings().sequence.tolist()
+            assert sequence == list(range(len(sequence)))
+    assert most > 0
+
+
+def test_a_session_killed_at_any_moment_leaves_a_beginning_of_the_whole_session(tmp_path):
+    whole = Session(tmp_path / "whole").run()
+    chance = random.Random(2)
+    lengths = set()
+    for run in range(12):
+        folder = tmp_path / str(run)
+
+        def work(report, folder=folder):
+            session = Session(folder)
+            report("begun")
+            session.run(progress=lambda status: report(status.safe.readings, status.safe.events))
+
+        process, reading = forked(work)
+        os.read(reading, 10)
+        time.sleep(chance.uniform(0.0, 0.12))
+        kill(process)
+        safe = [line for line in reported(reading) if len(line) == 2]
+        recording = Recording.open(folder)
+        events = recording.events
+        lengths.add(len(events))
+        assert events == whole.events[: len(events)]
+        block = recording.readings()
+        assert block.raw.tobytes() == whole.readings().raw[: len(block)].tobytes()
+        if safe:
+            assert (len(block), len(events)) >= tuple(safe[-1])
+        for record, meant in zip(recording.trials, whole.trials, strict=True):
+            assert record.score in (None, meant.score)
+    assert len(lengths) > 4
+
+
+def test_a_full_disk_gives_one_sentence_and_all_that_was_acknowledged_can_be_read(tmp_path):
+    folder = tmp_path / "s"
+
+    def write(report):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (600_000, 600_000))
+        writer = begun(folder)
+        try:
+            for i in range(100_000):
+                writer.readings(readings(50 * i, 50))
+                safe = writer.commit()
+                report(safe.readings)
+        except RecordingError as error:
+            report(str(error))
+            writer.close()
+
+    process, reading = forked(write)
+    os.waitpid(process, 0)
+    *safe, (sentence,) = reported(reading)
+    (acknowledged,) = safe[-1]
+    assert acknowledged > 500
+    assert f"the first {acknowledged} readings and 0 events are safe; free space on the disk" in sentence
+    recording = Recording.open(folder)
+    assert recording.readings().sequence.tolist()[:acknowledged] == list(range(acknowledged))
+    assert recording.losses[-1].startswith("the session has no end")
+
+
+def test_a_disk_that_is_full_from_the_beginning_is_told_so(tmp_path):
+    def write(report):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+        try:
+            begun(tmp_path / "s")
+        except RecordingError as error:
+            report(str(error))
+
+    process, reading = forked(write)
+    os.waitpid(process, 0)
+    ((sentence,),) = reported(reading)
+    assert "cannot be begun" in sentence
+    shutil.rmtree(tmp_path / "s")

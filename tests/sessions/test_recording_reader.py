@@ -1,0 +1,269 @@
+import hashlib
+import shutil
+import sqlite3
+from contextlib import closing
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from recordings import PLAN, begun, change, ended, readings
+
+from sessions.recording import LoggedEvent, Recording, RecordingError
+from sessions.recording.log import trial_records
+from sessions.recording.torn import log_tail
+
+
+def hashes(folder):
+    return {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in folder.iterdir()
+        if not path.name.endswith("-shm")  # an index of the log that any reader makes anew
+    }
+
+
+@pytest.fixture
+def crashed(tmp_path):
+    """The files of a recording whose writer never closed: 5 commits of 100 readings, in the log alone."""
+    writer = begun(tmp_path / "live")
+    for i in range(5):
+        writer.readings(readings(100 * i, 100, received_ns=i))
+        writer.commit()
+    folder = tmp_path / "crashed"
+    folder.mkdir()
+    for name in ("session.sqlite", "session.sqlite-wal"):
+        shutil.copy(tmp_path / "live" / name, folder)
+    writer.close()
+    return folder
+
+
+UNENDED = "the session has no end: it was cut short, or is still running"
+
+
+# ---- whole recordings
+
+
+def test_a_trials_readings_are_those_received_during_its_take(tmp_path):
+    recording = Recording.open(ended(tmp_path / "s", blocks=4))  # the take lasts from 50 to 400, not included
+    assert recording.readings(1).sequence.tolist() == list(range(300))
+    assert recording.readings().sequence.tolist() == list(range(400))
+    assert recording.readings_between(101, 301).sequence.tolist() == list(range(100, 300))
+    assert recording.readings_between(300, None).sequence.tolist() == list(range(200, 400))
+
+
+def test_a_trial_the_plan_does_not_have_is_refused(tmp_path):
+    with pytest.raises(KeyError, match="has no trial 9"):
+        Recording.open(ended(tmp_path / "s")).readings(9)
+
+
+def test_a_folder_without_a_recording_is_refused(tmp_path):
+    with pytest.raises(RecordingError, match=r"holds no recording: there is no session\.sqlite"):
+        Recording.open(tmp_path)
+
+
+@pytest.mark.parametrize("content", [b"", b"no database at all", b"SQLite format 3\0" + bytes(4096)])
+def test_a_file_that_is_no_recording_is_refused_with_a_sentence(tmp_path, content):
+    (tmp_path / "session.sqlite").write_bytes(content)
+    with pytest.raises(RecordingError, match=r"session\.sqlite cannot be read"):
+        Recording.open(tmp_path)
+
+
+def test_a_recording_of_a_later_format_is_refused_by_name(tmp_path):
+    folder = ended(tmp_path / "s")
+    later = '{"name":"daq-app session","version":2}'
+    import zlib
+
+    change(folder, "UPDATE head SET value=?, crc32=? WHERE name='format'", (later, zlib.crc32(later.encode())))
+    with pytest.raises(RecordingError, match="up to version 1: use a later program"):
+        Recording.open(folder)
+
+
+def test_opening_and_reading_change_no_byte(tmp_path, crashed):
+    for folder in (ended(tmp_path / "s"), crashed):
+        before = hashes(folder)
+        recording = Recording.open(folder)
+        recording.readings()
+        assert recording.losses is not None
+        assert hashes(folder) == before
+
+
+# ---- damage is named, and costs only what it hit
+
+
+def test_a_damaged_block_is_left_out_and_named(tmp_path):
+    folder = ended(tmp_path / "s")
+    change(folder, "UPDATE blocks SET raw = zeroblob(4800) WHERE number = 2")
+    recording = Recording.open(folder)
+    assert recording.readings().sequence.tolist() == [*range(100), *range(200, 300)]
+    assert recording.losses == (
+        "block 2 of the readings is damaged and left out (its bytes do not give the CRC-32 stored with them)",
+    )
+
+
+def test_a_missing_block_is_named(tmp_path):
+    folder = ended(tmp_path / "s")
+    change(folder, "DELETE FROM blocks WHERE number = 2")
+    assert Recording.open(folder).losses == ("blocks 2 to 2 of the readings are missing",)
+
+
+def test_a_row_that_tells_of_other_readings_than_it_holds_is_named(tmp_path):
+    folder = ended(tmp_path / "s")
+    change(folder, "UPDATE blocks SET sequence_last = 7 WHERE number = 3")
+    assert "not those its row tells of" in Recording.open(folder).losses[0]
+
+
+def test_a_changed_and_a_missing_event_are_named_and_the_others_read(tmp_path):
+    folder = ended(tmp_path / "s")
+    change(folder, "UPDATE events SET data = '{\"score\":99.0}' WHERE kind = 'scored'")
+    change(folder, "DELETE FROM events WHERE number = 1")
+    recording = Recording.open(folder)
+    assert recording.losses == ("events 1 to 1 are missing", "event 3 is damaged and left out (CRC-32 differs)")
+    assert recording.trials[0].score is None
+
+
+def test_a_changed_plan_is_refused(tmp_path):
+    folder = ended(tmp_path / "s")
+    change(folder, "UPDATE head SET value = replace(value, 'S01', 'S02') WHERE name = 'plan'")
+    with pytest.raises(RecordingError, match=r"plan in its head is damaged"):
+        Recording.open(folder)
+
+
+def test_a_file_cut_short_gives_what_can_be_read_or_a_sentence(tmp_path):
+    whole = (ended(tmp_path / "s", blocks=40) / "session.sqlite").read_bytes()
+    for part in (0.2, 0.5, 0.8, 0.95):
+        folder = tmp_path / f"cut-{part}"
+        folder.mkdir()
+        (folder / "session.sqlite").write_bytes(whole[: int(len(whole) * part)])
+        try:
+            recording = Recording.open(folder)
+        except RecordingError as error:
+            assert "cannot be read" in str(error)  # noqa: PT017  either outcome is right
+            continue
+        sequence = recording.readings().sequence.tolist()
+        assert set(sequence) <= set(range(4000))
+        assert recording.losses
+
+
+# ---- after a crash
+
+
+def test_a_log_left_by_a_crash_is_read_and_the_missing_end_named(crashed):
+    recording = Recording.open(crashed)
+    assert recording.readings().sequence.tolist() == list(range(500))
+    assert recording.losses == (UNENDED,)
+
+
+def test_a_log_whose_tail_was_cut_gives_its_whole_commits_and_names_the_rest(crashed):
+    log = crashed / "session.sqlite-wal"
+    whole = log.read_bytes()
+    kept = set()
+    for cut in range(0, len(whole) - 32, 509):
+        log.write_bytes(whole[: len(whole) - cut])
+        tail = log_tail(log.read_bytes())
+        try:
+            recording = Recording.open(crashed)
+        except RecordingError:
+            assert tail.commits == 0  # not even the tables were committed
+            continue
+        sequence = recording.readings().sequence.tolist()
+        assert sequence == list(range(100 * (tail.commits - 1)))  # the first commit holds the tables
+        named = any("hold no whole commit" in loss for loss in recording.losses)
+        assert named == (tail.torn_bytes > 0)
+        kept.add(len(sequence))
+    assert kept == {0, 100, 200, 300, 400, 500}
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """The bytes of file and log of a recording with 3 commits of 100 readings, its writer not yet closed."""
+    folder = tmp_path_factory.mktemp("written") / "s"
+    writer = begun(folder)
+    for i in range(3):
+        writer.readings(readings(100 * i, 100))
+        writer.commit()
+    yield {path.name: path.read_bytes() for path in folder.iterdir() if not path.name.endswith("-shm")}
+    writer.close()
+
+
+@given(place=st.floats(0, 0.999), bit=st.integers(0, 7))
+@settings(max_examples=60, deadline=None)
+def test_a_flipped_bit_in_the_log_is_never_taken_for_a_reading(written, tmp_path_factory, place, bit):
+    folder = tmp_path_factory.mktemp("flipped")
+    for name, content in written.items():
+        changed = bytearray(content)
+        if name.endswith("-wal"):
+            changed[int(place * len(changed))] ^= 1 << bit
+        (folder / name).write_bytes(changed)
+    try:
+        recording = Recording.open(folder)
+    except RecordingError:
+        return
+    sequence = recording.readings().sequence.tolist()
+    assert sequence == list(range(len(sequence)))
+    assert len(sequence) == 300 or any("hold no whole commit" in loss for loss in recording.losses)
+
+
+def test_frames_left_over_from_an_earlier_run_of_the_log_are_no_loss(tmp_path):
+    writer = begun(tmp_path / "s")
+    for i in range(30):
+        writer.readings(readings(100 * i, 100))
+        writer.commit()
+    writer._connection.execute("PRAGMA wal_checkpoint(RESTART)")  # the next commit begins the log anew, at its head
+    writer.readings(readings(3000, 100))
+    writer.commit()
+    tail = log_tail((tmp_path / "s" / "session.sqlite-wal").read_bytes())
+    assert (tail.commits, tail.torn_bytes) == (1, 0)
+    assert Recording.open(tmp_path / "s").losses == (UNENDED,)
+    writer.close()
+
+
+def test_a_log_shorter_than_its_head_holds_nothing():
+    assert log_tail(b"") == log_tail(b"") == type(log_tail(b""))(0, 0)
+    assert log_tail(bytes(31)).torn_bytes == 31
+    assert log_tail(bytes(5000)).torn_bytes == 5000
+
+
+def test_a_change_that_a_crash_cut_short_is_undone_in_a_copy_and_the_file_stays_as_it_is(tmp_path):
+    folder = ended(tmp_path / "s", blocks=20)
+    torn = tmp_path / "torn"
+    torn.mkdir()
+    with closing(sqlite3.connect(folder / "session.sqlite", isolation_level=None)) as connection:
+        connection.execute("PRAGMA cache_size=1")  # changes go to the file before the commit
+        connection.execute("BEGIN")
+        connection.execute("UPDATE blocks SET raw = zeroblob(4800)")
+        for path in folder.iterdir():
+            shutil.copy(path, torn)
+    assert (torn / "session.sqlite-journal").exists()
+    before = hashes(torn)
+    recording = Recording.open(torn)
+    assert recording.readings().raw.tolist() == readings(0, 2000).raw.tolist()
+    assert hashes(torn) == before
+
+
+# ---- what the log says of a trial
+
+
+def told(*lines):
+    return [LoggedEvent(i, 10 * i, kind, trial, 0, data) for i, (kind, trial, data) in enumerate(lines, 1)]
+
+
+def test_a_take_that_was_kept_and_then_discarded_keeps_its_own_end():
+    (record,) = trial_records(
+        PLAN,
+        told(
+            ("take_started", 1, {"take": 1}),
+            ("scored", 1, {"score": 5.0}),
+            ("take_kept", 1, {"take": 1}),
+            ("take_discarded", 1, {"take": 1, "reason": "wrong hand"}),
+            ("take_started", 1, {"take": 2}),
+        ),
+    )
+    assert (record.outcome, record.score, record.take) == ("open", None, None)
+    assert [(take.start_ns, take.stop_ns, take.discarded) for take in record.other_takes] == [
+        (10, 30, "wrong hand"),
+        (50, None, None),
+    ]
+
+
+def test_a_recording_without_a_plan_of_trials_has_none():
+    assert trial_records(replace(PLAN, blocks=()), told(("started", None, {}))) == ()
