@@ -17,6 +17,7 @@ from sessions.analysis import ZERO_SETTING, ZERO_STATED
 from sessions.csv_columns import TIME_UNITS, Columns, ColumnsUnknown, columns
 from sessions.plan import Frame, Origin, SessionPlan
 from sessions.recording.provenance import Setting, provenance
+from sessions.recording.whole_file import write_whole
 from sessions.recording.writer import SessionWriter
 from sessions.toml_file import SettingsError
 
@@ -108,7 +109,7 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
         {**provenance(clock, _settings(told, frame, rate, rate_origin, stated)), "imported": source},
         clock=clock,
     )
-    (folder / ORIGINAL_FILE).write_bytes(content)
+    write_whole(folder / ORIGINAL_FILE, content)
     writer.event("started", data={"settings": {}}, time_ns=0)
     writer.event("imported", data=source, time_ns=0)
     writer.readings(block)

@@ -183,7 +183,7 @@ def _judge_drift(found: Findings, zero: ZeroInForce, settings: AnalysisSettings)
     sentence = (
         f"With nothing pressing, the forces around this stroke lie {sideways:.2g} N sideways and {pressing:.2g} N "
         f"along the normal from its zero: mu may be wrong by {100 * share:.0f} %"
-        f"{', so no numbers are given' if refused else ''}."
+        f"{', so no force, friction or speed is given' if refused else ''}."
     )
     found.flaw(FlawName.DRIFT, sentence, "refused" if refused else "doubtful", EVERYTHING if refused else ())
 

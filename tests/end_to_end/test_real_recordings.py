@@ -202,6 +202,15 @@ def test_a_wheel_has_no_normal_axis_and_no_strokes(session, name):
     assert refused(analysis) == {"normal_axis_implausible"}
 
 
+def test_with_the_axis_of_its_pushes_stated_the_wheel_shows_each_push(session):
+    """Twelve pushes stand out of the second recording's Fy by eye, from 9.7 to 26 s; the last swing goes the other way."""
+    _, analysis = session("pushrim_propulsion_2", normal="-y")
+    assert len(analysis.strokes) == 12
+    assert analysis.strokes[0].onset == pytest.approx(9.7, abs=0.1)
+    assert analysis.strokes[-1].lift == pytest.approx(26.0, abs=0.2)
+    assert all(getattr(stroke, number) is None for stroke in analysis.strokes for number in FRICTION)
+
+
 @pytest.mark.parametrize("normal", ["+x", "-x", "+y", "-y", "+z", "-z"])
 def test_a_wheel_without_a_hand_shows_no_friction_whatever_the_normal_is_said_to_be(session, normal):
     _, analysis = session("pushrim_no_hand", normal=normal)
