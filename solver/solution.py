@@ -10,7 +10,7 @@ from scipy.linalg import LinAlgError
 from solver.audits import audits, course_audits
 from solver.contact import NAMES, SLIP, Contact, ContactLost, Course
 from solver.evidence import model, warnings
-from solver.failures import Cancelled, NoSteadyState, NotConverged
+from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure
 from solver.finger import FingerModel
 from solver.friction import FrictionLaw
 from solver.grid import MeshError
@@ -27,6 +27,7 @@ SAFETY = 0.6  # chosen so that the estimate lay above the true error in 95 of 10
 # coarsest mesh worth trying for a tolerance
 START = ((0.008, 6), (0.004, 8), (0.002, 12), (0.001, 16), (0.0004, 24), (0.0, 32))
 
+_Answer = Prediction | SolveFailure
 Progress = Callable[[float], bool]  # told the part done, 0 to 1; returns False to stop the work (Cancelled is raised)
 
 
@@ -45,10 +46,22 @@ def solve_together(scenes: Sequence[Scene], progress: Progress | None = None) ->
     Scenes with the same finger, materials and receptor share one mesh, fine enough for the strictest tolerance among
     them, so that differences between them are more accurate than each of them. Raises as `solve` does.
     """
-    out: dict[int, Prediction] = {}
+    done: list[Prediction] = []
+    for answer in answers(scenes, progress):
+        if isinstance(answer, SolveFailure):
+            raise answer
+        done.append(answer)
+    return tuple(done)
+
+
+def answers(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | SolveFailure, ...]:
+    """Return the prediction of each scene or why it has none, as `solve_together` does.
+
+    Raises SceneError where a finger cannot be meshed, Cancelled where `progress` says so.
+    """
+    out: dict[int, Prediction | SolveFailure] = {}
     for group in _groups(scenes):
-        for number, prediction in zip(group, _solve_group([scenes[i] for i in group], progress), strict=True):
-            out[number] = prediction
+        out |= dict(zip(group, _solve_group([scenes[i] for i in group], progress), strict=True))
     return tuple(out[i] for i in range(len(scenes)))
 
 
@@ -59,25 +72,44 @@ def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
     return list(groups.values())
 
 
-def _solve_group(scenes: list[Scene], progress: Progress | None) -> list[Prediction]:
+def _solve_group(scenes: list[Scene], progress: Progress | None) -> list[_Answer]:
     """Refine until every scene's estimate meets its tolerance, or the finest mesh is reached."""
-    asked = min((s.solve.tolerance for s in scenes if s.solve.tolerance is not None), default=None)
-    fineness = DEFAULT if asked is None else next(n for least, n in START if asked >= least)
+    asked = [s.solve.tolerance for s in scenes]
+    strictest = min((a for a in asked if a is not None), default=None)
+    fineness = DEFAULT if strictest is None else next(n for least, n in START if strictest >= least)
     while True:
         done = _solve_on(scenes, fineness, progress)
+        missed = [_misses(answer, tolerance) for answer, tolerance in zip(done, asked, strict=True)]
         finer = [n for n in FINENESS if n > fineness]
-        if asked is None or not finer or all(p.error_estimate <= asked for p in done):
+        if not finer or not any(missed):
             break
         fineness = finer[0]
-    if asked is None:
-        return done
-    missed = "The finest mesh leaves an error estimate above the tolerance asked for."
-    return [replace(p, warnings=(*p.warnings, missed)) if p.error_estimate > asked else p for p in done]
+    told = "The finest mesh leaves an error estimate above the tolerance asked for."
+    return [
+        replace(answer, warnings=(*answer.warnings, told)) if misses and isinstance(answer, Prediction) else answer
+        for answer, misses in zip(done, missed, strict=True)
+    ]
 
 
-def _solve_on(scenes: list[Scene], fineness: float, progress: Progress | None) -> list[Prediction]:
+def _misses(answer: _Answer, tolerance: float | None) -> bool:
+    return isinstance(answer, Prediction) and tolerance is not None and answer.error_estimate > tolerance
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shared:
+    """What scenes solved together share, and each one's part of what it took [s]."""
+
+    fine: FingerModel
+    coarse: tuple[FingerModel, ...]
+    setup_s: float
+    solve_s: float
+    estimate_s: float
+
+
+def _solve_on(scenes: list[Scene], fineness: float, progress: Progress | None) -> list[_Answer]:
     """Solve all scenes on one mesh, and on two coarser ones for the estimate; look wider where contact reaches out."""
     depth = max(scene.loading.indentation for scene in scenes)
+    done: list[_Answer | None] = []
     for margin in (1.0, 4.0, 16.0):
         begun = perf_counter()
         fine = _meshed(scenes[0], Sizing(fineness, depth, margin=margin))
@@ -87,16 +119,21 @@ def _solve_on(scenes: list[Scene], fineness: float, progress: Progress | None) -
             _meshed(scenes[0], Sizing(fineness / 2.0, depth, shift, margin=margin)) for shift in (False, True)
         )
         shared = _Shared(fine, coarse, setup, fine.solve_s / len(scenes), (perf_counter() - begun) / len(scenes))
-        done: list[Prediction] = []
+        done = []
         for number, scene in enumerate(scenes):
             _report(progress, number / len(scenes))
-            predicted = _predicted(scene, shared, progress)
-            if predicted is None:
-                break
-            done.append(predicted)
-        if len(done) == len(scenes):
-            return done
-    raise NotConverged("The skin touched the surface beyond every part of it where contact was looked for.")
+            done.append(_answer(scene, shared, progress))
+        if all(answer is not None for answer in done):
+            break
+    lost = NotConverged("The skin touched the surface beyond every part of it where contact was looked for.")
+    return [lost if answer is None else answer for answer in done]
+
+
+def _answer(scene: Scene, shared: _Shared, progress: Progress | None) -> _Answer | None:
+    try:
+        return _predicted(scene, shared, progress)
+    except SolveFailure as failure:
+        return failure
 
 
 def _report(progress: Progress | None, part: float) -> None:
@@ -109,17 +146,6 @@ def _meshed(scene: Scene, sizing: Sizing) -> FingerModel:
         return FingerModel.of(scene, sizing)
     except (MeshError, LinAlgError) as bad:
         raise SceneError("finger", scene.finger, f"no mesh fits it ({bad})") from bad
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Shared:
-    """What scenes solved together share, and each one's part of what it took [s]."""
-
-    fine: FingerModel
-    coarse: tuple[FingerModel, ...]
-    setup_s: float
-    solve_s: float
-    estimate_s: float
 
 
 def _law(scene: Scene) -> FrictionLaw:

@@ -1,0 +1,303 @@
+"""From the friction of a session's strokes to what the model predicts: the only door to the solver.
+
+Each trial becomes a scene: its measured friction, its block's indentation, its direction and speed, and one finger. All
+scenes are solved together on one mesh, so that differences between surfaces are accurate.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, Literal
+
+from sessions.analysis import Analysis, FrictionParameters, Stroke
+from sessions.plan import DISTAL_TO_PROXIMAL, PROXIMAL_TO_DISTAL, Block, SessionPlan, Stimulus, Trial
+from solver.failures import SolveFailure
+from solver.fields import Fields, fields_of
+from solver.matching import matching_depths
+from solver.prediction import History, Prediction, Skin
+from solver.reference import SCALE
+from solver.reference import Reading as TauReading
+from solver.scene import Friction, Loading, Scene, Slide, Solve
+from solver.solution import answers
+
+SLIDES: dict[int, Slide] = {PROXIMAL_TO_DISTAL: "+x", DISTAL_TO_PROXIMAL: "-x"}
+DEFAULT_SPEED = 20.0  # where none was measured [mm/s]; rescales the time of a course and nothing else
+
+Progress = Callable[[float], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class PredictionOptions:
+    """What a user may ask of the model."""
+
+    tau_reading: TauReading = "computed"  # "as-printed": a hundredth of it, as the paper's tables are headed
+    scene: Scene | None = None  # whose finger, width, materials, receptor and tolerance to take; None: the published
+    indentation: float | None = None  # [mm], instead of each block's own
+    course: Literal["steady", "history"] = "history"
+    kinematics: Literal["small"] = "small"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrialPrediction:
+    """What the model says of one trial, or of one stroke of a recording without trials.
+
+    A number is None where `reasons` says why, under the number's name.
+    """
+
+    trial: int | None
+    stroke: int | None  # position in `Analysis.strokes`; None where the trial has none
+    block: str | None
+    stimulus: Stimulus | None
+    mu: float | None  # that the model got [-]
+    mu_rule: str  # which mu that is
+    tau_max: float | None  # that the model got [MPa]
+    indentation: float | None  # [mm]
+    direction: int | None  # +1 proximal to distal, -1 back; as measured, or else as planned
+    speed: float | None  # [mm/s]
+    sed: float | None  # averaged over the ending [MPa]
+    error_estimate: float | None  # relative, of sed
+    normal_per_mm: float | None  # [N/mm]
+    tangential_per_mm: float | None  # [N/mm]
+    normal_force: float | None  # normal_per_mm times the finger's width [N]
+    tangential_force: float | None  # [N]
+    measured_normal: float | None  # mean over the steady window [N]
+    measured_tangential: float | None  # [N]
+    matching_depth: float | None  # indentation at which the model's normal force is the measured one [mm]
+    opposite_sed: float | None  # at the same depth, slid the other way [MPa]
+    wall_s: float | None  # the solve [s]
+    prediction: Prediction | None  # all that the solver found
+    reasons: Mapping[str, str]
+
+    @property
+    def history(self) -> History | None:
+        """Return the course in time, where it was asked for."""
+        return None if self.prediction is None else self.prediction.history
+
+    def picture(self) -> tuple[Fields, Skin] | None:
+        """Return the deformed finger with its SED, and the skin's pressures; None where there is no prediction."""
+        return None if self.prediction is None else (fields_of(self.prediction), self.prediction.skin)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        row = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("prediction", "stimulus")}
+        row["stimulus"] = None if self.stimulus is None else asdict(self.stimulus)
+        row["reasons"] = dict(self.reasons)
+        row["solver"] = None if self.prediction is None else self.prediction.to_dict()
+        return row
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SessionPrediction:
+    """What the model says of a session."""
+
+    simulated: bool
+    trials: tuple[TrialPrediction, ...]
+    width: float  # of the finger [mm]
+    width_origin: str  # "set" or "assumed"
+    options: PredictionOptions
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data, None where honesty allows no number."""
+        return {
+            **({"simulated": "SIMULATED"} if self.simulated else {}),
+            "trials": [trial.to_dict() for trial in self.trials],
+            "width": self.width,
+            "width_origin": self.width_origin,
+            "options": asdict(self.options),
+        }
+
+
+def predict(
+    analysis: Analysis,
+    plan: SessionPlan,
+    options: PredictionOptions | None = None,
+    progress: Progress | None = None,
+) -> SessionPrediction:
+    """Return what the model predicts for every trial of `plan`, or for every stroke where it plans none.
+
+    A trial without friction, without depth or without a settled state keeps its row, with the reason. Raises SceneError
+    where the options make no scene, Cancelled where `progress` (told the part done) returns False.
+    """
+    asked = options or PredictionOptions()
+    rows = [_prepared(case, asked) for case in _cases(analysis, plan)]
+    scenes = [row.scene for row in rows if row.scene is not None]
+    opposite = [_opposite(scene) for scene in scenes]
+    found = answers([*scenes, *opposite], progress)
+    forces = [_force_per_mm(row) for row in rows if row.scene is not None]
+    depths = matching_depths(
+        [scene for scene, force in zip(scenes, forces, strict=True) if force is not None],
+        [force for force in forces if force is not None],
+    )
+    matched = iter(depths)
+    depth = iter([None if force is None else next(matched) for force in forces])
+    answered = zip(found[: len(scenes)], found[len(scenes) :], depth, strict=True)
+    base = asked.scene
+    return SessionPrediction(
+        simulated=analysis.simulated,
+        trials=tuple(row.row if row.scene is None else _filled(row, *next(answered)) for row in rows),
+        width=_template(asked).width,
+        width_origin="assumed" if base is None or base.width == _template(PredictionOptions()).width else "set",
+        options=asked,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Case:
+    """One thing to predict: a planned trial, or a stroke of a recording without a plan."""
+
+    trial: Trial | None
+    block: Block | None
+    friction: FrictionParameters | None
+    number: int | None  # of its stroke
+    stroke: Stroke | None
+
+
+def _cases(analysis: Analysis, plan: SessionPlan) -> Iterator[_Case]:
+    if not plan.blocks:
+        for number, (stroke, friction) in enumerate(zip(analysis.strokes, analysis.friction, strict=True)):
+            yield _Case(None, None, friction, number, stroke)
+        return
+    if not plan.forces:
+        return
+    given = {friction.trial: friction for friction in analysis.friction}
+    first: dict[int | None, int] = {}
+    for number, stroke in enumerate(analysis.strokes):
+        first.setdefault(stroke.trial, number)
+    for block in plan.blocks:
+        for trial in block.trials:
+            number = first.get(trial.number)
+            stroke = None if number is None else analysis.strokes[number]
+            yield _Case(trial, block, given.get(trial.number), number, stroke)
+
+
+def _template(options: PredictionOptions) -> Scene:
+    """Return the scene whose finger is predicted; its friction and loading are put in for each trial."""
+    return options.scene or Scene(friction=Friction(0.0), loading=Loading(1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class _Prepared:
+    row: TrialPrediction  # as far as it is known before solving
+    scene: Scene | None  # None where there is nothing to solve
+
+
+def _prepared(case: _Case, options: PredictionOptions) -> _Prepared:
+    """Return what the model gets of one case, with the reason for every number that is missing."""
+    friction, stroke, trial = case.friction, case.stroke, case.trial
+    direction = friction.direction if friction is not None else None
+    if direction is None and trial is not None:
+        direction = trial.direction
+    planned = None if case.block is None else case.block.indentation
+    row = TrialPrediction(
+        trial=None if trial is None else trial.number,
+        stroke=case.number,
+        block=None if case.block is None else case.block.name,
+        stimulus=None if trial is None else trial.stimulus,
+        mu=None if friction is None else friction.mu,
+        mu_rule="" if friction is None else friction.rule,
+        tau_max=None if friction is None else _bound(friction.tau_max, options),
+        indentation=planned if options.indentation is None else options.indentation,
+        direction=direction,
+        speed=None if friction is None else friction.speed,
+        sed=None,
+        error_estimate=None,
+        normal_per_mm=None,
+        tangential_per_mm=None,
+        normal_force=None,
+        tangential_force=None,
+        measured_normal=None if stroke is None else stroke.normal_force,
+        measured_tangential=None if stroke is None else stroke.tangential_force,
+        matching_depth=None,
+        opposite_sed=None,
+        wall_s=None,
+        prediction=None,
+        reasons={},
+    )
+    why = _missing(row, stroke)
+    if why is not None:
+        names = ("sed", "normal_force", "tangential_force", "matching_depth", "opposite_sed")
+        return _Prepared(replace(row, reasons=dict.fromkeys(names, why)), None)
+    return _Prepared(row, _scene(row, options))
+
+
+def _bound(tau_max: float | None, options: PredictionOptions) -> float | None:
+    """Return the traction bound [MPa] in the reading asked for."""
+    return None if tau_max is None else tau_max * SCALE[options.tau_reading] / SCALE["computed"]
+
+
+def _missing(row: TrialPrediction, stroke: Stroke | None) -> str | None:
+    """Return why there is nothing to solve; None where all is there."""
+    if stroke is None:
+        return "No stroke was found in this trial."
+    if row.mu is None or row.tau_max is None:
+        what = "coefficient of friction" if row.mu is None else "traction bound"
+        flaws = ", ".join(stroke.flaws) or "no steady sliding"
+        return f"The stroke gives no {what} ({flaws})."
+    if row.direction is None:
+        return "Neither the stroke nor a plan tells the direction."
+    if row.indentation is None:
+        return "No plan tells how deep the model is to press: give an indentation."
+    return None
+
+
+def _scene(row: TrialPrediction, options: PredictionOptions) -> Scene:
+    assert row.mu is not None  # `_missing` said so, and the same of the next two
+    assert row.indentation is not None
+    assert row.direction is not None
+    base = _template(options)
+    surface = "" if row.stimulus is None else f"{row.stimulus.descriptor} {row.stimulus.index}"
+    return replace(
+        base,
+        title=f"trial {row.trial}: {surface}" if surface else f"stroke {row.stroke}",
+        friction=Friction(max(row.mu, 0.0), row.tau_max),
+        loading=Loading(row.indentation, SLIDES[row.direction], row.speed or DEFAULT_SPEED),
+        solve=Solve(options.kinematics, options.course, base.solve.tolerance),
+    )
+
+
+def _opposite(scene: Scene) -> Scene:
+    """Return the same press, slid the other way, its settled state alone."""
+    slide = SLIDES[-scene.loading.direction]
+    return replace(scene, loading=replace(scene.loading, slide=slide), solve=replace(scene.solve, course="steady"))
+
+
+def _force_per_mm(prepared: _Prepared) -> float | None:
+    measured = prepared.row.measured_normal
+    return None if measured is None or prepared.scene is None else measured / prepared.scene.width
+
+
+def _filled(
+    prepared: _Prepared,
+    found: Prediction | SolveFailure,
+    opposite: Prediction | SolveFailure,
+    depth: float | None,
+) -> TrialPrediction:
+    """Return the row with what the solver found, or with the reason for what it did not."""
+    row, scene = prepared.row, prepared.scene
+    assert scene is not None  # the caller solved it
+    reasons: dict[str, str] = {}
+    if depth is None:
+        reasons["matching_depth"] = (
+            "The stroke gives no steady normal force."
+            if row.measured_normal is None
+            else "The model would have to be pressed nearly to its bone, or has no settled state there."
+        )
+    if isinstance(opposite, SolveFailure):
+        reasons["opposite_sed"] = str(opposite)
+    else:
+        row = replace(row, opposite_sed=opposite.sed_ending)
+    row = replace(row, matching_depth=depth)
+    if isinstance(found, SolveFailure):
+        reasons |= dict.fromkeys(("sed", "normal_force", "tangential_force"), str(found))
+        return replace(row, reasons=reasons)
+    return replace(
+        row,
+        sed=found.sed_ending,
+        error_estimate=found.error_estimate,
+        normal_per_mm=found.normal_force,
+        tangential_per_mm=found.tangential_force,
+        normal_force=found.normal_force * scene.width,
+        tangential_force=found.tangential_force * scene.width,
+        wall_s=found.wall_s,
+        prediction=found,
+        reasons=reasons,
+    )

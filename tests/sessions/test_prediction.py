@@ -1,0 +1,197 @@
+"""What the model says of a session, trial by trial, with friction given as the paper's tables give it."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sessions.analysis import Analysis, AnalysisSettings, FrictionParameters, Stroke
+from sessions.plan import Block, Frame, SessionPlan, Stimulus, Trial
+from sessions.prediction import PredictionOptions, predict
+from solver.reference import INDENTATION, SLIPPERINESS, STICKINESS
+from solver.scene import Finger, Friction, Loading, Scene, SceneError
+from solver.solution import solve
+
+PLAN = SessionPlan(
+    protocol="sensotact-friction",
+    subject="P01",
+    seed=1,
+    order_rule="as listed",
+    blocks=tuple(
+        Block(
+            name=surfaces[0].descriptor,
+            instruction="Stroke.",
+            direction=direction,
+            indentation=INDENTATION[surfaces[0].descriptor],
+            scale_ends=("none", "most"),
+            trials=tuple(
+                Trial(first + n, surfaces[0].descriptor, Stimulus(s.descriptor, s.index, f"K{first + n}"), direction, 1)
+                for n, s in enumerate(surfaces)
+            ),
+        )
+        for surfaces, direction, first in ((STICKINESS, 1, 1), (SLIPPERINESS, -1, 6))
+    ),
+    forces=True,
+    frame=Frame(),
+)
+MEASURED = 2.5  # N
+
+
+def stroke(trial, **known):
+    empty = dict.fromkeys(Stroke.__dataclass_fields__)
+    told = {"trial": trial, "readings": 100, "zero": "before contact", "flaws": (), "reasons": {}}
+    return Stroke(**(empty | told | {"normal_force": MEASURED, "tangential_force": 1.2} | known))
+
+
+def parameters(trial, mu, tau_max, direction, speed=20.0, flaws=()):
+    return FrictionParameters(trial, mu, None, tau_max, 100.0, speed, direction, "maximum", flaws)
+
+
+def analysis(friction, strokes):
+    return Analysis(True, tuple(strokes), tuple(friction), (), "none", AnalysisSettings())
+
+
+@pytest.fixture(scope="module")
+def tables():
+    """An analysis that found the paper's tables."""
+    surfaces = STICKINESS + SLIPPERINESS
+    directions = [1] * 5 + [-1] * 5
+    friction = [
+        parameters(n + 1, s.mu, s.printed_bound * 1e-2, d, s.speed)
+        for n, (s, d) in enumerate(zip(surfaces, directions, strict=True))
+    ]
+    return analysis(friction, [stroke(n + 1) for n in range(10)])
+
+
+@pytest.fixture(scope="module")
+def predicted(tables):
+    return predict(tables, PLAN)
+
+
+def test_every_trial_has_its_row_in_the_order_of_the_plan(predicted):
+    assert [row.trial for row in predicted.trials] == list(range(1, 11))
+    assert [row.stimulus.index for row in predicted.trials] == [0, 20, 50, 80, 100, 0, 20, 55, 75, 100]
+    assert [row.indentation for row in predicted.trials] == [2.0] * 5 + [1.5] * 5
+    assert all(row.sed > 0 and row.error_estimate < 0.01 for row in predicted.trials)
+
+
+def test_the_paper_s_friction_gives_the_paper_s_finding(predicted):
+    seds = np.array([row.sed for row in predicted.trials])
+    index = np.array([row.stimulus.index for row in predicted.trials])
+    assert np.corrcoef(seds[:5], index[:5])[0, 1] >= 0.95
+    assert np.corrcoef(seds[5:], index[5:])[0, 1] <= -0.85
+    assert seds[7] < seds[8]  # 55 below 75
+
+
+def test_all_trials_share_one_mesh(predicted):
+    assert len({row.prediction.dofs for row in predicted.trials}) == 1
+
+
+def test_model_forces_are_those_per_mm_times_the_finger_s_width_which_is_marked_as_assumed(predicted):
+    assert (predicted.width, predicted.width_origin) == (15.0, "assumed")
+    for row in predicted.trials:
+        assert row.normal_force == pytest.approx(15.0 * row.prediction.normal_force)
+        assert row.tangential_force == pytest.approx(15.0 * row.prediction.tangential_force)
+        assert row.measured_normal == MEASURED
+
+
+def test_at_the_matching_depth_the_model_presses_as_hard_as_the_finger_did(predicted):
+    for row in (predicted.trials[0], predicted.trials[9]):
+        scene = row.prediction.scene
+        deeper = replace(scene, loading=replace(scene.loading, indentation=row.matching_depth))
+        assert solve(deeper).normal_force * 15.0 == pytest.approx(MEASURED, rel=0.01)
+
+
+def test_the_opposite_direction_is_predicted_at_the_same_depth(predicted):
+    row = predicted.trials[4]
+    scene = row.prediction.scene
+    back = solve(replace(scene, loading=replace(scene.loading, slide="-x")))
+    assert row.opposite_sed == pytest.approx(back.sed_ending, rel=0.005)
+    assert row.opposite_sed != pytest.approx(row.sed, rel=0.05)
+
+
+def test_the_course_presses_a_second_then_slides_at_the_measured_speed(predicted):
+    row = predicted.trials[2]
+    late = row.history.time > 1.0
+    assert np.allclose(row.history.bone_x[late], row.speed * (row.history.time[late] - 1.0))
+    assert row.history.sed_ending[-1] == pytest.approx(row.sed)
+
+
+def test_the_bound_read_as_printed_is_a_named_choice_that_leaves_next_to_no_drag(tables):
+    found = predict(tables, PLAN, PredictionOptions(tau_reading="as-printed", course="steady"))
+    assert found.trials[0].tau_max == pytest.approx(0.8033e-4)
+    assert max(row.tangential_per_mm for row in found.trials) < 0.0040
+    assert found.to_dict()["options"]["tau_reading"] == "as-printed"
+
+
+def test_another_finger_is_taken_from_a_scene(tables):
+    other = Scene(finger=Finger(tip_radius=6.0), width=12.0, friction=Friction(0.1), loading=Loading(1.0))
+    found = predict(tables, PLAN, PredictionOptions(scene=other, course="steady"))
+    assert (found.width, found.width_origin) == (12.0, "set")
+    assert found.trials[0].prediction.scene.finger.tip_radius == 6.0
+    assert found.trials[0].prediction.scene.loading.indentation == 2.0
+    assert found.trials[0].mu == 0.28
+
+
+def test_what_the_stroke_does_not_tell_is_missing_with_its_reason(tables):
+    friction = list(tables.friction)
+    friction[1] = parameters(2, None, 0.01, 1, flaws=("no_steady_sliding",))
+    friction[2] = parameters(3, 5.0, 0.9, 1)
+    strokes = list(tables.strokes)
+    strokes[1] = stroke(2, flaws=("no_steady_sliding",))
+    strokes[3] = stroke(4, normal_force=None)
+    found = predict(analysis(friction[:4], strokes[:4]), PLAN, PredictionOptions(course="steady"))
+    assert found.trials[1].sed is None
+    assert "no_steady_sliding" in found.trials[1].reasons["sed"]
+    assert found.trials[2].sed is None
+    assert "no steady sliding" in found.trials[2].reasons["sed"]
+    assert found.trials[3].sed is not None
+    assert found.trials[3].matching_depth is None
+    assert "steady normal force" in found.trials[3].reasons["matching_depth"]
+    assert found.trials[4].reasons["sed"] == "No stroke was found in this trial."
+    json.dumps(found.to_dict(), allow_nan=False)
+
+
+def test_a_force_that_would_press_the_model_to_its_bone_has_no_matching_depth(tables):
+    hard = analysis(tables.friction[:1], [stroke(1, normal_force=40.0)])
+    row = predict(hard, PLAN, PredictionOptions(course="steady")).trials[0]
+    assert row.matching_depth is None
+    assert "bone" in row.reasons["matching_depth"]
+
+
+def test_a_recording_without_a_plan_needs_a_depth():
+    loose = analysis([parameters(None, 0.4, 0.03, 1)], [stroke(None)])
+    imported = replace(PLAN, blocks=(), forces=True)
+    nothing = predict(loose, imported).trials[0]
+    assert nothing.sed is None
+    assert "indentation" in nothing.reasons["sed"]
+    row = predict(loose, imported, PredictionOptions(indentation=1.5)).trials[0]
+    assert row.sed > 0
+    assert row.trial is None
+    assert row.stroke == 0
+
+
+def test_a_depth_beyond_the_finger_is_refused(tables):
+    with pytest.raises(SceneError, match="indentation"):
+        predict(tables, PLAN, PredictionOptions(indentation=8.0))
+
+
+def test_a_visit_for_scores_only_predicts_nothing():
+    assert predict(analysis([], []), replace(PLAN, forces=False)).trials == ()
+
+
+def test_it_is_plain_data_that_says_simulated_at_its_head(predicted):
+    told = predicted.to_dict()
+    assert next(iter(told)) == "simulated"
+    assert told["simulated"] == "SIMULATED"
+    assert json.loads(json.dumps(told, allow_nan=False)) == json.loads(json.dumps(told))
+    row = told["trials"][0]
+    assert row["stimulus"] == {"descriptor": "stickiness", "index": 0, "code": "K1"}
+    assert len(row["solver"]["time"]) == len(row["solver"]["history"]["sed_ending"])
+
+
+def test_a_picture_can_be_drawn_of_every_row(predicted):
+    fields, skin = predicted.trials[0].picture()
+    assert len(fields.sed) == len(fields.nodes)
+    assert len(skin.pressure) == len(skin.state)
