@@ -26,7 +26,7 @@ class Findings:
         """Name a flaw, and the numbers it forbids; the first to forbid a number is its reason."""
         self.flaws.append(Flaw(name, sentence, grade))
         for number in withheld:
-            self.reasons.setdefault(number, name)
+            self.reasons.setdefault(number, str(name))
 
     def allowed(self, names: tuple[str, ...]) -> Mapping[str, Any]:
         """Return the numbers under these names, None for those that are missing or forbidden."""

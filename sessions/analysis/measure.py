@@ -131,7 +131,7 @@ def _judge_loads(found: Findings, track: Track, contact_area: float, settings: A
             f"T/N exceeds 1 while N is below half its peak ({peak:.3g} N), and not above: drift or a side load makes "
             "the ratio there; its maximum is that above half the peak."
         )
-        found.flaw(FlawName.RATIO_ABOVE_ONE, sentence, "doubtful")
+        found.flaw(FlawName.RATIO_ABOVE_ONE, sentence, "doubtful", ("mu_static",))
         found.numbers["mu_max"] = _greatest_ratio(track, 0.5 * peak, settings)
 
 

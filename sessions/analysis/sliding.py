@@ -28,9 +28,12 @@ def slide(found: Findings, span: Span, track: Track, frame: Frame, settings: Ana
         moved, trouble = _speed(span, track, window, frame, settings)
     at_rest = _rest(span, track, window, settings)
     if window is None or at_rest is not None:
-        sentence = at_rest or "T/N holds steady over no long enough part of the stroke."
+        name, sentence = at_rest or (
+            FlawName.NO_STEADY_SLIDING,
+            "T/N holds steady over no long enough part of the stroke.",
+        )
         forbidden = (*COEFFICIENTS, *SPEED, *DIRECTION, "normal_force", "tangential_force")
-        found.flaw(FlawName.NO_STEADY_SLIDING, sentence, "refused", forbidden)
+        found.flaw(name, sentence, "refused", forbidden)
         return None
     found.numbers["steady"] = (float(track.time[window.start]), float(track.time[window.stop - 1]))
     if trouble is not None:
@@ -42,16 +45,24 @@ def slide(found: Findings, span: Span, track: Track, frame: Frame, settings: Ana
     return window
 
 
-def _rest(span: Span, track: Track, window: slice | None, settings: AnalysisSettings) -> str | None:
+def _rest(span: Span, track: Track, window: slice | None, settings: AnalysisSettings) -> tuple[FlawName, str] | None:
     """Say why nothing shows that the contact slides over a window, or None where it does."""
     if window is None:
         return None
-    way = displacement(track.position[window])
+    position = track.position[window]
+    way = displacement(position)
     step = span.torque_step / float(np.nanmean(track.normal[window]))
-    if way > max(settings.shear, settings.shear_steps * step):
-        return None
+    if np.isfinite(way):
+        where = float(np.nanmedian(np.hypot(position[:, 0], position[:, 1])))
+        if where > settings.farthest:
+            return FlawName.UNITS_IMPLAUSIBLE, (
+                f"The centre of pressure lies {where:.3g} mm from the axis, where no finger is: check the units of the "
+                "torques and the face's height; nothing shows that the contact slides, so no friction is given."
+            )
+        if way > max(settings.shear, settings.shear_steps * step):
+            return None
     moves = f"moves by {way:.2g} mm" if np.isfinite(way) else "is not known"
-    return (
+    return FlawName.NO_STEADY_SLIDING, (
         f"T/N holds steady for a while, but the centre of pressure {moves} meanwhile: nothing shows that the contact "
         "slides, and a ratio at rest is no coefficient of friction; torques in a wrong unit would look so too."
     )
@@ -75,15 +86,7 @@ def _speed_trouble(
     if moved is None:
         return name, "The centre of pressure is known at too few instants of the steady window for a speed."
     way = moved.speed * float(track.time[window.stop - 1] - track.time[window.start])
-    position = track.position[window]
-    normal = float(np.nanmean(track.normal[window]))
-    step = span.torque_step / normal
-    where = float(np.nanmedian(np.hypot(position[:, 0], position[:, 1])))
-    if where > settings.farthest:
-        return FlawName.UNITS_IMPLAUSIBLE, (
-            f"The centre of pressure lies {where:.3g} mm from the axis, where no finger is: check the units of the "
-            "torques and the face's height; no speed is given."
-        )
+    step = span.torque_step / float(np.nanmean(track.normal[window]))
     if step > settings.speed_step * way:
         return name, f"The torques come in steps that move the centre of pressure by {step:.2g} mm: no speed is told."
     if moved.error > settings.speed_error * moved.speed:

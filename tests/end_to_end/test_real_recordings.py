@@ -203,7 +203,7 @@ def test_a_wheel_has_no_normal_axis_and_no_strokes(session, name):
 
 
 def test_with_the_axis_of_its_pushes_stated_the_wheel_shows_each_push(session):
-    """Twelve pushes stand out of the second recording's Fy by eye, from 9.7 to 26 s; the last swing goes the other way."""
+    """By eye twelve pushes stand out of the second recording's Fy from 9.7 to 26 s; a last swing goes the other way."""
     _, analysis = session("pushrim_propulsion_2", normal="-y")
     assert len(analysis.strokes) == 12
     assert analysis.strokes[0].onset == pytest.approx(9.7, abs=0.1)

@@ -248,15 +248,14 @@ def test_a_normal_axis_along_which_the_finger_pulls_is_refused():
     assert names(found, "refused") == {"normal_axis_implausible"}
 
 
-def test_torques_in_the_wrong_unit_give_no_speed():
+@pytest.mark.parametrize(("factor", "flaw"), [(1000.0, "units_implausible"), (0.001, "no_steady_sliding")])
+def test_torques_in_the_wrong_unit_give_no_speed_and_no_proof_of_sliding(factor, flaw):
     raw = felt(PLAIN)
-    raw[:, 3:] *= 1000.0
+    raw[:, 3:] *= factor
     (one,) = analysed(block(T, raw), info=with_info(calibration=wide())).strokes
+    assert flaw in one.flaws
     assert one.speed is None
-    raw = felt(PLAIN)
-    raw[:, 3:] /= 1000.0
-    (one,) = analysed(block(T, raw)).strokes
-    assert one.speed is None
+    assert one.mu_dynamic is None
 
 
 def wide():
