@@ -1,0 +1,98 @@
+"""What recording costs: an hour's worth of readings at 7000 Hz written, opened, read and sealed (or `--seconds N`).
+
+Run: python benchmarks/recording.py
+"""
+
+import argparse
+import resource
+import statistics
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from drivers.calibration import Calibration
+from drivers.readings import ReadingBlock
+from drivers.transducer import TransducerInfo
+from sessions.plan import Frame, SessionPlan
+from sessions.recording import Recording, SessionWriter, provenance
+from sessions.recording.archive import problems, seal
+
+RATE = 7000
+BLOCK = 140  # readings handed over at once: 20 ms
+INFO = TransducerInfo(
+    "bench://", "bench", "bench", "0", True, RATE, RATE, Calibration("0", "counts", np.eye(6), np.ones(6), "none")
+)
+
+
+class ToldClock:
+    """A clock that is told the time."""
+
+    factor = 1.0
+    ns = 0
+
+    def now_ns(self) -> int:
+        """Return the told time [ns]."""
+        return self.ns
+
+    def sleep(self, seconds: float) -> None:
+        """Move the time on."""
+        self.ns += round(seconds * 1e9)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=int, default=3600)
+    parser.add_argument("--folder", type=Path, help="where to write; a temporary folder when left out")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory(dir=options.folder) as room:
+        measure(Path(room) / "session", options.seconds)
+
+
+def measure(folder: Path, seconds: int) -> None:
+    """Write, open, read and seal one recording."""
+    clock = ToldClock()
+    plan = SessionPlan("bench", "S00", 0, "none", (), True, Frame())
+    writer = SessionWriter.create(folder, plan, INFO, provenance(clock), clock=clock)
+    raw = np.round(np.random.default_rng(0).normal(0, 4000, (BLOCK, 6)))
+    calls: list[float] = []
+    for first in range(0, seconds * RATE, BLOCK):
+        i = np.arange(first, first + BLOCK)
+        block = ReadingBlock(i, i, i * 0, i / RATE, np.full(BLOCK, clock.ns), raw)
+        clock.sleep(BLOCK / RATE)
+        began = time.perf_counter()
+        writer.readings(block)
+        calls.append(time.perf_counter() - began)
+    began = time.perf_counter()
+    event_times: list[float] = []
+    for _ in range(50):
+        began = time.perf_counter()
+        writer.event("scored", data={"score": 1.0})
+        event_times.append(time.perf_counter() - began)
+    writer.event("ended", data={"reason": "the benchmark is over"})
+    writer.close()
+    print(f"writing: {100 * sum(calls) / seconds:.2f} % of real time, longest call {1e3 * max(calls):.0f} ms")
+    print(
+        f"an event made safe: median {1e3 * statistics.median(event_times):.1f} ms,"
+        f" most {1e3 * max(event_times):.0f} ms"
+    )
+    print(f"file: {(folder / 'session.sqlite').stat().st_size / 1e6:.0f} MB")
+    began = time.perf_counter()
+    recording = Recording.open(folder)
+    print(f"opening: {time.perf_counter() - began:.2f} s")
+    began = time.perf_counter()
+    count = len(recording.readings())
+    print(f"reading {count} readings whole: {time.perf_counter() - began:.1f} s")
+    began = time.perf_counter()
+    seal(folder)
+    print(f"sealing: {time.perf_counter() - began:.1f} s")
+    began = time.perf_counter()
+    found = problems(folder)
+    print(f"checking: {time.perf_counter() - began:.1f} s, {len(found)} problems")
+    print(f"largest memory: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3:.0f} MB")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,83 @@
+"""What the format page tells is what is written."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import get_args
+
+import h5py
+import pytest
+from recordings import rows
+from test_runner import Session
+
+from sessions.protocols.protocol import BlockOutline, Face, Protocol
+from sessions.recording.archive import seal
+from sessions.runner import LOSSES
+from sessions.steps import Event
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "session-format.md").read_text(encoding="utf-8")
+NAMED = set(re.findall(r"`([\w./-]+)`", PAGE))
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("format") / "s"
+    Session(folder).run()
+    seal(folder)
+    return folder
+
+
+@pytest.mark.parametrize("table", ["head", "blocks", "events"])
+def test_every_column_of_the_live_file_is_told(recorded, table):
+    assert f"### Table `{table}`" in PAGE
+    columns = {name for _, name, *_ in rows(recorded, f"PRAGMA table_info({table})")}
+    assert columns <= NAMED
+
+
+def test_the_live_file_has_no_other_table(recorded):
+    assert {name for (name,) in rows(recorded, "SELECT name FROM sqlite_master WHERE type='table'")} == {
+        "head",
+        "blocks",
+        "events",
+    }
+
+
+def test_every_data_set_of_the_copy_is_told(recorded):
+    found = []
+    with h5py.File(recorded / "session.h5") as copy:
+        copy.visititems(lambda name, item: found.append(name) if isinstance(item, h5py.Dataset) else None)
+        assert set(copy.attrs) <= NAMED
+    assert set(found) <= NAMED
+
+
+def test_every_kind_of_event_is_told(recorded):
+    met = {kind for (kind,) in rows(recorded, "SELECT kind FROM events")}
+    possible = {re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__).lower() for kind in get_args(Event)}
+    assert met | possible | set(LOSSES) <= NAMED
+
+
+def test_the_printed_reader_reads_a_session_with_nothing_installed(recorded, tmp_path):
+    (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.S)
+    script = tmp_path / "reader.py"
+    script.write_text(code, encoding="utf-8")
+    run = subprocess.run(
+        [sys.executable, "-I", script, recorded], capture_output=True, text=True, check=True, encoding="utf-8"
+    )
+    lines = run.stdout.splitlines()
+    assert lines[0].startswith("SIMULATED: the transducer and the subject")
+    assert lines[1] == "subject S01 protocol sensotact-friction"
+    scores = [line for line in lines if line.startswith("trial ")]
+    assert len(scores) == 10
+    readings = [line for line in lines if re.match(r"[\d.]+ ", line)]
+    assert len(readings) == rows(recorded, "SELECT sum(readings) FROM blocks")[0][0]
+    # A bias of 0.1 N with 4 mN of noise was planted, pressing being negative.
+    assert float(readings[0].split()[3]) == pytest.approx(-0.1, abs=0.03)
+
+
+def test_every_key_of_a_protocol_is_told():
+    page = (DOCS / "how-to" / "add-a-protocol.md").read_text(encoding="utf-8")
+    for prefix, kind in (("", Protocol), ("face.", Face), ("blocks.", BlockOutline)):
+        for name in kind.__dataclass_fields__:
+            assert f"`{prefix}{name}`" in page or f"[{name}]" in page
