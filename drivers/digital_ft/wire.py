@@ -1,0 +1,246 @@
+"""Modbus frames, calibration registers and stream packets of the RS-485 transducer (manual 9620-05-Digital FT, ch. 8).
+
+The manual itself was not at hand: layouts are those of a published driver that cites it. The codes of the units in a
+calibration are taken to be those of the networked box; that, too, is not verified.
+"""
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.calibration import Calibration
+from drivers.records import Records
+from drivers.transducer import SetupError
+
+Array = NDArray[np.float64]
+
+ADDRESS = 10
+READ, WRITE, START_STREAM, UNLOCK = 0x03, 0x10, 0x46, 0x6A  # function codes
+START_KEY, UNLOCK_KEY, LOCK_KEY = 0x55, 0xAA, 0x18
+MOST_REGISTERS = 64  # read at one go
+
+GAINS_AND_OFFSETS = 0x0000  # in force: six gains, then six offsets
+STATUS = 0x001D
+CALIBRATIONS = 16
+CALIBRATION_SIZE = 133  # registers
+_FIRST_CALIBRATION, _CALIBRATION_STEP = 0x00E3, 192
+
+JAM = bytes(72)  # sent into a stream ends it; at least 14 bytes are said to be needed, and their value is not verified
+
+STREAM_RATE = 7000.0  # packets a second, good to 0.5 % [Hz]
+PACKET_SIZE = 13
+STATUS_FLAG = 0x80  # in a packet: the status word is not 0
+GAUGE_AT_END = 0x100  # put into the status here: a gauge is at the end of its range, so that all six values are invalid
+
+_EXCEPTION = 0x80
+_REASONS = {1: "illegal function", 2: "illegal address", 3: "illegal value", 4: "device failure"}
+_MEANING = {
+    0: "watchdog reset",
+    1: "excitation too high",
+    2: "excitation too low",
+    3: "artificial ground out of range",
+    4: "supply too high",
+    5: "supply too low",
+    7: "EEPROM error",
+    8: "invalid configuration",
+    9: "gauge supply current too high",
+    10: "gauge supply current too low",
+    11: "thermistor too high",
+    12: "thermistor too low",
+    13: "converter reading out of range",
+}
+_FORCE = {1: 4.4482216152605, 2: 1.0, 3: 4448.2216152605, 4: 1000.0, 5: 9.80665, 6: 0.00980665}  # newtons in one
+_TORQUE = {1: 112.9848290276, 2: 1355.8179483314, 3: 1000.0, 4: 1.0, 5: 98.0665, 6: 1e6}  # newton millimetres in one
+_ORDER = (0, 3, 1, 4, 2, 5)  # of the gauges: where G0 to G5 stand in a packet
+_CALIBRATION = struct.Struct(">8s32s4s20s36fBB6fii6H6H")
+_PROOF = 6  # packets in a row that must be sound before a new place is believed
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """The transducer understood a request and will not carry it out."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class StoredCalibration:
+    """One of the calibrations the transducer keeps."""
+
+    calibration: Calibration  # raw unit: counts of the six gauges
+    part_number: str
+    calibrated: str  # when, as stored
+    gains_and_offsets: bytes  # of the gauges, as registers; to be put in force with this calibration
+
+
+def crc16(data: bytes) -> int:
+    """Return the checksum of a Modbus RTU frame (Modbus over serial line 1.02, section 6.2.2).
+
+    >>> hex(crc16(bytes.fromhex("0A 46 55")))
+    '0x9da3'
+    """
+    crc = 0xFFFF
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ (0xA001 if crc & 1 else 0)
+    return crc
+
+
+def request(function: int, data: bytes) -> bytes:
+    """Return the frame that asks for `function`."""
+    return _framed(bytes([ADDRESS, function]) + data)
+
+
+def read_registers(first: int, count: int) -> bytes:
+    """Return the request for `count` registers from `first`."""
+    return request(READ, struct.pack(">HH", first, count))
+
+
+def write_registers(first: int, registers: bytes) -> bytes:
+    """Return the request to write `registers`, two bytes each, from `first`."""
+    return request(WRITE, struct.pack(">HHB", first, len(registers) // 2, len(registers)) + registers)
+
+
+def answer_in(heard: bytes, asked: bytes) -> bytes | Refused | None:
+    """Return the data of the answer to the request `asked` wherever it lies in `heard`; None while it is not there.
+
+    For registers read that is their bytes, else what follows the function code. Raises nothing.
+    """
+    function = asked[1]
+    size, head = 5, bytes([ADDRESS, function])
+    if function == READ:
+        size, head = 5 + 2 * asked[5], bytes([ADDRESS, READ, 2 * asked[5]])
+    elif function == WRITE:
+        size, head = 8, asked[:6]
+    for frame in _frames(heard, head, size):
+        if frame != asked:  # an adapter may repeat what we send
+            return frame[3:-2] if function == READ else frame[2:-2]
+    for frame in _frames(heard, bytes([ADDRESS, function | _EXCEPTION]), 5):
+        return Refused(_REASONS.get(frame[2], f"exception {frame[2]}"))
+    return None
+
+
+def calibration_address(number: int) -> int:
+    """Return the first register of calibration `number`, 1 to 16."""
+    return _FIRST_CALIBRATION + _CALIBRATION_STEP * (number - 1)
+
+
+def parse_calibration(registers: bytes) -> StoredCalibration:
+    """Return what the registers of a calibration say. Raises SetupError, half a sentence, where it makes no sense."""
+    serial, part, _, day, *numbers = _CALIBRATION.unpack(registers)
+    basic = np.array(numbers[:36], np.float64).reshape(6, 6)
+    force, torque = _FORCE.get(numbers[36]), _TORQUE.get(numbers[37])
+    ratings = np.array(numbers[38:44], np.float64)
+    counts = numbers[44:46]
+    name = _text(serial)
+    if not name:
+        raise SetupError("holds no serial number: it is empty; choose another one")
+    if force is None or torque is None:
+        raise SetupError(f"gives units as codes {numbers[36]} and {numbers[37]}, which are unknown here")
+    units = np.repeat([force, torque], 3)
+    with np.errstate(all="ignore"):
+        matrix = basic * (units / np.repeat(np.maximum(counts, 0), 3))[:, None]
+        sound = bool(np.all(np.isfinite(matrix))) and np.linalg.matrix_rank(matrix) == 6
+    if not sound:
+        raise SetupError("holds a matrix that does not tell forces and torques apart; have the transducer calibrated")
+    rated = np.where(np.isfinite(ratings) & (ratings > 0.0), ratings, np.nan) * units
+    day_text, part_text = _text(day), _text(part)
+    source = f"registers of the transducer: {part_text}, calibrated {day_text or 'on a day not stated'}"
+    calibration = Calibration(name, "counts", matrix, rated, source)
+    return StoredCalibration(calibration, part_text, day_text, registers[2 * 121 :])
+
+
+def status_words(status: int) -> tuple[str, ...]:
+    """Return what the set bits of the status word mean.
+
+    >>> status_words(0b100010)
+    ('excitation too high', 'supply too low')
+    """
+    return tuple(_MEANING.get(bit, f"unknown bit {bit}") for bit in range(16) if status >> bit & 1)
+
+
+class StreamDecoder:
+    """Packets without any mark: their place is found, and kept, by their checksums.
+
+    A checksum of seven bits lets one wrong place in 128 pass. So a place is believed at first only when several
+    packets in a row are sound, and from then on a packet is a reading only when the next one is sound too.
+    """
+
+    def __init__(self) -> None:
+        """Start with nothing received, searching."""
+        self.malformed = 0
+        self._buffer = b""
+        self._in_step = False
+        self._skipped = 0  # bytes since the last sound packet
+
+    def feed(self, data: bytes) -> Records:
+        """Take what arrived and return every packet it completes."""
+        self._buffer += data
+        found: list[NDArray[np.uint8]] = []
+        damaged: list[NDArray[np.int64]] = []
+        while (count := len(self._buffer) // PACKET_SIZE) >= (needed := 2 if self._in_step else _PROOF):
+            packets = np.frombuffer(self._buffer, np.uint8, count * PACKET_SIZE).reshape(count, PACKET_SIZE)
+            sound = _sound(packets)
+            good = count if sound.all() else int(np.argmin(sound))
+            if good < needed:
+                self._in_step = False
+                self._skip()
+                continue
+            first = 1 if self._skipped else 0  # the one behind a break may be pieced together from two
+            broken = -(-self._skipped // PACKET_SIZE) + first
+            self.malformed += broken
+            self._skipped = 0
+            found.append(packets[first : good - 1])
+            damaged.append(np.concatenate([[broken], np.zeros(good - 2 - first, np.int64)]))
+            self._buffer = self._buffer[(good - 1) * PACKET_SIZE :]
+            self._in_step = True
+        return _records(found, damaged)
+
+    def _skip(self) -> None:
+        """Drop bytes up to the next place where the packets in the buffer may be sound."""
+        data = np.frombuffer(self._buffer, np.uint8)
+        windows = np.lib.stride_tricks.sliding_window_view(data[1:], PACKET_SIZE)
+        sound = _sound(windows)
+        skip = 1 + int(np.argmax(sound)) if sound.any() else 1 + len(windows)
+        self._skipped += skip
+        self._buffer = self._buffer[skip:]
+
+
+def _sound(packets: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Tell which of packets (n, 13) have the checksum they state."""
+    return packets[:, :12].sum(axis=1, dtype=np.uint32) & 0x7F == packets[:, 12] & 0x7F
+
+
+def _records(found: list[NDArray[np.uint8]], damaged: list[NDArray[np.int64]]) -> Records:
+    """Return sound packets as records: gauges in the order G0 to G5, the flag as status."""
+    if not found:
+        return Records.of([], [], [])
+    packets = np.concatenate(found)
+    gauges = np.ascontiguousarray(packets[:, :12]).view(">i2")[:, _ORDER].astype(np.float64)
+    at_end = np.any(np.abs(gauges + 0.5) >= 32767.0, axis=1)
+    status = (packets[:, 12] & STATUS_FLAG).astype(np.int64) + np.where(at_end, GAUGE_AT_END, 0)
+    return Records(gauges, status, np.concatenate(damaged))
+
+
+def _framed(frame: bytes) -> bytes:
+    return frame + struct.pack("<H", crc16(frame))
+
+
+def _frames(heard: bytes, head: bytes, size: int) -> Iterator[bytes]:
+    """Yield the sound frames of `size` bytes in `heard` that begin with `head`."""
+    at = heard.find(head)
+    while 0 <= at <= len(heard) - size:
+        frame = heard[at : at + size]
+        if _framed(frame[:-2]) == frame:
+            yield frame
+        at = heard.find(head, at + 1)
+
+
+def _text(field: bytes) -> str:
+    """Return stored text without its padding, and without anything that cannot be shown."""
+    plain = field.split(b"\0")[0].decode("ascii", "replace")
+    return "".join(c for c in plain if c.isprintable() and c != "\ufffd").strip()

@@ -1,0 +1,226 @@
+"""The RS-485 transducer on a pseudo-terminal.
+
+Registers, frames and packets after its manual (9620-05-Digital FT, chapter 8) as a published driver gives them, packed
+here and nowhere else. How long a jam must be, and how long the transducer is deaf after it, is not verified.
+"""
+
+import struct
+import threading
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import Clock
+from simulators.bench import Bench
+from simulators.faults import Faults
+from simulators.pseudo_terminal import PseudoTerminal
+
+Array = NDArray[np.float64]
+
+RATE = 7000  # packets a second
+COUNTS_PER_VOLT = 3000.0  # of a gauge
+_COUNTS = 1_000_000  # in one N and in one N m, of what the stored matrix gives
+_SIZE = 3_400  # registers
+_CALIBRATION = 0x00E3  # the first register of calibration 1
+_GAINS_AND_OFFSETS = (*range(1000, 1006), *range(32_000, 32_006))  # as calibration 1 wants them
+_JAM = 14  # bytes heard while streaming that end the stream
+_DEAF = 0.3  # after a jam [s]
+_START_UP = 0.2  # after power-up [s]
+_NAP = 0.005  # longest wait [real s]
+_SHORTEST_NAP = 0.001
+_BURST = 700  # packets at one go after the computer was busy
+# A published calibration of a Nano43 (FT32831), N and N mm per volt of gauge.
+_MATRIX = np.array(
+    [
+        [0.02098, -0.02876, -0.05237, 4.51544, -0.05447, -4.46284],
+        [-0.13719, -5.12368, -0.04217, 2.58695, 0.04008, 2.52214],
+        [2.97639, -0.01655, 3.01180, 0.02275, 3.00141, 0.01232],
+        [-0.80476, -23.09345, 43.58858, 12.00245, -43.41430, 11.27584],
+        [-50.56376, 0.53041, 25.49010, -20.29578, 25.13749, 20.18422],
+        [-1.25627, -38.28410, 0.53176, -37.15623, -0.42515, -37.35515],
+    ]
+)
+
+
+class DigitalFtBox:
+    """A transducer with a simulated bench behind it. Its time, and the bench's, begins when it is started.
+
+    It holds one calibration, as number 1, whose part number tells that it is simulated.
+    """
+
+    def __init__(
+        self,
+        bench: Bench,
+        clock: Clock,
+        *,
+        rate_error: float = 0.0,
+        faults: Faults | None = None,
+        streaming: bool = False,
+    ) -> None:
+        """Set up a transducer whose sampling is wrong by `rate_error` [-], perhaps left `streaming` by somebody."""
+        self._bench = bench
+        self._clock = clock
+        self._rate = RATE * (1.0 + rate_error)
+        self._faults = faults or Faults()
+        self._rated = np.array(bench.settings.rated)
+        self._gauges = np.linalg.inv(_MATRIX) * COUNTS_PER_VOLT  # counts for one N or N mm
+        self._stored = self._calibration()
+        self._closing = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._port: PseudoTerminal | None = None
+        self._origin_ns = 0
+        self._power_up(0.0)
+        self._deaf_until = 0.0
+        self._streaming_since = 0.0 if streaming else None
+
+    @property
+    def uri(self) -> str:
+        """The address to open it at; known once it is started. Pseudo-terminals carry no parity."""
+        assert self._port is not None
+        return f"digital-ft://{self._port.path}?parity=none"
+
+    def now(self) -> float:
+        """Return the box's and the bench's time [s]: 0 when it was started."""
+        return (self._clock.now_ns() - self._origin_ns) * 1e-9
+
+    def start(self) -> None:
+        """Make the port and begin to serve."""
+        self._port = PseudoTerminal("ttyDigitalFT")
+        self._origin_ns = self._clock.now_ns()
+        self._thread = threading.Thread(target=self._serve, args=(self._port,), name="simulated digital-ft box")
+        self._thread.start()
+
+    def close(self) -> None:
+        """Switch the box off and remove its port. Harmless when repeated."""
+        self._closing.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        if self._port is not None:
+            self._port.close()
+
+    def _calibration(self) -> bytes:
+        """Return the registers of calibration 1."""
+        serial = f"SIM{self._bench.seed:05d}".encode()[:8]
+        stated = np.vstack([_MATRIX[:3], _MATRIX[3:] / 1000.0]) * (_COUNTS / COUNTS_PER_VOLT)
+        ratings = np.concatenate([self._rated[:3], self._rated[3:] / 1000.0])
+        names = (
+            serial.ljust(8, b"\0") + b"SIMULATED SI-36-0.5".ljust(32, b"\0") + b"DIG\0" + b"2026/11/21".ljust(20, b"\0")
+        )
+        numbers = struct.pack(">36f", *stated.ravel()) + bytes([2, 3]) + struct.pack(">6f", *ratings)
+        return names + numbers + struct.pack(">ii12H", _COUNTS, _COUNTS, *_GAINS_AND_OFFSETS)
+
+    def _power_up(self, now: float) -> None:
+        """Forget what is not kept over power-off."""
+        self._on = True
+        self._unlocked = False
+        self._registers = bytearray(2 * _SIZE)
+        self._registers[2 * _CALIBRATION : 2 * _CALIBRATION + len(self._stored)] = self._stored
+        self._heard = bytearray()
+        self._streaming_since: float | None = None
+        self._sent = 0  # packets of this stream
+        self._jammed_by = 0  # bytes heard while streaming
+        self._deaf_until = now + _START_UP
+        self._last = bytes(13)
+
+    def _serve(self, port: PseudoTerminal) -> None:
+        """Be the transducer until closed."""
+        while not self._closing.is_set():
+            now = self.now()
+            if self._faults.active("unplug", now):
+                port.unplug()
+                self._closing.wait(_NAP)
+                continue
+            port.plug_in()
+            if self._faults.active("reboot", now):
+                self._on = False
+                port.heard(_NAP)
+                continue
+            if not self._on:
+                self._power_up(now)
+            self._send_due(port, now)
+            wait = _NAP if self._streaming_since is None else _SHORTEST_NAP
+            heard = port.heard(wait)
+            if self._streaming_since is not None:
+                self._jammed_by += len(heard)
+                if self._jammed_by >= _JAM:
+                    self._streaming_since = None
+                    self._deaf_until = self.now() + _DEAF
+            elif self.now() >= self._deaf_until:
+                self._heard += heard
+                port.say(self._answers())
+
+    def _send_due(self, port: PseudoTerminal, now: float) -> None:
+        """Send the packets that are due, and whatever was delayed until now."""
+        if self._streaming_since is None:
+            return
+        due = int((now - self._streaming_since) * self._rate)
+        if due - self._sent > _BURST:  # the computer was busy for long: a line would have carried on meanwhile
+            self._sent = due - _BURST
+        numbers = np.arange(self._sent, due, dtype=np.float64)
+        times: Array = self._streaming_since + numbers / self._rate
+        self._sent = due
+        port.say(b"".join(self._faults.route(now, zip(times.tolist(), self._packets(times), strict=True))))
+
+    def _packets(self, times: Array) -> list[bytes]:
+        """Return a packet for each of `times` (n,) [s]."""
+        gauges = np.rint(self._bench.wrench(times) @ self._gauges.T)
+        forced = np.array([self._faults.active("saturate", time) for time in times.tolist()], bool)
+        gauges[forced] = 32767
+        over = np.any(np.abs(gauges) >= 32767, axis=1)
+        gauges = np.clip(gauges, -32768, 32767)[:, [0, 2, 4, 1, 3, 5]].astype(">i2")
+        packets: list[bytes] = []
+        for time, six, above in zip(times.tolist(), gauges, over.tolist(), strict=True):
+            if not self._faults.active("stall", time):
+                body = six.tobytes()
+                self._last = body + bytes([sum(body) & 0x7F | (0x80 if above else 0)])
+            packets.append(self._last)
+        return packets
+
+    def _answers(self) -> bytes:
+        """Return the answers to all whole requests heard; what is none is forgotten."""
+        answers = b""
+        while len(self._heard) >= 5:
+            function = self._heard[1]
+            long = {0x03: 8, 0x10: 9 + self._heard[6] if len(self._heard) > 6 else 300}.get(function, 5)
+            if len(self._heard) < long:
+                break
+            frame = bytes(self._heard[:long])
+            if frame[0] != 0x0A or _crc(frame[:-2]) != frame[-2:]:
+                self._heard.clear()
+                break
+            del self._heard[:long]
+            answer = b"\x0a" + self._carried_out(function, frame[2:-2])
+            answers += answer + _crc(answer)
+        return answers
+
+    def _carried_out(self, function: int, data: bytes) -> bytes:
+        """Carry out one request; return function code and data of the answer."""
+        if function == 0x46 and data == b"\x55":
+            self._streaming_since, self._sent, self._jammed_by = self.now(), 0, 0
+            return b"\x46\x01"
+        if function == 0x6A and data in (b"\xaa", b"\x18"):
+            self._unlocked = data == b"\xaa"
+            return b"\x6a\x01"
+        if function not in (0x03, 0x10):
+            return bytes([function | 0x80, 1])
+        first, count = struct.unpack(">HH", data[:4])
+        place = slice(2 * first, 2 * (first + count))
+        if not (1 <= count <= 64 and first + count <= _SIZE):
+            return bytes([function | 0x80, 2])
+        if function == 0x03:
+            return bytes([3, 2 * count]) + bytes(self._registers[place])
+        if not self._unlocked or len(data) != 5 + 2 * count:
+            return bytes([0x90, 4])
+        self._registers[place] = data[5:]
+        return b"\x10" + data[:4]
+
+
+def _crc(frame: bytes) -> bytes:
+    """Return the two bytes that close a Modbus RTU frame."""
+    crc = 0xFFFF
+    for byte in frame:
+        crc ^= byte
+        for _ in range(8):
+            crc = (crc >> 1) ^ 0xA001 if crc & 1 else crc >> 1
+    return crc.to_bytes(2, "little")
