@@ -38,6 +38,7 @@ def seal(folder: Path) -> None:
     recording = Recording.open(folder)
     new = folder / f".{SEALED_FILE}.part"
     try:
+        _clear_unfinished(folder)
         write_copy(recording, new)
         put_in_place(new, folder / SEALED_FILE)
         unequal = next(differences(recording), None)
@@ -64,6 +65,14 @@ def problems(folder: Path) -> tuple[str, ...]:
     if not is_sealed(folder):
         return (*recording.losses, f"the session was never sealed: there is no {MANIFEST_FILE}")
     return (*changed_files(folder), *recording.losses, *differences(recording))
+
+
+def _clear_unfinished(folder: Path) -> None:
+    """Remove what an earlier sealing left that did not come to its end: copies, made anew from the live file."""
+    for name in (SEALED_FILE, DESCRIPTION_FILE):
+        if (folder / name).exists():
+            (folder / name).chmod(0o644)  # some systems remove no read-only file
+            (folder / name).unlink()
 
 
 def _fold_log(crashed: Recording) -> None:

@@ -211,6 +211,27 @@ def test_a_disk_that_is_full_while_sealing_leaves_the_live_file_whole(tmp_path, 
     assert (folder / "session.sqlite").read_bytes() == before
 
 
+@pytest.mark.parametrize("step", ["write_copy", "put_in_place", "differences", "write_whole", "list_in_manifest"])
+def test_sealing_that_was_cut_short_at_any_step_is_begun_anew(tmp_path, monkeypatch, step):
+    from sessions.recording import archive
+
+    folder = ended(tmp_path / "s")
+
+    class Killed(BaseException):
+        """Stands for the end of the process."""
+
+    def killed(*_):
+        raise Killed
+
+    monkeypatch.setattr(archive, step, killed)
+    with pytest.raises(Killed):
+        seal(folder)
+    assert problems(folder) == ("the session was never sealed: there is no MANIFEST.json",)
+    monkeypatch.undo()
+    seal(folder)
+    assert problems(folder) == ()
+
+
 # ---- what checking finds
 
 

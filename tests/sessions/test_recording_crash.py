@@ -3,7 +3,6 @@
 import json
 import os
 import random
-import resource
 import shutil
 import signal
 import time
@@ -16,6 +15,7 @@ from test_runner import Session
 from sessions.recording import Recording, RecordingError
 from sessions.recording.torn import log_tail
 
+resource = pytest.importorskip("resource", reason="limits a file's size, which needs POSIX")
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="kills a process of its own, which needs fork")
 
 
