@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from drivers.address import Address, parse_address
+from drivers.address import Address, AddressError, parse_address
 from drivers.clock import Clock
 from drivers.links import UdpLink
 from drivers.net_ft import handshake
@@ -78,4 +78,4 @@ def _driver(address: Address) -> Driver:
         if driver.name == address.scheme:
             return driver
     known = ", ".join(f"{driver.name}://" for driver in DRIVERS)
-    raise SetupError(f"{address.uri}: there is no driver {address.scheme!r}; addresses begin with {known}")
+    raise AddressError(f"{address.uri}: there is no driver {address.scheme!r}; addresses begin with {known}")

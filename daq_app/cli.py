@@ -1,0 +1,131 @@
+"""The command line: verbs, exit codes, and the one sentence a failure is told in."""
+
+import argparse
+import importlib
+import sys
+import traceback
+from types import ModuleType
+
+from daq_app.console import Console
+
+DONE, FAILED, WRONG, FLAWED, STOPPED = 0, 1, 2, 3, 130
+
+# Verb to module and to what it does. A verb's module is imported only when it is the one asked for.
+VERBS = {
+    "demo": "run the whole study on the simulated transducer and simulated subjects",
+    "devices": "list the transducers that can be reached, or probe one",
+    "run": "run one session",
+    "import": "make a session folder of a foreign recording",
+    "analyse": "find the strokes of a session and their friction",
+    "predict": "predict the receptor's strain-energy density for each trial",
+    "solve": "run the solver on a scene file",
+    "report": "write a session's report as one page",
+    "simulate": "serve the other end of a wire, to try a driver without hardware",
+    "verify": "check every checksum of a session and recompute every derived number",
+}
+
+
+class WrongValue(Exception):
+    """The command line or a value in a file was wrong: exit code 2."""
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command line and return its exit code. Never raises, save for a broken interpreter."""
+    debug = "--debug" in arguments
+    try:
+        return _dispatch(arguments)
+    except KeyboardInterrupt:
+        return _said("stopped", STOPPED)
+    except BrokenPipeError:
+        return FAILED  # whoever read our output has gone; there is nobody to tell
+    except Exception as error:  # noqa: BLE001  the last resort: no traceback reaches a user
+        if debug:
+            traceback.print_exc()
+        return _said(*_failure(error))
+
+
+def _dispatch(arguments: list[str]) -> int:
+    if not arguments or arguments[0] in {"-h", "--help"}:
+        _overview().print_help(sys.stdout if arguments else sys.stderr)
+        return DONE if arguments else WRONG
+    name, *rest = arguments
+    if name not in VERBS:
+        return _said(f"there is no verb '{name}': 'daq-app --help' lists them", WRONG)
+    verb = importlib.import_module(f"daq_app.verbs.{name.replace('import', 'import_')}")
+    try:
+        options = _parser(name, verb).parse_args(_joined(rest))
+    except SystemExit as leaving:  # argparse has printed its help (0) or its complaint (2)
+        return int(leaving.code or 0)
+    return verb.run(options, Console(as_json=options.json))
+
+
+def _joined(arguments: list[str]) -> list[str]:
+    """Join --normal to its value, which may begin with a hyphen and would be taken for an option.
+
+    >>> _joined(["a.csv", "--normal", "-z", "--json"])
+    ['a.csv', '--normal=-z', '--json']
+    """
+    if "--normal" not in arguments[:-1]:
+        return arguments
+    at = arguments.index("--normal")
+    return [*arguments[:at], f"--normal={arguments[at + 1]}", *arguments[at + 2 :]]
+
+
+def _overview() -> argparse.ArgumentParser:
+    width = max(map(len, VERBS))
+    verbs = "\n".join(f"  {name:<{width}}  {does}" for name, does in VERBS.items())
+    return argparse.ArgumentParser(
+        prog="daq-app",
+        usage="daq-app VERB [options]",
+        description="Friction psychophysics: the experiment, the transducer, the finite-element finger.",
+        epilog=f"verbs:\n{verbs}\n\n'daq-app VERB --help' explains one and shows an example.\n"
+        "exit codes: 0 done, 1 could not be done, 2 wrong command line or value in a file, "
+        "3 done with named losses or flaws, 130 stopped",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+
+
+def _parser(name: str, verb: ModuleType) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=f"daq-app {name}",
+        description=verb.__doc__,
+        epilog=f"example:\n  {verb.EXAMPLE}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    verb.add_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON document on stdout, and nothing else there")
+    parser.add_argument("--debug", action="store_true", help="show the traceback of a failure")
+    return parser
+
+
+def _failure(error: Exception) -> tuple[str, int]:
+    """Return the sentence and the exit code for what went wrong."""
+    # Imported here: only a failure has to pay for every room.
+    from daq_app.wiring import TimetableError
+    from drivers.address import AddressError
+    from drivers.transducer import DeviceFault, LinkLost, SetupError
+    from sessions.exports.html import ReportError
+    from sessions.import_csv import ImportRefused
+    from sessions.recording import RecordingError
+    from sessions.toml_file import SettingsError
+    from solver.failures import SolveFailure
+    from solver.scene import SceneError
+
+    sentence = " ".join(str(error).split())
+    if isinstance(error, WrongValue | SettingsError | SceneError | AddressError | TimetableError):
+        return sentence, WRONG
+    if isinstance(
+        error, SetupError | DeviceFault | LinkLost | RecordingError | ImportRefused | ReportError | SolveFailure
+    ):
+        return sentence, FAILED
+    if isinstance(error, OSError):
+        if error.filename is None or error.strerror is None:
+            return sentence, FAILED
+        return f"{error.filename}: {error.strerror.lower()}", FAILED
+    return f"unexpected {type(error).__name__} ({sentence}); run again with --debug and report what it shows", FAILED
+
+
+def _said(sentence: str, code: int) -> int:
+    print(f"daq-app: {sentence}", file=sys.stderr)
+    return code

@@ -1,0 +1,44 @@
+"""One session from plan to sealed folder: what `run` and `demo` share."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from daq_app.console import Console
+from drivers.clock import Clock
+from drivers.transducer import Transducer
+from sessions.plan import SessionPlan
+from sessions.recording import SessionWriter, Setting, provenance
+from sessions.recording.archive import seal
+from sessions.runner import Operator, SessionEnd, Status, run_session
+
+
+def conduct(
+    plan: SessionPlan,
+    folder: Path,
+    operator: Operator,
+    transducer: Transducer | None,
+    clock: Clock,
+    console: Console,
+    *,
+    subject_simulated: bool,
+    settings: Sequence[Setting] = (),
+) -> SessionEnd:
+    """Run the session into `folder` and seal it, however it ended.
+
+    Raises RecordingError when the folder cannot be used or the disk takes no more.
+    """
+    info = None if transducer is None else transducer.info
+    came_from = provenance(clock, settings)
+    writer = SessionWriter.create(folder, plan, info, came_from, subject_simulated=subject_simulated, clock=clock)
+
+    def shown(status: Status) -> None:
+        done = 0.0 if status.trial is None else (status.trial - 1) / status.trials
+        console.progress(done, f"{plan.subject}: {status.state}, {status.safe.readings} readings safe")
+
+    end = run_session(plan, writer, operator, transducer, clock, progress=shown if subject_simulated else _silent)
+    seal(folder)
+    return end
+
+
+def _silent(_: Status) -> None:
+    """Show nothing: people at a terminal are being asked things there."""

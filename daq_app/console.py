@@ -1,0 +1,80 @@
+"""What a verb says to people and to scripts, kept apart."""
+
+import json
+import sys
+import time
+from collections.abc import Mapping
+from typing import Any, TextIO
+
+
+class Console:
+    """Text for people on stdout, or one JSON document there and everything else on stderr."""
+
+    def __init__(self, *, as_json: bool, out: TextIO | None = None, err: TextIO | None = None) -> None:
+        """Speak to people, or with `as_json` to scripts."""
+        self.as_json = as_json
+        self._out = out or sys.stdout
+        self._err = err or sys.stderr
+        self._shown = 0.0
+        self._line_open = False
+
+    def say(self, text: str = "") -> None:
+        """Print a line for people; left out where a script reads."""
+        if not self.as_json:
+            self._end_progress()
+            print(text, file=self._out, flush=True)
+
+    def note(self, text: str) -> None:
+        """Print a line on stderr: progress, warnings, losses."""
+        self._end_progress()
+        print(text, file=self._err, flush=True)
+
+    def result(self, document: Mapping[str, Any]) -> None:
+        """Print the one JSON document; left out where a person reads. NaN and infinity are refused by the format."""
+        if self.as_json:
+            self._end_progress()
+            print(json.dumps(document, indent=1, allow_nan=False), file=self._out, flush=True)
+
+    def progress(self, done: float, text: str) -> None:
+        """Show how far a long job is (`done` from 0 to 1): a moving line on a terminal, else now and then a new one."""
+        now = time.monotonic()
+        terminal = self._err.isatty()
+        if now - self._shown < (0.1 if terminal else 2.0) and done < 1:
+            return
+        self._shown = now
+        line = f"{100 * done:3.0f} %  {text}"
+        print(f"\r\x1b[K{line}" if terminal else line, end="" if terminal else "\n", file=self._err, flush=True)
+        self._line_open = terminal
+
+    def _end_progress(self) -> None:
+        if self._line_open:
+            print(file=self._err)
+            self._line_open = False
+
+
+def table(rows: list[list[str]], *, head: list[str]) -> str:
+    """Return rows as aligned columns; the first column to the left, the others to the right.
+
+    >>> print(table([["slip 0", "1.5"], ["slip 100", "12.0"]], head=["surface", "N"]))
+    surface      N
+    slip 0     1.5
+    slip 100  12.0
+    """
+    lines = [head, *rows]
+    widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
+    aligned = [
+        "  ".join(c.ljust(w) if i == 0 else c.rjust(w) for i, (c, w) in enumerate(zip(line, widths, strict=True)))
+        for line in lines
+    ]
+    return "\n".join(text.rstrip() for text in aligned)
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a number with so many significant digits, and a dash where there is none.
+
+    >>> number(0.0052573, 3), number(None), number(12.0, 3)
+    ('0.00526', '–', '12.0')
+    """
+    if value is None:
+        return "–"
+    return f"{value:#.{digits}g}".rstrip(".")

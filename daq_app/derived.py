@@ -1,0 +1,49 @@
+"""Numbers made from a session: made, kept in its folder, and made once more to verify them."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from daq_app.console import Console
+from sessions.analysis import Analysis, analyse
+from sessions.prediction import PredictionOptions, SessionPrediction, predict
+from sessions.recording import Recording, RecordingError
+from sessions.recording.derived import store_derived
+from sessions.toml_file import from_table
+
+ANALYSIS = "analysis.json"
+PREDICTION = "prediction.json"
+
+
+def analysed(recording: Recording, console: Console) -> Analysis:
+    """Return the analysis of a session, and keep it in the session's folder."""
+    analysis = analyse(recording)
+    _keep(recording, ANALYSIS, analysis.to_dict(), console)
+    return analysis
+
+
+def predicted(
+    recording: Recording, analysis: Analysis, console: Console, options: PredictionOptions | None = None
+) -> SessionPrediction:
+    """Return what the model predicts for a session, and keep it in the session's folder. Raises as `predict` does."""
+
+    def shown(part: float) -> bool:
+        console.progress(part, "predicting")
+        return True
+
+    prediction = predict(analysis, recording.plan, options, shown)
+    _keep(recording, PREDICTION, prediction.to_dict(), console)
+    return prediction
+
+
+def predicted_again(recording: Recording, analysis: Analysis, stored: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the prediction made once more, with the options stored beside it. Raises SettingsError where damaged."""
+    options = from_table(stored.get("options", {}), PredictionOptions, PREDICTION)
+    return predict(analysis, recording.plan, options).to_dict()
+
+
+def _keep(recording: Recording, name: str, document: Mapping[str, Any], console: Console) -> None:
+    """Store a document in the session's folder; a folder that cannot be written is named, and nothing fails."""
+    try:
+        store_derived(recording.folder, name, document)
+    except RecordingError as error:
+        console.note(f"not kept: {error}")

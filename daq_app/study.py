@@ -1,0 +1,81 @@
+"""The paper's study on simulated people: ten subjects score ten surfaces, one repeats the strokes on a transducer."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from daq_app.conduct import conduct
+from daq_app.console import Console
+from daq_app.wiring import Connected, SimulatedPeople, connected
+from drivers.clock import Clock
+from sessions.protocols import plan, protocol
+from sessions.recording import Recording, Setting
+from sessions.report import Planted
+
+PROTOCOL = "sensotact-friction"
+SUBJECTS = 10
+STROKING = 3  # the subject who strokes on the transducer
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """Where the visits lie, and what was planted in the one with forces."""
+
+    scored: tuple[Path, ...]  # a folder a subject
+    stroked: Path
+    planted: tuple[Planted, ...]  # a row a trial
+    readings: int
+    lost: int
+
+
+def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Study:
+    """Run every visit into a folder of its own below `out`. The same seed gives the same people and surfaces.
+
+    Raises RecordingError where `out` cannot be used.
+    """
+    chosen = protocol(PROTOCOL)
+    scored: list[Path] = []
+    for number in range(1, SUBJECTS + 1):
+        subject = f"S{number:02d}"
+        folder = out / f"{subject}-scores"
+        people = SimulatedPeople(_seed(seed, number), clock)
+        planned = plan(chosen, subject, _seed(seed, number), forces=False)
+        conduct(planned, folder, people, None, clock, console, subject_simulated=True, settings=[_told(seed)])
+        scored.append(folder)
+    subject = f"S{STROKING:02d}"
+    folder = out / f"{subject}-forces"
+    with connected(f"sim:?seed={seed}&rate=200", clock) as bench:
+        people = SimulatedPeople(_seed(seed, STROKING), clock, bench)
+        planned = plan(chosen, subject, _seed(seed, STROKING) + 1, frame=bench.frame)
+        end = conduct(
+            planned,
+            folder,
+            people,
+            bench.transducer,
+            clock,
+            console,
+            subject_simulated=True,
+            settings=[_told(seed)],
+        )
+        planted = _planted(bench, Recording.open(folder))
+    return Study(tuple(scored), folder, planted, end.readings, end.health.lost)
+
+
+def _seed(study: int, subject: int) -> int:
+    """Return a seed of one subject's own."""
+    return (study * 100 + subject) % 2**31
+
+
+def _told(seed: int) -> Setting:
+    return Setting("study seed", seed, "", "set")
+
+
+def _planted(bench: Connected, recording: Recording) -> tuple[Planted, ...]:
+    """Return what the bench planted, trial by trial."""
+    strokes = {} if bench.bench is None else {(s.surface.descriptor, s.surface.index): s for s in bench.bench.planted()}
+    rows: list[Planted] = []
+    for record in recording.trials:
+        stimulus = record.trial.stimulus
+        stroke = strokes.get((stimulus.descriptor, stimulus.index))
+        if stroke is not None:
+            rows.append(Planted(record.trial.number, stroke.mu, stroke.tau_max, stroke.speed, stroke.direction))
+    return tuple(rows)

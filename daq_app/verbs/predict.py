@@ -1,0 +1,66 @@
+"""Predict the strain-energy density at the receptor for each trial of a session, with its error estimate.
+
+Beside it stand the model's force times the finger's width, the measured force, the depth at which they would match, and
+the same press slid the other way.
+"""
+
+import argparse
+from pathlib import Path
+
+from daq_app.console import Console, number, table
+from daq_app.derived import analysed, predicted
+from sessions.prediction import PredictionOptions
+from sessions.recording import Recording
+from sessions.toml_file import load_toml
+from solver.scene import Scene
+
+EXAMPLE = "daq-app predict recordings/P07 --tau as-printed"
+HEAD = ["trial", "surface", "mu", "tau_max [kPa]", "SED [kPa]", "error", "model N [N]", "measured [N]", "match [mm]"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the session and what may be asked of the model."""
+    parser.add_argument("session", type=Path, metavar="SESSION")
+    parser.add_argument("--kinematics", choices=["small"], default="small", help="small strain (the paper's)")
+    parser.add_argument(
+        "--tau",
+        choices=["computed", "as-printed"],
+        default="computed",
+        help="reading of the traction bound: force over area, or a hundredth of it, as the paper's tables are headed",
+    )
+    parser.add_argument("--scene", type=Path, metavar="FILE", help="scene file with another finger")
+    parser.add_argument("--indentation", type=float, metavar="MM", help="instead of each block's own")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Predict, keep the result in the session's folder and print it."""
+    asked = PredictionOptions(
+        tau_reading=options.tau,
+        scene=None if options.scene is None else load_toml(options.scene, Scene),
+        indentation=options.indentation,
+        kinematics=options.kinematics,
+    )
+    recording = Recording.open(options.session)
+    prediction = predicted(recording, analysed(recording, console), console, asked)
+    console.result(prediction.to_dict())
+    if recording.simulated_sentence:
+        console.say(recording.simulated_sentence)
+    rows = [
+        [
+            str(row.trial or (row.stroke or 0) + 1),
+            "–" if row.stimulus is None else f"{row.stimulus.descriptor} {row.stimulus.index}",
+            number(row.mu),
+            number(None if row.tau_max is None else row.tau_max * 1e3),
+            number(None if row.sed is None else row.sed * 1e3, 4),
+            "–" if row.error_estimate is None else f"{100 * row.error_estimate:.2g} %",
+            number(row.normal_force),
+            number(row.measured_normal),
+            number(row.matching_depth),
+        ]
+        for row in prediction.trials
+    ]
+    console.say(table(rows, head=HEAD) if rows else "nothing to predict: no forces were recorded")
+    for row in prediction.trials:
+        for reason in dict.fromkeys(row.reasons.values()):
+            console.say(f"{row.trial or (row.stroke or 0) + 1}: {reason}")
+    return 3 if any(row.sed is None for row in prediction.trials) else 0

@@ -1,0 +1,41 @@
+"""Write a session's report as one self-contained page: scores, strokes, predictions, and how they agree.
+
+Scores of further visits (other subjects, or this one without a transducer) are joined with --scores.
+"""
+
+import argparse
+from pathlib import Path
+
+from daq_app.console import Console
+from daq_app.derived import analysed, predicted
+from sessions.recording import Recording
+
+EXAMPLE = "daq-app report recordings/P07 -o P07.html --scores recordings/P01 recordings/P02"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the session, the page and further scores."""
+    parser.add_argument("session", type=Path, metavar="SESSION")
+    parser.add_argument("-o", "--out", type=Path, metavar="FILE.html", help="the page (SESSION/report.html)")
+    parser.add_argument("--scores", type=Path, nargs="+", default=[], metavar="SESSION", help="further visits")
+    parser.add_argument("--figures", type=Path, metavar="DIR", help="also write every picture as SVG, its data as CSV")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Analyse, predict and write the page."""
+    # Imported here: drawing is slow to load, and what is wrong with the session should be said before.
+    recording = Recording.open(options.session)
+    visits = [Recording.open(folder) for folder in options.scores]
+    analysis = analysed(recording, console)
+    prediction = predicted(recording, analysis, console)
+    from sessions.exports.html import write_figures, write_report
+    from sessions.report import findings, score_table
+
+    report = findings(recording, analysis, prediction, [score_table(visit) for visit in visits])
+    page = options.out or options.session / "report.html"
+    console.progress(0.9, "drawing")
+    write_report(report, page)
+    pictures = write_figures(report, options.figures) if options.figures else ()
+    console.result({"page": str(page), "pictures": [str(path) for path in pictures], "flaws": len(report.flaws)})
+    console.say(f"{page}{' (SIMULATED)' if report.simulated else ''}")
+    return 3 if analysis.flaws else 0

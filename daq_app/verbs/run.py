@@ -1,0 +1,97 @@
+"""Run one session: the plan is made from a protocol and a seed, everything is recorded as it happens, then sealed.
+
+Experimenter and subject answer at this terminal, or are simulated (on the simulated bench only).
+"""
+
+import argparse
+import secrets
+from contextlib import nullcontext
+from dataclasses import asdict, replace
+from datetime import datetime
+from pathlib import Path
+
+from daq_app.cli import DONE, FLAWED, WrongValue
+from daq_app.conduct import conduct
+from daq_app.console import Console
+from daq_app.terminal import Terminal
+from daq_app.wiring import SimulatedPeople, connected
+from drivers.clock import PacedClock, RealClock
+from sessions.plan import Frame
+from sessions.protocols import plan, protocol
+from sessions.recording import Setting
+
+EXAMPLE = "daq-app run sensotact-friction --device sim:?seed=7 --subject P07 --headless --simulate-subject 7 --pace 20"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare protocol, device, people and folder."""
+    parser.add_argument(
+        "protocol", metavar="PROTOCOL", help="a built-in one such as sensotact-friction, or a TOML file"
+    )
+    device = parser.add_mutually_exclusive_group(required=True)
+    device.add_argument("--device", metavar="URI", help="the transducer, e.g. sim: or net-ft://192.168.1.1")
+    device.add_argument("--scores-only", action="store_true", help="a visit without a transducer")
+    parser.add_argument("--subject", required=True, metavar="CODE", help="a code, never a name")
+    parser.add_argument("--seed", type=int, help="of the stimulus order (a new one, recorded, unless given)")
+    parser.add_argument("--headless", action="store_true", help="no window: answers at the terminal, or simulated")
+    parser.add_argument("--simulate-subject", type=int, metavar="SEED", help="simulated people")
+    parser.add_argument("--pace", type=float, default=1.0, help="told seconds a real second, simulated people only (1)")
+    parser.add_argument("--height", type=float, metavar="MM", help="of the stimulus's face above the sensor's origin")
+    parser.add_argument("--normal", choices=["+x", "-x", "+y", "-y", "+z", "-z"], help="axis along which pressing is +")
+    parser.add_argument("--contact-area", type=float, metavar="MM2", help="of finger and surface, for tau_max")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="the session's folder (one below recordings/)")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Run the session and say where it lies."""
+    simulated_bench = options.device is not None and options.device.startswith("sim:")
+    _refuse_mixtures(options, simulated_bench=simulated_bench)
+    chosen = protocol(options.protocol)
+    seed = secrets.randbelow(2**31) if options.seed is None else options.seed
+    planned = plan(
+        chosen,
+        options.subject,
+        seed,
+        forces=options.device is not None,
+        contact_area=options.contact_area,
+    )
+    clock = RealClock() if options.pace == 1.0 else PacedClock(options.pace)
+    stamp = datetime.now().strftime("%Y%m%dT%H%M%S")
+    folder = options.out or Path("recordings") / f"{options.subject}_{planned.protocol}_{stamp}"
+    with connected(options.device, clock) if options.device else nullcontext() as bench:
+        frame = _frame(options, planned.frame if bench is None else bench.frame or planned.frame)
+        planned = replace(planned, frame=frame)
+        people = (
+            Terminal(forces=planned.forces)
+            if options.simulate_subject is None
+            else SimulatedPeople(options.simulate_subject, clock, bench)
+        )
+        end = conduct(
+            planned,
+            folder,
+            people,
+            None if bench is None else bench.transducer,
+            clock,
+            console,
+            subject_simulated=options.simulate_subject is not None,
+            settings=[Setting("seed", seed, "", "default" if options.seed is None else "set")],
+        )
+    console.result({"session": str(folder), "end": asdict(end), "seed": seed})
+    console.say(f"{folder}: {end.reason}; {end.readings} readings, {end.health.lost} lost")
+    return DONE if end.complete and not end.health.lost else FLAWED
+
+
+def _refuse_mixtures(options: argparse.Namespace, *, simulated_bench: bool) -> None:
+    if options.simulate_subject is not None and not (simulated_bench or options.scores_only):
+        raise WrongValue("--simulate-subject strokes the simulated bench only: give --device sim: or --scores-only")
+    if options.pace != 1.0 and not (options.simulate_subject is not None and 0.1 <= options.pace <= 200):
+        raise WrongValue(f"--pace {options.pace:g} is not allowed: 0.1 to 200, and only with --simulate-subject")
+
+
+def _frame(options: argparse.Namespace, stated: Frame) -> Frame:
+    """Return the frame as stated by bench or protocol, save for what the command line states."""
+    if options.normal is not None:
+        stated = replace(stated, normal=options.normal, normal_origin="set")
+    if options.height is not None:
+        stated = replace(stated, height=options.height, height_origin="set")
+    return stated

@@ -1,0 +1,53 @@
+"""Check every checksum of a session, and make every number that was derived from it once more.
+
+Exit code 0: whole; 3: readable, with what is lost or differs named; 1: unreadable.
+"""
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from daq_app.console import Console
+from daq_app.derived import ANALYSIS, PREDICTION, predicted_again
+from sessions.analysis import analyse
+from sessions.recording import Recording
+from sessions.recording.archive import problems
+from sessions.recording.derived import load_derived
+from sessions.verification import MADE_BY, differences, told
+
+EXAMPLE = "daq-app verify recordings/P07"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the session folder."""
+    parser.add_argument("session", type=Path, metavar="SESSION")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Verify and tell."""
+    folder: Path = options.session
+    found = list(problems(folder))
+    recording = Recording.open(folder)
+    checked = ["files"]
+    analysis = None
+    for name in (ANALYSIS, PREDICTION):
+        stored = load_derived(folder, name)
+        if stored is None:
+            continue
+        console.progress(0.5, f"making {name} again")
+        analysis = analysis or analyse(recording)
+        fresh = analysis.to_dict() if name == ANALYSIS else predicted_again(recording, analysis, stored)
+        changed = told(list(differences(stored, json.loads(json.dumps(fresh)), name)))
+        if changed:
+            found += [*changed, f"{name} was made by {_versions(stored)}"]
+        checked.append(name)
+    console.result({"session": str(folder), "checked": checked, "problems": found})
+    for sentence in found:
+        console.say(sentence)
+    console.say(f"{folder}: {'whole' if not found else 'readable, with the above'} ({', '.join(checked)} checked)")
+    return 3 if found else 0
+
+
+def _versions(stored: dict[str, Any]) -> str:
+    return ", ".join(f"{name} {version}" for name, version in stored.get(MADE_BY, {}).items())

@@ -1,0 +1,144 @@
+"""Builds real or simulated parts; the only file that knows the simulators."""
+
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+from drivers.address import check_options, parse_address
+from drivers.catalog import open_transducer
+from drivers.clock import Clock
+from drivers.transducer import SetupError, Transducer
+from sessions.plan import Frame, Trial
+from sessions.steps import (
+    AskBegin,
+    AskFinish,
+    AskMount,
+    AskScore,
+    AskStroke,
+    Begin,
+    Command,
+    Event,
+    Finish,
+    Scored,
+    StimulusMounted,
+    StrokeDone,
+)
+from simulators.bench import Bench
+from simulators.net_ft_box import NetFtBox
+from simulators.serving import serve_net_ft
+from simulators.subject import SimulatedSubject
+from simulators.surface import Surface, paper_surfaces
+from simulators.timetable import TimetableError
+
+__all__ = ["Connected", "SimulatedPeople", "TimetableError", "connected", "planted_surface", "serve_net_ft"]
+
+SIMULATED = "sim"
+JUDGING = 0.8  # from lift to score [s]; an unloaded stretch in which drift shows
+_OPTIONS = frozenset({"seed", "rate"})
+
+
+@dataclass(frozen=True, slots=True)
+class Connected:
+    """An opened transducer, and the bench behind it where that is simulated in this process."""
+
+    transducer: Transducer
+    bench: Bench | None = None
+    bench_now: Callable[[], float] | None = None  # the bench's time [s]
+
+    @property
+    def frame(self) -> Frame | None:
+        """How a simulated bench's axes lie to its face; None for a real one, which cannot tell."""
+        return None if self.bench is None else Frame("-z", "set", self.bench.settings.height, "set")
+
+
+@contextmanager
+def connected(uri: str, clock: Clock) -> Generator[Connected]:
+    """Open the transducer at `uri` and close it in any case.
+
+    `sim:?seed=7&rate=200` is the simulated bench: a box on loopback, read by the very driver a real box is read by.
+    Raises SetupError or LinkLost as the driver does.
+    """
+    address = parse_address(uri)
+    if address.scheme != SIMULATED:
+        transducer = open_transducer(uri, clock)
+        try:
+            yield Connected(transducer)
+        finally:
+            transducer.close()
+        return
+    check_options(address, _OPTIONS)
+    bench = Bench(address.number("seed", 0, 0, 2**31 - 1))
+    box = NetFtBox(bench, clock, rate=address.number("rate", 200, 1, 7000))
+    box.start()
+    try:
+        with connected(box.uri, clock) as inner:
+            yield Connected(inner.transducer, bench, box.now)
+    finally:
+        box.close()
+
+
+class SimulatedPeople:
+    """Experimenter and subject in one, for a session nobody sits at: they do at once what is asked of them.
+
+    With a bench the subject strokes it, and judges when the finger has left; without one it strokes and judges unseen.
+    """
+
+    def __init__(self, subject_seed: int, clock: Clock, bench: Connected | None = None) -> None:
+        """Let the subject of that seed stroke the bench, where there is one."""
+        self._subject = SimulatedSubject(subject_seed)
+        self._clock = clock
+        self._bench = bench
+        self._takes: dict[int, int] = {}  # by trial number
+        self._due: list[tuple[int, Event]] = []  # session clock [ns]
+
+    def show(self, command: Command) -> None:
+        """Do what the command asks for."""
+        match command:
+            case AskBegin():
+                self._answer(Begin())
+            case AskMount(trial):
+                self._mount(trial)
+                self._answer(StimulusMounted(trial.stimulus.code))
+            case AskStroke(trial):
+                self._takes[trial.number] = self._takes.get(trial.number, 0) + 1
+                self._stroke(trial)
+            case AskScore(trial):
+                score = self._subject.score(planted_surface(trial), self._takes[trial.number])
+                self._answer(Scored(score), after=JUDGING if self._bench else 0.0)
+            case AskFinish():
+                self._answer(Finish())
+            case _:
+                pass
+
+    def poll(self) -> tuple[Event, ...]:
+        """Return what has been done by now."""
+        now_ns = self._clock.now_ns()
+        done = tuple(event for due, event in self._due if due <= now_ns)
+        self._due = [(due, event) for due, event in self._due if due > now_ns]
+        return done
+
+    def _answer(self, event: Event, after: float = 0.0) -> None:
+        self._due.append((self._clock.now_ns() + int(after * 1e9), event))
+
+    def _mount(self, trial: Trial) -> None:
+        if self._bench is not None and self._bench.bench is not None:
+            self._bench.bench.mount(planted_surface(trial))
+
+    def _stroke(self, trial: Trial) -> None:
+        if self._bench is None or self._bench.bench is None or self._bench.bench_now is None:
+            self._answer(StrokeDone())
+            return
+        stroke = self._subject.stroke(planted_surface(trial), self._takes[trial.number])
+        self._bench.bench.begin_stroke(stroke, self._bench.bench_now())
+
+
+def planted_surface(trial: Trial) -> Surface:
+    """Return the simulated surface of a trial, stroked as the trial asks. Raises SetupError where there is none."""
+    stimulus = trial.stimulus
+    surface = paper_surfaces().get((stimulus.descriptor, stimulus.index))
+    if surface is None:
+        raise SetupError(
+            f"the simulated bench has no surface '{stimulus.descriptor} {stimulus.index}': it holds the ten of "
+            "sensotact-friction; run this protocol with people"
+        )
+    return replace(surface, direction=trial.direction)

@@ -1,0 +1,38 @@
+"""Is a session what it was: every checksum, and every number made from it made once more."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, cast
+
+MADE_BY = "made_by"  # versions of what made a stored document
+TIMINGS = frozenset({"wall_s", "setup_s", "estimate_s", MADE_BY, "SIMULATED"})  # not numbers of the session
+_MOST = 20  # differences told one by one
+
+
+def differences(stored: object, fresh: object, where: str) -> Iterator[str]:
+    """Yield a sentence for each value that was stored otherwise than it comes out now; timings are left out.
+
+    >>> list(differences({"a": [1.0, 2.0], "wall_s": 3}, {"a": [1.0, 2.5], "wall_s": 4}, "x"))
+    ['x.a[1] was stored as 2.0 and comes out as 2.5']
+    """
+    if isinstance(stored, Mapping) and isinstance(fresh, Mapping):
+        then, now = cast("Mapping[str, Any]", stored), cast("Mapping[str, Any]", fresh)
+        for key in sorted({*then, *now} - TIMINGS):
+            if key not in then or key not in now:
+                yield f"{where}.{key} is {'new' if key in now else 'no longer made'}"
+            else:
+                yield from differences(then[key], now[key], f"{where}.{key}")
+    elif isinstance(stored, list | tuple) and isinstance(fresh, list | tuple):
+        before, after = cast("Sequence[Any]", stored), cast("Sequence[Any]", fresh)
+        if len(before) != len(after):
+            yield f"{where} was stored with {len(before)} entries and comes out with {len(after)}"
+        else:
+            for i, (a, b) in enumerate(zip(before, after, strict=True)):
+                yield from differences(a, b, f"{where}[{i}]")
+    elif stored != fresh or isinstance(stored, bool) != isinstance(fresh, bool):
+        yield f"{where} was stored as {stored!r} and comes out as {fresh!r}"
+
+
+def told(found: Sequence[str]) -> tuple[str, ...]:
+    """Return the first of many sentences, and how many more there are."""
+    more = len(found) - _MOST
+    return tuple(found) if more <= 0 else (*found[:_MOST], f"and {more} more numbers differ")

@@ -1,0 +1,65 @@
+import importlib
+
+import pytest
+
+from daq_app.cli import VERBS, run
+
+
+def test_without_arguments_the_verbs_are_listed_and_the_command_line_counts_as_wrong(capsys):
+    assert run([]) == 2
+    listed = capsys.readouterr().err
+    assert all(verb in listed for verb in VERBS)
+
+
+def test_an_unknown_verb_is_one_sentence_and_exit_code_2(capsys):
+    assert run(["fly"]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    assert "fly" in said.err
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_explains_itself_with_an_example(verb, capsys):
+    assert run([verb, "--help"]) == 0
+    told = capsys.readouterr().out
+    module = importlib.import_module(f"daq_app.verbs.{verb.replace('import', 'import_')}")
+    assert module.EXAMPLE in told
+    assert "--json" in told
+
+
+@pytest.mark.parametrize("verb", ["analyse", "predict", "report", "verify"])
+def test_a_missing_session_is_one_sentence_and_exit_code_1(verb, tmp_path, capsys):
+    assert run([verb, str(tmp_path / "nowhere")]) == 1
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    assert "nowhere" in said.err
+
+
+def test_a_missing_scene_is_one_sentence_and_exit_code_1(tmp_path, capsys):
+    assert run(["solve", str(tmp_path / "nowhere.toml")]) == 1
+    assert "nowhere.toml" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        (
+            "[friction]\nmu = 0.3\n[loading]\nindentation = 1.5\n[materials.fat]\nE = 0.034\nnu = 0.5\n",
+            "materials.fat.nu",
+        ),
+        ("[friction]\nmu = -1\n[loading]\nindentation = 1.5\n", "friction.mu"),
+        ("[friction]\nmu = 0.3\n[loading]\nindentation = 1.5\nslip = 1\n", "loading.slip"),
+        ("[friction]\nmu = 'much'\n[loading]\nindentation = 1.5\n", "friction.mu"),
+        ("[friction]\nmu = 0.3\n", "loading"),
+        ("mu = \n", "TOML"),
+    ],
+)
+def test_a_wrong_scene_names_key_value_and_what_is_allowed_with_exit_code_2(text, named, tmp_path, capsys):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(text)
+    assert run(["solve", str(scene)]) == 2
+    said = capsys.readouterr()
+    assert named in said.err
+    assert said.err.count("\n") == 1

@@ -1,0 +1,34 @@
+import io
+import json
+
+import pytest
+
+from daq_app.console import Console
+
+
+def console(*, as_json):
+    out, err = io.StringIO(), io.StringIO()
+    return Console(as_json=as_json, out=out, err=err), out, err
+
+
+def test_with_json_stdout_holds_one_document_and_nothing_else():
+    speaker, out, err = console(as_json=True)
+    speaker.say("for people")
+    speaker.progress(0.5, "half")
+    speaker.note("a warning")
+    speaker.result({"a": 1.5})
+    assert json.loads(out.getvalue()) == {"a": 1.5}
+    assert "a warning" in err.getvalue()
+
+
+def test_without_json_the_document_stays_unsaid():
+    speaker, out, _ = console(as_json=False)
+    speaker.say("for people")
+    speaker.result({"a": 1})
+    assert out.getvalue() == "for people\n"
+
+
+def test_a_number_that_is_none_never_becomes_json():
+    speaker, _, _ = console(as_json=True)
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        speaker.result({"a": float("nan")})

@@ -1,0 +1,175 @@
+"""The verbs as scripts use them: JSON on stdout, exit codes, and what a session folder holds."""
+
+import json
+import shutil
+import stat
+
+import pytest
+
+from daq_app.cli import run
+
+SCENE = """
+title = "slipperiness 100"
+[friction]
+mu = 0.24
+tau_max = 0.00877
+[loading]
+indentation = 1.5
+slide = "-x"
+speed = 39.0
+"""
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory):
+    """One simulated session; tests that change it take a copy."""
+    folder = tmp_path_factory.mktemp("recorded") / "P07"
+    words = ["run", "sensotact-friction", "--device", "sim:?seed=7", "--subject", "P07", "--headless"]
+    assert run([*words, "--simulate-subject", "7", "--pace", "20", "--seed", "3", "--out", str(folder), "--json"]) == 0
+    return folder
+
+
+@pytest.fixture
+def session(recorded, tmp_path):
+    return shutil.copytree(recorded, tmp_path / "P07")
+
+
+def printed(capsys):
+    return json.loads(capsys.readouterr().out)
+
+
+def test_a_simulated_session_analyses_without_a_flaw_and_says_simulated(session, capsys):
+    assert run(["analyse", str(session), "--json"]) == 0
+    document = printed(capsys)
+    assert document["flaws"] == []
+    assert [stroke["trial"] for stroke in document["strokes"]] == list(range(1, 11))
+    wanted = {"trial", "onset", "lift", "steady", "mu_static", "mu_dynamic", "tau_max", "speed", "direction", "flaws"}
+    assert all(wanted <= set(stroke) for stroke in document["strokes"])
+    assert "SIMULATED" in json.dumps(document)
+
+
+def test_every_file_of_a_simulated_session_says_simulated(session, capsys):
+    run(["predict", str(session)])
+    capsys.readouterr()
+    for name in ("session.json", "analysis.json", "prediction.json", "MANIFEST.json"):
+        assert "SIMULATED" in (session / name).read_text()[:200], name
+
+
+def test_predict_gives_a_row_a_trial_and_verify_makes_it_again(session, capsys):
+    assert run(["predict", str(session), "--json"]) == 0
+    rows = printed(capsys)["trials"]
+    assert len(rows) == 10
+    assert all(row["sed"] > 0 and row["error_estimate"] > 0 and row["measured_normal"] > 0 for row in rows)
+    assert run(["verify", str(session), "--json"]) == 0
+    assert printed(capsys)["problems"] == []
+
+
+def test_the_reading_of_tau_as_printed_is_asked_for_by_name_and_is_a_hundredth(session, capsys):
+    run(["predict", str(session), "--json"])
+    computed = printed(capsys)["trials"]
+    run(["predict", str(session), "--json", "--tau", "as-printed"])
+    document = printed(capsys)
+    assert document["options"]["tau_reading"] == "as-printed"
+    for row, other in zip(document["trials"], computed, strict=True):
+        assert row["tau_max"] == pytest.approx(other["tau_max"] / 100)
+
+
+def test_verify_names_a_changed_byte_of_the_recording_with_exit_code_3(session, capsys):
+    live = session / "session.sqlite"
+    live.chmod(stat.S_IRUSR | stat.S_IWUSR)
+    content = bytearray(live.read_bytes())
+    content[len(content) // 2] ^= 1
+    live.write_bytes(content)
+    assert run(["verify", str(session), "--json"]) == 3
+    assert any("session.sqlite" in problem for problem in printed(capsys)["problems"])
+
+
+def test_verify_names_a_derived_number_that_comes_out_otherwise(session, capsys):
+    run(["analyse", str(session)])
+    stored = json.loads((session / "analysis.json").read_text())
+    stored["strokes"][4]["mu_dynamic"] += 1e-9
+    (session / "analysis.json").write_text(json.dumps(stored))
+    capsys.readouterr()
+    assert run(["verify", str(session), "--json"]) == 3
+    assert any("strokes[4].mu_dynamic" in problem for problem in printed(capsys)["problems"])
+
+
+def test_verify_of_what_is_no_recording_is_exit_code_1(tmp_path, capsys):
+    (tmp_path / "session.sqlite").write_bytes(b"not a database at all" * 100)
+    assert run(["verify", str(tmp_path)]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_session_is_never_written_over(recorded, capsys):
+    before = {path.name: path.read_bytes() for path in recorded.iterdir()}
+    words = ["run", "sensotact-friction", "--scores-only", "--subject", "P08", "--simulate-subject", "1"]
+    assert run([*words, "--out", str(recorded)]) == 1
+    assert "not empty" in capsys.readouterr().err
+    assert {path.name: path.read_bytes() for path in recorded.iterdir()} == before
+
+
+def test_report_is_one_page_that_says_simulated(session, tmp_path, capsys):
+    page = tmp_path / "page.html"
+    assert run(["report", str(session), "-o", str(page), "--json"]) == 0
+    assert printed(capsys)["page"] == str(page)
+    text = page.read_text()
+    assert "SIMULATED" in text
+    assert "<script" not in text
+    assert "http://" not in text.replace("http://www.w3.org/", "")
+
+
+def test_solve_prints_what_the_contract_names(tmp_path, capsys):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE)
+    assert run(["solve", str(scene), "--json"]) == 0
+    document = printed(capsys)
+    names = "sed_ending sed_point normal_force tangential_force contact_width error_estimate dofs newton_iterations"
+    assert {*names.split(), "wall_s", "setup_s", "row", "model", "audits"} <= set(document)
+    assert document["tangential_force"] > 0
+    assert document["normal_force"] > 0
+
+
+def test_solve_with_a_history_prints_its_course(tmp_path, capsys):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE + '[solve]\ncourse = "history"\n')
+    assert run(["solve", str(scene), "--json"]) == 0
+    document = printed(capsys)
+    assert len(document["time"]) == len(document["bone_x"]) == len(document["bone_y"]) > 10
+    assert document["bone_y"][-1] == pytest.approx(-1.5)
+    assert document["bone_x"][-1] < 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "named"),
+    [
+        (["--device", "sim:", "--subject", "Anna Schmidt"], 2, "Anna Schmidt"),
+        (["--device", "sim:?speed=3", "--subject", "P1", "--simulate-subject", "1"], 2, "speed"),
+        (["--device", "teapot://x", "--subject", "P1"], 2, "teapot"),
+        (["--device", "net-ft://127.0.0.1?http=9", "--subject", "P1"], 1, "127.0.0.1"),
+        (["--device", "net-ft://127.0.0.1", "--subject", "P1", "--simulate-subject", "1"], 2, "simulate"),
+    ],
+)
+def test_a_session_that_cannot_begin_says_why_and_leaves_no_folder(arguments, code, named, tmp_path, capsys):
+    folder = tmp_path / "none"
+    assert run(["run", "sensotact-friction", *arguments, "--out", str(folder)]) == code
+    said = capsys.readouterr().err
+    assert named in said.splitlines()[-1]
+    assert not folder.exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "named"),
+    [
+        ("t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm\n0,1,2,3,4,5,6\n0.1,1,2\n", 1, "line 3"),
+        ("t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm\n0,1,2,3,4,5,6\n0.1,1,2,nan,4,5,6\n", 1, "line 3"),
+        ("", 1, "empty"),
+    ],
+)
+def test_a_csv_that_cannot_be_taken_is_one_sentence_and_leaves_no_folder(text, code, named, tmp_path, capsys):
+    file = tmp_path / "a.csv"
+    file.write_text(text)
+    assert run(["import", str(file), "--out", str(tmp_path / "a")]) == code
+    said = capsys.readouterr().err
+    assert named in said
+    assert said.count("\n") == 1
+    assert not (tmp_path / "a").exists()

@@ -1,0 +1,48 @@
+"""Every check of the project, one after another, each with what it proves and how long it took.
+
+`make test` runs the quick ones (under five minutes on two cores), `make test-long` the endurance runs.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = ["daq_app", "drivers", "sessions", "simulators", "solver"]
+STATIC = [
+    ("the code is formatted in one way", ["ruff", "format", "--check", "."]),
+    ("the code keeps the house's rules", ["ruff", "check", "."]),
+    ("imports go one way", ["lint-imports", "--no-cache"]),
+    ("types agree (strict)", ["basedpyright", "--level", "error", *PACKAGES]),
+]
+QUICK = [("every sentence a test proves", ["pytest", "-n", "2", "-m", "not slow and not hardware"])]
+LONG = [("the endurance runs", ["pytest", "-m", "slow"])]
+
+
+def main() -> int:
+    """Run the checks, all of them even when one fails, and return the exit code."""
+    checks = LONG if "--long" in sys.argv[1:] else [*STATIC, *QUICK]
+    environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    failed = 0
+    for sentence, command in checks:
+        print(f"── {sentence}: {' '.join(command)}", flush=True)
+        began = time.monotonic()
+        code = subprocess.run(installed(command), cwd=ROOT, env=environment, check=False).returncode
+        failed += code != 0
+        print(f"── {'passed' if code == 0 else 'FAILED'} in {time.monotonic() - began:.0f} s", flush=True)
+    return 1 if failed else 0
+
+
+def installed(command: list[str]) -> list[str]:
+    """Return the command as installed beside this interpreter, so that no path has to be set."""
+    found = shutil.which(command[0], path=str(Path(sys.executable).parent))
+    if found is None:
+        sys.exit(f"{command[0]} is not installed beside {sys.executable}: run 'make test', which installs it")
+    return [found, *command[1:]]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
