@@ -50,9 +50,11 @@ def places(n: int) -> Callable[[float], str]:
 def signed(value: float) -> str:
     """Return a number with one decimal and its sign.
 
-    >>> signed(-0.25)
-    '−0.2'
+    >>> signed(-0.25), signed(-0.01)
+    ('−0.2', '0.0')
     """
+    if abs(value) < 0.05:
+        return "0.0"
     return f"{value:+.1f}".replace("-", "−")
 
 

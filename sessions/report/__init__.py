@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 
-from sessions.analysis.analysis import Analysis
+from sessions.analysis import Analysis
 from sessions.analysis.scores import MeanScore, Relation, ScoreTable, joined, score_table
+from sessions.prediction import SessionPrediction
 from sessions.recording.provenance import software_versions
 from sessions.recording.reader import Recording
 from sessions.report import facts
@@ -21,6 +22,7 @@ from sessions.report.contents import (
     Trace,
 )
 from sessions.report.experiments import experiments
+from sessions.report.predictions import fields, left_out, modelled, predicted_seds, predictions
 from sessions.report.strokes import course, flaws, strokes
 
 __all__ = [
@@ -38,12 +40,14 @@ __all__ = [
     "StrokeFinding",
     "Trace",
     "findings",
+    "score_table",
 ]
 
 
 def findings(
     recording: Recording,
     analysis: Analysis,
+    prediction: SessionPrediction | None = None,
     scores: Sequence[ScoreTable] | None = None,
     planted: Sequence[Planted] | None = None,
 ) -> Report:
@@ -54,6 +58,7 @@ def findings(
     """
     tables = joined((score_table(recording), *(scores or ())))
     found = strokes(recording, analysis)
+    predicted = predictions(prediction)
     head = _head(recording, tables)
     return Report(
         title=_title(recording),
@@ -65,19 +70,25 @@ def findings(
         apparatus=facts.apparatus(recording, analysis),
         excluded=facts.excluded(recording, found, tables),
         flaws=flaws(analysis),
-        experiments=experiments(recording.plan, tables, {}),
+        experiments=experiments(recording.plan, tables, predicted_seds(predicted)),
         course=course(recording),
         strokes=found,
-        predictions=(),
-        fields=(),
+        predictions=predicted,
+        fields=fields(prediction),
         planted=tuple(planted or ()),
-        sealed="",
-        modelled=(),
-        left_out=(),
+        sealed=_sealed(tables, predicted),
+        modelled=modelled(prediction),
+        left_out=left_out(prediction),
         again=facts.again(recording, analysis),
-        commands=(),
-        width=None,
+        commands=facts.commands(recording, predicted=prediction is not None),
+        width=None if prediction is None else prediction.width,
     )
+
+
+def _sealed(tables: Sequence[ScoreTable], predicted: Sequence[PredictionFinding]) -> str:
+    if not predicted or not any(table.scores for table in tables):
+        return ""
+    return "The predictions were made after the scores had been given, and had not been sealed before."
 
 
 def _title(recording: Recording) -> str:

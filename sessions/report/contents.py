@@ -93,15 +93,16 @@ class History:
 class PredictionFinding:
     """What the model says of one trial. A number is None where `reasons` says why under the number's name."""
 
-    trial: int
+    trial: int | None  # None for a stroke of a recording without trials
+    stroke: int | None  # number of its stroke; None where the trial has none
     experiment: str
-    index: int
+    index: int | None
     code: str
-    mu: float | None
+    mu: float | None  # that the model got [-]
     mu_rule: str  # which mu the model got: "maximum" or "mean over steady window"
     tau_max: float | None  # [MPa]
-    indentation: float  # [mm]
-    direction: int
+    indentation: float | None  # [mm]
+    direction: int | None
     sed: float | None  # [MPa], averaged over the ending
     error_estimate: float | None  # relative, of sed
     normal_per_mm: float | None  # [N/mm]

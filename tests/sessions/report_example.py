@@ -135,6 +135,7 @@ def prediction(number, descriptor, index):
     course = press + np.clip(t - 1, 0, None) / (0.1 + np.clip(t - 1, 0, None)) * (sed - 1.03 * sed)
     return PredictionFinding(
         trial=number,
+        stroke=number,
         experiment=descriptor,
         index=index,
         code=f"K{number}",

@@ -13,6 +13,7 @@ from sessions.analysis.analysis import analyse
 from sessions.analysis.scores import Score, ScoreTable, score_table
 from sessions.exports.html import page
 from sessions.plan import Frame, SessionPlan
+from sessions.prediction import PredictionOptions, predict
 from sessions.recording import Recording, SessionWriter
 from sessions.report import Planted, findings
 from sessions.report.strokes import _extremes
@@ -31,6 +32,13 @@ def session(tmp_path_factory):
 def report(session):
     recording, analysis, truth = session
     return findings(recording, analysis, planted=truth)
+
+
+@pytest.fixture(scope="module")
+def predicted(session):
+    recording, analysis, truth = session
+    prediction = predict(analysis, recording.plan)
+    return prediction, findings(recording, analysis, prediction, planted=truth)
 
 
 def foreign(folder, *, press=2.0):
@@ -142,6 +150,66 @@ def test_a_number_withheld_carries_the_sentence_of_its_flaw(tmp_path):
     for stroke in made.strokes:
         assert stroke.mu_dynamic is None
         assert stroke.reasons["mu_dynamic"] == told["too little force"]
+
+
+def test_predictions_enter_with_their_forces_times_the_width_beside_the_measured_ones(predicted):
+    prediction, report = predicted
+    assert report.width == 15.0
+    for row, source in zip(report.predictions, prediction.trials, strict=True):
+        assert (row.trial, row.sed, row.matching_depth) == (source.trial, source.sed, source.matching_depth)
+        assert row.normal_force == pytest.approx(row.normal_per_mm * 15.0)
+        stroke = next(s for s in report.strokes if s.trial == row.trial)
+        assert row.measured_normal == stroke.normal_force
+
+
+def test_the_published_finding_comes_out_of_its_own_numbers(predicted):
+    _, report = predicted
+    sticky, slippery = report.experiments
+    assert sticky.index_relation.pearson >= 0.95
+    assert slippery.index_relation.pearson <= -0.85
+    sed = {(p.experiment, p.index): p.sed for p in report.predictions}
+    assert sed["slipperiness", 55] < sed["slipperiness", 75]  # because its measured mu is lower
+
+
+def test_the_finger_of_each_experiment_lies_on_the_surface_and_is_pressed_where_it_touches(predicted):
+    _, report = predicted
+    assert [(f.experiment, f.index) for f in report.fields] == [("stickiness", 100), ("slipperiness", 100)]
+    for field in report.fields:
+        touching = [i for i, state in enumerate(field.state) if state != "open"]
+        assert min(y for _, y in field.nodes) == pytest.approx(0.0, abs=1e-6)
+        assert all(field.contact[i][1] == pytest.approx(0.0, abs=1e-6) for i in touching)
+        assert all(field.pressure[i] >= 0 for i in touching)
+        way = {"stickiness": -1, "slipperiness": 1}[field.experiment]  # friction opposes the stroke
+        assert all(way * field.traction[i] >= 0 for i in touching)
+
+
+def test_the_page_says_what_was_left_out_and_how_much_it_may_matter(predicted):
+    _, report = predicted
+    left_out = {fact.name: fact for fact in report.left_out}
+    assert {"finite strain", "viscosity", "bone compliance", "inertia"} <= set(left_out)
+    assert "% of the SED" in left_out["viscosity"].value
+    text = page(report)
+    assert "What was modelled, and what was left out" in text
+    json.dumps(report.to_dict(), allow_nan=False)
+
+
+def test_a_trial_without_friction_keeps_its_row_with_a_dash_and_the_reason(tmp_path):
+    recording = foreign(tmp_path / "light", press=0.2)
+    analysis = analyse(recording)
+    made = findings(recording, analysis, predict(analysis, recording.plan, PredictionOptions(indentation=1.0)))
+    assert [p.sed for p in made.predictions] == [None, None]
+    for row in made.predictions:
+        assert "too_little_force" in row.reasons["sed"]
+        assert row.reasons["error_estimate"] == row.reasons["sed"]
+    assert "The stroke gives no coefficient of friction" in page(made)
+
+
+def test_strokes_without_a_plan_are_predicted_at_the_depth_given_for_them(tmp_path):
+    recording = foreign(tmp_path / "wipes")
+    analysis = analyse(recording)
+    made = findings(recording, analysis, predict(analysis, recording.plan, PredictionOptions(indentation=1.0)))
+    assert [p.stroke for p in made.predictions] == [1, 2]
+    assert "Predicted responses" in page(made)
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=5000))

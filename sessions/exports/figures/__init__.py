@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from sessions.exports.figures.course import course_panel
-from sessions.exports.figures.finger import common_greatest, finger_panels
+from sessions.exports.figures.finger import common_levels, finger_panels
 from sessions.exports.figures.relation import relation_panel
 from sessions.exports.figures.responses import response_panel
 from sessions.exports.figures.scores import score_panel
@@ -71,12 +71,12 @@ def _speed(report: Report) -> Plate:
 def _fingers(report: Report) -> Plate:
     caption = (
         "Strain-energy density (SED) in the deformed finger in its settled state, sliding; lengths are true. Thin "
-        "lines: skin and the boundaries between epidermis, dermis and fat; outlined in red: the ending. Right: the "
+        "lines: skin and the boundaries between epidermis, dermis and fat; outlined: the ending. Right: the "
         "contact close by, with the traction of the surface on the skin as arrows and, under them, which part of the "
         "skin slips. One scale of colours for all; it ends below the peaks at the edges of the contact."
     )
-    greatest = common_greatest(report.fields) if report.fields else 0.0
-    pairs = [finger_panels(field, greatest, simulated=report.simulated) for field in report.fields]
+    levels = common_levels(report.fields) if report.fields else ()
+    pairs = [finger_panels(field, levels, simulated=report.simulated) for field in report.fields]
     return Plate("finger", caption, tuple(panel for pair in pairs for panel in pair))
 
 
@@ -87,8 +87,8 @@ def _responses(report: Report) -> Plate:
         "settled, not computed further."
     )
     panels = [
-        response_panel([p for p in report.predictions if p.experiment == e.name], e.name, simulated=report.simulated)
-        for e in report.experiments
+        response_panel([p for p in report.predictions if p.experiment == name], name, simulated=report.simulated)
+        for name in dict.fromkeys(p.experiment for p in report.predictions)
     ]
     return Plate("response", caption, tuple(panel for panel in panels if panel is not None))
 

@@ -7,13 +7,16 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
 from matplotlib.tri import Triangulation, TriContourSet
 
-from sessions.exports.figures.style import GREY, INK, PALE, VERMILLION, Panel, Sheet, sheet, svg
+from sessions.exports.figures.style import GREY, INK, PALE, Panel, Sheet, sheet, svg
 from sessions.report import Field
 
-LEVELS = 12
+# Perceptually uniform, darker for more, in the same order in grey; its black end is left to the lines.
+COLOURS = ListedColormap(colormaps["magma_r"](np.linspace(0.0, 0.8, 256)))
 LONGEST_ARROW = 1.5  # of the tractions in the picture [mm]
 ARROWS = 22  # at most
 HALF_WIDTH = 4.6  # of the close view [mm]
@@ -21,17 +24,20 @@ _STYLE = {"slip": "solid", "cap": (0, (4, 1.2)), "stick": (0, (1, 1))}
 _WORDS = {"slip": "slips", "cap": "slips at the bound", "stick": "sticks"}
 
 
-def finger_panels(field: Field, greatest: float, *, simulated: bool) -> tuple[Panel, Panel]:
-    """Return the whole finger and a close view of its contact; colours end at `greatest` [MPa] in every picture."""
+def finger_panels(field: Field, levels: tuple[float, ...], *, simulated: bool) -> tuple[Panel, Panel]:
+    """Return the whole finger and a close view of its contact; `levels` [kPa] are the borders of the colours."""
     whole, close = sheet(328, 330), sheet(328, 330)
-    filled = _tissue(whole.axes[0], field, greatest)
-    _tissue(close.axes[0], field, greatest)
+    filled = _tissue(whole.axes[0], field, levels)
+    _tissue(close.axes[0], field, levels)
     x = np.array([place[0] for place in field.nodes])
     y = np.array([place[1] for place in field.nodes])
     whole.axes[0].set_xlim(x.min() - 0.5, x.max() + 0.5)
     whole.axes[0].set_ylim(-1.2, y.max() + 0.5)
-    _bar(whole, filled, greatest)
+    _bar(whole, filled, levels)
+    _name_layers(whole.axes[0], field)
     _tractions(close, field)
+    inside = np.mean(np.asarray(field.patch), axis=0)
+    close.axes[0].annotate("ending", tuple(inside), xytext=(0, 7), textcoords="offset points", ha="center", va="bottom")
     middle = _middle(field)
     close.axes[0].set_xlim(middle - HALF_WIDTH, middle + HALF_WIDTH)
     close.axes[0].set_ylim(-3.1, 4.4)
@@ -59,23 +65,26 @@ def finger_panels(field: Field, greatest: float, *, simulated: bool) -> tuple[Pa
     )
 
 
-def common_greatest(fields: Sequence[Field]) -> float:
-    """Return where the colours end for all fields together [MPa]: few nodes, at corners of the contact, lie above."""
-    values = np.concatenate([np.asarray(field.sed) for field in fields])
-    high = float(np.quantile(values, 0.985))
-    step = 10.0 ** np.floor(np.log10(high))
-    return float(np.ceil(high / step * 2) / 2 * step)
+def common_levels(fields: Sequence[Field]) -> tuple[float, ...]:
+    """Return the borders of the colours for all fields together [kPa]: few nodes, at bone and contact, lie above.
+
+    They rise from 0 in steps of 1, 2 or 5 times a power of ten.
+    """
+    values = np.concatenate([np.asarray(field.sed) for field in fields]) * 1e3
+    high = float(np.quantile(values, 0.97))
+    step = _nice(high / 8)
+    return tuple(round(step * n, 9) for n in range(int(np.ceil(high / step)) + 1))
 
 
-def _tissue(axes: Axes, field: Field, greatest: float) -> TriContourSet:
+def _tissue(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSet:
     """Fill the finger by its SED, outline layers, bone and ending, and draw the surface it rests on."""
     nodes = np.asarray(field.nodes)
     mesh = Triangulation(nodes[:, 0], nodes[:, 1], np.asarray(field.triangles))
     filled = axes.tricontourf(
         mesh,
         np.asarray(field.sed) * 1e3,
-        levels=np.linspace(0.0, greatest * 1e3, LEVELS + 1),
-        cmap="viridis_r",
+        levels=levels,
+        cmap=COLOURS,
         extend="max",
     )
     filled.set_edgecolor("face")  # else hairlines of the page show between the levels
@@ -91,24 +100,51 @@ def _tissue(axes: Axes, field: Field, greatest: float) -> TriContourSet:
             axes.plot(line[:, 0], line[:, 1], color=INK, linewidth=0.8 if name == "skin" else 0.4)
     patch = np.asarray([*field.patch, field.patch[0]])
     axes.plot(patch[:, 0], patch[:, 1], color="white", linewidth=2.2)
-    axes.plot(patch[:, 0], patch[:, 1], color=VERMILLION, linewidth=1.0)
+    axes.plot(patch[:, 0], patch[:, 1], color=INK, linewidth=1.0)
     axes.axhline(0.0, color=INK, linewidth=1.0)
     axes.axhspan(-50.0, 0.0, color=PALE, alpha=0.45, linewidth=0, zorder=0)
     axes.set_aspect("equal", anchor="N")
     return filled
 
 
-def _bar(drawn: Sheet, filled: TriContourSet, greatest: float) -> None:
+def _bar(drawn: Sheet, filled: TriContourSet, levels: tuple[float, ...]) -> None:
     bar = drawn.figure.colorbar(
         filled,
         ax=drawn.axes[0],
         location="bottom",
-        ticks=list(np.linspace(0.0, greatest * 1e3, 5)),
+        ticks=levels[:: -(-len(levels) // 6)],
         spacing="proportional",
         aspect=28,
         pad=0.02,
     )
     bar.set_label("SED [kPa]")
+
+
+def _name_layers(axes: Axes, field: Field) -> None:
+    """Write the layers' names beside the finger's back, each with a line into its layer."""
+    lines = [
+        np.asarray(field.outlines[name]) for name in ("skin", "epidermis", "dermis", "bone") if name in field.outlines
+    ]
+    if len(lines) < 4 or len({len(line) for line in lines}) > 1:
+        return  # the outlines have no points in common that would lie across the layers
+    for row, (name, outer, inner) in enumerate(zip(("epidermis", "dermis", "fat"), lines[:-1], lines[1:], strict=True)):
+        at = int((0.88 - 0.04 * row) * len(outer))
+        axes.annotate(
+            name,
+            xy=tuple((outer[at] + inner[at]) / 2),
+            xytext=(0.75, 0.95 - 0.1 * row),
+            textcoords="axes fraction",
+            ha="left",
+            va="center",
+            arrowprops={
+                "arrowstyle": "-",
+                "color": INK,
+                "linewidth": 0.4,
+                "shrinkA": 1.0,
+                "shrinkB": 0.0,
+                "relpos": (0.0, 0.5),
+            },
+        )
 
 
 def _middle(field: Field) -> float:

@@ -95,12 +95,13 @@ def _point(drawn: Sheet, mean: MeanScore, prediction: PredictionFinding, sed: fl
         error = sed * prediction.error_estimate
         axes.plot([mean.mean] * 2, [sed - error, sed + error], color=GREY, linewidth=0.8, zorder=2)
     axes.plot(mean.mean, sed, "o", color=GREEN, markersize=5, zorder=3, gid=drawn.note(text))
+    right = mean.mean < 80
     axes.annotate(
         str(mean.index),
         (mean.mean, sed),
-        xytext=(0, 6 if above else -6),
+        xytext=(5 if right else -5, 4 if above else -4),
         textcoords="offset points",
-        ha="center",
+        ha="left" if right else "right",
         va="bottom" if above else "top",
         zorder=4,
     )

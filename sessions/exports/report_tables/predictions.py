@@ -11,8 +11,7 @@ def prediction_table(report: Report) -> Table | None:
         return None
     notes = Notes()
     columns = (
-        Column("trial"),
-        Column("index"),
+        *_who(report),
         Column("µ"),
         Column("which µ"),
         Column("τ max", "kPa"),
@@ -24,12 +23,11 @@ def prediction_table(report: Report) -> Table | None:
 
     def row(p: PredictionFinding) -> tuple[Cell, ...]:
         return (
-            Cell(str(p.trial)),
-            Cell(str(p.index)),
+            *_named(p),
             notes.number(p.mu, places(3), p.reasons.get("mu")),
             Cell(p.mu_rule),
             notes.number(p.tau_max, tau, p.reasons.get("tau_max")),
-            Cell(f"{p.indentation:g}"),
+            _depth(p, notes),
             notes.number(p.sed, sed, p.reasons.get("sed")),
             notes.number(p.error_estimate, lambda v: significant(100 * v, 2), p.reasons.get("error_estimate")),
             notes.number(p.wall_s, lambda v: significant(v, 2), p.reasons.get("wall_s")),
@@ -49,8 +47,7 @@ def force_table(report: Report) -> Table | None:
         return None
     notes = Notes()
     columns = (
-        Column("trial"),
-        Column("index"),
+        *_who(report),
         Column("model N", "N/mm"),
         Column("model N × width", "N"),
         Column("measured N", "N"),
@@ -65,14 +62,13 @@ def force_table(report: Report) -> Table | None:
             return notes.number(value, places(decimals), p.reasons.get(name))
 
         return (
-            Cell(str(p.trial)),
-            Cell(str(p.index)),
+            *_named(p),
             cell("normal_per_mm", p.normal_per_mm, 4),
             cell("normal_force", p.normal_force),
             cell("measured_normal", p.measured_normal),
             cell("tangential_force", p.tangential_force),
             cell("measured_tangential", p.measured_tangential),
-            Cell(f"{p.indentation:g}"),
+            _depth(p, notes),
             cell("matching_depth", p.matching_depth),
         )
 
@@ -91,25 +87,23 @@ def direction_table(report: Report) -> Table | None:
         return None
     notes = Notes()
     columns = (
-        Column("trial"),
-        Column("index"),
+        *_who(report),
         Column("depth", "mm"),
         Column("stroked"),
         Column("SED as stroked", "kPa"),
         Column("SED the other way", "kPa"),
-        Column("proximal over distal"),
+        Column("d → p over p → d"),
     )
 
     def row(p: PredictionFinding) -> tuple[Cell, ...]:
         ratio = None
-        if p.sed is not None and p.opposite_sed is not None:
+        if p.sed is not None and p.opposite_sed is not None and p.direction is not None:
             backward, forward = (p.sed, p.opposite_sed) if p.direction < 0 else (p.opposite_sed, p.sed)
             ratio = backward / forward
         why = p.reasons.get("opposite_sed") or p.reasons.get("sed")
         return (
-            Cell(str(p.trial)),
-            Cell(str(p.index)),
-            Cell(f"{p.indentation:g}"),
+            *_named(p),
+            _depth(p, notes),
             Cell(direction(p.direction)),
             notes.number(p.sed, sed, p.reasons.get("sed")),
             notes.number(p.opposite_sed, sed, why),
@@ -117,8 +111,22 @@ def direction_table(report: Report) -> Table | None:
         )
 
     caption = (
-        "Both directions at equal depth, each with its trial's friction. Last column: SED while sliding towards the "
-        "body (distal to proximal) over SED while sliding away from it."
+        "Both directions at equal depth, each with its trial's friction. Last column: SED while sliding from distal "
+        "to proximal over SED while sliding from proximal to distal."
     )
     groups = grouped(report, report.predictions, lambda p: p.experiment, row)
     return Table("table-directions", caption, columns, groups, notes.listed())
+
+
+def _who(report: Report) -> tuple[Column, ...]:
+    """Return the columns that name a row: trial and index, or the stroke where there are no trials."""
+    planned = any(p.trial is not None for p in report.predictions)
+    return (Column("trial"), Column("index")) if planned else (Column("stroke"),)
+
+
+def _named(p: PredictionFinding) -> tuple[Cell, ...]:
+    return (Cell(str(p.stroke)),) if p.trial is None else (Cell(str(p.trial)), Cell(str(p.index)))
+
+
+def _depth(p: PredictionFinding, notes: Notes) -> Cell:
+    return notes.number(p.indentation, lambda v: f"{v:g}", "no plan tells how deep the model is to press")

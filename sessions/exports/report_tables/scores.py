@@ -94,7 +94,9 @@ def _relation_row(name: str, related: Relation, notes: Notes) -> tuple[Cell, ...
         interval = notes.number(None, str, related.reason)
     else:
         interval = Cell(f"{correlation(related.low)} to {correlation(related.high)}")
-    left_out = ", ".join(f"{label}: {NONE if r is None else correlation(r)}" for label, r in related.without)
+    left_out = ", ".join(
+        f"{label}:\N{NO-BREAK SPACE}{NONE if r is None else correlation(r)}" for label, r in related.without
+    )
     return (
         Cell(name),
         Cell(str(related.n)),

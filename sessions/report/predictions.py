@@ -1,0 +1,183 @@
+"""What the model predicts, as findings: a row a trial, courses, pictures of the finger, what was left out."""
+
+import re
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.prediction import SessionPrediction, TrialPrediction
+from sessions.report.contents import Fact, Field, History, PredictionFinding
+
+_SCENE = ("finger", "materials", "receptor")  # what all trials of a session share
+_READINGS = {
+    "computed": "greatest tangential force over the contact area",
+    "as-printed": "a hundredth of the greatest tangential force over the contact area, as printed with the paper's tables",
+}
+_FROM_ROW = {"tau_max": "mu", "error_estimate": "sed", "normal_per_mm": "normal_force", "wall_s": "sed"}
+
+
+def predictions(found: SessionPrediction | None) -> tuple[PredictionFinding, ...]:
+    """Return a finding for each trial, or for each stroke of a recording without trials."""
+    return () if found is None else tuple(_finding(row) for row in found.trials)
+
+
+def predicted_seds(findings: Sequence[PredictionFinding]) -> dict[tuple[str, int], float]:
+    """Return the SED [MPa] by experiment and index, the mean over repetitions."""
+    given: defaultdict[tuple[str, int], list[float]] = defaultdict(list)
+    for finding in findings:
+        if finding.sed is not None and finding.index is not None:
+            given[finding.experiment, finding.index].append(finding.sed)
+    return {key: float(np.mean(values)) for key, values in given.items()}
+
+
+def fields(found: SessionPrediction | None) -> tuple[Field, ...]:
+    """Return the settled finger of each experiment's greatest index that has a prediction."""
+    if found is None:
+        return ()
+    chosen: dict[str, TrialPrediction] = {}
+    for row in found.trials:
+        if row.prediction is not None and row.stimulus is not None and row.block is not None:
+            before = chosen.get(row.block)
+            if before is None or before.stimulus is None or before.stimulus.index < row.stimulus.index:
+                chosen[row.block] = row
+    made = [_field(name, row) for name, row in chosen.items()]
+    return tuple(field for field in made if field is not None)
+
+
+def modelled(found: SessionPrediction | None) -> tuple[Fact, ...]:
+    """Return what the model holds, with the greatest residual of each audit over all trials."""
+    solved = [] if found is None else [row.prediction for row in found.trials if row.prediction is not None]
+    if found is None or not solved:
+        return ()
+    first = solved[0]
+    facts = [Fact(name, str(value)) for name, value in first.model.items() if name != "left_out"]
+    facts += [Fact(name, _values(asdict(getattr(first.scene, name)))) for name in _SCENE]
+    facts.append(Fact("finger's width", f"{found.width:g} mm", found.width_origin))
+    facts.append(Fact("τ max", _READINGS[found.options.tau_reading]))
+    facts.append(Fact("unknowns", f"{first.dofs} displacements", "one mesh for all trials"))
+    audits = ", ".join(
+        f"{name.replace('_', ' ')} {_worst(name, [p.audits for p in solved]):.1e}" for name in first.audits
+    )
+    return (*facts, Fact("audits", audits, "the worst over all trials"))
+
+
+def left_out(found: SessionPrediction | None) -> tuple[Fact, ...]:
+    """Return what was left out, how much that may have changed the SED, and how this was estimated."""
+    solved = [] if found is None else [row.prediction for row in found.trials if row.prediction is not None]
+    told: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
+    for prediction in solved:
+        for name, entry in prediction.model.get("left_out", {}).items():
+            told[name].append(entry)
+    facts = [Fact(name, _share(entries), entries[0]["how"]) for name, entries in told.items()]
+    warned: dict[str, list[str]] = defaultdict(list)  # sentences that differ in their numbers only stand together
+    for prediction in solved:
+        for sentence in prediction.warnings:
+            warned[re.sub(r"\d+", "#", sentence)].append(sentence)
+    return (
+        *facts,
+        *(Fact("warning", same[0], f"the first of {len(same)} trials warned so") for same in warned.values()),
+    )
+
+
+def _worst(audit: str, told: Sequence[Mapping[str, float]]) -> float:
+    """Return the least value of an audit whose name says that it has one, else the greatest."""
+    values = [audits[audit] for audits in told if audit in audits]
+    return min(values) if "least" in audit or "smallest" in audit else max(values, key=abs)
+
+
+def _finding(row: TrialPrediction) -> PredictionFinding:
+    history = row.history
+    reasons = dict(row.reasons)
+    for name, other in _FROM_ROW.items():
+        if other in reasons:
+            reasons.setdefault(name, reasons[other])
+    return PredictionFinding(
+        trial=row.trial,
+        stroke=None if row.stroke is None else row.stroke + 1,
+        experiment=row.block or "",
+        index=None if row.stimulus is None else row.stimulus.index,
+        code="" if row.stimulus is None else row.stimulus.code,
+        mu=row.mu,
+        mu_rule=row.mu_rule,
+        tau_max=row.tau_max,
+        indentation=row.indentation,
+        direction=row.direction,
+        sed=row.sed,
+        error_estimate=row.error_estimate,
+        normal_per_mm=row.normal_per_mm,
+        normal_force=row.normal_force,
+        tangential_force=row.tangential_force,
+        measured_normal=row.measured_normal,
+        measured_tangential=row.measured_tangential,
+        matching_depth=row.matching_depth,
+        opposite_sed=row.opposite_sed,
+        wall_s=row.wall_s,
+        history=None if history is None else History(_numbers(history.time), _numbers(history.sed_ending)),
+        reasons=reasons,
+    )
+
+
+def _field(experiment: str, row: TrialPrediction) -> Field | None:
+    picture = row.picture()
+    if picture is None or row.stimulus is None:
+        return None
+    drawn, skin = picture
+    return Field(
+        experiment=experiment,
+        index=row.stimulus.index,
+        nodes=_pairs(drawn.nodes),
+        triangles=tuple((int(a), int(b), int(c)) for a, b, c in drawn.triangles),
+        sed=_numbers(drawn.sed),
+        outlines={name: _pairs(line) for name, line in drawn.outlines.items()},
+        patch=_pairs(drawn.patch),
+        contact=_pairs(np.column_stack([skin.x, skin.gap])),
+        pressure=_numbers(skin.pressure),
+        traction=_numbers(skin.traction),
+        state=skin.state,
+    )
+
+
+def _share(entries: Sequence[Mapping[str, Any]]) -> str:
+    """Return the estimated change of the SED, over all trials."""
+    known = [100 * entry["estimate"] for entry in entries if entry["estimate"] is not None]
+    if not known:
+        return "no estimate"
+    low, high = min(known), max(known)
+    ends = dict.fromkeys((_plain(low), _plain(high)))
+    return f"{' to '.join(ends)} % of the SED"
+
+
+def _plain(value: float) -> str:
+    """Return a share in two figures without powers of ten, however small.
+
+    >>> _plain(158.38), _plain(0.126), _plain(8e-6)
+    ('158', '0.13', 'below 0.01')
+    """
+    if value == 0.0 or value >= 10.0:
+        return f"{value:.0f}"
+    return "below 0.01" if value < 0.01 else f"{value:.2g}"
+
+
+def _values(table: Mapping[str, Any]) -> str:
+    """Return a scene's table in words, mm, degrees and MPa as in a scene file."""
+    return "; ".join(f"{name.replace('_', ' ')} {_value(value)}" for name, value in table.items())
+
+
+def _value(value: float | tuple[float, ...] | Mapping[str, float]) -> str:
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} {number:g}" for name, number in value.items())
+    if isinstance(value, tuple):
+        return "(" + ", ".join(f"{number:g}" for number in value) + ")"
+    return f"{value:g}"
+
+
+def _numbers(values: NDArray[np.float64]) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)
+
+
+def _pairs(points: NDArray[np.float64]) -> tuple[tuple[float, float], ...]:
+    return tuple((float(x), float(y)) for x, y in points)
