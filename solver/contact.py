@@ -105,6 +105,7 @@ class Course:
         self.body = body
         self.law = law
         self._system: _System | None = None
+        self._entering = SLIP  # what a point is first thought to do when it comes to touch
 
     def sliding(self, depth: float, direction: int, guess: States | None = None) -> Contact:
         """Return the settled sliding state of a body driven `depth` [mm] into the surface and along +x or -x.
@@ -131,7 +132,13 @@ class Course:
 
         Backward Euler: a point sticks where it was, or slips from there against its friction force.
         """
-        return self._consistent(depth, travel, before.shift, before.state, before.sense, free=True)
+        try:
+            return self._consistent(depth, travel, before.shift, before.state, before.sense, free=True)
+        except ContactLost:  # points that come to touch are then first thought to stick, not to slip
+            self._entering = SLIP if self.law.frictionless else STICK
+            return self._consistent(depth, travel, before.shift, before.state, before.sense, free=True)
+        finally:
+            self._entering = SLIP
 
     def _consistent(
         self, depth: float, travel: float, anchor: Array, state: States, sense: Array, *, free: bool
@@ -223,7 +230,7 @@ class Course:
         enters = ~touching & (found.gap < -SMALL * height)
         if free:
             sense[enters] = np.where(found.shift > anchor, -1.0, 1.0)[enters]
-        change(enters, SLIP, -found.gap * force / height)
+        change(enters, self._entering, -found.gap * force / height)
         return state, sense, badness
 
 

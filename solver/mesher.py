@@ -15,6 +15,7 @@ EPIDERMIS, DERMIS, FAT = 0, 1, 2  # numbers of the regions
 GROWTH = 0.2  # of the elements' size with the distance from where the skin may touch [-]
 TALL = 1.4  # size of elements across the skin by that along it [-]
 COARSEST = 10.0  # elements far from the contact by those in the bulk of the pulp [-]
+FINEST = 1e-3  # smallest element by tip radius: thinner ones across the whole finger would drown in round-off [-]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +49,7 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     outline = Outline.of(finger)
     overlap = _lower_than(outline, sizing.indentation)
     bulk = 1.25 * finger.tip_radius / sizing.fineness
-    fine = min(bulk, (overlap[1] - overlap[0]) / (2.0 * sizing.fineness))
+    fine = min(bulk, max((overlap[1] - overlap[0]) / (2.0 * sizing.fineness), FINEST * finger.tip_radius))
     half = receptor.ending[1] / 2.0
     frame = outline.along(0.0, receptor.depth, np.array([-half, half]))
     arcs = _stations(outline, overlap, fine, bulk, frame, shift=sizing.shift)

@@ -24,6 +24,8 @@ from solver.stepping import March, march
 FINENESS = (4, 6, 8, 12, 16, 24, 32, 48)  # the meshes that can be asked for
 DEFAULT = 12
 SAFETY = 0.6  # chosen so that the estimate lay above the true error in 95 of 100 random scenes
+UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]
+DOUBTED = 1e-8  # and from which it is told
 # coarsest mesh worth trying for a tolerance
 START = ((0.008, 6), (0.004, 8), (0.002, 12), (0.001, 16), (0.0004, 24), (0.0, 32))
 
@@ -180,6 +182,12 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Pred
         return None
     sed = finger.sed_ending(displacement)
     checks = audits(finger, law, contact, scene.loading.indentation, displacement)
+    unbalanced = max(checks[name] for name in ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance"))
+    if unbalanced > UNSOUND:
+        message = f"Forces balance to {unbalanced:.1g} only at {scene.loading.indentation:g} mm indentation"
+        raise NotConverged(
+            f"{message}: round-off has swallowed the answer, as with contacts far smaller than the mesh."
+        )
     if way is not None:
         checks |= course_audits(finger, way)
         checks["course_against_direct"] = abs(finger.sed_ending(finger.displacement(direct)) / sed - 1.0)
@@ -208,8 +216,14 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Pred
         mesh=finger.geometry.mesh,
         displacement=displacement,
         history=history,
-        warnings=warnings(left["left_out"]),
+        warnings=(*warnings(left["left_out"]), *_doubts(unbalanced)),
     )
+
+
+def _doubts(unbalanced: float) -> tuple[str, ...]:
+    if unbalanced <= DOUBTED:
+        return ()
+    return (f"Forces balance to {unbalanced:.1g} only: materials near the incompressible limit magnify round-off.",)
 
 
 def _drag(scene: Scene, tangential: float) -> float:

@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from solver.body import skin_lengths
-from solver.failures import Cancelled, NoSteadyState
+from solver.failures import Cancelled, NoSteadyState, SolveFailure
 from solver.fields import fields_of
 from solver.reference import SLIPPERINESS, STICKINESS, scene, scenes
 from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
@@ -196,6 +198,39 @@ def test_a_bound_lets_even_the_stickiest_surface_slide():
     found = solve(Scene(friction=Friction(1000.0, 0.005), loading=Loading(1.5, "-x")))
     assert set(found.skin.state) <= {"open", "cap", "slip"}
     assert found.audits["cone_violation"] < 1e-10
+
+
+@settings(deadline=None, max_examples=25, derandomize=True)
+@given(
+    depth=st.floats(-4, 0.4).map(lambda power: 10**power),
+    mu=st.sampled_from([0.0, 1e-9, 0.3, 0.7, 1.5, 1000.0]),
+    bound=st.sampled_from([None, 0.0, 1e-9, 0.005, 0.05, 1e9]),
+    slide=st.sampled_from(["+x", "-x", "none"]),
+    angle=st.floats(15, 85),
+    nu=st.sampled_from([0.0, 0.3, 0.48, 0.4999999]),
+    course=st.sampled_from(["steady", "steady", "history"]),
+)
+def test_any_scene_ends_in_a_balanced_answer_or_in_a_sentence(depth, mu, bound, slide, angle, nu, course):
+    asked = Scene(
+        finger=Finger(contact_angle=angle),
+        materials=Materials(Material(0.136, nu), Material(0.08, nu), Material(0.034, nu)),
+        friction=Friction(mu, bound),
+        loading=Loading(depth, slide),
+        solve=Solve(course=course),
+    )
+    try:
+        found = solve(asked)
+    except SolveFailure as failure:
+        assert str(failure).endswith(".")
+        assert mu > 0.7 or "round-off" in str(failure)  # a state exists below, and was not refused
+        json.dumps(failure.to_dict(), allow_nan=False)
+        return
+    json.dumps(found.to_dict(), allow_nan=False)
+    assert found.sed_ending > 0.0
+    assert found.error_estimate > 0.0
+    assert found.audits["equilibrium_y"] < 1e-4
+    assert found.audits["equilibrium_y"] < 1e-8 or found.warnings
+    assert found.audits["cone_violation"] < 1e-9
 
 
 def test_a_run_can_be_stopped():
