@@ -58,10 +58,8 @@ class SerialLink:
             raise LinkLost(f"{self._where} is gone; check that its plug is in") from None
 
     def close(self) -> None:
-        """Give the port back, dropping what was not sent yet. Harmless when repeated."""
-        if self._port.is_open:
-            with contextlib.suppress(OSError, serial.SerialException):  # it was pulled out
-                self._port.reset_output_buffer()
+        """Give the port back. Harmless when repeated."""
+        with contextlib.suppress(OSError):  # it was pulled out
             self._port.close()
 
 

@@ -37,7 +37,7 @@ class ControllerConversation:
             raise LinkLost("the controller gives no prompt; check its power, the cable and the baud rate")
         output = wire.BINARY_OUTPUT if self._binary else wire.ASCII_OUTPUT
         for command in (output, *wire.SETTINGS):
-            if not _said(link, command + wire.RETURN, _ANSWER).rstrip().endswith(wire.PROMPT):
+            if not _said(link, command + wire.RETURN, _ANSWER, settled=False).rstrip().endswith(wire.PROMPT):
                 raise LinkLost(f"the controller does not answer to {command.decode()}; switch it off and on")
         for _ in range(_TRIES):
             if wire.answered_record(_said(link, wire.ONE_RECORD + wire.RETURN, _ANSWER), binary=self._binary):
@@ -96,15 +96,18 @@ def banner(link: Link) -> str:
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
-def _said(link: Link, request: bytes, patience: float) -> bytes:
-    """Return what the controller says to `request`, up to a prompt that nothing follows, or within `patience`."""
+def _said(link: Link, request: bytes, patience: float, *, settled: bool = True) -> bytes:
+    """Return what the controller says to `request`, up to a prompt, or within `patience`.
+
+    With `settled` only a prompt that nothing follows is one: in a binary record its byte means something else.
+    """
     link.receive(_BETWEEN)
     link.send(request)
     said = b""
     deadline = time.monotonic() + patience
     while time.monotonic() < deadline:
         data = link.receive(_SETTLED)
-        if data is None and said.rstrip().endswith(wire.PROMPT):
-            break
         said += data or b""
+        if said.rstrip().endswith(wire.PROMPT) and (data is None or not settled):
+            break
     return said

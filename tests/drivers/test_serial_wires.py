@@ -1,0 +1,342 @@
+"""What the drivers on serial lines do, each on its own simulator over a real port of the system."""
+
+import os
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drivers import serial_stream
+from drivers.address import parse_address
+from drivers.clock import Clock, PacedClock
+from drivers.digital_ft.handshake import identify_digital_ft, open_digital_ft
+from drivers.readings import ReadingBlock
+from drivers.serial_ft.handshake import identify_serial_ft, open_serial_ft
+from drivers.serial_link import port_of
+from drivers.transducer import DeviceFault, LinkLost, SetupError
+from simulators.bench import Bench
+from simulators.digital_ft_box import DigitalFtBox
+from simulators.faults import Fault, Faults
+from simulators.serial_ft_box import SerialFtBox
+from simulators.stroke import Stroke
+from simulators.surface import paper_surfaces
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="there are no pseudo-terminals on this system")
+
+FACTOR = 2.0
+
+
+@dataclass
+class Simulated:
+    """A simulated device: where it is, how to open it, what it feels, its clock, and how to switch it off."""
+
+    uri: str
+    opens: Any
+    identifies: Any
+    bench: Bench
+    clock: Clock
+    box: Any
+
+    def open(self, more=""):
+        return self.opens(parse_address(self.uri + more), self.clock)
+
+    def heard(self, block):
+        """When the last reading arrived, on the bench's clock."""
+        return (block.received_ns[-1] - self.box._origin_ns) * 1e-9 if len(block) else 0.0
+
+    def identify(self):
+        return self.identifies(parse_address(self.uri), 1.0)
+
+
+def serial_ft(form="binary"):
+    bench, clock = Bench(3), PacedClock(FACTOR)
+    box = SerialFtBox(bench, clock, baud=115200 if form == "ascii" else 38400)
+    box.start()
+    return Simulated(f"{box.uri}&format={form}", open_serial_ft, identify_serial_ft, bench, clock, box)
+
+
+def serial_ft_ascii():
+    return serial_ft("ascii")
+
+
+def digital_ft(**settings):
+    bench, clock = Bench(3), PacedClock(1.0)
+    box = DigitalFtBox(bench, clock, **settings)
+    box.start()
+    return Simulated(box.uri, open_digital_ft, identify_digital_ft, bench, clock, box)
+
+
+WIRES = {"serial-ft": serial_ft, "serial-ft, text": serial_ft_ascii, "digital-ft": digital_ft}
+
+
+def open_files():
+    return len(list(Path("/dev/fd").iterdir()))
+
+
+@pytest.fixture(params=WIRES)
+def simulator(request):
+    """Return a function that starts the simulator."""
+    threads_before, files_before = set(threading.enumerate()), open_files()
+    started = []
+
+    def start():
+        started.append(WIRES[request.param]())
+        return started[-1]
+
+    yield start
+    for one in started:
+        one.box.close()
+    assert set(threading.enumerate()) <= threads_before, "a thread was left running"
+    assert open_files() == files_before, "a port was left open"
+
+
+def readings(device, transducer, until):
+    """Return what comes until so many seconds of the bench's time, and the rest after a stop."""
+    blocks = []
+    while device.box.now() < until:
+        blocks.append(transducer.read(0.1))
+    transducer.stop()
+    return ReadingBlock.joined([*blocks, transducer.read(0.0)])
+
+
+def test_it_says_who_it_is_and_that_it_is_simulated(simulator):
+    device = simulator()
+    found = device.identify()
+    transducer = device.open()
+    transducer.close()
+    info = transducer.info
+    assert info.simulated
+    assert found.simulated
+    assert info.uri == device.uri
+    assert info.model == found.model
+    assert info.serial == found.serial == info.calibration.serial == "SIM00003"
+    assert info.calibration.rated.tolist() == pytest.approx(device.bench.settings.rated)
+    assert info.rate > 50.0
+    assert np.isnan(info.counter_rate)
+    assert "host arrival" in info.settings["time"]
+
+
+def test_a_second_program_is_told_that_the_port_is_taken_and_the_stream_goes_on(simulator):
+    device = simulator()
+    transducer = device.open()
+    transducer.start()
+    with pytest.raises(SetupError, match="another program has it"):
+        device.identify()
+    with pytest.raises(SetupError, match="another program has it"):
+        device.open()
+    block = readings(device, transducer, device.box.now() + 1.0)
+    transducer.close()
+    assert transducer.health.restarted == transducer.health.lost == 0
+    assert len(block) > 0.8 * transducer.info.rate
+
+
+def test_an_undisturbed_stream_is_whole_evenly_timed_and_feels_what_the_bench_exerts(simulator):
+    device = simulator()
+    transducer = device.open()
+    device.bench.mount(paper_surfaces()["stickiness", 80])
+    transducer.start()
+    planted = device.bench.begin_stroke(Stroke(7.81, 17.5, approach=0.3, stick=0.3, slide=1.0), device.box.now() + 0.1)
+    block = readings(device, transducer, planted.end + 0.5)
+    transducer.close()
+    info, health = transducer.info, transducer.health
+    assert health.received == len(block)
+    assert health.lost == health.malformed == health.restarted == health.saturated == 0
+    assert block.sequence.tolist() == list(range(1, len(block) + 1))
+    assert block.time[0] == 0.0
+    assert np.all(np.diff(block.time) > 0.0)
+    np.testing.assert_allclose(block.time[-1] / (len(block) - 1), 1.0 / info.rate, rtol=0.05)
+    assert np.all(np.diff(block.received_ns) >= 0)
+    wrench = info.calibration.wrench(block.raw, np.zeros(6))
+    assert -wrench[:, 2].min() == pytest.approx(planted.peak_normal_force, abs=0.05)
+    assert wrench[:, 0].max() == pytest.approx(planted.mu * planted.peak_normal_force, abs=0.05)
+
+
+FAULTS = {  # what a line without numbers and clock can show of each
+    "lose": lambda health: health.lost > 0,
+    "corrupt": lambda health: health.malformed > 0,
+    "shorten": lambda health: health.malformed > 0,
+    "saturate": lambda health: health.saturated > 0,
+    "reboot": lambda health: health.restarted >= 1 and health.lost > 0,
+    "unplug": lambda health: health.restarted >= 1 and health.lost > 0,
+}
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_it_survives_each_fault_and_accounts_for_every_reading(simulator, kind):
+    device = simulator()
+    transducer = device.open()
+    transducer.start()
+    begin = device.box.now() + 0.3
+    end = begin + (0.8 if kind in ("reboot", "unplug", "lose") else 0.4) * device.clock.factor
+    share = 0.05 if kind in ("corrupt", "shorten") else 1.0
+    device.box._faults = Faults([Fault(kind, begin, end, share=share)], seed=1)
+    block, deadline = ReadingBlock.empty(), end + 20.0 * device.clock.factor
+    while (device.heard(block) < end + 0.3) and device.box.now() < deadline:
+        block = ReadingBlock.joined([block, transducer.read(0.1)])
+    transducer.stop()
+    block = ReadingBlock.joined([block, transducer.read(0.0)])
+    health = transducer.health
+    transducer.close()
+    assert device.heard(block) > end, "it did not go on after the fault"
+    assert FAULTS[kind](health), health
+    assert health.received == len(block)
+    assert health.received + health.lost == block.sequence[-1]
+    assert np.all(np.diff(block.sequence) >= 1)
+    assert np.all(np.diff(block.time) > 0.0)
+    if kind != "corrupt":  # none of the formats can show every change of a byte
+        wrench = transducer.info.calibration.wrench(block.raw[block.status == 0], np.zeros(6))
+        assert np.abs(wrench[:, :3]).max() < 0.1, "a broken record came out as a reading"
+        assert np.abs(wrench[:, 3:]).max() < 1.0
+
+
+def test_a_device_that_goes_away_is_lost_in_one_sentence(simulator, monkeypatch):
+    monkeypatch.setattr(serial_stream, "_SILENCE", 0.8)
+    device = simulator()
+    transducer = device.open()
+    transducer.start()
+    device.box.close()
+    sentence = None
+    while sentence is None:
+        try:
+            transducer.read(10.0)
+        except LinkLost as error:
+            sentence = str(error)
+    transducer.close()
+    assert device.uri in sentence
+    assert "\n" not in sentence
+    with pytest.raises(SetupError, match="no such port"):
+        device.open()
+
+
+def test_stopping_and_closing_twice_are_harmless_and_it_can_start_again(simulator):
+    device = simulator()
+    transducer = device.open()
+    transducer.start()
+    with pytest.raises(SetupError, match="already"):
+        transducer.start()
+    transducer.stop()
+    transducer.stop()
+    transducer.start()
+    block = readings(device, transducer, device.box.now() + 1.0)
+    transducer.close()
+    transducer.close()
+    assert block.time[0] == 0.0
+    assert block.sequence[0] == 1
+    assert transducer.health.lost == 0
+
+
+def test_a_stop_ends_even_a_device_that_is_being_brought_back(simulator):
+    device = simulator()
+    transducer = device.open()
+    transducer.start()
+    device.box._faults = Faults([Fault("reboot", 0.0, 1e9)])
+    while len(transducer.read(0.5 * device.clock.factor)):
+        pass
+    transducer.close()
+    assert transducer.health.received > 0
+
+
+def test_a_malformed_address_is_refused_in_one_sentence(simulator):
+    device = simulator()
+    with pytest.raises(SetupError, match="unheard-of"):
+        device.open("&unheard-of=1")
+
+
+def test_the_baud_rate_of_a_controller_is_found_by_trying():
+    clock = PacedClock(FACTOR)
+    box = SerialFtBox(Bench(1), clock, baud=19200)
+    box.start()
+    try:
+        uri = box.uri.replace("baud=19200&", "")
+        transducer = open_serial_ft(parse_address(uri), clock)
+        assert transducer.info.settings["baud"] == "19200, found by trying"
+        assert transducer.info.rate == pytest.approx(19200 / 130, rel=0.05)
+        with pytest.raises(LinkLost, match="tried 9600 baud"):
+            open_serial_ft(parse_address(uri + "&baud=9600"), clock)
+    finally:
+        box.close()
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        ("", "cannot tell its units"),
+        ("?counts_per_N=20", "cannot tell its units"),
+        ("?counts_per_N=20&counts_per_Nm=-3", "counts_per_Nm=-3 must be a number above 0"),
+        ("?counts_per_N=20&counts_per_Nm=3_0", "must be a number above 0"),
+        ("?counts_per_N=20&counts_per_Nm=30&format=morse", "format=morse"),
+        ("?counts_per_N=20&counts_per_Nm=30&baud=fast", "baud=fast"),
+    ],
+)
+def test_a_controllers_address_without_sense_is_refused(options, complaint):
+    with pytest.raises(SetupError, match=complaint):
+        open_serial_ft(parse_address(f"serial-ft:///dev/ttyUSB0{options}"), PacedClock(1.0))
+
+
+def test_a_transducer_left_streaming_is_stopped_when_it_is_opened_and_left_alone_when_it_is_looked_for():
+    device = digital_ft(streaming=True)
+    try:
+        with pytest.raises(LinkLost, match="it streams, and nobody reads"):
+            device.identify()
+        transducer = device.open()
+        assert transducer.info.serial == "SIM00003"
+        transducer.close()
+    finally:
+        device.box.close()
+
+
+def test_an_empty_calibration_is_refused_by_its_number():
+    device = digital_ft()
+    try:
+        with pytest.raises(SetupError, match="calibration 2 holds no serial number"):
+            device.open("&calibration=2")
+        with pytest.raises(SetupError, match="calibration=17"):
+            device.open("&calibration=17")
+    finally:
+        device.box.close()
+
+
+def test_another_transducer_on_the_same_line_is_not_read():
+    device = digital_ft()
+    transducer = device.open()
+    other = DigitalFtBox(Bench(4), device.clock)
+    other.start()
+    try:
+        path = Path(port_of(parse_address(device.uri)))
+        path.unlink()
+        path.symlink_to(Path(port_of(parse_address(other.uri))).readlink())
+        with pytest.raises(DeviceFault, match="transducer SIM00004 answers where SIM00003 was"):
+            transducer.start()
+    finally:
+        transducer.close()
+        other.close()
+        device.box.close()
+
+
+def test_the_bias_of_a_controller_is_dropped_so_that_raw_stays_raw():
+    device = serial_ft()
+    device.bench.mount(paper_surfaces()["stickiness", 80])
+    device.box._biases.append(np.full(6, 5.0))
+    transducer = device.open()
+    transducer.start()
+    block = readings(device, transducer, device.box.now() + 0.5)
+    transducer.close()
+    device.box.close()
+    assert np.abs(transducer.info.calibration.wrench(block.raw, np.zeros(6))[:, :3]).max() < 0.1
+    assert "dropped" in transducer.info.settings["bias"]
+
+
+def test_times_follow_the_bench_though_the_rate_is_half_a_percent_off():
+    device = digital_ft(rate_error=0.005)
+    transducer = device.open()
+    transducer.start()
+    block = readings(device, transducer, device.box.now() + 3.0)
+    transducer.close()
+    device.box.close()
+    assert transducer.info.rate == 7000.0
+    assert transducer.health.lost == 0
+    half = len(block) // 2
+    assert (block.time[-1] - block.time[half]) * 7035.0 == pytest.approx(len(block) - 1 - half, rel=0.01)
