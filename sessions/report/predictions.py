@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from sessions.prediction import SessionPrediction, TrialPrediction
 from sessions.report.contents import Fact, Field, History, PredictionFinding
 
-_SCENE = ("finger", "materials", "receptor")  # what all trials of a session share
+_SCENE = {"finger": "mm, degrees", "materials": "E in MPa", "receptor": "mm"}  # what all trials share, with its units
 _READINGS = {
     "computed": "greatest tangential force over the contact area",
-    "as-printed": "a hundredth of the greatest tangential force over the contact area, as printed with the paper's tables",
+    "as-printed": "a hundredth of that, as the paper's tables are headed",
 }
 _FROM_ROW = {"tau_max": "mu", "error_estimate": "sed", "normal_per_mm": "normal_force", "wall_s": "sed"}
 
@@ -55,7 +55,7 @@ def modelled(found: SessionPrediction | None) -> tuple[Fact, ...]:
         return ()
     first = solved[0]
     facts = [Fact(name, str(value)) for name, value in first.model.items() if name != "left_out"]
-    facts += [Fact(name, _values(asdict(getattr(first.scene, name)))) for name in _SCENE]
+    facts += [Fact(name, _values(asdict(getattr(first.scene, name))), units) for name, units in _SCENE.items()]
     facts.append(Fact("finger's width", f"{found.width:g} mm", found.width_origin))
     facts.append(Fact("τ max", _READINGS[found.options.tau_reading]))
     facts.append(Fact("unknowns", f"{first.dofs} displacements", "one mesh for all trials"))
@@ -86,7 +86,7 @@ def left_out(found: SessionPrediction | None) -> tuple[Fact, ...]:
 def _worst(audit: str, told: Sequence[Mapping[str, float]]) -> float:
     """Return the least value of an audit whose name says that it has one, else the greatest."""
     values = [audits[audit] for audits in told if audit in audits]
-    return min(values) if "least" in audit or "smallest" in audit else max(values, key=abs)
+    return (min(values) if "least" in audit or "smallest" in audit else max(values, key=abs)) + 0.0  # no minus zero
 
 
 def _finding(row: TrialPrediction) -> PredictionFinding:

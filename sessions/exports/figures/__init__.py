@@ -71,9 +71,9 @@ def _speed(report: Report) -> Plate:
 def _fingers(report: Report) -> Plate:
     caption = (
         "Strain-energy density (SED) in the deformed finger in its settled state, sliding; lengths are true. Thin "
-        "lines: skin and the boundaries between epidermis, dermis and fat; outlined: the ending. Right: the "
-        "contact close by, with the traction of the surface on the skin as arrows and, under them, which part of the "
-        "skin slips. One scale of colours for all; it ends below the peaks at the edges of the contact."
+        "lines: skin and the boundaries between epidermis, dermis and fat; outlined: the ending. The close view adds "
+        "the traction of the surface on the skin as arrows and, under them, which part of the skin slips. One scale of "
+        "colours for all; it ends below the peaks at bone and contact."
     )
     levels = common_levels(report.fields) if report.fields else ()
     pairs = [finger_panels(field, levels, simulated=report.simulated) for field in report.fields]

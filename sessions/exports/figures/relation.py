@@ -23,9 +23,10 @@ def relation_panel(
     figure_sheet = _two_columns()
     axes, beside = figure_sheet.axes
     related = experiment.score_relation
+    rising = related is not None and (related.slope or 0.0) > 0.0
     for mean, prediction, sed in points:
         expected = sed if related is None else _on_line(related, mean.mean)
-        _point(figure_sheet, mean, prediction, sed, above=sed >= expected)
+        _point(figure_sheet, mean, prediction, sed, above=sed >= expected, rising=rising)
     if related is not None:
         ends = [min(m.mean for m, _, _ in points), max(m.mean for m, _, _ in points)]
         axes.plot(ends, [_on_line(related, x) for x in ends], color=GREEN, linewidth=1.0, zorder=1)
@@ -85,7 +86,9 @@ def _on_line(related: Relation, score: float) -> float:
     return 1e3 * (related.intercept + related.slope * score)
 
 
-def _point(drawn: Sheet, mean: MeanScore, prediction: PredictionFinding, sed: float, *, above: bool) -> None:
+def _point(
+    drawn: Sheet, mean: MeanScore, prediction: PredictionFinding, sed: float, *, above: bool, rising: bool
+) -> None:
     """Draw one stimulus with both errors, its index on the side away from the line."""
     axes = drawn.axes[0]
     text = f"index {mean.index}: score {mean.mean:.1f}, SED {sed:.3f} kPa"
@@ -95,7 +98,7 @@ def _point(drawn: Sheet, mean: MeanScore, prediction: PredictionFinding, sed: fl
         error = sed * prediction.error_estimate
         axes.plot([mean.mean] * 2, [sed - error, sed + error], color=GREY, linewidth=0.8, zorder=2)
     axes.plot(mean.mean, sed, "o", color=GREEN, markersize=5, zorder=3, gid=drawn.note(text))
-    right = mean.mean < 80
+    right = above != rising  # away from the line
     axes.annotate(
         str(mean.index),
         (mean.mean, sed),
