@@ -12,8 +12,10 @@ import pytest
 from drivers import serial_stream
 from drivers.address import parse_address
 from drivers.clock import Clock, PacedClock
+from drivers.digital_ft import handshake as digital_ft_handshake
 from drivers.digital_ft.handshake import identify_digital_ft, open_digital_ft
 from drivers.readings import ReadingBlock
+from drivers.serial_ft import handshake as serial_ft_handshake
 from drivers.serial_ft.handshake import identify_serial_ft, open_serial_ft
 from drivers.serial_link import port_of
 from drivers.transducer import DeviceFault, LinkLost, SetupError
@@ -58,10 +60,6 @@ def serial_ft(form="binary"):
     return Simulated(f"{box.uri}&format={form}", open_serial_ft, identify_serial_ft, bench, clock, box)
 
 
-def serial_ft_ascii():
-    return serial_ft("ascii")
-
-
 def digital_ft(**settings):
     bench, clock = Bench(3), PacedClock(1.0)
     box = DigitalFtBox(bench, clock, **settings)
@@ -69,7 +67,7 @@ def digital_ft(**settings):
     return Simulated(box.uri, open_digital_ft, identify_digital_ft, bench, clock, box)
 
 
-WIRES = {"serial-ft": serial_ft, "serial-ft, text": serial_ft_ascii, "digital-ft": digital_ft}
+WIRES = {"serial-ft": serial_ft, "digital-ft": digital_ft}
 
 
 def open_files():
@@ -77,8 +75,10 @@ def open_files():
 
 
 @pytest.fixture(params=WIRES)
-def simulator(request):
-    """Return a function that starts the simulator."""
+def simulator(request, monkeypatch):
+    """Return a function that starts the simulator. The stream is watched for its rate only as long as a test needs."""
+    monkeypatch.setattr(serial_ft_handshake, "_MEASURED", 0.25)
+    monkeypatch.setattr(digital_ft_handshake, "_MEASURED", 0.15)
     threads_before, files_before = set(threading.enumerate()), open_files()
     started = []
 
@@ -166,7 +166,19 @@ FAULTS = {  # what a line without numbers and clock can show of each
 
 @pytest.mark.parametrize("kind", FAULTS)
 def test_it_survives_each_fault_and_accounts_for_every_reading(simulator, kind):
-    device = simulator()
+    survives(simulator(), kind)
+
+
+@pytest.mark.parametrize("kind", ["shorten", "reboot"])
+def test_a_controller_that_sends_text_survives_too(kind):
+    device = serial_ft("ascii")
+    try:
+        survives(device, kind)
+    finally:
+        device.box.close()
+
+
+def survives(device, kind):
     transducer = device.open()
     transducer.start()
     begin = device.box.now() + 0.3
@@ -333,7 +345,7 @@ def test_times_follow_the_bench_though_the_rate_is_half_a_percent_off():
     device = digital_ft(rate_error=0.005)
     transducer = device.open()
     transducer.start()
-    block = readings(device, transducer, device.box.now() + 3.0)
+    block = readings(device, transducer, device.box.now() + 2.0)
     transducer.close()
     device.box.close()
     assert transducer.info.rate == 7000.0

@@ -1,0 +1,128 @@
+import os
+
+import pytest
+import serial
+
+from drivers import serial_link
+from drivers.address import parse_address
+from drivers.clock import RealClock
+from drivers.digital_ft.handshake import open_digital_ft
+from drivers.serial_ft.handshake import open_serial_ft
+from drivers.serial_link import SerialLink, port_of
+from drivers.transducer import LinkLost, SetupError
+from simulators.pseudo_terminal import PseudoTerminal
+
+needs_terminals = pytest.mark.skipif(os.name != "posix", reason="there are no pseudo-terminals on this system")
+
+
+@pytest.fixture
+def terminal():
+    made = PseudoTerminal("ttyTest")
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def stand_in(monkeypatch):
+    """Let every port opened be one that keeps how it was set and never answers."""
+    opened = []
+
+    class Port:
+        is_open = True
+        in_waiting = 0
+
+        def __init__(self, *arguments, **settings):
+            opened.append((arguments, settings))
+
+        def write(self, data):
+            return len(data)
+
+        def read(self, size):
+            return b""[:size]
+
+        def close(self):
+            self.is_open = False
+
+    monkeypatch.setattr(serial_link.serial, "Serial", Port)
+    return opened
+
+
+def test_the_rs485_transducer_is_opened_with_its_own_line_settings(stand_in):
+    with pytest.raises(LinkLost, match="does not answer"):
+        open_digital_ft(parse_address("digital-ft:///dev/ttyUSB7"), RealClock())
+    ((port, baud), settings) = stand_in[0]
+    assert (port, baud) == ("/dev/ttyUSB7", 1_250_000)
+    assert settings["parity"] == serial.PARITY_EVEN
+    assert settings["bytesize"] == serial.EIGHTBITS
+    assert settings["stopbits"] == serial.STOPBITS_ONE
+    assert settings["exclusive"]
+    assert not settings["xonxoff"]
+
+
+def test_the_controller_is_opened_without_parity_at_each_rate_it_might_have(stand_in):
+    with pytest.raises(LinkLost, match="no controller answers"):
+        open_serial_ft(parse_address("serial-ft:///dev/ttyUSB0?counts_per_N=20&counts_per_Nm=333.33"), RealClock())
+    assert [arguments[1] for arguments, _ in stand_in][:3] == [38400, 9600, 115200]
+    assert {settings["parity"] for _, settings in stand_in} == {serial.PARITY_NONE}
+
+
+@needs_terminals
+def test_every_byte_goes_through_unchanged_both_ways(terminal):
+    link = SerialLink(terminal.path, 38400)
+    every = bytes(range(256))
+    link.send(every)
+    heard = b""
+    while len(heard) < 256:
+        heard += terminal.heard(1.0)
+    terminal.say(every)
+    got = b""
+    while len(got) < 256:
+        got += link.receive(1.0) or b""
+    link.close()
+    assert heard == got == every
+
+
+@needs_terminals
+def test_nothing_received_is_none_and_a_port_pulled_out_is_lost(terminal):
+    link = SerialLink(terminal.path, 38400)
+    assert link.receive(0.0) is None
+    assert link.receive(0.01) is None
+    terminal.unplug()
+    with pytest.raises(LinkLost, match="is gone"):
+        link.receive(0.01)
+    with pytest.raises(LinkLost, match="takes no bytes"):
+        link.send(b"x")
+    link.close()
+    link.close()
+
+
+@needs_terminals
+def test_a_port_is_had_by_one_at_a_time(terminal):
+    link = SerialLink(terminal.path, 38400)
+    with pytest.raises(SetupError, match="another program has it"):
+        SerialLink(terminal.path, 38400)
+    link.close()
+    SerialLink(terminal.path, 38400).close()
+
+
+def test_a_port_that_cannot_be_opened_is_named_with_the_reason(tmp_path, monkeypatch):
+    missing = str(tmp_path / "ttyNone")
+    with pytest.raises(SetupError, match="no such port") as refused:
+        SerialLink(missing, 9600)
+    assert str(refused.value).startswith(missing)
+    plain = tmp_path / "plain.txt"
+    plain.write_bytes(b"")
+    with pytest.raises(SetupError, match="no serial port"):
+        SerialLink(str(plain), 9600)
+
+    def forbidden(*_, **__):
+        raise serial.SerialException(13, "could not open port: Permission denied")
+
+    monkeypatch.setattr(serial_link.serial, "Serial", forbidden)
+    with pytest.raises(SetupError, match="you may not use it"):
+        SerialLink("/dev/ttyS0", 9600)
+
+
+def test_an_address_without_a_port_is_refused():
+    with pytest.raises(SetupError, match="names no port"):
+        port_of(parse_address("serial-ft://?baud=9600"))
