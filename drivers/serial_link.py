@@ -12,7 +12,18 @@ from drivers.transducer import LinkLost, SetupError
 
 Parity = Literal["none", "even"]
 
+
+def _terminal_errors() -> tuple[type[Exception], ...]:
+    """Return what setting a port raises beside OSError; nothing on Windows."""
+    try:
+        import termios
+    except ImportError:
+        return ()
+    return (termios.error,)
+
+
 _PARITY = {"none": serial.PARITY_NONE, "even": serial.PARITY_EVEN}
+_GONE = (OSError, *_terminal_errors())  # raised when a port is pulled out; pyserial's own errors are OSErrors
 _WRITE_PATIENCE = 0.1  # for the system to take what is sent [real s]
 
 
@@ -35,14 +46,14 @@ class SerialLink:
                 xonxoff=False,  # binary records may hold those very bytes
                 exclusive=True,
             )
-        except (OSError, ValueError) as error:
+        except (*_GONE, ValueError) as error:
             raise SetupError(f"{port} cannot be opened: {_reason(error, baud)}") from None
 
     def send(self, data: bytes) -> None:
         """Send `data`. Raises LinkLost when the port is gone or takes nothing any more."""
         try:
             self._port.write(data)
-        except (OSError, serial.SerialException):
+        except _GONE:
             raise LinkLost(f"{self._where} takes no bytes any more; check that its plug is in") from None
 
     def receive(self, timeout: float) -> bytes | None:
@@ -54,12 +65,12 @@ class SerialLink:
             first = self._port.read(1)
             waiting = self._port.in_waiting if first else 0
             return (first + self._port.read(waiting) if waiting else first) or None
-        except (OSError, serial.SerialException):
+        except _GONE:
             raise LinkLost(f"{self._where} is gone; check that its plug is in") from None
 
     def close(self) -> None:
         """Give the port back. Harmless when repeated."""
-        with contextlib.suppress(OSError):  # it was pulled out
+        with contextlib.suppress(*_GONE):  # it was pulled out
             self._port.close()
 
 

@@ -160,13 +160,13 @@ class StreamingTransducer:
         self._reset()
         self._thread = threading.Thread(target=self._run, name=f"{self._info.driver} {self._info.serial}".strip())
         self._thread.start()
-        while not self._ever:
+        while not self._ever and self._thread.is_alive():
             self._arrived.wait(_TICK)
             self._arrived.clear()
-            if self._ended is not None:
-                ended = self._ended
-                self.stop()
-                raise ended
+        if self._ended is not None:
+            ended = self._ended
+            self.stop()
+            raise ended
 
     def read(self, timeout: float) -> ReadingBlock:
         """Return all readings not yet handed over, waiting up to `timeout` session seconds for the first."""

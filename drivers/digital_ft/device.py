@@ -114,7 +114,8 @@ def _answer(link: Link, asked: bytes, what: str) -> bytes:
 
 def _heard(link: Link, asked: bytes, expected: bytes) -> bytes:
     """Return what comes after a request, up to an answer to it, or to the bytes expected where there are some."""
-    while link.receive(0.0):
+    deadline = time.monotonic() + _ANSWER
+    while link.receive(0.0) and time.monotonic() < deadline:
         pass  # left over from before
     link.send(asked)
     heard = b""

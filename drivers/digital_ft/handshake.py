@@ -49,8 +49,8 @@ def open_digital_ft(address: Address, clock: Clock) -> StreamingTransducer:
     return StreamingTransducer(_info(place, stored, status, rate), connect, conversation, clock)
 
 
-def identify_digital_ft(address: Address, patience: float) -> TransducerInfo:  # noqa: ARG001 it answers or it does not
-    """Return who answers, changing nothing: a stream left over from before goes on. Takes at most about 0.5 s."""
+def identify_digital_ft(address: Address, _patience: float) -> TransducerInfo:
+    """Return who answers, changing nothing: a stream left over from before goes on. An answer takes 0.2 s at most."""
     place = _where(address)
     link = SerialLink(place.port, place.baud, place.parity)
     try:
