@@ -1,7 +1,7 @@
 """How long the small-strain solver takes and how true it is on the ten published surfaces.
 
-Run: python -m benchmarks.solver (from the root). Prints medians over repeated runs on one thread, and the ratio to the floor, which is
-one assembly and elimination of the same mesh in the same run. Mesh and tables are set-up, and stand apart.
+Run from the root: python -m benchmarks.solver. Prints medians over repeated runs on one thread, and the ratio to the
+floor, which is one assembly and elimination of the same mesh in the same run. Mesh and tables stand apart, as set-up.
 """
 
 import os

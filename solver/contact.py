@@ -100,10 +100,11 @@ class _System:
 class Course:
     """Contact of one body under one law, step after step; keeps the last factorisation, since most steps reuse it."""
 
-    def __init__(self, body: Touchable, law: FrictionLaw) -> None:
-        """Start with nothing known."""
+    def __init__(self, body: Touchable, law: FrictionLaw, patience: int | None = None) -> None:
+        """Start with nothing known; a step is given up after `patience` corrections (None: when nothing can help)."""
         self.body = body
         self.law = law
+        self._patience = 20 + 4 * len(body.gap) if patience is None else patience
         self._system: _System | None = None
         self._entering = SLIP  # what a point is first thought to do when it comes to touch
 
@@ -117,7 +118,7 @@ class Course:
         sense = np.full(count, -float(direction))
         low = self.body.gap + self.body.normal_free < depth
         guesses = [np.where(low, SLIP, OPEN)] if guess is None else [guess]
-        if np.isfinite(self.law.tau_max):
+        if guess is None and np.isfinite(self.law.tau_max):
             guesses.append(np.where(low, CAP, OPEN))
         for number, first in enumerate(guesses):
             try:
@@ -146,8 +147,7 @@ class Course:
         """Change states until none contradicts the solution; with `free`, points may stick and turn round."""
         seen: set[bytes] = set()
         one_by_one = False
-        limit = 20 + 4 * len(state)
-        for iteration in range(1, limit + 1):
+        for iteration in range(1, self._patience + 1):
             if self._system is None or self._system.key != state.tobytes() + sense.tobytes():
                 self._system = _System(self.body, self.law, state, sense)
             if self._system.singular:
@@ -167,7 +167,9 @@ class Course:
                 one_by_one = True
                 seen.clear()
             seen.add(key)
-        raise ContactLost(f"the states of the touching points still contradicted each other after {limit} corrections")
+        raise ContactLost(
+            f"the states of the touching points still contradicted each other after {self._patience} corrections"
+        )
 
     def _solved(
         self,

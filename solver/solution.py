@@ -20,6 +20,7 @@ from solver.prediction import History, Prediction, Row, Skin
 from solver.receptor import ROW
 from solver.scene import Scene, SceneError
 from solver.stepping import March, march
+from solver.wedging import WIDE, deepest, followed
 
 FINENESS = (4, 6, 8, 12, 16, 24, 32, 48)  # the meshes that can be asked for
 DEFAULT = 12
@@ -106,13 +107,14 @@ class _Shared:
     setup_s: float
     solve_s: float
     estimate_s: float
+    widest: bool  # whether contact was looked for wherever it can be
 
 
 def _solve_on(scenes: list[Scene], fineness: float, progress: Progress | None) -> list[_Answer]:
     """Solve all scenes on one mesh, and on two coarser ones for the estimate; look wider where contact reaches out."""
     depth = max(scene.loading.indentation for scene in scenes)
     done: list[_Answer | None] = []
-    for margin in (1.0, 4.0, 16.0):
+    for margin in (1.0, 4.0, WIDE):
         begun = perf_counter()
         fine = _meshed(scenes[0], Sizing(fineness, depth, margin=margin))
         setup = perf_counter() - begun - fine.solve_s
@@ -120,7 +122,8 @@ def _solve_on(scenes: list[Scene], fineness: float, progress: Progress | None) -
         coarse = tuple(
             _meshed(scenes[0], Sizing(fineness / 2.0, depth, shift, margin=margin)) for shift in (False, True)
         )
-        shared = _Shared(fine, coarse, setup, fine.solve_s / len(scenes), (perf_counter() - begun) / len(scenes))
+        estimate = (perf_counter() - begun) / len(scenes)
+        shared = _Shared(fine, coarse, setup, fine.solve_s / len(scenes), estimate, widest=margin == WIDE)
         done = []
         for number, scene in enumerate(scenes):
             _report(progress, number / len(scenes))
@@ -162,20 +165,42 @@ def _settled(scene: Scene, finger: FingerModel) -> Contact:
     return Course(touch, law).sliding(scene.loading.indentation, scene.loading.direction or 1)
 
 
-def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Prediction | None:
-    """Return the prediction of one scene; None where contact reached the end of the skin that may touch."""
-    finger, law = shared.fine, _law(scene)
-    begun = perf_counter()
-    way: March | None = None
+def _direct(scene: Scene, shared: _Shared) -> Contact | None:
+    """Return the settled state; None where contact must be looked for on more of the skin.
+
+    Near a limit, or beyond it, guesses can end in states that no sliding leads to. Where none was found, or one that is
+    folded, only what is reached by following the state from mu = 0 counts. Raises NoSteadyState, NotConverged.
+    """
+    finger, direction = shared.fine, scene.loading.direction
     try:
         contact = _settled(scene, finger)
-        if scene.solve.course == "history":
-            way = march(finger.body.touchable, law, scene.loading, progress)
-            direct, contact = contact, way.instants[-1].contact
-        else:
-            direct = contact
+        if direction == 0 or not _folded(finger, contact):
+            return contact
+        why = "the state found is folded"
     except ContactLost as lost:
-        raise _no_answer(scene, shared.coarse[0], lost) from lost
+        why = str(lost)
+    if not shared.widest:
+        return None
+    if direction == 0:
+        raise _no_answer(scene, why, 0.0)
+    contact, limit = followed(finger.body.touchable, _law(scene), scene.loading.indentation, direction)
+    if contact is None:
+        raise _no_answer(scene, why, limit)
+    return contact
+
+
+def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Prediction | None:
+    """Return the prediction of one scene; None where contact must be looked for on more of the skin."""
+    finger, law = shared.fine, _law(scene)
+    begun = perf_counter()
+    contact = _direct(scene, shared)
+    if contact is None:
+        return None
+    way: March | None = None
+    direct = contact
+    if scene.solve.course == "history":
+        way = march(finger.body.touchable, law, scene.loading, progress)
+        contact = way.instants[-1].contact
     skin = finger.skin_displacement(contact)
     displacement = finger.body.displacement(skin)[:, :, 0]
     if finger.reaches_out(contact, displacement, scene.loading.indentation):
@@ -281,40 +306,24 @@ def _history(scene: Scene, finger: FingerModel, way: March) -> History:
     )
 
 
-def _no_answer(scene: Scene, finger: FingerModel, lost: ContactLost) -> NoSteadyState | NotConverged:
-    """Return the failure that says what is known: the limits, looked for on a coarse mesh."""
-    depth, mu = scene.loading.indentation, float(scene.friction.mu)
-    at = f"{depth:g} mm indentation, mu = {mu:g}" + (
-        "" if scene.friction.tau_max is None else f" and tau_max = {scene.friction.tau_max:g} MPa"
-    )
-    limit_mu = _largest(lambda m: _exists(scene, finger, depth, m), mu)
-    limit_depth = _largest(lambda d: _exists(scene, finger, d, mu), depth)
-    if limit_mu is None or limit_mu >= mu or scene.loading.direction == 0:
-        message = f"No settled sliding was found at {at}: {lost}, from every first guess tried."
-        return NotConverged(message, limit_mu=limit_mu, limit_indentation=limit_depth)
+def _folded(finger: FingerModel, contact: Contact) -> bool:
+    """Return whether tissue is turned inside out somewhere, as in states that no sliding leads to."""
+    return bool(np.prod(finger.stretches(finger.displacement(contact)), axis=0).min() <= 0.0)
+
+
+def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotConverged:
+    """Return the failure that says what is known."""
+    mu = float(scene.friction.mu)
+    at = f"{scene.loading.indentation:g} mm indentation and mu = {mu:g}"
+    if scene.friction.tau_max is not None:
+        at += f" with tau_max = {scene.friction.tau_max:g} MPa"
+    if scene.loading.direction == 0 or limit_mu <= 0.0:
+        return NotConverged(f"No settled state was found at {at}: {why}, from every first guess tried.")
+    limit_depth = deepest(scene, _law(scene))
     message = (
         f"There is no steady sliding at {at}: the drag presses the finger against the surface faster than it yields, "
-        f"so it wedges; at this depth steady sliding ends at mu = {limit_mu:.3g}"
+        f"so it wedges; followed from mu = 0, steady sliding at this depth ends at mu = {limit_mu:.3g}"
     )
     if limit_depth is not None:
         message += f", and at this friction at {limit_depth:.3g} mm"
     return NoSteadyState(message + ".", limit_mu=limit_mu, limit_indentation=limit_depth)
-
-
-def _exists(scene: Scene, finger: FingerModel, depth: float, mu: float) -> bool:
-    try:
-        Course(finger.body.touchable, FrictionLaw(mu, scene.friction.cap)).sliding(depth, scene.loading.direction or 1)
-    except ContactLost:
-        return False
-    return True
-
-
-def _largest(exists: Callable[[float], bool], asked: float) -> float | None:
-    """Return the largest value below `asked` that still exists, to 1 %; None where even a thousandth does not."""
-    low, high = 1e-3 * asked, asked
-    if not exists(low):
-        return None
-    while high - low > 0.01 * high:
-        middle = (low + high) / 2.0
-        low, high = (middle, high) if exists(middle) else (low, middle)
-    return low

@@ -137,7 +137,7 @@ def test_another_finger_is_taken_from_a_scene(tables):
 def test_what_the_stroke_does_not_tell_is_missing_with_its_reason(tables):
     friction = list(tables.friction)
     friction[1] = parameters(2, None, 0.01, 1, flaws=("no_steady_sliding",))
-    friction[2] = parameters(3, 5.0, 0.9, 1)
+    friction[2] = parameters(3, 5.0, 9e9, 1)
     strokes = list(tables.strokes)
     strokes[1] = stroke(2, flaws=("no_steady_sliding",))
     strokes[3] = stroke(4, normal_force=None)

@@ -13,7 +13,7 @@ from solver.failures import Cancelled, NoSteadyState, SolveFailure
 from solver.fields import fields_of
 from solver.reference import SLIPPERINESS, STICKINESS, scene, scenes
 from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
-from solver.solution import solve, solve_together
+from solver.solution import answers, solve, solve_together
 
 # Mean of two independent codes (structured quadrilaterals with exact active sets; a public high-order triangle code
 # with penalty contact), err 0.1 % of sed_ending: the reference page of this finger, small strain.
@@ -200,7 +200,7 @@ def test_a_bound_lets_even_the_stickiest_surface_slide():
     assert found.audits["cone_violation"] < 1e-10
 
 
-@settings(deadline=None, max_examples=25, derandomize=True)
+@settings(deadline=None, max_examples=15, derandomize=True)
 @given(
     depth=st.floats(-4, 0.4).map(lambda power: 10**power),
     mu=st.sampled_from([0.0, 1e-9, 0.3, 0.7, 1.5, 1000.0]),
@@ -218,12 +218,11 @@ def test_any_scene_ends_in_a_balanced_answer_or_in_a_sentence(depth, mu, bound, 
         loading=Loading(depth, slide),
         solve=Solve(course=course),
     )
-    try:
-        found = solve(asked)
-    except SolveFailure as failure:
-        assert str(failure).endswith(".")
-        assert mu > 0.7 or "round-off" in str(failure)  # a state exists below, and was not refused
-        json.dumps(failure.to_dict(), allow_nan=False)
+    (found,) = answers([asked])
+    if isinstance(found, SolveFailure):
+        assert str(found).endswith(".")
+        assert mu > 0.7 or "round-off" in str(found)  # a state exists below, and is not refused
+        json.dumps(found.to_dict(), allow_nan=False)
         return
     json.dumps(found.to_dict(), allow_nan=False)
     assert found.sed_ending > 0.0
