@@ -198,10 +198,10 @@ def survives(device, kind):
     assert health.received + health.lost == block.sequence[-1]
     assert np.all(np.diff(block.sequence) >= 1)
     assert np.all(np.diff(block.time) > 0.0)
-    if kind != "corrupt":  # none of the formats can show every change of a byte
-        wrench = transducer.info.calibration.wrench(block.raw[block.status == 0], np.zeros(6))
-        assert np.abs(wrench[:, :3]).max() < 0.1, "a broken record came out as a reading"
-        assert np.abs(wrench[:, 3:]).max() < 1.0
+    # None of the formats can show every change of a byte, and the binary one of the controller not every loss either.
+    wrench = transducer.info.calibration.wrench(block.raw[block.status == 0], np.zeros(6))
+    wrong = int(np.count_nonzero((np.abs(wrench[:, :3]) > 0.1).any(axis=1) | (np.abs(wrench[:, 3:]) > 1.0).any(axis=1)))
+    assert wrong <= (0.2 * health.malformed + 2 if kind in ("corrupt", "shorten") else 0)
 
 
 def test_a_device_that_goes_away_is_lost_in_one_sentence(simulator, monkeypatch):
