@@ -5,6 +5,7 @@ import importlib
 import sys
 import traceback
 from types import ModuleType
+from typing import NoReturn
 
 from daq_app.console import Console
 
@@ -16,6 +17,7 @@ VERBS = {
     "devices": "list the transducers that can be reached, or probe one",
     "run": "run one session",
     "import": "make a session folder of a foreign recording",
+    "replay": "run a recorded session once more and compare what comes out",
     "analyse": "find the strokes of a session and their friction",
     "predict": "predict the receptor's strain-energy density for each trial",
     "solve": "run the solver on a scene file",
@@ -44,6 +46,13 @@ def run(arguments: list[str]) -> int:
         return _said(*_failure(error))
 
 
+class _Parser(argparse.ArgumentParser):
+    """Tells what is wrong with a command line in one sentence, without printing how all of it is used."""
+
+    def error(self, message: str) -> NoReturn:
+        raise WrongValue(f"{message}; '{self.prog} --help' explains")
+
+
 def _dispatch(arguments: list[str]) -> int:
     if not arguments or arguments[0] in {"-h", "--help"}:
         _overview().print_help(sys.stdout if arguments else sys.stderr)
@@ -54,7 +63,7 @@ def _dispatch(arguments: list[str]) -> int:
     verb = importlib.import_module(f"daq_app.verbs.{name.replace('import', 'import_')}")
     try:
         options = _parser(name, verb).parse_args(_joined(rest))
-    except SystemExit as leaving:  # argparse has printed its help (0) or its complaint (2)
+    except SystemExit as leaving:  # argparse has printed its help
         return int(leaving.code or 0)
     return verb.run(options, Console(as_json=options.json))
 
@@ -86,7 +95,7 @@ def _overview() -> argparse.ArgumentParser:
 
 
 def _parser(name: str, verb: ModuleType) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog=f"daq-app {name}",
         description=verb.__doc__,
         epilog=f"example:\n  {verb.EXAMPLE}",

@@ -62,7 +62,7 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
 
 def _seed(study: int, subject: int) -> int:
     """Return a seed of one subject's own."""
-    return (study * 100 + subject) % 2**31
+    return study * 100 + subject
 
 
 def _told(seed: int) -> Setting:

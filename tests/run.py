@@ -19,7 +19,7 @@ STATIC = [
     ("types agree (strict)", ["basedpyright", "--level", "error", *PACKAGES]),
 ]
 QUICK = [("every sentence a test proves", ["pytest", "-n", "2", "-m", "not slow and not hardware"])]
-LONG = [("the endurance runs", ["pytest", "-m", "slow"])]
+LONG = [("the endurance runs", ["pytest", "-s", "-m", "slow", "tests/endurance"])]
 
 
 def main() -> int:

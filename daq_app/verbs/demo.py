@@ -11,6 +11,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from daq_app.cli import WrongValue
 from daq_app.console import Console, number, table
 from daq_app.derived import analysed, predicted
 from daq_app.study import Study, simulated_study
@@ -22,6 +23,7 @@ from sessions.recording import Recording
 
 EXAMPLE = "daq-app demo --seed 7"
 PACE = 20.0  # told seconds a real second
+LARGEST_SEED = 10_000_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,6 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     """Run the study and print its table."""
     began = time.monotonic()
+    if not 0 <= options.seed <= LARGEST_SEED:
+        raise WrongValue(f"--seed {options.seed} is not allowed: a whole number from 0 to {LARGEST_SEED}")
     out = options.out or Path("demo-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
     clock = RealClock() if options.real_time else PacedClock(PACE)
     console.say(f"SIMULATED study, seed {options.seed}; time runs {clock.factor:g} times as fast as real")

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from daq_app.cli import WrongValue
 from daq_app.console import Console, number, table
 from daq_app.wiring import connected
 from drivers.catalog import Found, reachable
@@ -32,8 +33,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     """List or probe."""
     if options.words[:1] == ["probe"]:
         if len(options.words) != 2:
-            console.note("daq-app: 'devices probe' takes one address, for example sim: or net-ft://192.168.1.1")
-            return 2
+            raise WrongValue("'devices probe' takes one address, for example sim: or net-ft://192.168.1.1")
         return _probe(options.words[1], console)
     found = reachable(options.words)
     console.result({"devices": [_described(device) for device in found] + [{"uri": "sim:", "simulated": True}]})

@@ -8,6 +8,7 @@ import argparse
 import time
 from pathlib import Path
 
+from daq_app.cli import WrongValue
 from daq_app.console import Console
 from daq_app.wiring import serve_net_ft
 
@@ -29,6 +30,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Serve until Ctrl-C."""
+    if not 1 <= options.rate <= 7000:
+        raise WrongValue(f"--rate {options.rate} is not allowed: the box gives 1 to 7000 readings a second")
+    if not 0.01 <= options.factor <= 1000:
+        raise WrongValue(f"--factor {options.factor:g} is not allowed: 0.01 to 1000")
     box = serve_net_ft(
         rdt_port=options.rdt_port,
         tcp_port=options.tcp_port,

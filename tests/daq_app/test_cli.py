@@ -63,3 +63,24 @@ def test_a_wrong_scene_names_key_value_and_what_is_allowed_with_exit_code_2(text
     said = capsys.readouterr()
     assert named in said.err
     assert said.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["solve"],
+        ["demo", "--seed", "x"],
+        ["demo", "--seed", "-1"],
+        ["simulate", "net-ft", "--rate", "0"],
+        ["simulate", "net-ft", "--factor", "0"],
+        ["simulate", "carrier-pigeon"],
+        ["devices", "probe"],
+        ["analyse", "a", "--unheard-of"],
+        ["import", "a.csv", "--units", "N"],
+    ],
+)
+def test_a_wrong_command_line_is_one_sentence_and_exit_code_2(arguments, capsys):
+    assert run(arguments) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
