@@ -1,0 +1,158 @@
+"""A body at finite strain as the arrays that the compiled loops ask for, and the places where its energy is probed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver import kernels
+from solver.elements import Q2P1
+from solver.hyperelastic import Law
+from solver.mesh import Array, Indices, Mesh
+from solver.receptor import Endings
+
+Narrow = NDArray[np.int32]
+_VALUES, _SLOPES = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FiniteBody:
+    """Elements, their unknowns and the skin that may touch; e elements, n unknowns, k nodes of skin.
+
+    The centre node of an element meets no other and is eliminated inside it; held nodes are fixed. What is left is
+    numbered as the mesh numbers its nodes, so a mesh numbered column by column has a narrow band.
+    """
+
+    mesh: Mesh
+    grad_x: Array  # (e, 9, 9) of the shape functions at the quadrature points [1/mm]
+    grad_y: Array  # (e, 9, 9)
+    weight: Array  # (e, 9) areas of the quadrature points [mm2]
+    modes: Array  # (e, 9, 3) pressure modes there, orthonormal over the element [1/mm]
+    centre: Array  # (e, 2) the modes are combinations of 1, x - centre, y - centre
+    combination: Array  # (e, 3, 3) mode m = sum over l of combination[m, l] (1, x - centre, y - centre)[l]
+    shear: Array  # (e,) [MPa]
+    stiffening: Array  # (e,)
+    lame: Array  # (e,) [MPa]
+    nodes: Narrow  # (e, 9)
+    unknown: Narrow  # (e, 8, 2) of the outer nodes, -1 where fixed
+    first: Narrow  # (n,) first column of each row of the tangent that is not zero
+    last: Narrow  # (n,) last row of each column that is not zero, fill included
+    half: int  # half the bandwidth
+    skin: Narrow  # (k, 2) unknowns of the skin's nodes
+    middle: Narrow  # (k,) 1 at the middle of an edge of the skin, 0 at its ends
+
+    @staticmethod
+    def of(mesh: Mesh, laws: Sequence[Law]) -> "FiniteBody":
+        """Prepare `mesh`, whose regions are made of `laws`. The centre of an element is never held."""
+        corners = mesh.nodes[mesh.elements]  # (e, 9, 2)
+        jacobian = np.swapaxes(corners, 1, 2)[:, None] @ _SLOPES  # (e, q, 2, 2)
+        det = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
+        inverse = np.empty_like(jacobian)
+        inverse[..., 0, 0], inverse[..., 1, 1] = jacobian[..., 1, 1] / det, jacobian[..., 0, 0] / det
+        inverse[..., 0, 1], inverse[..., 1, 0] = -jacobian[..., 0, 1] / det, -jacobian[..., 1, 0] / det
+        gradient = _SLOPES @ inverse  # (e, q, 9, 2)
+        weight = det * Q2P1.weights
+        place = _VALUES @ corners
+        centre = place.mean(axis=1)
+        raw = np.concatenate([np.ones((*place.shape[:2], 1)), place - centre[:, None]], axis=2)
+        mass = np.swapaxes(raw * weight[:, :, None], 1, 2) @ raw
+        combination = np.asarray(np.linalg.inv(np.linalg.cholesky(mass)), np.float64)
+        modes = raw @ np.swapaxes(combination, 1, 2)
+
+        unknown = np.zeros((len(mesh.nodes), 2), np.int64)
+        unknown[mesh.held] = -1
+        unknown[mesh.elements[:, 8]] = -1
+        free = unknown >= 0
+        unknown[free] = np.arange(int(free.sum()))
+        outer = unknown[mesh.elements[:, :8]]
+        first, last = _profile(outer.reshape(len(outer), 16), int(free.sum()))
+        at_middle = (np.arange(len(mesh.skin)) % 2).astype(np.int32)
+        return FiniteBody(
+            mesh,
+            np.ascontiguousarray(gradient[..., 0]),
+            np.ascontiguousarray(gradient[..., 1]),
+            weight,
+            np.ascontiguousarray(modes),
+            centre,
+            combination,
+            np.array([law.shear for law in laws])[mesh.region],
+            np.array([law.stiffening for law in laws])[mesh.region],
+            np.array([law.lame for law in laws])[mesh.region],
+            mesh.elements.astype(np.int32),
+            outer.astype(np.int32),
+            first,
+            last,
+            int((np.arange(len(first)) - first).max()),
+            unknown[mesh.skin].astype(np.int32),
+            at_middle,
+        )
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns after the centres are eliminated."""
+        return len(self.first)
+
+    @property
+    def dofs(self) -> int:
+        """Number of unknown displacements, centres included."""
+        return len(self.first) + 2 * len(self.nodes)
+
+
+def _profile(unknown: Indices, size: int) -> tuple[Narrow, Narrow]:
+    """Return the first column of each row, and the last row of each column with the fill of elimination."""
+    low = np.where(unknown >= 0, unknown, size).min(axis=1)
+    first = np.arange(size)
+    spread = np.broadcast_to(low[:, None], unknown.shape)
+    inside = unknown >= 0
+    np.minimum.at(first, unknown[inside], spread[inside])
+    last = np.arange(size)
+    np.maximum.at(last, first, np.arange(size))
+    last = np.maximum.accumulate(last)
+    return first.astype(np.int32), last.astype(np.int32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FiniteProbes:
+    """Places inside elements where the strain energy is wanted, p of them, averaged with weights over r patches."""
+
+    element: Narrow  # (p,)
+    grad_x: Array  # (p, 9)
+    grad_y: Array  # (p, 9)
+    modes: Array  # (p, 3)
+    weights: Array  # (p,) areas [mm2]
+    patch: Indices  # (p,)
+    count: int
+
+    @staticmethod
+    def of(body: FiniteBody, endings: Endings) -> "FiniteProbes":
+        """Carry the probes of `endings` over to `body`, element by element."""
+        probes = endings.probes
+        order = np.argsort(probes.element, kind="stable")
+        element = probes.element[order]
+        modes = (body.combination[element] @ probes.modes[order][:, :, None])[:, :, 0]
+        gradient = probes.gradient[order]
+        return FiniteProbes(
+            element.astype(np.int32),
+            np.ascontiguousarray(gradient[..., 0]),
+            np.ascontiguousarray(gradient[..., 1]),
+            modes,
+            endings.weights[order],
+            endings.patch[order],
+            endings.count,
+        )
+
+    def energy(self, body: FiniteBody, displacement: Array) -> Array:
+        """Return the SED (p,) [MPa] for displacements (nodes, 2), ln J being each element's best fit of it."""
+        out = np.empty(len(self.element))
+        kernels.energies(
+            displacement, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening, body.lame,
+            body.nodes, self.element, self.grad_x, self.grad_y, self.modes, out,
+        )  # fmt: skip
+        return out
+
+    def average(self, body: FiniteBody, displacement: Array) -> Array:
+        """Return the SED averaged over each patch (r,) [MPa]; nan where there is no patch."""
+        total = np.bincount(self.patch, self.energy(body, displacement) * self.weights, self.count)
+        area = np.bincount(self.patch, self.weights, self.count)
+        return total / np.where(area > 0.0, area, np.nan)

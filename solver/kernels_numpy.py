@@ -1,0 +1,91 @@
+"""What `solver.kernels` computes, said once more in plain NumPy: slow, short, and what the tests hold the other to."""
+
+import numpy as np
+
+from solver.finite_body import FiniteBody
+from solver.mesh import Array
+
+
+def deformation(body: FiniteBody, u: Array) -> Array:
+    """Return F (e, 9, 2, 2) at the quadrature points for displacements `u` (nodes, 2)."""
+    gradient = np.stack([body.grad_x, body.grad_y], axis=-1)  # (e, q, 9, 2)
+    return np.eye(2) + np.einsum("eia,eqiA->eqaA", u[body.nodes], gradient)
+
+
+def _logarithm(body: FiniteBody, F: Array) -> tuple[Array, Array]:
+    """Return J (e, 9) and the modes of ln J (e, 3)."""
+    J = np.linalg.det(F)
+    return J, np.einsum("eq,eqm,eq->em", body.weight, body.modes, np.log(J))
+
+
+def _excess(F: Array, J: Array) -> Array:
+    return np.sum(F * F, axis=(-2, -1)) - 2.0 - 2.0 * np.log(J)
+
+
+def energy(body: FiniteBody, u: Array) -> float:
+    """Return the energy stored in the body [N mm per mm]."""
+    F = deformation(body, u)
+    J, volume = _logarithm(body, F)
+    b = body.stiffening[:, None]
+    safe = np.where(b > 0.0, b, 1.0)
+    Q = _excess(F, J)
+    shape = np.where(b > 0.0, np.expm1(b * Q) / safe, Q)
+    return float(np.sum(body.weight * body.shear[:, None] / 2.0 * shape) + np.sum(body.lame / 2.0 * (volume**2).T))
+
+
+def forces_and_tangents(body: FiniteBody, u: Array, pressure: Array) -> tuple[Array, Array]:
+    """Return the internal forces (e, 18) and tangents (e, 18, 18) of the elements, ordered x, y, x, y, ...
+
+    `pressure` (e, 3) is what the geometric part of the tangent sees; the forces follow from `u` alone.
+    """
+    F = deformation(body, u)
+    J, volume = _logarithm(body, F)
+    inverse = np.swapaxes(np.linalg.inv(F), -1, -2)
+    gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
+    w = body.weight
+    G = body.shear[:, None] * np.exp(body.stiffening[:, None] * _excess(F, J))
+    spatial = np.einsum("eqaA,eqiA->eqia", inverse, gradient)  # gradients in the deformed body
+    dilate = np.einsum("eq,eqm,eqia->emia", w, body.modes, spatial)
+    excess = np.einsum("eqaA,eqiA->eqia", F - inverse, gradient)
+    force = np.einsum("eq,eqia->eia", w * G, excess)
+    force += body.lame[:, None, None] * np.einsum("em,emia->eia", volume, dilate)
+    geometric = w * (G - np.einsum("eqm,em->eq", body.modes, pressure))
+    tangent = np.einsum("eq,eqiA,eqjA,ab->eiajb", w * G, gradient, gradient, np.eye(2))
+    tangent += np.einsum("eq,eqja,eqib->eiajb", geometric, spatial, spatial)
+    tangent += np.einsum("eq,eqia,eqjb->eiajb", 2.0 * body.stiffening[:, None] * w * G, excess, excess)
+    tangent += np.einsum("e,emia,emjb->eiajb", body.lame, dilate, dilate)
+    count = len(body.nodes)
+    return force.reshape(count, 18), tangent.reshape(count, 18, 18)
+
+
+def system(body: FiniteBody, u: Array, pressure: Array) -> tuple[Array, Array]:
+    """Return the internal forces (n,) and the tangent (n, n) with the elements' centres eliminated."""
+    force, tangent = forces_and_tangents(body, u, pressure)
+    inside = np.linalg.inv(tangent[:, 16:, 16:])
+    across = tangent[:, :16, 16:] @ inside
+    force = force[:, :16] - (across @ force[:, 16:, None])[:, :, 0]
+    tangent = tangent[:, :16, :16] - across @ tangent[:, 16:, :16]
+    out, whole = np.zeros(body.size + 1), np.zeros((body.size + 1, body.size + 1))
+    at = body.unknown.reshape(-1, 16)  # fixed unknowns, -1, go to the last place and are cut off
+    np.add.at(out, at, force)
+    np.add.at(whole, (at[:, :, None], at[:, None, :]), tangent)
+    return out[:-1], whole[:-1, :-1]
+
+
+def dense(band: Array) -> Array:
+    """Return the matrix (n, n) that a band (n, 2 h + 5) of `solver.kernels` stores."""
+    size, half = len(band), (band.shape[1] - 5) // 2
+    out = np.zeros((size, size))
+    for row in range(size):
+        low, high = max(0, row - half), min(size, row + half + 1)
+        out[row, low:high] = band[row, low - row + half : high - row + half]
+    return out
+
+
+def tributary(x: Array) -> Array:
+    """Return the length of skin each node stands for (k,): Simpson's rule on edges of three nodes."""
+    out = np.zeros(len(x))
+    slopes = np.array([[-1.5, 2.0, -0.5], [-0.5, 0.0, 0.5], [0.5, -2.0, 1.5]])
+    for start in range(0, len(x) - 2, 2):
+        out[start : start + 3] += np.array([1.0, 4.0, 1.0]) / 3.0 * (slopes @ x[start : start + 3])
+    return out

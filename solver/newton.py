@@ -1,0 +1,155 @@
+"""One load step of a body at finite strain: Newton, contact states and displacements updated together.
+
+Unknown are the displacements; the states of the skin's nodes (open, stick, slip, slip at the bound) change with every
+iteration (primal-dual active set: Alart and Curnier 1991; Hüeber and Wohlmuth 2005). Nothing is left of a penalty. The
+pressure in the geometric stiffness is the linearised prediction of the iteration before (mixed integration points:
+Magisano, Leonetti and Garcea 2017), which lets a nearly incompressible body take the whole depth in a step or two.
+"""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver import kernels
+from solver.failures import NotConverged
+from solver.finite_body import FiniteBody
+from solver.kernels import OPEN
+from solver.mesh import Array
+
+States = NDArray[np.int32]
+EQUILIBRIUM, BY_DEPTH, BY_FRICTION, BY_TRAVEL = 0, 1, 2, 3  # columns of Iteration.steps
+
+
+class Pull(NamedTuple):
+    """What the surface does: how far it has risen, how far it has moved, and its friction."""
+
+    depth: float  # of the bone's travel towards the surface [mm]
+    mu: float  # [-]
+    tau: float = np.inf  # traction bound [MPa]
+    sense: int = (
+        0  # +1, -1: the settled sliding state whose friction force on the skin points there; 0: sticks or slips
+    )
+    travel: float = 0.0  # of the surface along +x relative to the bone [mm]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shape:
+    """A state of the body; never changed once made. k nodes of skin, e elements."""
+
+    u: Array  # (nodes, 2) displacements relative to the bone [mm]
+    pressure: Array  # (e, 3) modes of the pressure as the next tangent sees them
+    state: States  # (k,)
+    sense: States  # (k,) direction of the friction force on the skin where it slips
+    reaction: Array  # (k, 2) forces of the surface on the skin [N/mm]
+    pull: Pull
+    iterations: int  # linear systems solved on the way here, from undeformed
+
+    @staticmethod
+    def undeformed(body: FiniteBody) -> "Shape":
+        """Return the body before anything touches it."""
+        count = len(body.skin)
+        zero = np.zeros(count, np.int32)
+        u, pressure = np.zeros(body.mesh.nodes.shape), np.zeros((len(body.nodes), 3))
+        return Shape(u, pressure, zero, zero, np.zeros((count, 2)), Pull(0.0, 0.0), 0)
+
+    def place(self, body: FiniteBody) -> Array:
+        """Return the deformed positions of the skin's nodes (k, 2) [mm]."""
+        return body.mesh.nodes[body.mesh.skin] + self.u[body.mesh.skin]
+
+    @property
+    def touching(self) -> NDArray[np.bool_]:
+        """Which nodes touch, (k,)."""
+        return self.state != OPEN
+
+    @property
+    def force(self) -> Array:
+        """Force of the surface on the body along x and y (2,) [N/mm]."""
+        return self.reaction.sum(axis=0)
+
+
+class Newton:
+    """The iterations on one body, with the memory they need."""
+
+    def __init__(self, body: FiniteBody) -> None:
+        """Set memory aside for `body`."""
+        size, count, skin = body.size, len(body.nodes), len(body.skin)
+        self.body = body
+        self.band = np.zeros((size, 2 * body.half + 5))
+        self.force = np.zeros(size)
+        self.fold, self.dilate = np.zeros((count, 2, 17)), np.zeros((count, 3, 18))
+        self.volume = np.zeros((count, 3))
+        self.rows = np.zeros((skin, 2, 2 * body.half + 5))
+        self.steps = np.zeros((size, 4))
+        self.length = np.zeros(skin)
+        self.skin_nodes = body.mesh.skin.astype(np.int32)
+        self.skin_x, self.skin_y = body.mesh.nodes[body.mesh.skin].T.copy()
+
+    def linearise(self, shape: Shape, pull: Pull, anchor: Array) -> bool:
+        """Fill the system at `shape` under `pull` and solve it into `steps` (n, 4); False where it cannot be.
+
+        `anchor` (k,) are the positions along x where nodes stick [mm].
+        """
+        body = self.body
+        least = kernels.assemble(
+            shape.u, shape.pressure, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening,
+            body.lame, body.nodes, body.unknown, self.band, self.force, self.fold, self.dilate, self.volume,
+        )  # fmt: skip
+        if not least > 0.0:
+            return False
+        x = self.skin_x + shape.u[self.skin_nodes, 0]
+        above = self.skin_y + shape.u[self.skin_nodes, 1] - pull.depth
+        kernels.tributary(x, body.middle, self.length)
+        kernels.impose(
+            self.band, self.force, body.skin, body.middle, shape.state, shape.sense, pull.mu, pull.tau, above,
+            x - anchor, self.length, self.rows, self.steps,
+        )  # fmt: skip
+        if kernels.factorise(self.band, body.first, body.last) == 0.0:
+            return False
+        kernels.substitute(self.band, body.first, body.last, self.steps)
+        return bool(np.isfinite(self.steps[-1, 0]))
+
+    def moved(
+        self, shape: Shape, pull: Pull, step: Array, anchor: Array, scale: float = 1.0
+    ) -> tuple[Shape, float, int]:
+        """Return the shape after `step` (n,), its largest displacement [mm], and how many contact states it changed."""
+        body = self.body
+        u, pressure = np.empty_like(shape.u), np.empty_like(shape.pressure)
+        largest = kernels.advance(
+            shape.u, shape.pressure, step, scale, body.nodes, body.unknown, body.lame, self.fold, self.dilate,
+            self.volume, u, pressure,
+        )  # fmt: skip
+        state, sense, reaction = shape.state.copy(), shape.sense.copy(), np.empty((len(shape.state), 2))
+        kernels.reactions(self.force, body.skin, self.rows, step, reaction)
+        x = self.skin_x + u[self.skin_nodes, 0]
+        above = self.skin_y + u[self.skin_nodes, 1] - pull.depth
+        kernels.tributary(x, body.middle, self.length)
+        changed = kernels.restate(state, sense, reaction, above, x - anchor, self.length, pull.mu, pull.tau, pull.sense)
+        return Shape(u, pressure, state, sense, reaction, pull, shape.iterations + 1), largest, changed
+
+    def settle(self, start: Shape, pull: Pull, tolerance: float = 1e-8, limit: int = 25) -> Shape:
+        """Return the equilibrium under `pull`, from `start`. Newton ends at a step below `tolerance` [mm].
+
+        Raises NotConverged where `limit` iterations do not do it or the body would turn inside out.
+        """
+        anchor = start.place(self.body)[:, 0] + (pull.travel - start.pull.travel)
+        shape = self._entered(start, pull)
+        for _ in range(limit):
+            if not self.linearise(shape, pull, anchor):
+                raise NotConverged("the body would turn inside out")
+            shape, largest, changed = self.moved(shape, pull, self.steps[:, EQUILIBRIUM].copy(), anchor)
+            if not largest < 1e3:
+                raise NotConverged("the displacements grow without bound")
+            if largest < tolerance and not changed:
+                return shape
+        raise NotConverged(f"no equilibrium within {limit} iterations")
+
+    def _entered(self, start: Shape, pull: Pull) -> Shape:
+        """Return `start` with the states that `pull` brings at once: new contacts, and slip in its direction."""
+        state, sense = start.state.copy(), start.sense.copy()
+        x = self.skin_x + start.u[self.skin_nodes, 0]
+        above = self.skin_y + start.u[self.skin_nodes, 1] - pull.depth
+        kernels.tributary(x, self.body.middle, self.length)
+        kernels.restate(state, sense, start.reaction, above, x - x, self.length, pull.mu, pull.tau, pull.sense)
+        return replace(start, state=state, sense=sense)

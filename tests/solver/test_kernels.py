@@ -1,0 +1,142 @@
+# ruff: noqa: N806 - the letters of the literature
+"""The compiled loops agree with their NumPy twin, and the tangent with differences."""
+
+import numpy as np
+import pytest
+
+from solver import kernels, kernels_numpy
+from solver.finite_body import FiniteBody
+from solver.hyperelastic import Demiray, NeoHooke
+from solver.kernels import CAP, OPEN, SLIP, STICK
+from solver.newton import Newton, Pull, Shape
+from tests.solver.finite_examples import block, finger
+
+
+def distorted(law, seed=1):
+    body = FiniteBody.of(block(distortion=0.06, seed=seed), [law])
+    u = np.random.default_rng(seed).uniform(-0.015, 0.015, body.mesh.nodes.shape)
+    u[body.mesh.held] = 0.0
+    return body, u
+
+
+def assembled(body, u, pressure):
+    newton = Newton(body)
+    least = kernels.assemble(
+        u, pressure, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening, body.lame,
+        body.nodes, body.unknown, newton.band, newton.force, newton.fold, newton.dilate, newton.volume,
+    )  # fmt: skip
+    return newton, least
+
+
+LAWS = [NeoHooke(0.08, 0.48), NeoHooke(0.08, 0.4999), Demiray(0.08, 0.48, 1.5)]
+
+
+@pytest.mark.parametrize("law", LAWS, ids=str)
+def test_compiled_forces_and_tangent_agree_with_the_plain_ones(law):
+    body, u = distorted(law)
+    pressure = np.random.default_rng(2).normal(0.0, 0.01, (len(body.nodes), 3))
+    newton, least = assembled(body, u, pressure)
+    force, tangent = kernels_numpy.system(body, u, pressure)
+    np.testing.assert_allclose(newton.force, force, atol=1e-13 * np.abs(tangent).max())
+    np.testing.assert_allclose(kernels_numpy.dense(newton.band), tangent, atol=1e-12 * np.abs(tangent).max())
+    assert least == pytest.approx(np.linalg.det(kernels_numpy.deformation(body, u)).min(), rel=1e-12)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=str)
+def test_forces_are_the_derivative_of_the_energy_and_the_tangent_that_of_the_forces(law):
+    body, u = distorted(law)
+    way = np.random.default_rng(3).normal(size=u.shape)
+    pressure = newton_pressure(body, u)
+    force, tangent = kernels_numpy.forces_and_tangents(body, u, pressure)
+    local = way[body.nodes].reshape(len(body.nodes), 18)
+    h = 1e-6
+    slope = (kernels_numpy.energy(body, u + h * way) - kernels_numpy.energy(body, u - h * way)) / (2 * h)
+    assert np.sum(force * local) == pytest.approx(slope, rel=1e-7)
+    ahead = kernels_numpy.forces_and_tangents(body, u + h * way, pressure)[0]
+    behind = kernels_numpy.forces_and_tangents(body, u - h * way, pressure)[0]
+    change = np.einsum("eij,ej->ei", tangent, local)
+    np.testing.assert_allclose((ahead - behind) / (2 * h), change, atol=1e-7 * np.abs(change).max())
+
+
+@pytest.mark.parametrize("columns", [1, 2, 5])
+def test_band_factors_solve_what_a_dense_solver_solves(columns):
+    body = FiniteBody.of(block(columns=columns, rows=3, distortion=0.1), [NeoHooke(0.08, 0.48)])
+    newton, _ = assembled(body, np.zeros(body.mesh.nodes.shape), np.zeros((len(body.nodes), 3)))
+    matrix = kernels_numpy.dense(newton.band)
+    right = np.random.default_rng(0).normal(size=(body.size, 4))
+    solution = right.copy()
+    assert kernels.factorise(newton.band, body.first, body.last) > 0.0
+    kernels.substitute(newton.band, body.first, body.last, solution)
+    np.testing.assert_allclose(solution, np.linalg.solve(matrix, right), rtol=1e-9, atol=1e-9)
+
+
+def test_tributary_lengths_add_up_and_agree_with_the_plain_ones():
+    x = np.cumsum(np.random.default_rng(0).uniform(0.1, 0.3, 9))
+    length = np.empty(9)
+    kernels.tributary(x, (np.arange(9) % 2).astype(np.int32), length)
+    np.testing.assert_allclose(length, kernels_numpy.tributary(x), rtol=1e-13)
+    assert length.sum() == pytest.approx(x[-1] - x[0])
+
+
+def test_contact_rows_are_the_derivatives_of_their_conditions():
+    body, u = distorted(NeoHooke(0.08, 0.48))
+    newton = Newton(body)
+    start = Shape.undeformed(body)
+    state = np.array([STICK, SLIP, CAP, CAP, CAP, SLIP, OPEN], np.int32)
+    sense = np.array([1, 1, -1, -1, -1, -1, 1], np.int32)
+    pull = Pull(0.05, 0.4, 0.01, 0)
+    anchor = newton.skin_x + 0.01
+
+    def conditions(u):
+        pressure = newton_pressure(body, u)
+        at = Shape(u, pressure, state, sense, start.reaction, pull, 0)
+        force = kernels_numpy.system(body, u, pressure)[0]
+        place = at.place(body)
+        length = kernels_numpy.tributary(place[:, 0])
+        out = force.copy()
+        for i, (x, y) in enumerate(body.skin):
+            if state[i] != OPEN:
+                out[y] = place[i, 1] - pull.depth
+            if state[i] == STICK:
+                out[x] = place[i, 0] - anchor[i]
+            elif state[i] == SLIP:
+                out[x] = force[x] - sense[i] * pull.mu * force[y]
+            elif state[i] == CAP:
+                out[x] = force[x] - sense[i] * pull.tau * length[i]
+        return out, at
+
+    # the centres must be in equilibrium, since the condensed force is that of a body whose centres are
+    u = equilibrated(body, u)
+    here, shape = conditions(u)
+    assert newton.linearise(shape, pull, anchor)
+    step = newton.steps[:, 0] * 1e-5
+    u_new = np.empty_like(u)
+    kernels.advance(
+        u, shape.pressure, step, 1.0, body.nodes, body.unknown, body.lame, newton.fold, newton.dilate, newton.volume,
+        u_new, np.empty_like(shape.pressure),
+    )  # fmt: skip
+    after, _ = conditions(equilibrated(body, u_new))
+    np.testing.assert_allclose(after - here, -1e-5 * here, atol=1e-4 * np.abs(1e-5 * here).max())
+
+
+def newton_pressure(body, u):
+    J = np.linalg.det(kernels_numpy.deformation(body, u))
+    return body.lame[:, None] * np.einsum("eq,eqm,eq->em", body.weight, body.modes, np.log(J))
+
+
+def equilibrated(body, u):
+    u = u.copy()
+    for _ in range(8):
+        force, tangent = kernels_numpy.forces_and_tangents(body, u, newton_pressure(body, u))
+        u[body.nodes[:, 8]] -= np.linalg.solve(tangent[:, 16:, 16:], force[:, 16:, None])[:, :, 0]
+    return u
+
+
+def test_probed_energy_of_an_even_squeeze_is_the_laws_own():
+    newton, probes, _ = finger(4)
+    body = newton.body
+    F = np.array([[1.1, 0.2], [0.05, 0.9]])
+    u = body.mesh.nodes @ (F - np.eye(2)).T
+    Q = np.sum(F * F) - 2.0 - 2.0 * np.log(np.linalg.det(F))
+    expected = body.shear / 2.0 * Q + body.lame / 2.0 * np.log(np.linalg.det(F)) ** 2
+    np.testing.assert_allclose(probes.energy(body, u), expected[probes.element], rtol=1e-9)

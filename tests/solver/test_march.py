@@ -1,0 +1,52 @@
+"""The course in time at finite strain."""
+
+import numpy as np
+import pytest
+
+from solver import kernels_numpy
+from solver.kernels import SLIP, STICK
+from solver.march import march, press_and_slide
+from solver.newton import Pull
+from solver.sliding import settled
+from tests.solver.finite_examples import finger
+
+
+@pytest.mark.parametrize(
+    ("depth", "mu", "tau", "direction"), [(1.5, 0.24, 0.00877, -1), (1.5, 0.62, 0.04707, -1), (2.0, 0.28, 0.008033, 1)]
+)
+def test_sliding_far_ends_in_the_state_that_is_solved_directly(depth, mu, tau, direction):
+    newton, probes, _ = finger(5)
+    *_, last = march(newton, press_and_slide(depth, mu, tau, direction, press=5, slides=15, distance=8.0))
+    direct = settled(newton, Pull(depth, mu, tau, -direction))
+    assert probes.average(newton.body, last.u)[0] == pytest.approx(probes.average(newton.body, direct.u)[0], rel=1e-10)
+
+
+def test_work_of_the_bone_is_stored_or_lost_to_friction_and_friction_only_takes():
+    newton, _, _ = finger(4)
+    body = newton.body
+    course = press_and_slide(1.0, 0.4, 0.02, 1, press=20, slides=60, distance=2.0)
+    before, work, lost = None, 0.0, 0.0
+    for shape in march(newton, course):
+        if before is not None:
+            push = (shape.reaction + before.reaction) / 2.0
+            work += push[:, 1].sum() * (shape.pull.depth - before.pull.depth)
+            work += push[:, 0].sum() * (shape.pull.travel - before.pull.travel)
+            slid = np.diff([s.place(body)[:, 0] - s.pull.travel for s in (before, shape)], axis=0)[0]
+            assert (shape.reaction[:, 0] * slid).max() < 1e-12
+            lost -= float(push[:, 0] @ slid)
+        before = shape
+    assert work == pytest.approx(kernels_numpy.energy(body, before.u) + lost, rel=3e-3)
+
+
+def test_points_stick_before_they_slip_and_turn_round_with_the_bone():
+    newton, probes, _ = finger(5)
+    there = press_and_slide(1.5, 0.44, 0.03009, -1, press=6, slides=20, distance=6.0)
+    back = [pull._replace(travel=6.0 - 0.5 * i) for i, pull in enumerate([there[-1]] * 22, start=1)]
+    shapes = list(march(newton, there + back))
+    early, settled_one, last = shapes[5], shapes[25], shapes[-1]
+    assert (early.state == STICK).any()
+    assert (settled_one.state[settled_one.touching] >= SLIP).all()
+    assert (settled_one.sense[settled_one.touching] == 1).all()
+    assert (last.sense[last.touching] == -1).all()
+    opposite = settled(newton, Pull(1.5, 0.44, 0.03009, -1))
+    assert probes.average(newton.body, last.u)[0] == pytest.approx(probes.average(newton.body, opposite.u)[0], rel=1e-9)

@@ -1,0 +1,135 @@
+# ruff: noqa: N806 - the letters of the literature
+"""Settled sliding at finite strain: the published finger, the incompressible limit, balance, and patch states."""
+
+import numpy as np
+import pytest
+
+from solver import kernels_numpy
+from solver.finite_body import FiniteBody
+from solver.hyperelastic import NeoHooke
+from solver.kernels import CAP, OPEN, SLIP
+from solver.newton import Newton, Pull
+from solver.sliding import settled
+from tests.solver.finite_examples import block, finger
+
+# ending-averaged SED [MPa], normal and tangential force [N/mm]: means of two independent codes (quadrilaterals with
+# exact contact, up to 36,000 unknowns; high-order triangles with penalty contact, 27,000), which agree to 0.05-0.2 %
+REFERENCE = {
+    "press d1.5": (Pull(1.5, 0.0, np.inf, 1), 0.0065997, 0.12497, 0.0),
+    "press d2.0": (Pull(2.0, 0.0, np.inf, 1), 0.0102866, 0.20519, 0.0),
+    "slip 0": (Pull(1.5, 0.62, 0.04707, 1), 0.0019115, 0.08142, 0.05048),
+    "slip 55": (Pull(1.5, 0.44, 0.03009, 1), 0.0025631, 0.09056, 0.03985),
+    "slip 100": (Pull(1.5, 0.24, 0.00877, 1), 0.0039081, 0.10361, 0.02487),
+    "stick 0": (Pull(2.0, 0.28, 0.008033, -1), 0.009656, 0.26279, 0.05666),
+    "stick 0 at d1.0": (Pull(1.0, 0.28, 0.008033, -1), 0.003254, 0.07777, 0.02177),
+    "stick 100 at d1.0": (Pull(1.0, 0.67, 0.05255, -1), 0.0020332, 0.09485, 0.06355),
+}
+
+
+@pytest.mark.parametrize("name", REFERENCE)
+def test_the_published_finger_answers_as_two_other_codes_found(name):
+    pull, sed, normal, tangential = REFERENCE[name]
+    newton, probes, _ = finger(24, margin=3.0)
+    shape = settled(newton, pull, tolerance=1e-7)
+    assert probes.average(newton.body, shape.u)[0] == pytest.approx(sed, rel=0.003)
+    assert shape.force[1] == pytest.approx(normal, rel=0.003)
+    assert pull.sense * shape.force[0] == pytest.approx(tangential, rel=0.003, abs=1e-12)
+
+
+@pytest.fixture(scope="module")
+def capped():
+    newton, _, _ = finger(5)
+    return newton, settled(newton, Pull(1.5, 0.44, 0.03009, 1))
+
+
+def test_the_surface_and_the_bone_push_alike(capped):
+    newton, shape = capped
+    body = newton.body
+    pressure = pressure_of(body, shape.u)
+    force, _ = kernels_numpy.forces_and_tangents(body, shape.u, pressure)
+    whole = np.zeros(body.mesh.nodes.shape)
+    np.add.at(whole, body.nodes, force.reshape(-1, 9, 2))
+    bone = whole[body.mesh.held].sum(axis=0)
+    np.testing.assert_allclose(shape.force, -bone, atol=1e-10)
+    free = np.ones(len(whole), bool)
+    free[body.mesh.held] = free[body.mesh.skin] = False
+    assert np.abs(whole[free]).max() < 1e-10
+
+
+def test_forces_of_touching_points_obey_the_friction_law(capped):
+    newton, shape = capped
+    pull, body = shape.pull, newton.body
+    length = kernels_numpy.tributary(shape.place(body)[:, 0])
+    slip, cap, open_ = (shape.state == code for code in (SLIP, CAP, OPEN))
+    np.testing.assert_allclose(shape.reaction[slip, 0], pull.mu * shape.reaction[slip, 1], atol=1e-12)
+    np.testing.assert_allclose(shape.reaction[cap, 0], pull.tau * length[cap], atol=1e-12)
+    np.testing.assert_allclose(shape.reaction[open_], 0.0, atol=1e-12)
+    assert (shape.reaction[slip | cap, 1] >= -1e-12).all()
+    height = shape.place(body)[:, 1] - pull.depth
+    assert height.min() > -1e-10
+
+
+def test_incompressible_tissue_takes_no_more_iterations_and_has_its_own_limit():
+    iterations, sed = [], []
+    for nu in (0.48, 0.4999, 0.4999999):
+        newton, probes, _ = finger(5, nu=nu)
+        shape = settled(newton, Pull(1.5, 0.24, 0.00877, 1))
+        iterations.append(shape.iterations)
+        sed.append(probes.average(newton.body, shape.u)[0])
+    assert max(iterations) <= iterations[0] + 2
+    assert sed[2] == pytest.approx(sed[1], rel=3e-3)
+
+
+def test_without_friction_both_directions_are_the_same_and_a_bound_of_nothing_is_no_friction():
+    newton, probes, _ = finger(5)
+    pulls = (Pull(1.0, 0.0, np.inf, 1), Pull(1.0, 0.0, np.inf, -1), Pull(1.0, 0.5, 0.0, 1))
+    sed = [probes.average(newton.body, settled(newton, pull).u)[0] for pull in pulls]
+    np.testing.assert_allclose(sed, sed[0], rtol=1e-10)
+
+
+def test_the_next_surface_follows_from_the_last_one():
+    newton, _, _ = finger(5)
+    first = settled(newton, Pull(1.5, 0.24, 0.00877, 1))
+    pull = Pull(1.5, 0.44, 0.03009, 1)
+    onward, afresh = settled(newton, pull, first), settled(newton, pull)
+    assert onward.iterations - first.iterations <= 7
+    np.testing.assert_allclose(onward.u, afresh.u, atol=1e-9)
+
+
+def test_scaling_all_stiffness_scales_the_answer():
+    newton, probes, _ = finger(5)
+    body = newton.body
+    stiffer = FiniteBody.of(body.mesh, [NeoHooke(10 * E, 0.48) for E in (0.136, 0.08, 0.034)])
+    one = settled(newton, Pull(1.0, 0.44, 0.02, 1))
+    ten = settled(Newton(stiffer), Pull(1.0, 0.44, 0.2, 1))
+    np.testing.assert_allclose(ten.u, one.u, atol=1e-9)
+    assert probes.average(stiffer, ten.u)[0] == pytest.approx(10 * probes.average(body, one.u)[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("distortion", [0.0, 0.06])
+def test_a_block_pressed_between_its_sides_has_the_closed_form_pressure_at_every_node(distortion):
+    mesh = block(distortion=distortion, held="sides and top")
+    body = FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)])
+    u = np.zeros(mesh.nodes.shape)
+    u[:, 1] = (1.0 - mesh.nodes[:, 1]) * 0.2  # to 0.8 of its height; sigma_yy = -0.193089
+    force = np.zeros(mesh.nodes.shape)
+    found, _ = kernels_numpy.forces_and_tangents(body, u, pressure_of(body, u))
+    np.add.at(force, mesh.elements, found.reshape(-1, 9, 2))
+    length = kernels_numpy.tributary(mesh.nodes[mesh.skin, 0])
+    np.testing.assert_allclose(force[mesh.skin[1:-1], 1], 0.193089 * length[1:-1], rtol=3e-6)
+    inside = np.setdiff1d(np.arange(len(force)), np.concatenate([mesh.skin, mesh.held]))
+    np.testing.assert_allclose(force[inside], 0.0, atol=1e-15)
+
+
+def test_turning_the_unloaded_body_by_a_right_angle_stores_nothing():
+    body = FiniteBody.of(block(distortion=0.06), [NeoHooke(0.08, 0.48)])
+    x, y = body.mesh.nodes.T
+    u = np.stack([-y - x, x - y], axis=1)
+    force, _ = kernels_numpy.forces_and_tangents(body, u, np.zeros((len(body.nodes), 3)))
+    assert abs(kernels_numpy.energy(body, u)) < 1e-15
+    np.testing.assert_allclose(force, 0.0, atol=1e-14)
+
+
+def pressure_of(body, u):
+    J = np.linalg.det(kernels_numpy.deformation(body, u))
+    return body.lame[:, None] * np.einsum("eq,eqm,eq->em", body.weight, body.modes, np.log(J))
