@@ -35,7 +35,7 @@ def test_a_session_killed_at_any_moment_holds_all_that_was_said_to_be_safe(tmp_p
         deadline = time.monotonic() + 20
         while not (folder / "session.sqlite").exists() and time.monotonic() < deadline:
             time.sleep(0.01)
-        time.sleep(chance.uniform(0.0, 3.5))
+        time.sleep(chance.uniform(0.0, 2.8))
         process.send_signal(signal.SIGKILL)
         said = process.communicate()[1]
         safe = max((int(found) for found in re.findall(r"(\d+) readings safe", said)), default=0)
