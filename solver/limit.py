@@ -46,7 +46,8 @@ def follow(
     """
     shape, previous = start, None
     value = _value(start.pull, by)
-    length = 0.1 * abs(target - value)
+    reach = min(abs(target - value), LARGEST_MU)
+    length = 0.1 * reach
     largest, best = value, start
     for _ in range(400):
         if stop():
@@ -61,7 +62,7 @@ def follow(
             if found is not None and not _leapt(newton, shape, found, outline):
                 break
             length /= 2.0
-            if length < 1e-4 * abs(target):
+            if length < 1e-4 * reach:
                 return Branch(best, largest, limited=True)
         easy = found.iterations - shape.iterations <= 5
         previous, shape = (direction, rate), found
@@ -74,27 +75,33 @@ def follow(
     return Branch(best, largest, limited=True)
 
 
-def largest_friction(newton: Newton, pull: Pull, outline: Indices, target: float | None = None) -> Branch:
+def largest_friction(
+    newton: Newton,
+    pull: Pull,
+    outline: Indices,
+    target: float | None = None,
+    stop: Callable[[], bool] = lambda: False,
+) -> Branch:
     """Follow settled sliding at the depth and bound of `pull` from mu = 0 to `target`, LARGEST_MU where there is none.
 
     Raises NotConverged where not even the frictionless state is found.
     """
-    start = settled(newton, pull._replace(mu=0.0), tolerance=TOLERANCE)
-    return follow(newton, start, BY_FRICTION, LARGEST_MU if target is None else target, outline)
+    start = settled(newton, pull._replace(mu=0.0), None, TOLERANCE, stop)
+    return follow(newton, start, BY_FRICTION, LARGEST_MU if target is None else target, outline, stop)
 
 
-def largest_depth(newton: Newton, pull: Pull, outline: Indices) -> Branch:
+def largest_depth(newton: Newton, pull: Pull, outline: Indices, stop: Callable[[], bool] = lambda: False) -> Branch:
     """Follow settled sliding at the friction of `pull` from a small depth to the depth of `pull`.
 
     Raises NotConverged where there is none even at a hundredth of that depth.
     """
     for part in (0.3, 0.1, 0.03, 0.01):
         try:
-            start = settled(newton, pull._replace(depth=part * pull.depth), tolerance=TOLERANCE)
+            start = settled(newton, pull._replace(depth=part * pull.depth), None, TOLERANCE, stop)
         except NotConverged:
             continue
         if not _crossed(newton, start, outline):
-            return follow(newton, start, BY_DEPTH, pull.depth, outline)
+            return follow(newton, start, BY_DEPTH, pull.depth, outline, stop)
     raise NotConverged(f"no sliding state was found at mu = {pull.mu:.3g} even at {0.01 * pull.depth:.3g} mm")
 
 

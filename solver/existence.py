@@ -1,0 +1,60 @@
+"""The settled sliding state where there is one, and where there is none, how far there would be."""
+
+from collections.abc import Callable
+
+from solver.crossing import crosses_itself, least_stretch
+from solver.failures import NoSteadyState, NotConverged
+from solver.limit import largest_depth, largest_friction
+from solver.mesh import Indices
+from solver.newton import Newton, Pull, Shape
+from solver.sliding import settled
+
+SOUND = 0.6  # least stretch of the skin that needs no proof: neo-Hookean surfaces fold from 0.544 on (Biot 1963)
+
+
+def steady(
+    newton: Newton,
+    pull: Pull,
+    outline: Indices,
+    tolerance: float = 1e-8,
+    start: Shape | None = None,
+    stop: Callable[[], bool] = lambda: False,
+) -> Shape:
+    """Return the settled sliding state under `pull`, proven to lie on the branch that begins without friction.
+
+    A state whose skin is squeezed so far that it might have folded, or that was not found directly, is approached by
+    raising the friction coefficient along the branch. `outline` (o,) are the nodes of the whole skin in order; `start`
+    a sound state nearby. Raises NoSteadyState with both limits where the branch ends before, NotConverged where it
+    cannot be begun, Cancelled where `stop` says so.
+    """
+    try:
+        shape = settled(newton, pull, start, tolerance, stop)
+    except NotConverged:
+        pass
+    else:
+        if _sound(newton, shape, outline):
+            return shape
+    branch = largest_friction(newton, pull, outline, pull.mu, stop)
+    if not branch.limited:
+        return settled(newton, pull, branch.last, tolerance, stop)
+    depth = None
+    try:
+        deepest = largest_depth(newton, pull, outline, stop)
+    except NotConverged:
+        beyond = ""
+    else:
+        depth = deepest.value
+        beyond = f", and with this friction up to {depth:.3g} mm"
+    raise NoSteadyState(
+        f"At {pull.depth:.3g} mm of indentation there is settled sliding up to mu = {branch.value:.3g}{beyond}, but "
+        f"not at mu = {pull.mu:.3g}: the skin behind the contact folds; ask for less depth, less friction or small "
+        "strain.",
+        limit_mu=branch.value,
+        limit_indentation=depth,
+    )
+
+
+def _sound(newton: Newton, shape: Shape, outline: Indices) -> bool:
+    nodes = newton.body.mesh.nodes[outline]
+    moved = nodes + shape.u[outline]
+    return least_stretch(nodes, moved) >= SOUND and not crosses_itself(moved)
