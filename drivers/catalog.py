@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 from drivers.address import Address, AddressError, parse_address
 from drivers.clock import Clock
+from drivers.digital_ft.handshake import identify_digital_ft, open_digital_ft
 from drivers.links import UdpLink
 from drivers.net_ft import handshake
 from drivers.net_ft.device import NetFtTransducer
+from drivers.serial_ft.handshake import identify_serial_ft, open_serial_ft
 from drivers.transducer import DeviceFault, LinkLost, SetupError, Transducer, TransducerInfo
 
 
@@ -44,7 +46,11 @@ def _identify_net_ft(address: Address, patience: float) -> TransducerInfo:
     return handshake.identify(handshake.where(address), patience)
 
 
-DRIVERS: tuple[Driver, ...] = (Driver("net-ft", _open_net_ft, _identify_net_ft, ("net-ft://192.168.1.1",)),)
+DRIVERS: tuple[Driver, ...] = (
+    Driver("net-ft", _open_net_ft, _identify_net_ft, ("net-ft://192.168.1.1",)),
+    Driver("serial-ft", open_serial_ft, identify_serial_ft, ()),
+    Driver("digital-ft", open_digital_ft, identify_digital_ft, ()),
+)
 
 
 def open_transducer(uri: str, clock: Clock) -> Transducer:
