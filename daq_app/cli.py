@@ -27,6 +27,24 @@ VERBS = {
 }
 
 
+# Where each failure a person can act on is defined.
+_WRONG = (
+    "drivers.address.AddressError",
+    "sessions.toml_file.SettingsError",
+    "simulators.timetable.TimetableError",
+    "solver.scene.SceneError",
+)
+_FAILED = (
+    "drivers.transducer.DeviceFault",
+    "drivers.transducer.LinkLost",
+    "drivers.transducer.SetupError",
+    "sessions.exports.html.ReportError",
+    "sessions.import_csv.ImportRefused",
+    "sessions.recording.errors.RecordingError",
+    "solver.failures.SolveFailure",
+)
+
+
 class WrongValue(Exception):
     """The command line or a value in a file was wrong: exit code 2."""
 
@@ -110,29 +128,22 @@ def _parser(name: str, verb: ModuleType) -> argparse.ArgumentParser:
 
 def _failure(error: Exception) -> tuple[str, int]:
     """Return the sentence and the exit code for what went wrong."""
-    # Imported here: only a failure has to pay for every room.
-    from daq_app.wiring import TimetableError
-    from drivers.address import AddressError
-    from drivers.transducer import DeviceFault, LinkLost, SetupError
-    from sessions.exports.html import ReportError
-    from sessions.import_csv import ImportRefused
-    from sessions.recording import RecordingError
-    from sessions.toml_file import SettingsError
-    from solver.failures import SolveFailure
-    from solver.scene import SceneError
-
     sentence = " ".join(str(error).split())
-    if isinstance(error, WrongValue | SettingsError | SceneError | AddressError | TimetableError):
+    if isinstance(error, (WrongValue, *_loaded(_WRONG))):
         return sentence, WRONG
-    if isinstance(
-        error, SetupError | DeviceFault | LinkLost | RecordingError | ImportRefused | ReportError | SolveFailure
-    ):
+    if isinstance(error, _loaded(_FAILED)):
         return sentence, FAILED
     if isinstance(error, OSError):
         if error.filename is None or error.strerror is None:
             return sentence, FAILED
         return f"{error.filename}: {error.strerror.lower()}", FAILED
     return f"unexpected {type(error).__name__} ({sentence}); run again with --debug and report what it shows", FAILED
+
+
+def _loaded(names: tuple[str, ...]) -> tuple[type[Exception], ...]:
+    """Return those of the exceptions whose module was imported: no other can have been raised, nor need be imported."""
+    pairs = [name.rsplit(".", 1) for name in names]
+    return tuple(getattr(sys.modules[module], name) for module, name in pairs if module in sys.modules)
 
 
 def _said(sentence: str, code: int) -> int:

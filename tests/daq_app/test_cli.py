@@ -2,6 +2,7 @@ import importlib
 
 import pytest
 
+from daq_app import cli
 from daq_app.cli import VERBS, run
 
 
@@ -84,3 +85,9 @@ def test_a_wrong_command_line_is_one_sentence_and_exit_code_2(arguments, capsys)
     said = capsys.readouterr()
     assert said.out == ""
     assert said.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", [*cli._WRONG, *cli._FAILED])
+def test_every_failure_the_command_line_tells_of_exists_where_it_is_looked_for(name):
+    module, kind = name.rsplit(".", 1)
+    assert issubclass(getattr(importlib.import_module(module), kind), Exception)
