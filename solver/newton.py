@@ -19,6 +19,7 @@ from solver.kernels import OPEN
 from solver.mesh import Array
 
 States = NDArray[np.int32]
+SHORTEST = 1.0 / 16.0  # part of a Newton step below which a body that turns inside out is given up
 EQUILIBRIUM, BY_DEPTH, BY_FRICTION, BY_TRAVEL = 0, 1, 2, 3  # columns of Iteration.steps
 
 
@@ -134,14 +135,20 @@ class Newton:
         Raises NotConverged where `limit` iterations do not do it or the body would turn inside out.
         """
         anchor = start.place(self.body)[:, 0] + (pull.travel - start.pull.travel)
-        shape = self._entered(start, pull)
+        shape = before = self._entered(start, pull)
+        scale = 1.0
         for _ in range(limit):
             if not self.linearise(shape, pull, anchor):
-                raise NotConverged("the body would turn inside out")
-            shape, largest, changed = self.moved(shape, pull, self.steps[:, EQUILIBRIUM].copy(), anchor)
+                scale /= 2.0  # the last step went too far
+                if shape is before or scale < SHORTEST or not self.linearise(before, pull, anchor):
+                    raise NotConverged("the body would turn inside out")
+                shape = before
+            elif shape is not before:
+                before, scale = shape, min(1.0, 2.0 * scale)
+            shape, largest, changed = self.moved(before, pull, self.steps[:, EQUILIBRIUM].copy(), anchor, scale)
             if not largest < 1e3:
                 raise NotConverged("the displacements grow without bound")
-            if largest < tolerance and not changed:
+            if largest < tolerance and not changed and scale == 1.0:
                 return shape
         raise NotConverged(f"no equilibrium within {limit} iterations")
 

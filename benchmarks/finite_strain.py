@@ -1,0 +1,146 @@
+"""How long the finite-strain solver takes and how true it is: medians, and the ratio to one assembly and solve.
+
+Run it alone, single-threaded: OPENBLAS_NUM_THREADS=1 python -m benchmarks.finite_strain
+"""
+
+from collections.abc import Callable
+from itertools import pairwise
+from statistics import median
+from time import perf_counter
+
+import numpy as np
+
+from solver.carrying import carried
+from solver.failures import NotConverged
+from solver.finite_body import FiniteBody, FiniteProbes
+from solver.hyperelastic import NeoHooke
+from solver.march import march, press_and_slide
+from solver.materials import Hooke
+from solver.mesher import Sizing, finger_mesh
+from solver.newton import Newton, Pull, Shape
+from solver.receptor import endings
+from solver.scene import Finger, Materials, Receptor
+from solver.sliding import settled
+from solver.stepper import Stepper
+from solver.stiffness import Elastic
+
+# ending-averaged SED [MPa] of two independent codes, which agree to 0.05-0.22 %
+REFERENCE = {
+    "slip 100": (Pull(1.5, 0.24, 0.00877, 1), 3.9081e-3),
+    "slip 55": (Pull(1.5, 0.44, 0.03009, 1), 2.5631e-3),
+    "slip 0": (Pull(1.5, 0.62, 0.04707, 1), 1.9115e-3),
+    "stick 0": (Pull(2.0, 0.28, 0.008033, -1), 9.656e-3),
+}
+TISSUES = Materials()
+MODULI = [(tissue.E, tissue.nu) for tissue in (TISSUES.epidermis, TISSUES.dermis, TISSUES.fat)]
+
+
+class Meshed:
+    """One mesh of the published finger."""
+
+    def __init__(self, fineness: float) -> None:
+        """Mesh and prepare it."""
+        begin = perf_counter()
+        self.finger = finger_mesh(Finger(), Receptor(), Sizing(fineness, 2.0, margin=3.0))
+        self.body = FiniteBody.of(self.finger.mesh, [NeoHooke(*moduli) for moduli in MODULI])
+        elastic = Elastic.of(self.finger.mesh, [Hooke(*moduli) for moduli in MODULI])
+        self.probes = FiniteProbes.of(self.body, endings(self.finger, elastic, Receptor(), np.zeros(1)))
+        self.newton = Newton(self.body)
+        self.setup = perf_counter() - begin
+
+    def sed(self, shape: Shape) -> float:
+        """Return the ending-averaged SED [MPa]."""
+        return float(self.probes.average(self.body, shape.u)[0])
+
+
+def cascade(levels: list[Meshed], pull: Pull) -> Shape:
+    """Return the sliding state on the last mesh, each mesh starting from the one before."""
+    shape = settled(levels[0].newton, pull, tolerance=1e-3)
+    for coarse, fine in pairwise(levels):
+        start = carried(shape, coarse.finger, fine.finger, fine.body)
+        shape = settled(fine.newton, pull, start, 1e-5 if fine is levels[-1] else 1e-3)
+    return shape
+
+
+def timed(work: Callable[[], object], repeats: int = 5) -> float:
+    """Return the median time of `work()` in ms."""
+    spans: list[float] = []
+    for _ in range(repeats):
+        begin = perf_counter()
+        work()
+        spans.append(perf_counter() - begin)
+    return 1e3 * median(spans)
+
+
+def sliding_row(level: Meshed, ladder: list[Meshed]) -> str:
+    """Return the figures of settled sliding on one mesh."""
+    direct: list[float] = []
+    upward: list[float] = []
+    onward: list[float] = []
+    error: list[float] = []
+    failed: list[str] = []
+    for name, (pull, expected) in REFERENCE.items():
+        try:
+            error.append(abs(level.sed(settled(level.newton, pull, tolerance=1e-6)) / expected - 1.0))
+            direct.append(timed(lambda p=pull: settled(level.newton, p, tolerance=1e-5)))
+            upward.append(timed(lambda p=pull: cascade(ladder, p)))
+        except NotConverged:
+            failed.append(name)
+    neighbours = [REFERENCE[name][0] for name in ("slip 100", "slip 55", "slip 0")]
+    for one, other in pairwise(neighbours):
+        start = settled(level.newton, one, tolerance=1e-6)
+        onward.append(timed(lambda p=other, s=start: settled(level.newton, p, s, 1e-5)))
+    shape = settled(level.newton, neighbours[0])
+    floor = timed(lambda: level.newton.linearise(shape, shape.pull, level.newton.skin_x))
+    return (
+        f"{level.body.dofs:6} {floor:6.2f} {median(direct):11.1f} ({median(direct) / floor:3.0f}) "
+        f"{median(onward):11.1f} ({median(onward) / floor:3.0f}) {median(upward):11.1f} "
+        f"{max(error):12.2%} {1e3 * level.setup:8.0f} {' '.join(failed)}"
+    )
+
+
+def history_row(level: Meshed, pull: Pull) -> str:
+    """Return the figures of a course of 200 substeps beside those of the direct state."""
+    course = press_and_slide(pull.depth, pull.mu, pull.tau, -pull.sense, press=40, slides=160, distance=8.0)
+    direct = timed(lambda: settled(level.newton, pull))
+    begin = perf_counter()
+    *_, last = march(level.newton, course)
+    span = 1e3 * (perf_counter() - begin)
+    difference = level.sed(last) / level.sed(settled(level.newton, pull)) - 1.0
+    return f"{span:6.0f} ms, {span / direct:4.0f} times the direct solve, SED differs by {difference:.0e}"
+
+
+def stepper_row(level: Meshed, truth: Meshed, pull: Pull) -> str:
+    """Return the figures of the warm stepper fed with the forces of a course on a finer mesh, without a cap."""
+    stepper = Stepper(level.newton, level.probes, pull.mu)
+    spans: list[float] = []
+    found: list[float] = []
+    true: list[float] = []
+    course = press_and_slide(pull.depth, pull.mu, np.inf, -pull.sense, press=200, slides=60, distance=6.0)
+    for shape in march(truth.newton, course, tolerance=1e-6):
+        begin = perf_counter()
+        found.append(stepper.step(shape.force[1], shape.force[0]))
+        spans.append(1e3 * (perf_counter() - begin))
+        true.append(truth.sed(shape))
+    worst = np.abs(np.subtract(found, true)).max() / max(true)
+    return f"median {median(spans):.2f} ms, p99 {np.percentile(spans, 99):.2f} ms, error {worst:.1%} of peak"
+
+
+def main() -> None:
+    """Print the tables."""
+    levels = {fineness: Meshed(fineness) for fineness in (5, 8, 12, 16, 24)}
+    settled(levels[5].newton, REFERENCE["slip 100"][0])  # compiles
+    print("times in ms, ratio to one assembly, factorisation and solve (floor); error: worst of slip 0-100 and stick 0")
+    print("  dofs  floor  undeformed       next surface      carried up        error     mesh  not found directly")
+    for fineness, level in levels.items():
+        print(sliding_row(level, [levels[n] for n in (5, 12) if n < fineness] + [level]))
+    print("history of 200 substeps:")
+    for name, (pull, _) in REFERENCE.items():
+        print(f"  {name:9} {history_row(levels[5], pull)}")
+    print("warm stepper, one iteration a reading:")
+    for name, (pull, _) in REFERENCE.items():
+        print(f"  {name:9} {stepper_row(levels[5], levels[12], pull)}")
+
+
+if __name__ == "__main__":
+    main()
