@@ -27,11 +27,11 @@ def steady(
     a sound state nearby. Raises NoSteadyState with both limits where the branch ends before, NotConverged where it
     cannot be begun, Cancelled where `stop` says so.
     """
-    try:
-        shape = settled(newton, pull, start, tolerance, stop)
-    except NotConverged:
-        pass
-    else:
+    for begin in dict.fromkeys((start, None)):  # where the nearby state leads nowhere, the undeformed one may
+        try:
+            shape = settled(newton, pull, begin, tolerance, stop)
+        except NotConverged:
+            continue
         if _sound(newton, shape, outline):
             return shape
     branch = largest_friction(newton, pull, outline, pull.mu, stop)
