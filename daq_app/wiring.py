@@ -3,12 +3,15 @@
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from drivers.address import check_options, parse_address
 from drivers.catalog import open_transducer
 from drivers.clock import Clock
 from drivers.transducer import SetupError, Transducer
 from sessions.plan import Frame, Trial
+from sessions.recording import Recording
+from sessions.recording.replay import ReplayTransducer
 from sessions.steps import (
     AskBegin,
     AskFinish,
@@ -33,6 +36,7 @@ from simulators.timetable import TimetableError
 __all__ = ["Connected", "SimulatedPeople", "TimetableError", "connected", "planted_surface", "serve_net_ft"]
 
 SIMULATED = "sim"
+REPLAY = "replay:"  # and the path of a session folder
 JUDGING = 0.8  # from lift to score [s]; an unloaded stretch in which drift shows
 _OPTIONS = frozenset({"seed", "rate"})
 
@@ -44,11 +48,14 @@ class Connected:
     transducer: Transducer
     bench: Bench | None = None
     bench_now: Callable[[], float] | None = None  # the bench's time [s]
+    recorded_frame: Frame | None = None  # of a recording that is replayed
 
     @property
     def frame(self) -> Frame | None:
-        """How a simulated bench's axes lie to its face; None for a real one, which cannot tell."""
-        return None if self.bench is None else Frame("-z", "set", self.bench.settings.height, "set")
+        """How the axes of a simulated or recorded bench lie to its face; None for a real one, which cannot tell."""
+        if self.bench is None:
+            return self.recorded_frame
+        return Frame("-z", "set", self.bench.settings.height, "set")
 
 
 @contextmanager
@@ -56,8 +63,13 @@ def connected(uri: str, clock: Clock) -> Generator[Connected]:
     """Open the transducer at `uri` and close it in any case.
 
     `sim:?seed=7&rate=200` is the simulated bench: a box on loopback, read by the very driver a real box is read by.
-    Raises SetupError or LinkLost as the driver does.
+    `replay:recordings/P07` is the transducer of a recording, speaking as it spoke then. Raises SetupError or LinkLost
+    as the driver does, RecordingError for a folder that holds no recording.
     """
+    if uri.startswith(REPLAY):
+        recording = Recording.open(Path(uri.removeprefix(REPLAY)))
+        yield Connected(ReplayTransducer(recording, clock, uri), recorded_frame=recording.plan.frame)
+        return
     address = parse_address(uri)
     if address.scheme != SIMULATED:
         transducer = open_transducer(uri, clock)

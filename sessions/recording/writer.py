@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock
@@ -56,8 +56,9 @@ class SessionWriter:
         self._acknowledged = Acknowledged(time_ns=clock.now_ns())
         self._failure: str | None = None
 
-    @staticmethod
+    @classmethod
     def create(
+        cls,
         folder: Path,
         plan: SessionPlan,
         info: TransducerInfo | None,
@@ -65,7 +66,7 @@ class SessionWriter:
         *,
         subject_simulated: bool = False,
         clock: Clock | None = None,
-    ) -> "SessionWriter":
+    ) -> Self:
         """Begin a recording in `folder`, which is made, or is empty: nothing is ever written over.
 
         `info` is None for a scores-only visit. `clock` times events and commits (the machine's when None).
@@ -98,7 +99,7 @@ class SessionWriter:
                 f"{path} cannot be begun ({error}); free space, or give a folder on a local disk"
             ) from error
         sync_folder(folder)
-        return SessionWriter(connection, path, clock or RealClock())
+        return cls(connection, path, clock or RealClock())
 
     @property
     def folder(self) -> Path:

@@ -1,0 +1,139 @@
+"""A transducer that speaks from a recording: sequence, device counter, status and raw numbers as they were recorded."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import fields, replace
+
+import numpy as np
+
+from drivers.clock import Clock
+from drivers.readings import ReadingBlock
+from drivers.transducer import Health, LinkLost, SetupError, TransducerInfo
+from sessions.recording.log import LoggedEvent
+from sessions.recording.reader import Recording
+
+COUNTED = frozenset(field.name for field in fields(Health)) - {"received", "lag_ms"}  # what a "losses" event may count
+
+
+class RecordedReadings:
+    """The readings of a recording in their order, handed over a part at a time and read from the file as they go."""
+
+    def __init__(self, recording: Recording) -> None:
+        """Begin at the first reading."""
+        self._blocks: Iterator[ReadingBlock] = recording.blocks()
+        self._waiting: list[ReadingBlock] = []
+        self.position = 0  # how many were handed over
+
+    def up_to(self, position: int | None) -> ReadingBlock:
+        """Hand over the next readings until `position` of them were, or until none are left (None: all that are)."""
+        taken: list[ReadingBlock] = []
+        while (position is None or self.position < position) and self._look():
+            first = self._waiting[0]
+            count = len(first) if position is None else min(len(first), position - self.position)
+            taken.append(self._take(count))
+        return ReadingBlock.joined(taken)
+
+    def received_by(self, instant_ns: int) -> ReadingBlock:
+        """Hand over the next readings up to the first that was received later than `instant_ns` [ns]."""
+        taken: list[ReadingBlock] = []
+        while self._look():
+            late = self._waiting[0].received_ns > instant_ns
+            count = int(np.argmax(late)) if late.any() else len(late)
+            if count:
+                taken.append(self._take(count))
+            if late.any():
+                break
+        return ReadingBlock.joined(taken)
+
+    def next_received_ns(self) -> int | None:
+        """Return when the next reading was received [ns]; None after the last."""
+        return int(self._waiting[0].received_ns[0]) if self._look() else None
+
+    def _look(self) -> bool:
+        """Have the next readings at hand, and say whether there are any."""
+        while not self._waiting:
+            block = next(self._blocks, None)
+            if block is None:
+                return False
+            if len(block):
+                self._waiting.append(block)
+        return True
+
+    def _take(self, count: int) -> ReadingBlock:
+        block = self._waiting.pop()
+        if count < len(block):
+            self._waiting.append(block.between(count, len(block)))
+        self.position += count
+        return block.between(0, count)
+
+
+class ReplayTransducer:
+    """The transducer of a recording, as it spoke then: each reading comes as long after the start as it did."""
+
+    def __init__(self, recording: Recording, clock: Clock, uri: str) -> None:
+        """Speak on `clock`, under the address `uri`. Raises SetupError for a recording without readings."""
+        self._readings = RecordedReadings(recording)
+        first_ns = self._readings.next_received_ns()
+        if recording.info is None or first_ns is None:
+            raise SetupError(f"{recording.folder} holds no readings to replay; give a session with forces")
+        # Whatever comes of a simulated session is simulated, whichever part of it was.
+        self.info: TransducerInfo = replace(
+            recording.info, uri=uri, driver="replay", simulated=recording.simulated or recording.info.simulated
+        )
+        self._name = str(recording.folder)
+        self._clock = clock
+        self._first_ns = first_ns
+        self._shift_ns: int | None = None  # from the recorded clock to ours
+        self._stopped_ns: int | None = None  # on the recorded clock
+        self._losses = [event for event in recording.events if event.kind == "losses"]
+        self._lag_ms = 0.0
+
+    @property
+    def health(self) -> Health:
+        """Totals so far: what the recording tells of lost and distrusted readings, when it told it."""
+        return replace(
+            health_of(event for event in self._losses if event.readings <= self._readings.position),
+            received=self._readings.position,
+            lag_ms=self._lag_ms,
+        )
+
+    def start(self) -> None:
+        """Begin to speak."""
+        self._shift_ns = self._clock.now_ns() - self._first_ns
+
+    def read(self, timeout: float) -> ReadingBlock:
+        """Return what is due by now. Raises LinkLost after the last reading."""
+        shift = self._shift_ns
+        if shift is None:
+            return ReadingBlock.empty()
+        if self._stopped_ns is not None:
+            return self._shifted(self._readings.received_by(self._stopped_ns), shift)
+        next_ns = self._readings.next_received_ns()
+        if next_ns is None:
+            raise LinkLost(f"the recording {self._name} ends here")
+        wait = (next_ns + shift - self._clock.now_ns()) * 1e-9
+        if wait > 0.0:
+            self._clock.sleep(min(wait, timeout))
+        return self._shifted(self._readings.received_by(self._clock.now_ns() - shift), shift)
+
+    def stop(self) -> None:
+        """Speak no further than to this instant."""
+        if self._stopped_ns is None and self._shift_ns is not None:
+            self._stopped_ns = self._clock.now_ns() - self._shift_ns
+
+    def close(self) -> None:
+        """Stop; there is nothing else to give back."""
+        self.stop()
+
+    def _shifted(self, block: ReadingBlock, shift_ns: int) -> ReadingBlock:
+        """Return the readings as received on our clock."""
+        if not len(block):
+            return block
+        block = replace(block, received_ns=block.received_ns + shift_ns)
+        self._lag_ms = (self._clock.now_ns() - int(block.received_ns[-1])) * 1e-6
+        return block
+
+
+def health_of(told: Iterable[LoggedEvent]) -> Health:
+    """Return the totals of what "losses" events tell."""
+    events = list(told)
+    return Health(**{name: sum(int(event.data.get(name, 0)) for event in events) for name in COUNTED})

@@ -1,0 +1,334 @@
+"""A recorded session goes through the same course once more, from its readings and from what people did."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from difflib import SequenceMatcher
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from drivers.clock import Clock
+from drivers.readings import ReadingBlock
+from drivers.transducer import Health, LinkLost, TransducerInfo
+from sessions.course import Step, steps
+from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter
+from sessions.recording.replay import RecordedReadings, health_of
+from sessions.recording.schema import COLUMNS
+from sessions.runner import RunnerSettings, run_session
+from sessions.steps import Command, Event
+from sessions.verification import differences
+
+SLICE = 0.02  # longest wait before a stop is noticed [s]
+LATER = frozenset({"log_torn"})  # written by sealing, not by the course
+Progress = Callable[[float, str], None]  # part done (0 to 1), what is happening
+
+
+class Stopped(Exception):
+    """The replay was stopped before its end."""
+
+
+def replay(recording: Recording, folder: Path, speed: float | None, progress: Progress) -> Recording:
+    """Run a recorded session once more into `folder`, `speed` times as fast as it was (None: as fast as can be).
+
+    An imported recording has no course: its readings are handed over once more, at once, and its events written again.
+    Raises Stopped on Ctrl-C, RecordingError for a session that was resumed, or when the folder takes no more.
+    """
+    if any(event.kind == "resumed" for event in recording.events):
+        raise RecordingError(
+            f"{recording.folder} was resumed after a break, which cannot be replayed; use 'daq-app verify' on it"
+        )
+    player = _Player(recording, speed, progress)
+    writer = _Rewriter.create(
+        folder,
+        recording.plan,
+        recording.info,
+        recording.provenance,
+        subject_simulated="subject" in (recording.simulated_sentence or ""),
+        clock=player.clock,
+    )
+    writer.follow(recording)
+    if recording.plan.trials:
+        _run(recording, player, writer)
+    else:
+        _copy(recording, writer)
+    return Recording.open(folder)
+
+
+def different_events(recorded: Recording, replayed: Recording) -> Iterator[str]:
+    """Yield a sentence for each event that came out otherwise, is new, or came no more."""
+    then, now = ([event for event in made.events if event.kind not in LATER] for made in (recorded, replayed))
+    matcher = SequenceMatcher(None, [_key(event) for event in then], [_key(event) for event in now], autojunk=False)
+    for what, i, i_end, j, j_end in matcher.get_opcodes():
+        if what == "equal":
+            for before, after in zip(then[i:i_end], now[j:j_end], strict=True):
+                yield from differences(_plain(before), _plain(after), _name(before))
+        else:
+            yield from (f"{_name(event)} came no more" for event in then[i:i_end])
+            yield from (f"{_name(event)} of the replay is new" for event in now[j:j_end])
+
+
+def different_readings(recorded: Recording, replayed: Recording) -> Iterator[str]:
+    """Yield a sentence for each column of the readings that is not what it was."""
+    (then, before), (now, after) = _digests(recorded), _digests(replayed)
+    if then != now:
+        yield f"the recording holds {then} readings and the replay {now}"
+    yield from (f"{name} of the readings came out otherwise" for name in COLUMNS if before[name] != after[name])
+
+
+class _Rewriter(SessionWriter):
+    """Writes a replay: each event has the instant at which it was recorded, for a replay makes no time of its own.
+
+    A recording that was cut short is cut short here too, and the disk is not waited for: nothing can be lost.
+    """
+
+    def follow(self, recording: Recording) -> None:
+        """Take the instants from the log of `recording`."""
+        self._log = [event for event in recording.events if event.kind not in LATER]
+        self._torn = [event.data for event in recording.events if event.kind in LATER]
+        self._cut = not any(event.kind == "ended" for event in self._log)
+        self._told = 0
+        self._connection.execute("PRAGMA synchronous=OFF")
+
+    def event(
+        self,
+        kind: str,
+        trial: int | None = None,
+        data: Mapping[str, Any] | None = None,
+        *,
+        time_ns: int | None = None,
+        commit: bool = True,
+    ) -> LoggedEvent:
+        """Write an event down. Raises _CutShort where the recording ends without an end."""
+        if self._cut and (kind == "ended" or self._told == len(self._log)):
+            raise _CutShort("the recording was cut short here")
+        ahead = range(self._told, len(self._log))
+        place = next((i for i in ahead if (self._log[i].kind, self._log[i].trial) == (kind, trial)), None)
+        if place is not None:
+            self._told = place + 1
+            time_ns = self._log[place].time_ns
+        return super().event(kind, trial, data, time_ns=time_ns, commit=commit)
+
+    def finish(self) -> None:
+        """Write down what sealing said of a torn log, and close."""
+        with suppress(RecordingError):  # closed already, by a session that came to its end
+            for data in self._torn:
+                super().event("log_torn", data=data)
+        self.close()
+
+
+class _CutShort(RecordingError):
+    """The recording ends here, without an end."""
+
+
+class _Again(Exception):
+    """An error of the program that the recording tells of, raised where it was raised."""
+
+
+class _RecordedClock:
+    """The session clock of the recording: it stands where the last step was, and nobody waits for it."""
+
+    def __init__(self, factor: float, now_ns: int) -> None:
+        self.factor = factor
+        self._now_ns = now_ns
+
+    def now_ns(self) -> int:
+        return self._now_ns
+
+    def move(self, instant_ns: int) -> None:
+        """Go on to an instant; never back."""
+        self._now_ns = max(self._now_ns, instant_ns)
+
+    def sleep(self, seconds: float) -> None:
+        """Pass no time: the steps do."""
+
+
+class _Player:
+    """Transducer, experimenter and subject of a recording. One look of the runner is one step of the log."""
+
+    def __init__(self, recording: Recording, speed: float | None, progress: Progress) -> None:
+        self._steps = steps([event for event in recording.events if event.kind not in LATER])
+        first = recording.events[0].time_ns if recording.events else 0
+        factor = float(recording.provenance.get("clock", {}).get("factor", 1.0))
+        self._clock = _RecordedClock(factor, first)
+        self._settings = recorded_settings(recording)
+        self._readings = RecordedReadings(recording)
+        self._info = recording.info
+        self._speed = speed
+        self._progress = progress
+        self._first_ns = first
+        self._began = time.monotonic()
+        self._next = 0
+        self._step: Step | None = None  # None while waiting for the next
+        self._reported: list[LoggedEvent] = []
+        self._said_ns: dict[str, int] = {}  # when losses, and a zero that cannot be measured, were last told of
+        self._health: Health | None = None  # at the end
+        self._stopped = False
+
+    @property
+    def clock(self) -> Clock:
+        return self._clock
+
+    @property
+    def done(self) -> bool:
+        """Say whether the last step was taken."""
+        return self._next == len(self._steps)
+
+    def go_on(self) -> bool:
+        """Take the next step when its time has come, and say whether the session is to be stopped in it."""
+        self._step = None
+        if self.done:
+            return True  # the course went another way, and waits for what never comes
+        step = self._steps[self._next]
+        if self._waiting(step):
+            return False
+        self._step = step
+        self._next += 1
+        self._progress(self._next / len(self._steps), "replaying")
+        return step.end is not None and step.end.get("cause") not in {"device", "program"}
+
+    # ---- as an operator
+
+    def show(self, command: Command) -> None:
+        """Take a command: what was done about it is known."""
+
+    def poll(self) -> Sequence[Event]:
+        """Return what was done in this step."""
+        step = self._step
+        if step is None:
+            return ()
+        if step.end is not None and step.end.get("cause") == "program":
+            name, _, message = str(step.end.get("reason", "")).partition(": ")
+            raise type(name, (_Again,), {})(message)
+        self._clock.move(step.instant_ns)
+        return () if step.act is None else (step.act,)
+
+    # ---- as a transducer
+
+    @property
+    def info(self) -> TransducerInfo:
+        if self._info is None:
+            raise AssertionError("a visit without a transducer has none to ask")
+        return self._info
+
+    @property
+    def health(self) -> Health:
+        if self._health is not None:
+            return self._health
+        return replace(health_of(self._reported), received=self._readings.position)
+
+    def start(self) -> None:
+        """Begin."""
+
+    def read(self, timeout: float) -> ReadingBlock:  # noqa: ARG002  nothing is waited for
+        """Return the readings of this step; once stopped, all that are left."""
+        step = self._step
+        if self._stopped:
+            return self._readings.up_to(None)
+        if step is None:
+            return ReadingBlock.empty()
+        if step.end is not None and step.end.get("cause") == "device":
+            raise LinkLost(str(step.end.get("reason", "")))
+        if step.losses is not None:
+            self._reported.append(step.losses)
+            self._move_past("losses", step, self._settings.losses_every)
+        elif step.told:
+            self._move_past("told", step, self._settings.zero_patience)
+        elif step.act is None:
+            self._clock.move(step.instant_ns)
+        return self._readings.up_to(step.readings)
+
+    def stop(self) -> None:
+        """End: the health at the end is known where the recording has one."""
+        self._stopped = True
+        end = self._steps[-1].end
+        if end:
+            self._health = msgspec.convert(end.get("health", {}), Health)
+
+    def close(self) -> None:
+        """Give back nothing."""
+
+    def _waiting(self, step: Step) -> bool:
+        """Wait a little for a step whose time has not come, and say so."""
+        if self._speed is None:
+            return False
+        due = self._began + (step.instant_ns - self._first_ns) * 1e-9 / self._speed
+        left = due - time.monotonic()
+        if left > 0.0:
+            time.sleep(min(left, SLICE))
+        return left > SLICE
+
+    def _move_past(self, what: str, step: Step, every: float) -> None:
+        """Go on to the step, and so far that the runner, which tells such things now and then, tells it once more."""
+        last_ns = self._said_ns.get(what)
+        instant = step.instant_ns if last_ns is None else max(step.instant_ns, last_ns + round(every * 1e9))
+        self._clock.move(instant)
+        self._said_ns[what] = self._clock.now_ns()
+
+
+def recorded_settings(recording: Recording) -> RunnerSettings:
+    """Return how the session was run, as its log tells; what it does not tell is as it is now."""
+    for event in recording.events:
+        if event.kind == "started":
+            told: dict[str, Any] = {name: setting["value"] for name, setting in event.data["settings"].items()}
+            return msgspec.convert(told, RunnerSettings)
+    return RunnerSettings()
+
+
+def _run(recording: Recording, player: _Player, writer: _Rewriter) -> None:
+    """Let the runner conduct the session once more."""
+    transducer = player if recording.plan.forces else None
+    try:
+        end = run_session(
+            recording.plan,
+            writer,
+            player,
+            transducer,
+            player.clock,
+            settings=recorded_settings(recording),
+            stop=player.go_on,
+        )
+        if end.cause == "stopped" and not player.done:
+            raise Stopped
+    except (_CutShort, _Again):
+        pass  # as the recording ends
+    finally:
+        writer.finish()
+
+
+def _copy(recording: Recording, writer: _Rewriter) -> None:
+    """Hand the readings over once more, and write each event where it stood."""
+    readings = RecordedReadings(recording)
+    for event in recording.events:
+        if event.kind not in LATER:
+            writer.readings(readings.up_to(event.readings))
+            writer.event(event.kind, event.trial, event.data)
+    writer.readings(readings.up_to(None))
+    writer.finish()
+
+
+def _key(event: LoggedEvent) -> tuple[str, int | None]:
+    return event.kind, event.trial
+
+
+def _name(event: LoggedEvent) -> str:
+    where = "" if event.trial is None else f" in trial {event.trial}"
+    return f"event {event.number} ({event.kind}{where})"
+
+
+def _plain(event: LoggedEvent) -> dict[str, Any]:
+    return {"time_ns": event.time_ns, "readings": event.readings, "data": event.data}
+
+
+def _digests(recording: Recording) -> tuple[int, dict[str, str]]:
+    """Return how many readings there are, and the SHA-256 of each of their columns."""
+    sums = {name: sha256() for name in COLUMNS}
+    count = 0
+    for block in recording.blocks():
+        count += len(block)
+        for name, digest in sums.items():
+            digest.update(getattr(block, name).tobytes())
+    return count, {name: digest.hexdigest() for name, digest in sums.items()}

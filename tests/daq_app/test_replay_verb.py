@@ -1,0 +1,60 @@
+"""The verb replay as scripts use it."""
+
+import json
+import shutil
+
+import pytest
+
+from daq_app.cli import run
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("replay") / "P07"
+    words = ["run", "sensotact-friction", "--device", "sim:?seed=7", "--subject", "P07", "--headless"]
+    assert run([*words, "--simulate-subject", "7", "--pace", "50", "--seed", "3", "--out", str(folder), "--json"]) == 0
+    assert run(["analyse", str(folder), "--json"]) == 0
+    return folder
+
+
+def test_a_session_that_came_over_the_wire_replays_identical_with_exit_code_0(recorded, capsys):
+    assert run(["replay", str(recorded), "--fast", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["differences"] == []
+    assert document["compared"] == ["readings", "events", "analysis.json"]
+
+
+def test_a_stored_number_that_comes_out_otherwise_is_named_with_exit_code_3(recorded, tmp_path, capsys):
+    session = shutil.copytree(recorded, tmp_path / "P07")
+    stored = json.loads((session / "analysis.json").read_text())
+    stored["strokes"][2]["mu_dynamic"] += 1e-9
+    (session / "analysis.json").write_text(json.dumps(stored))
+    assert run(["replay", str(session), "--fast", "--json"]) == 3
+    (difference,) = json.loads(capsys.readouterr().out)["differences"]
+    assert difference.startswith("analysis.json.strokes[2].mu_dynamic was stored as")
+
+
+def test_a_replay_leaves_the_session_as_it_was(recorded):
+    before = {path.name: path.read_bytes() for path in recorded.iterdir()}
+    assert run(["replay", str(recorded), "--speed", "500", "--json"]) == 0
+    assert {path.name: path.read_bytes() for path in recorded.iterdir()} == before
+
+
+def test_a_recording_is_a_device_that_can_be_probed(recorded, capsys):
+    assert run(["devices", "probe", f"replay:{recorded}", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["simulated"] is True
+    assert document["health"]["received"] > 300
+
+
+@pytest.mark.parametrize(
+    ("words", "code"), [(["--speed", "0"], 2), (["--speed", "fast"], 2), (["--fast", "--speed", "2"], 2)]
+)
+def test_a_pace_that_cannot_be_is_exit_code_2(recorded, words, code, capsys):
+    assert run(["replay", str(recorded), *words]) == code
+    assert capsys.readouterr().err
+
+
+def test_what_is_no_recording_is_exit_code_1(tmp_path, capsys):
+    assert run(["replay", str(tmp_path), "--fast"]) == 1
+    assert capsys.readouterr().err.count("\n") == 1

@@ -1,0 +1,298 @@
+import json
+import random
+
+import pytest
+from recordings import change, rows
+from stand_ins import INFO, Hands, StandIn, ToldClock
+
+from drivers.transducer import LinkLost, SetupError
+from sessions.analysis import analyse
+from sessions.import_csv import import_csv
+from sessions.protocols import plan, protocol
+from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, provenance
+from sessions.recording.archive import seal
+from sessions.recording.replay import ReplayTransducer
+from sessions.recording.schema import event_crc, event_row
+from sessions.replay import different_events, different_readings, replay
+from sessions.runner import run_session
+from sessions.steps import (
+    Abort,
+    AskMount,
+    AskScore,
+    AskStroke,
+    Begin,
+    Pause,
+    Redo,
+    Resume,
+    Scored,
+    Skip,
+    StimulusMounted,
+    StrokeDone,
+)
+
+PAPER = protocol("sensotact-friction")
+
+
+def recorded(folder, *, forces=True, instead=None, stop=lambda _: False, hands=Hands, **transducer):
+    """A session in told time; `stop` is asked with the number of readings sent."""
+    clock = ToldClock()
+    planned = plan(PAPER, "S01", 3, forces=forces)
+    info = INFO if forces else None
+    writer = SessionWriter.create(folder, planned, info, provenance(clock), subject_simulated=True, clock=clock)
+    device = StandIn(clock, **transducer) if forces else None
+    run_session(
+        planned, writer, hands(clock, device, instead), device, clock, stop=lambda: stop(device and device.sent)
+    )
+    return Recording.open(folder)
+
+
+def replayed(recording, tmp_path, speed=None):
+    return replay(recording, tmp_path / "replayed", speed, lambda *_: None)
+
+
+def differences(recording, again):
+    return [*different_readings(recording, again), *different_events(recording, again)]
+
+
+def identical(recording, tmp_path):
+    again = replayed(recording, tmp_path)
+    assert differences(recording, again) == []
+    assert json.dumps(analyse(again).to_dict()) == json.dumps(analyse(recording).to_dict())
+    return again
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    return recorded(tmp_path_factory.mktemp("replay") / "whole")
+
+
+def once(*events):
+    left = [list(events)]
+    return lambda _: left.pop() if left else None
+
+
+def test_a_whole_session_comes_out_identical_to_the_last_bit(whole, tmp_path):
+    again = identical(whole, tmp_path)
+    assert len(again.events) > 90
+    assert again.simulated_sentence == whole.simulated_sentence
+
+
+@pytest.mark.parametrize(
+    "instead",
+    [
+        {AskStroke: once(Redo("the finger slipped"))},
+        {AskStroke: once(Skip("the label fell off"))},
+        {AskScore: once(Pause(), Resume())},
+        {AskStroke: once(Pause(), Resume())},
+        {AskMount: once(StimulusMounted("Z99"), Begin(), StimulusMounted("R29"))},
+        {AskScore: once(Scored(120.5), Scored(None), Redo(""))},
+        {AskScore: once(Abort("fire alarm"))},
+        {AskMount: once(Abort("fire alarm"))},
+    ],
+    ids=["redo", "skip", "pause", "early pause", "wrong stimulus", "wrong score", "abort", "early abort"],
+)
+def test_whatever_people_did_or_were_refused_comes_out_identical(instead, tmp_path):
+    identical(recorded(tmp_path / "session", instead=instead), tmp_path)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_session_in_which_people_do_anything_at_any_moment_comes_out_identical(seed, tmp_path):
+    chance = random.Random(seed)
+
+    class Restless(Hands):
+        def poll(self):
+            acts = super().poll()
+            if chance.random() < 0.02:
+                acts.append(
+                    chance.choice(
+                        [
+                            Redo("again"),
+                            Redo(""),
+                            Pause(),
+                            Resume(),
+                            Resume(),
+                            Resume(),
+                            Skip("no"),
+                            Scored(chance.choice([None, 7.25, -1.0, 130.0])),
+                            StrokeDone(),
+                            StimulusMounted("Q00"),
+                        ]
+                    )
+                )
+            return acts
+
+    lost = {chance.randrange(4000) for _ in range(40)}
+    recording = recorded(tmp_path / "session", hands=Restless, lost=lost, stop=lambda sent: sent > 4000)
+    assert any(event.kind == "refused" for event in recording.events)
+    identical(recording, tmp_path)
+
+
+def test_lost_readings_are_told_of_at_the_same_moments(tmp_path):
+    recording = recorded(tmp_path / "session", lost=range(100, 1500, 7))
+    assert sum(event.kind == "losses" for event in recording.events) > 3
+    identical(recording, tmp_path)
+
+
+def test_a_zero_that_could_not_be_measured_is_told_of_at_the_same_moments(tmp_path):
+    class Leaning(Hands):
+        def show(self, command):
+            if isinstance(command, AskMount) and not self.transducer.touches:
+                for i in range(48):  # a hand that leans on it now and then, for 14 s
+                    at = self.clock.ns + i * 300_000_000
+                    self.transducer.touches.append((at, at + 100_000_000, 1.0))
+            super().show(command)
+
+    recording = recorded(tmp_path / "session", hands=Leaning)
+    assert sum(event.kind == "told" for event in recording.events) > 1
+    identical(recording, tmp_path)
+
+
+def test_a_session_that_lost_its_transducer_ends_so_again(tmp_path):
+    recording = recorded(tmp_path / "session", link_lost_after=1234)
+    assert recording.events[-1].data["cause"] == "device"
+    identical(recording, tmp_path)
+
+
+def test_a_session_that_was_stopped_ends_so_again(tmp_path):
+    recording = recorded(tmp_path / "session", stop=lambda sent: sent > 777)
+    assert recording.events[-1].data["cause"] == "stopped"
+    identical(recording, tmp_path)
+
+
+def test_a_session_that_our_own_error_ended_ends_so_again(tmp_path):
+    class Broken(Hands):
+        def poll(self):
+            if self.transducer.sent > 500:
+                raise ZeroDivisionError("an error: of ours")
+            return super().poll()
+
+    with pytest.raises(ZeroDivisionError):
+        recorded(tmp_path / "session", hands=Broken)
+    recording = Recording.open(tmp_path / "session")
+    assert recording.events[-1].data["reason"] == "ZeroDivisionError: an error: of ours"
+    identical(recording, tmp_path)
+
+
+@pytest.mark.parametrize("last", [1, 4, 6, 7, 8, 9, 11, 13, 40])
+def test_a_session_cut_short_anywhere_is_replayed_to_where_it_was_cut(last, tmp_path):
+    recorded(tmp_path / "session")
+    change(tmp_path / "session", "DELETE FROM events WHERE number > ?", (last,))
+    # A crash keeps the blocks committed with or soon after the last event.
+    total, blocks = 0, rows(tmp_path / "session", "SELECT number, readings FROM blocks ORDER BY number")
+    keep = rows(tmp_path / "session", f"SELECT readings FROM events WHERE number = {last}")[0][0]
+    for number, count in blocks:
+        if total >= keep:
+            change(tmp_path / "session", "DELETE FROM blocks WHERE number > ?", (number - 1,))
+            break
+        total += count
+    recording = Recording.open(tmp_path / "session")
+    assert "cut short" in recording.losses[-1]
+    again = identical(recording, tmp_path)
+    assert again.losses == recording.losses
+
+
+def test_a_sealed_session_replays_as_the_live_one(tmp_path):
+    recording = recorded(tmp_path / "session")
+    seal(recording.folder)
+    identical(Recording.open(recording.folder), tmp_path)
+
+
+def test_a_visit_that_only_scored_comes_out_identical(tmp_path):
+    identical(recorded(tmp_path / "session", forces=False, instead={AskStroke: once(Redo("again"))}), tmp_path)
+
+
+def test_an_imported_recording_comes_out_identical(tmp_path):
+    file = tmp_path / "a.csv"
+    force = [0.0] * 200 + [2.0] * 200 + [0.0] * 100
+    lines = [f"{i / 200},{0.5 * n},0,{-n},0,0,0" for i, n in enumerate(force)]
+    file.write_text("\n".join(["t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm", *lines]))
+    imported = import_csv(file, tmp_path / "imported")
+    again = identical(Recording.open(imported.folder), tmp_path)
+    assert len(again.readings()) == 500
+
+
+def test_an_onset_that_was_stored_otherwise_is_named_with_both_values(tmp_path):
+    recording = recorded(tmp_path / "session")
+    onset = next(event for event in recording.events if event.kind == "contact_onset")
+    data = json.dumps({**onset.data, "time": onset.data["time"] + 0.5})
+    change(
+        recording.folder,
+        "UPDATE events SET data = ?, crc32 = ? WHERE number = ?",
+        (data, event_crc(onset, data), onset.number),
+    )
+    changed = Recording.open(recording.folder)
+    (found,) = differences(changed, replayed(changed, tmp_path))
+    assert found.startswith(f"event {onset.number} (contact_onset in trial 1).data.time was stored as")
+    assert str(onset.data["time"]) in found
+
+
+def test_an_onset_that_the_readings_do_not_show_comes_no_more(tmp_path):
+    recording = recorded(tmp_path / "session")
+    change(recording.folder, "DELETE FROM blocks WHERE number > 3")
+    torn = Recording.open(recording.folder)
+    found = differences(torn, replayed(torn, tmp_path))
+    assert any("(contact_onset in trial 10) came no more" in sentence for sentence in found)
+
+
+def test_at_a_chosen_speed_the_outcome_is_the_same(whole, tmp_path):
+    again = replayed(whole, tmp_path, speed=200.0)
+    assert differences(whole, again) == []
+
+
+def test_a_session_that_was_resumed_is_refused_with_a_sentence(tmp_path):
+    recording = recorded(tmp_path / "session", stop=lambda sent: sent > 300)
+    change(recording.folder, "DELETE FROM events WHERE kind = 'ended'")
+    last = rows(recording.folder, "SELECT max(number) FROM events")[0][0]
+    event = LoggedEvent(last + 1, 0, "resumed", None, 300, {})
+    change(recording.folder, "INSERT INTO events VALUES (?,?,?,?,?,?,?)", event_row(event))
+    with pytest.raises(RecordingError, match="resumed"):
+        replayed(Recording.open(recording.folder), tmp_path)
+
+
+# ---- the transducer of a recording, for anybody
+
+
+def test_a_replaying_transducer_gives_each_reading_as_long_after_the_start_as_it_came(whole):
+    clock = ToldClock(5_000_000_000_000)
+    transducer = ReplayTransducer(whole, clock, "replay:whole")
+    transducer.start()
+    began = clock.ns
+    expected = whole.readings()
+    found = []
+    while transducer.health.received < len(expected):
+        block = transducer.read(0.02)
+        assert not len(block) or block.received_ns[-1] <= clock.ns
+        found.append(block)
+    with pytest.raises(LinkLost, match="ends here"):
+        transducer.read(0.02)
+    for name in ("sequence", "counter", "status", "time", "raw"):
+        columns = [getattr(block, name).tobytes() for block in found]
+        assert b"".join(columns) == getattr(expected, name).tobytes()
+    received = [instant - began for block in found for instant in block.received_ns.tolist()]
+    assert received == (expected.received_ns - expected.received_ns[0]).tolist()
+    assert transducer.health.received == len(expected)
+    assert transducer.info.simulated
+
+
+def test_a_recording_without_readings_is_no_transducer(tmp_path):
+    recording = recorded(tmp_path / "session", forces=False)
+    with pytest.raises(SetupError, match="holds no readings"):
+        ReplayTransducer(recording, ToldClock(), "replay:x")
+
+
+def test_a_replayed_transducer_records_a_session_of_its_own(whole, tmp_path):
+    clock = ToldClock(9_000_000_000_000)
+    device = ReplayTransducer(whole, clock, "replay:whole")
+    planned = plan(PAPER, "S02", 4)
+    writer = SessionWriter.create(tmp_path / "new", planned, device.info, provenance(clock), clock=clock)
+
+    class Asking(Hands):
+        def stroke(self, now, newtons=2.0):
+            """Leave the stroking to the recording."""
+
+    end = run_session(planned, writer, Asking(clock, device), device, clock)
+    again = Recording.open(tmp_path / "new")
+    raw = whole.readings().raw
+    assert end.readings > 0.9 * len(raw)
+    assert again.readings().raw.tobytes() == raw[: end.readings].tobytes()
+    assert any(event.kind == "contact_onset" for event in again.events)
