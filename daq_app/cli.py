@@ -16,6 +16,7 @@ VERBS = {
     "demo": "run the whole study on the simulated transducer and simulated subjects",
     "devices": "list the transducers that can be reached, or probe one",
     "run": "run one session",
+    "resume": "go on with a session that was cut short",
     "import": "make a session folder of a foreign recording",
     "replay": "run a recorded session once more and compare what comes out",
     "analyse": "find the strokes of a session and their friction",

@@ -9,7 +9,7 @@ from drivers.transducer import Transducer
 from sessions.plan import SessionPlan
 from sessions.recording import SessionWriter, Setting, provenance
 from sessions.recording.archive import seal
-from sessions.runner import Operator, SessionEnd, Status, run_session
+from sessions.runner import Operator, Resumed, SessionEnd, Status, run_session
 
 
 def conduct(
@@ -23,20 +23,36 @@ def conduct(
     subject_simulated: bool,
     settings: Sequence[Setting] = (),
 ) -> SessionEnd:
-    """Run the session into `folder` and seal it, however it ended.
+    """Run the session into `folder` and seal it, however it ended, unless the transducer was lost: it can be resumed.
 
     Raises RecordingError when the folder cannot be used or the disk takes no more.
     """
     info = None if transducer is None else transducer.info
     came_from = provenance(clock, settings)
     writer = SessionWriter.create(folder, plan, info, came_from, subject_simulated=subject_simulated, clock=clock)
+    return carried_on(plan, writer, operator, transducer, clock, console, shown=subject_simulated)
 
-    def shown(status: Status) -> None:
+
+def carried_on(
+    plan: SessionPlan,
+    writer: SessionWriter,
+    operator: Operator,
+    transducer: Transducer | None,
+    clock: Clock,
+    console: Console,
+    *,
+    shown: bool,
+    resumed: Resumed | None = None,
+) -> SessionEnd:
+    """Run a session that is being written, from its beginning or from where it was cut short, and seal it."""
+
+    def told(status: Status) -> None:
         done = 0.0 if status.trial is None else (status.trial - 1) / status.trials
         console.progress(done, f"{plan.subject}: {status.state}, {status.safe.readings} readings safe")
 
-    end = run_session(plan, writer, operator, transducer, clock, progress=shown if subject_simulated else _silent)
-    seal(folder)
+    end = run_session(plan, writer, operator, transducer, clock, resumed=resumed, progress=told if shown else _silent)
+    if end.cause != "device":
+        seal(writer.folder)
     return end
 
 

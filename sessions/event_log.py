@@ -1,8 +1,11 @@
 """How events and commands of a session are written into its log. `docs/session-format.md` lists the kinds."""
 
 import re
-from typing import Any
+from typing import Any, get_args
 
+import msgspec
+
+from sessions.recording.log import LoggedEvent
 from sessions.steps import (
     AskMount,
     AskScore,
@@ -26,7 +29,16 @@ def kind_of(event: Event) -> str:
     >>> kind_of(ContactOnset())
     'contact_onset'
     """
-    return re.sub(r"(?<!^)(?=[A-Z])", "_", type(event).__name__).lower()
+    return _kind(type(event))
+
+
+def event_of(logged: LoggedEvent) -> Event | None:
+    """Return the event that was logged; None for a line that tells of a command, or of the recording itself.
+
+    Raises ValueError where the line does not hold what such an event has.
+    """
+    cls = _EVENTS.get(logged.kind)
+    return None if cls is None else msgspec.convert(dict(logged.data), cls)
 
 
 def line_of(command: Command) -> Line | None:
@@ -50,3 +62,10 @@ def line_of(command: Command) -> Line | None:
             return "told", None, {"sentence": sentence}
         case _:
             return None
+
+
+def _kind(cls: type[Event]) -> str:
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
+
+
+_EVENTS: dict[str, type[Event]] = {_kind(cls): cls for cls in get_args(Event)}

@@ -79,6 +79,24 @@ def advance(state: State, event: Event) -> Step:
             return _went_on(state, event)
 
 
+def interrupted(state: State, reason: str) -> Step:
+    """Return the state in which a session that was cut short goes on, and the commands that enter it.
+
+    It goes on at the same trial. A take that was open is discarded for `reason`: nobody knows what came after its last
+    reading. A pause is over.
+    """
+    match state:
+        case Idle():
+            return state, (AskBegin(),)
+        case Closing():
+            return state, (AskFinish(),)
+        case Ended():
+            return state, ()
+        case _:
+            place = state.place
+            return Mounting(place), (*_discarding(state, reason), *_asking_for(place, new_block=True))
+
+
 def trial_in_hand(state: State) -> int | None:
     """Return the number of the trial a state belongs to; None before the first, after the last."""
     return None if isinstance(state, Idle | Closing | Ended) else state.place.trial.number

@@ -1,6 +1,6 @@
 """Runs a session: carries out the machine's commands with a transducer, a writer and a clock, and feeds events back."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Literal, Protocol
 
@@ -14,6 +14,7 @@ from sessions.live import Detector, TakeWatch
 from sessions.machine import advance, start, trial_in_hand
 from sessions.plan import SessionPlan
 from sessions.recording import Acknowledged, RecordingError, SessionWriter
+from sessions.resuming import Resumption, Seam
 from sessions.steps import (
     Abort,
     Command,
@@ -58,6 +59,15 @@ class RunnerSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class Resumed:
+    """How a session that was cut short goes on."""
+
+    at: Resumption
+    data: Mapping[str, Any]  # of the event `resumed`
+    last: ReadingBlock  # last readings before; empty where there were none
+
+
+@dataclass(frozen=True, slots=True)
 class Status:
     """How far a running session is, for a lamp or a line of progress."""
 
@@ -90,19 +100,23 @@ def run_session(
     *,
     detector: Callable[[DetectorSettings], Detector] = ContactDetector,
     settings: RunnerSettings | None = None,
+    resumed: Resumed | None = None,
     stop: Callable[[], bool] = lambda: False,
     progress: Callable[[Status], None] = lambda _: None,
 ) -> SessionEnd:
     """Run the session to its end, record all of it, and close the writer.
 
     The session ends when the machine does, when `stop` says so or Ctrl-C is pressed, and when the transducer is lost:
-    each time with a written end that names the reason. The transducer is started and stopped, not closed. Raises
-    RecordingError when the disk takes no more; any other error of ours is raised again after the end was written.
+    each time with a written end that names the reason. With `resumed` a session that was cut short goes on. The
+    transducer is started and stopped, not closed. Raises RecordingError when the disk takes no more; any other error
+    of ours is raised again after the end was written.
     """
     if plan.forces != (transducer is not None):
         raise ValueError("a visit with forces needs a transducer, and one without has none")
     with interruptions() as interrupted:
         run = _Run(plan, writer, operator, transducer, clock, detector, settings or RunnerSettings(), progress)
+        if resumed is not None:
+            run.go_on(resumed)
         return run.to_the_end(interrupted, stop)
 
 
@@ -130,14 +144,21 @@ class _Run:
         self._progress = progress
         self._state, self._first_commands = start(plan)
         self._watch: TakeWatch | None = None
-        self._readings = 0
+        self._readings = writer.acknowledged.readings
+        self._resumed: Resumed | None = None
+        self._seam: Seam | None = None
         self._reported = Health()
         self._due_ns: dict[str, int] = dict.fromkeys(("losses", "status", "zero"), clock.now_ns())
+
+    def go_on(self, resumed: Resumed) -> None:
+        """Begin where a session that was cut short left off."""
+        self._resumed = resumed
+        self._state, self._first_commands = resumed.at.state, resumed.at.commands
 
     def to_the_end(self, interrupted: Interruptions, stop: Callable[[], bool]) -> SessionEnd:
         """Run, and write the end whatever it was."""
         try:
-            self._writer.event("started", data={"settings": _with_origin(self._settings)})
+            self._write_beginning()
             if self._transducer is not None:
                 with interrupted.raised():  # a device that does not answer may take its time
                     self._transducer.start()
@@ -155,6 +176,16 @@ class _Run:
             self._end("program", f"{type(error).__name__}: {error}")
             raise
         return self._end(cause, reason)
+
+    def _write_beginning(self) -> None:
+        """Write down how the session is run; of one that goes on also the gap, and the take that was open."""
+        settings = {"settings": _with_origin(self._settings)}
+        if self._resumed is None:
+            self._writer.event("started", data=settings)
+            return
+        for line in self._resumed.at.owed:
+            self._writer.event(*line, commit=False)
+        self._writer.event("resumed", data={**self._resumed.data, "run": settings["settings"]})
 
     def _go_round(self, stop: Callable[[], bool]) -> tuple[Cause, str]:
         """Look at transducer and operator again and again, until there is a reason to end."""
@@ -175,7 +206,7 @@ class _Run:
         """Record what the transducer gives, and let the machine know what it tells."""
         if self._transducer is None:
             return
-        block = self._transducer.read(self._settings.tick)
+        block = self._going_on(self._transducer.read(self._settings.tick))
         self._keep(block)
         if self._watch is not None:
             for event in self._watch.feed(block):
@@ -183,6 +214,15 @@ class _Run:
         if isinstance(self._state, Taring) and self._due("zero", self._settings.zero_patience):
             self._show(Tell("the zero cannot be measured while something moves or touches; take hands off"))
         self._report_losses()
+
+    def _going_on(self, block: ReadingBlock) -> ReadingBlock:
+        """Return readings so that their numbers and times follow those before a resumption."""
+        if self._resumed is None or not len(block):
+            return block
+        if self._seam is None:
+            self._seam = Seam.between(self._resumed.last, block)
+            self._writer.event("readings_joined", data=asdict(self._seam), commit=False)
+        return self._seam.joined(block)
 
     def _keep(self, block: ReadingBlock) -> None:
         self._writer.readings(block)
@@ -285,7 +325,7 @@ class _Run:
             return Health()
         self._transducer.stop()
         try:
-            while len(block := self._transducer.read(0.0)):
+            while len(block := self._going_on(self._transducer.read(0.0))):
                 self._keep(block)
         except (LinkLost, DeviceFault):
             pass  # all that had arrived was handed over before it says so

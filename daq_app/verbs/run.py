@@ -78,6 +78,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
         )
     console.result({"session": str(folder), "end": asdict(end), "seed": seed})
     console.say(f"{folder}: {end.reason}; {end.readings} readings, {end.health.lost} lost")
+    if end.cause == "device":
+        console.note(
+            f"it is not sealed yet: 'daq-app resume {folder}' goes on at the same trial, with --end it is ended"
+        )
     return DONE if end.complete and not end.health.lost else FLAWED
 
 

@@ -1,16 +1,15 @@
 """Seals an ended session: an HDF5 copy for any reader, a description, a manifest; compared before it counts."""
 
 import json
-import sqlite3
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 from sessions.recording.errors import RecordingError
+from sessions.recording.folding import fold_log
 from sessions.recording.head import info_to_dict, plan_to_dict
-from sessions.recording.log import LoggedEvent, TrialRecord
+from sessions.recording.log import TrialRecord
 from sessions.recording.manifest import changed_files, is_sealed, list_in_manifest
-from sessions.recording.reader import Recording, torn_log
+from sessions.recording.reader import Recording
 from sessions.recording.schema import (
     DESCRIPTION_FILE,
     FORMAT,
@@ -18,7 +17,6 @@ from sessions.recording.schema import (
     LIVE_FILE,
     MANIFEST_FILE,
     SEALED_FILE,
-    event_row,
 )
 from sessions.recording.sealed_copy import differences, write_copy
 from sessions.recording.whole_file import put_in_place, write_whole
@@ -34,7 +32,7 @@ def seal(folder: Path) -> None:
     """
     if is_sealed(folder):
         raise RecordingError(f"{folder} is sealed already: {MANIFEST_FILE} lists its files")
-    _fold_log(Recording.open(folder))
+    fold_log(Recording.open(folder))
     recording = Recording.open(folder)
     new = folder / f".{SEALED_FILE}.part"
     try:
@@ -75,33 +73,8 @@ def _clear_unfinished(folder: Path) -> None:
             (folder / name).unlink()
 
 
-def _fold_log(crashed: Recording) -> None:
-    """Fold a log that a crash left into the live file. Raises RecordingError while somebody still writes.
-
-    Folding loses sight of a torn tail, so that an event is added to tell of it.
-    """
-    live = crashed.folder / LIVE_FILE
-    if not live.with_name(f"{live.name}-wal").exists():
-        return
-    number, time_ns, readings = (
-        (last.number, last.time_ns, last.readings) if (last := next(reversed(crashed.events), None)) else (0, 0, 0)
-    )
-    torn = [
-        LoggedEvent(number + i, time_ns, "log_torn", None, readings, {"sentence": sentence})
-        for i, sentence in enumerate(torn_log(live), 1)
-    ]
-    try:
-        with closing(sqlite3.connect(live, timeout=0.5, isolation_level=None)) as connection:
-            for event in torn:
-                connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", event_row(event))
-            connection.execute("PRAGMA journal_mode=DELETE")
-    except sqlite3.Error as error:
-        raise RecordingError(f"{live} cannot be sealed ({error}); end the program that still writes it") from error
-
-
 def _description(recording: Recording) -> dict[str, Any]:
     """Return what `session.json` says: all but the readings and the events."""
-    ended = next((event.data for event in recording.events if event.kind == "ended"), None)
     return {
         **({"SIMULATED": recording.simulated_sentence} if recording.simulated_sentence else {}),
         "format": {"name": FORMAT, "version": FORMAT_VERSION},
@@ -111,7 +84,7 @@ def _description(recording: Recording) -> dict[str, Any]:
         "trials": [_trial(record) for record in recording.trials],
         "readings": sum(len(block) for block in recording.blocks()),
         "events": len(recording.events),
-        "ended": ended,
+        "ended": recording.end,
         "losses": list(recording.losses),
         "flaws": list(recording.flaws),
     }

@@ -4,7 +4,7 @@ import json
 import shutil
 import sqlite3
 import tempfile
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -71,7 +71,7 @@ class Recording:
         except sqlite3.Error as error:
             raise RecordingError(f"{path} cannot be read ({error}); restore the folder from a copy") from error
         losses += [event.data["sentence"] for event in events if event.kind == "log_torn"]
-        if not any(event.kind == "ended" for event in events):
+        if _end(events) is None:
             losses.append("the session has no end: it was cut short, or is still running")
         try:
             plan, transducer = plan_from_dict(head["plan"]), head["transducer"]
@@ -86,6 +86,11 @@ class Recording:
     def simulated(self) -> bool:
         """Say whether transducer or subject were simulated."""
         return self.simulated_sentence is not None
+
+    @property
+    def end(self) -> Mapping[str, Any] | None:
+        """Return what the end of the session tells; None where it was cut short, or is still running."""
+        return _end(self.events)
 
     @cached_property
     def losses(self) -> tuple[str, ...]:
@@ -136,6 +141,16 @@ class Recording:
             found.append(ReadingBlock(**{field.name: getattr(block, field.name)[inside] for field in fields(block)}))
         return ReadingBlock.joined(found)
 
+    def last_block(self) -> ReadingBlock:
+        """Return the last block of readings (an empty one where there is none). Raises RecordingError when damaged."""
+        path = self.folder / LIVE_FILE
+        try:
+            with _connected(path) as connection:
+                (last,) = connection.execute("SELECT max(number) FROM blocks").fetchone()
+                return ReadingBlock.empty() if last is None else _block(connection, last)
+        except (ValueError, TypeError, sqlite3.DatabaseError) as error:
+            raise RecordingError(f"{path}: the last block of readings is damaged ({error})") from error
+
     def blocks(
         self, losses: list[str] | None = None, between: tuple[int, int | None] | None = None
     ) -> Iterator[ReadingBlock]:
@@ -150,6 +165,17 @@ class Recording:
                 yield from _blocks(connection, damaged, between)
         except sqlite3.DatabaseError as error:
             damaged.append(f"{LIVE_FILE} cannot be read to its end ({error})")
+
+
+def _end(events: Iterable[LoggedEvent]) -> Mapping[str, Any] | None:
+    """Return what the last `ended` tells, unless the session was resumed after it."""
+    end = None
+    for event in events:
+        if event.kind == "ended":
+            end = event.data
+        elif event.kind == "resumed":
+            end = None
+    return end
 
 
 def _blocks(

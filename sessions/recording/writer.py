@@ -12,8 +12,11 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan import SessionPlan
 from sessions.recording.errors import RecordingError
+from sessions.recording.folding import fold_log
 from sessions.recording.head import info_to_dict, json_text, plan_to_dict, simulated_sentence
 from sessions.recording.log import LoggedEvent
+from sessions.recording.manifest import is_sealed
+from sessions.recording.reader import Recording
 from sessions.recording.schema import (
     APPLICATION_ID,
     FORMAT,
@@ -100,6 +103,30 @@ class SessionWriter:
             ) from error
         sync_folder(folder)
         return cls(connection, path, clock or RealClock())
+
+    @classmethod
+    def open(cls, folder: Path, clock: Clock) -> Self:
+        """Go on with the recording in `folder`, that was cut short: numbers of blocks and events continue.
+
+        Raises RecordingError when it is sealed, when somebody still writes it, or when it cannot be written.
+        """
+        if is_sealed(folder):
+            raise RecordingError(f"{folder} is sealed: nothing is added to it; begin a new session")
+        fold_log(Recording.open(folder))
+        path = folder / LIVE_FILE
+        connection = sqlite3.connect(path, isolation_level=None, timeout=0.5)
+        try:
+            _make_durable(connection)
+            writer = cls(connection, path, clock)
+            (writer._block_rows, writer._readings) = connection.execute(
+                "SELECT count(*), coalesce(sum(readings), 0) FROM blocks"
+            ).fetchone()
+            (writer._event_count,) = connection.execute("SELECT count(*) FROM events").fetchone()
+        except sqlite3.Error as error:
+            connection.close()
+            raise RecordingError(f"{path} cannot be gone on with ({error}); end whatever else uses it") from error
+        writer._acknowledged = Acknowledged(writer._readings, writer._event_count, clock.now_ns())
+        return writer
 
     @property
     def folder(self) -> Path:
@@ -219,10 +246,7 @@ class SessionWriter:
 def _prepare(connection: sqlite3.Connection, head: Mapping[str, str]) -> None:
     """Lay out the tables and write the head, in one commit."""
     connection.execute(f"PRAGMA application_id={APPLICATION_ID}")
-    (mode,) = connection.execute("PRAGMA journal_mode=WAL").fetchone()
-    if mode != "wal":
-        raise sqlite3.OperationalError(f"the disk allows no write-ahead log, journal mode is {mode}")
-    connection.execute("PRAGMA synchronous=FULL")
+    _make_durable(connection)
     connection.execute("BEGIN IMMEDIATE")
     for table in TABLES:
         connection.execute(table)
@@ -230,3 +254,11 @@ def _prepare(connection: sqlite3.Connection, head: Mapping[str, str]) -> None:
         connection.execute("INSERT INTO head VALUES (?,?,?,?)", (number, name, value, text_crc(value)))
     connection.execute(f"PRAGMA user_version={FORMAT_VERSION}")
     connection.execute("COMMIT")
+
+
+def _make_durable(connection: sqlite3.Connection) -> None:
+    """Have every commit survive the end of the process and of the machine's power."""
+    (mode,) = connection.execute("PRAGMA journal_mode=WAL").fetchone()
+    if mode != "wal":
+        raise sqlite3.OperationalError(f"the disk allows no write-ahead log, journal mode is {mode}")
+    connection.execute("PRAGMA synchronous=FULL")

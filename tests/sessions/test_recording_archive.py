@@ -168,7 +168,7 @@ def test_a_session_is_sealed_once(sealed):
 def test_a_session_that_is_still_written_is_not_sealed(tmp_path):
     writer = begun(tmp_path / "s")
     writer.event("started")
-    with pytest.raises(RecordingError, match="end the program that still writes it"):
+    with pytest.raises(RecordingError, match="end the program that still writes"):
         seal(tmp_path / "s")
     writer.event("ended")
     writer.close()

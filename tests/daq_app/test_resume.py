@@ -1,0 +1,49 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from daq_app.cli import run
+from sessions.recording import Recording
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kill -9 needs POSIX")
+def test_a_killed_run_is_resumed_at_the_same_trial_on_the_same_bench_only_and_ends_whole(tmp_path, capsys):
+    folder = tmp_path / "P07"
+    words = ["run", "sensotact-friction", "--device", "sim:?seed=7", "--subject", "P07", "--headless", "--seed", "3"]
+    people = ["--simulate-subject", "7", "--pace", "20"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "daq_app", *words, *people, "--out", str(folder)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    for _ in range(400):
+        time.sleep(0.05)
+        if (folder / "session.sqlite-wal").exists() and any(
+            event.kind == "take_kept" for event in Recording.open(folder).events
+        ):
+            break
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    before = Recording.open(folder)
+    assert before.end is None
+    resume = ["resume", str(folder), "--device", "sim:?seed=7", "--headless"]
+    assert run(resume) == 2
+    assert run(["resume", str(folder), "--device", "sim:?seed=7&rate=100", *people]) == 1
+    assert "readings a second" in capsys.readouterr().err
+    assert run([*resume, *people, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["end"]["complete"]
+    after = Recording.open(folder)
+    assert after.plan == before.plan
+    assert after.events[: len(before.events)] == before.events
+    assert all(record.outcome == "scored" for record in after.trials)
+    assert run(["verify", str(folder)]) in (0, 3)
+    assert run([*resume, *people]) == 1
+    assert "is sealed" in capsys.readouterr().err
+    assert run(["analyse", str(folder), "--json"]) in (0, 3)
+    strokes = json.loads(capsys.readouterr().out)["strokes"]
+    assert {stroke["trial"] for stroke in strokes if stroke["trial"]} == set(range(1, 11))

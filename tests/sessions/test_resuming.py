@@ -1,0 +1,209 @@
+import dataclasses
+import os
+import random
+import time
+from datetime import UTC, datetime, timedelta
+
+import pytest
+from hypothesis import given, settings
+from stand_ins import INFO, Hands, StandIn, ToldClock
+from test_machine import steps, walks
+from test_recording_crash import forked, kill, reported
+from test_runner import Session
+
+from sessions.event_log import kind_of, line_of
+from sessions.machine import advance, start
+from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter
+from sessions.recording.archive import problems, seal
+from sessions.resuming import (
+    Seam,
+    check_resumable,
+    check_same_transducer,
+    continued,
+    resumed_data,
+    resumption,
+)
+from sessions.runner import Resumed, run_session
+from sessions.steps import Abort, Ended, Refuse
+
+
+def logged(walk):
+    """The log of a walk, as the runner writes it."""
+    plan, events = walk
+    lines = [("started", None, {})]
+    for before, event, _, commands in steps(plan, events):
+        if any(isinstance(command, Refuse) for command in commands):
+            lines.append(("refused", None, {"event": kind_of(event), "sentence": ""}))
+            continue
+        trial = None if not hasattr(before, "place") else before.place.trial.number
+        lines.append((kind_of(event), trial, dataclasses.asdict(event)))
+        lines += [line for line in map(line_of, commands) if line is not None]
+    return plan, [LoggedEvent(i, i, kind, trial, 0, data) for i, (kind, trial, data) in enumerate(lines, 1)]
+
+
+def kept_takes(lines):
+    """Trial and take of what counts, from the lines about takes alone."""
+    kept = {}
+    for kind, trial, data in lines:
+        if kind == "take_kept":
+            kept[trial] = data["take"]
+        if kind == "take_discarded" and kept.get(trial) == data["take"]:
+            del kept[trial]
+    return kept
+
+
+def open_takes(lines):
+    found = set()
+    for kind, trial, data in lines:
+        if kind == "take_started":
+            found.add((trial, data["take"]))
+        if kind in ("take_kept", "take_discarded"):
+            found.discard((trial, data["take"]))
+    return found
+
+
+@given(walk=walks())
+@settings(max_examples=60, deadline=None)
+def test_any_beginning_of_a_log_gives_a_state_that_can_be_ended_with_kept_trials_kept_and_no_take_open(walk):
+    plan, events = logged(walk)
+    for length in range(len(events) + 1):
+        lines = [(event.kind, event.trial, event.data) for event in events[:length]]
+        at = resumption(plan, events[:length])
+        if not isinstance(at.state, Ended):
+            assert isinstance(advance(at.state, Abort("enough"))[0], Ended)
+        after = [*lines, *at.owed]
+        assert not open_takes(after)
+        taken_back = {trial for kind, trial, _ in at.owed if kind == "take_discarded"}
+        kept_before = kept_takes(lines)
+        for trial, take in kept_before.items():
+            # A take that was kept is taken back only where the experimenter had already asked for it.
+            assert kept_takes(after).get(trial) == take or (trial in taken_back and events[length - 1].kind == "redo")
+        again = [*events[:length], *(LoggedEvent(0, 0, *line[:2], 0, line[2]) for line in at.owed)]
+        assert resumption(plan, again).state == at.state
+        assert resumption(plan, again).owed == ()
+
+
+def test_a_log_in_which_something_does_not_follow_is_refused():
+    plan, _ = start_plan()
+    with pytest.raises(RecordingError, match="does not follow"):
+        resumption(plan, [LoggedEvent(1, 1, "finish", None, 0, {})])
+
+
+def start_plan():
+    from test_machine import FORCES
+
+    return FORCES, start(FORCES)
+
+
+def resume(folder, **transducer):
+    """Go on with the session in `folder` on a machine that was started anew."""
+    recording = Recording.open(folder)
+    check_resumable(recording)
+    last = recording.last_block()
+    now = datetime.fromisoformat(recording.provenance["created_utc"]) + timedelta(seconds=600)
+    clock, gap = continued(recording, last, ToldClock(5_000), now.astimezone(UTC))
+    told = ToldClock(clock.now_ns())
+    device = StandIn(told, **transducer)
+    at = resumption(recording.plan, recording.events)
+    writer = SessionWriter.open(folder, told)
+    resumed = Resumed(at, resumed_data(gap, device.info, {}), last)
+    end = run_session(recording.plan, writer, Hands(told, device), device, told, resumed=resumed)
+    return end, Recording.open(folder)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="kills a process of its own, which needs fork")
+def test_a_killed_session_goes_on_at_the_same_trial_and_nothing_acknowledged_is_lost(tmp_path):
+    chance = random.Random(4)
+    resumed_at = set()
+    for run in range(12):
+        folder = tmp_path / str(run)
+
+        def work(report, folder=folder):
+            session = Session(folder)
+            report("begun")
+            session.run(progress=lambda status: report(status.safe.readings, status.safe.events))
+
+        process, reading = forked(work)
+        os.read(reading, 10)
+        time.sleep(chance.uniform(0.0, 0.12))
+        kill(process)
+        safe = ([line for line in reported(reading) if len(line) == 2] or [[0, 0]])[-1]
+        before = Recording.open(folder)
+        if before.end is not None:
+            continue
+        readings = before.readings()
+        assert (len(readings), len(before.events)) >= tuple(safe)
+        kept = {record.trial.number: record for record in before.trials if record.take is not None}
+        end, after = resume(folder)
+        resumed_at.add(len(kept))
+        assert end.complete
+        assert after.events[: len(before.events)] == before.events
+        assert after.readings().raw[: len(readings)].tobytes() == readings.raw.tobytes()
+        assert [record.score for record in after.trials] == [t.stimulus.index for t in after.plan.trials]
+        assert after.plan == before.plan
+        for number, record in kept.items():
+            assert after.trial(number) == record
+        discarded = [take.discarded for record in after.trials for take in record.other_takes]
+        assert set(discarded) <= {"the recording was cut short in the middle of it"}
+        together = after.readings()
+        assert (together.sequence[1:] - together.sequence[:-1] == 1).all()
+        assert (together.time[1:] > together.time[:-1]).all()
+        assert after.losses == () or all("write-ahead log" in sentence for sentence in after.losses)
+        seal(folder)
+        assert problems(folder) == after.losses
+    assert len(resumed_at) > 2
+
+
+def test_a_session_whose_transducer_was_lost_goes_on_as_often_as_it_is_lost(tmp_path):
+    Session(tmp_path / "s", link_lost_after=1000).run()
+    end, recording = resume(tmp_path / "s", link_lost_after=700)
+    assert (end.cause, end.readings, len(recording.readings())) == ("device", 1700, 1700)
+    end, recording = resume(tmp_path / "s")
+    assert end.complete
+    gap = [event.data for event in recording.events if event.kind == "resumed"]
+    assert len(gap) == 2
+    assert recording.losses == ()
+    assert [record.score for record in recording.trials] == [t.stimulus.index for t in recording.plan.trials]
+
+
+def test_ended_and_sealed_sessions_are_refused(tmp_path):
+    recording = Session(tmp_path / "s").run()
+    with pytest.raises(RecordingError, match="has ended"):
+        check_resumable(recording)
+    seal(tmp_path / "s")
+    with pytest.raises(RecordingError, match="is sealed"):
+        SessionWriter.open(tmp_path / "s", ToldClock())
+
+
+def test_a_session_that_is_still_written_is_not_resumed(tmp_path):
+    session = Session(tmp_path / "s")
+    session.writer.event("started")
+    with pytest.raises(RecordingError, match="in use"):
+        SessionWriter.open(tmp_path / "s", ToldClock())
+    session.writer.close()
+
+
+def test_another_transducer_or_another_rate_is_refused_with_a_sentence():
+    check_same_transducer(INFO, INFO)
+    with pytest.raises(RecordingError, match="serial number FT1, and this one has FT2"):
+        check_same_transducer(INFO, dataclasses.replace(INFO, serial="FT2"))
+    with pytest.raises(RecordingError, match="gives 100 readings a second, and gave 200"):
+        check_same_transducer(INFO, dataclasses.replace(INFO, rate=100.0))
+
+
+def test_a_wall_clock_set_back_leaves_the_gap_unknown_and_the_session_clock_forward(tmp_path):
+    Session(tmp_path / "s", link_lost_after=1000).run()
+    recording = Recording.open(tmp_path / "s")
+    earlier = datetime(2001, 1, 1, tzinfo=UTC)
+    clock, gap = continued(recording, recording.last_block(), ToldClock(7), earlier)
+    assert gap.duration is None
+    assert clock.now_ns() > recording.events[-1].time_ns
+
+
+def test_the_seam_alters_nothing_the_device_said(tmp_path):
+    Session(tmp_path / "s", link_lost_after=1000).run()
+    block = Recording.open(tmp_path / "s").last_block()
+    joined = Seam(1000, 4.0).joined(block)
+    assert joined.raw.tobytes() == block.raw.tobytes()
+    assert joined.counter.tolist() == block.counter.tolist()
+    assert joined.sequence.tolist() == [number + 1000 for number in block.sequence.tolist()]
