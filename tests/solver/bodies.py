@@ -1,0 +1,203 @@
+"""Bodies of the published problems: patches of quadrilaterals joined to one mesh, and the stress inside."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from solver.contact import OPEN, SLIP
+from solver.elements import Q2P1
+from solver.grid import grid_mesh, quality
+from solver.mesh import Mesh
+from solver.stiffness import Probes, local_coordinates
+
+NONE = np.zeros(0, np.int64)
+
+
+def with_middles(lines):
+    """Return lines between elements with one more in the middle of each gap."""
+    out = np.empty(2 * len(lines) - 1)
+    out[::2], out[1::2] = lines, (lines[1:] + lines[:-1]) / 2
+    return out
+
+
+def graded(finest, growth, zone, end):
+    """Return lines from 0 to `end`, `finest` apart up to `zone` and then further and further apart."""
+    steps = [0.0]
+    while steps[-1] < end:
+        steps.append(steps[-1] + max(finest, finest + growth * (steps[-1] - zone)))
+    return np.array(steps) * end / steps[-1]
+
+
+def mirrored(lines):
+    return np.concatenate([-lines[:0:-1], lines])
+
+
+def joined(grids):
+    """Return the mesh of several grids of points (2 a + 1, 2 b + 1, 2), nodes at one place made one.
+
+    Nothing is held, nothing may touch.
+    """
+    turned = [g if _clockwise(g) else g[::-1] for g in grids]
+    meshes = [grid_mesh(g, np.zeros((g.shape[1] - 1) // 2, np.int64), slice(0, 1), NONE) for g in turned]
+    nodes = np.concatenate([m.nodes for m in meshes])
+    starts = np.cumsum([0, *(len(m.nodes) for m in meshes[:-1])])
+    elements = np.concatenate([m.elements + s for m, s in zip(meshes, starts, strict=True)])
+    _, first, place = np.unique(np.round(nodes, 9) + 0.0, axis=0, return_index=True, return_inverse=True)
+    elements = place.ravel()[elements]
+    return Mesh(nodes[first], elements, np.zeros(len(elements), np.int64), NONE, NONE)
+
+
+def chain(on, along):
+    """Return the nodes where `on` is true, in the order of `along`."""
+    found = np.flatnonzero(on)
+    return found[np.argsort(along[found])]
+
+
+def ring(inner, outer, radial, around):
+    """Return a thick cylinder that nothing holds, and the nodes of its hole in order; its skin is one outer edge."""
+    r = with_middles(np.geomspace(inner, outer, radial + 1))
+    turn = np.linspace(-np.pi, np.pi, 2 * around + 1)
+    mesh = joined([np.stack([r * np.cos(turn)[:, None], r * np.sin(turn)[:, None]], axis=-1)])
+    radius = np.hypot(*mesh.nodes.T)
+    angle = np.round(np.arctan2(mesh.nodes[:, 1], mesh.nodes[:, 0]), 9) % round(2 * np.pi, 9)
+    hole = chain(np.isclose(radius, inner), angle)
+    outside = chain(np.isclose(radius, outer), angle)
+    return replace(mesh, skin=outside[:3]), np.append(hole, hole[0])
+
+
+def membrane(across, up):
+    """Return Cook's membrane (0,0) (48,44) (48,60) (0,44), its left edge held, its right edge as the skin."""
+    x, part = with_middles(np.linspace(0, 48, across + 1)), with_middles(np.linspace(0, 1, up + 1))
+    low, high = 44 * x / 48, 44 + 16 * x / 48
+    points = np.empty((len(x), len(part), 2))
+    points[..., 0] = x[:, None]
+    points[..., 1] = high[:, None] + (low - high)[:, None] * part  # from the upper edge downwards
+    mesh = joined([points])
+    left = np.flatnonzero(np.isclose(mesh.nodes[:, 0], 0.0))
+    right = chain(np.isclose(mesh.nodes[:, 0], 48.0), mesh.nodes[:, 1])
+    return replace(mesh, held=left, skin=right)
+
+
+def mound(x_lines, y_lines, radius, zone):
+    """Return a block whose underside is the parabola x^2 / (2 radius) that the theory of Hertz has; its top is held.
+
+    It may touch where |x| is below `zone`.
+    """
+    x, y = with_middles(x_lines), with_middles(y_lines)[::-1]
+    part = y / y[0]
+    points = np.empty((len(x), len(y), 2))
+    points[..., 0] = x[:, None]
+    points[..., 1] = (x**2 / (2 * radius))[:, None] * (1 - part) + y[0] * part
+    corners = np.flatnonzero(np.abs(x_lines) < zone)
+    skin = slice(2 * int(corners[0]), 2 * int(corners[-1]) + 1)
+    return grid_mesh(points, np.zeros(len(y_lines) - 1, np.int64), skin, np.arange(len(x)) * len(y))
+
+
+def disc(radius, finest, zone):
+    """Return a whole cylinder standing on the surface, fine below and above; its skin is the lower quarter."""
+    fine = mirrored(graded(finest, 0.3, zone, radius * np.pi / 4)) / radius  # angles from the foot
+    beside = np.linspace(-np.pi / 4, np.pi / 4, 13)
+    out = 1 - graded(finest, 0.3, 0.0, 0.45 * radius)[::-1] / radius  # radii by the outer one
+    half = 0.4 * radius
+
+    def quarter(angles, turn):
+        angle = with_middles(angles)
+        square = half * np.stack([np.tan(angle), -np.ones_like(angle)], axis=-1)
+        circle = radius * np.stack([np.sin(angle), -np.cos(angle)], axis=-1)
+        level = (with_middles(out) - out[0]) / (1 - out[0])
+        points = square[:, None] + (circle - square)[:, None] * level[:, None]
+        c, s = np.cos(turn), np.sin(turn)
+        return points[::-1] @ np.array([[c, s], [-s, c]])
+
+    x, y = half * np.tan(with_middles(fine)), half * np.tan(with_middles(beside))
+    core = np.stack(np.meshgrid(x, y[::-1], indexing="ij"), axis=-1)
+    quarters = [quarter(fine if n % 2 == 0 else beside, n * np.pi / 2) for n in range(4)]
+    mesh = joined([core, *quarters])
+    nodes = mesh.nodes + np.array([0.0, radius])
+    on = np.isclose(np.hypot(*mesh.nodes.T), radius)
+    low = on & (mesh.nodes[:, 1] < -radius * np.cos(np.pi / 4) + 1e-9)
+    return replace(mesh, nodes=nodes, skin=chain(low, nodes[:, 0]))
+
+
+def _clockwise(grid):
+    first, second = grid[1, 0] - grid[0, 0], grid[0, 1] - grid[0, 0]
+    return first[0] * second[1] - first[1] * second[0] < 0
+
+
+def distorted(mesh, by, seed, still=None):
+    """Move the inner corners of elements at random by up to `by` of their shortest edge; mid-nodes follow.
+
+    Nodes in `still` stay, as does the boundary.
+    """
+    rng = np.random.default_rng(seed)
+    nodes = mesh.nodes.copy()
+    corners = mesh.elements[:, :4]
+    sides = np.stack([np.roll(corners, -1, axis=1), corners])  # two ends of every side
+    length = np.linalg.norm(nodes[sides[0]] - nodes[sides[1]], axis=2)
+    shortest = np.full(len(nodes), np.inf)
+    for ends in sides:
+        np.minimum.at(shortest, ends.ravel(), length.ravel())
+    pairs = np.sort(sides.reshape(2, -1), axis=0)
+    _, place, count = np.unique(pairs, axis=1, return_inverse=True, return_counts=True)
+    lonely = (count[place.ravel()] == 1).reshape(length.shape)  # sides of the boundary
+    free = np.zeros(len(nodes), bool)
+    free[corners] = True
+    for ends in sides:
+        free[ends[lonely]] = False
+    free[mesh.held] = free[mesh.skin] = False
+    if still is not None:
+        free[still] = False
+    nodes[free] += rng.uniform(-1, 1, (int(free.sum()), 2)) * by / np.sqrt(2) * shortest[free, None]
+    for side in range(4):
+        inside = ~lonely[:, side]
+        ends = corners[inside][:, [side, (side + 1) % 4]]
+        nodes[mesh.elements[inside, 4 + side]] = nodes[ends].mean(axis=1)
+    middle = nodes[mesh.elements[:, 4:8]].sum(axis=1) / 2 - nodes[corners].sum(axis=1) / 4
+    nodes[mesh.elements[:, 8]] = middle
+    out = replace(mesh, nodes=nodes)
+    quality(out)
+    return out
+
+
+def placed(mesh, points):
+    """Return the element that holds each point (p, 2), and the point's local coordinates there."""
+    centres = mesh.nodes[mesh.elements[:, 8]]
+    near = np.argsort(np.sum((points[:, None] - centres) ** 2, axis=2), axis=1)[:, :24]
+    corners = mesh.nodes[mesh.elements[near.ravel()]]
+    repeated = np.repeat(points, near.shape[1], axis=0)
+    local = local_coordinates(corners, repeated, np.zeros((near.size, 2)))
+    outside = np.abs(local).max(axis=1).reshape(near.shape)
+    best = np.argmin(np.where(np.isfinite(outside), outside, np.inf), axis=1)
+    rows = np.arange(len(points))
+    return near[rows, best], local.reshape(*near.shape, 2)[rows, best]
+
+
+def stress(body, displacement, points):
+    """Return the in-plane stress (p, 2, 2) [MPa] at `points` (p, 2) for displacements (nodes, 2)."""
+    mesh, elastic = body.mesh, body.elastic
+    element, local = placed(mesh, points)
+    probes = Probes.at(mesh, elastic, element, local)
+    strain = probes.displacement_gradient(mesh, displacement)
+    strain = (strain + np.swapaxes(strain, 1, 2)) / 2
+    moved = displacement[mesh.elements[element]].reshape(len(points), 18)
+    theta = np.einsum("pm,pmi,pi->p", probes.modes, elastic.dilatation[element], moved)
+    shear, lame = elastic.shear[element, None, None], elastic.lame[element] * theta
+    return 2 * shear * strain + lame[:, None, None] * np.eye(2)
+
+
+def skin_motion(body, found):
+    """Return the displacement (2 k,) of the skin, normal first, of a body that nothing holds, in a state of contact."""
+    t = body.touchable
+    up = t.normal_by_normal @ found.normal + t.normal_by_tangential @ found.tangential + t.normal_free
+    along = t.normal_by_tangential.T @ found.normal + t.tangential_by_tangential @ found.tangential + t.tangential_free
+    return np.concatenate([up, along]) + t.motions @ found.motion
+
+
+def touching_within(body, half_width):
+    """Return first states: points whose |x| is below `half_width` slip, the others are open."""
+    return np.where(np.abs(body.mesh.nodes[body.mesh.skin, 0]) < half_width, SLIP, OPEN).astype(np.int8)
+
+
+def local_corners(mesh):
+    """Return an element number and local corner for each corner of each element."""
+    return np.repeat(np.arange(len(mesh.elements)), 4), np.tile(Q2P1.corners, (len(mesh.elements), 1))
