@@ -15,7 +15,7 @@ from drivers.clock import Clock
 from drivers.readings import ReadingBlock
 from drivers.transducer import Health, LinkLost, TransducerInfo
 from sessions.course import Step, steps
-from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter
+from sessions.recording import Acknowledged, LoggedEvent, Recording, RecordingError, SessionWriter
 from sessions.recording.replay import RecordedReadings, health_of
 from sessions.recording.schema import COLUMNS
 from sessions.runner import RunnerSettings, run_session
@@ -23,6 +23,7 @@ from sessions.steps import Command, Event
 from sessions.verification import differences
 
 SLICE = 0.02  # longest wait before a stop is noticed [s]
+PART = 16_384  # readings written at once
 LATER = frozenset({"log_torn"})  # written by sealing, not by the course
 Progress = Callable[[float, str], None]  # part done (0 to 1), what is happening
 
@@ -91,6 +92,7 @@ class _Rewriter(SessionWriter):
         self._torn = [event.data for event in recording.events if event.kind in LATER]
         self._cut = not any(event.kind == "ended" for event in self._log)
         self._told = 0
+        self._closing = False
         self._connection.execute("PRAGMA synchronous=OFF")
 
     def event(
@@ -111,6 +113,16 @@ class _Rewriter(SessionWriter):
             self._told = place + 1
             time_ns = self._log[place].time_ns
         return super().event(kind, trial, data, time_ns=time_ns, commit=commit)
+
+    def commit(self) -> Acknowledged:
+        """Write in large parts: nobody waits for an acknowledgement."""
+        waiting = self._readings - self._acknowledged.readings
+        return super().commit() if self._closing or waiting >= PART else self._acknowledged
+
+    def close(self) -> None:
+        """Write the rest, and close."""
+        self._closing = True
+        super().close()
 
     def finish(self) -> None:
         """Write down what sealing said of a torn log, and close."""
