@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 Origin = Literal["measured", "set", "default"]  # where a value came from; a default was chosen by nobody
+Hand = Literal["left", "right"]
 PROXIMAL_TO_DISTAL = 1
 DISTAL_TO_PROXIMAL = -1
 
@@ -65,6 +66,8 @@ class SessionPlan:
     contact_area_origin: Origin = "default"
     contact_angle: float = 45.0  # between the finger's axis and the face [degrees]
     contact_angle_origin: Origin = "default"
+    stroking_hand: Hand | None = None  # None: nobody stated it
+    answering_hand: Hand | None = None
 
     @property
     def trials(self) -> tuple[Trial, ...]:

@@ -1,6 +1,7 @@
 """What the course of a session is made of: its states, what may happen, and what is to be done. All of it is data."""
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from sessions.plan import Block, SessionPlan, Trial
 
@@ -172,9 +173,14 @@ class StrokeDone:
 
 @dataclass(frozen=True, slots=True)
 class Scored:
-    """The subject has judged."""
+    """The subject has judged. What an input device cannot tell is empty or None."""
 
     score: float | None  # 0 to 100; None: the subject gave no answer
+    positions: tuple[tuple[float, float], ...] = ()  # every one on the line: (session clock [s], 0 to 100), in order
+    first_touch: float | None = None  # session clock [s]
+    corrections: int | None = None  # how often the subject changed an answer given
+    hand: Literal["left", "right"] | None = None  # that answered
+    input_device: str | None = None  # such as a pen, a finger on the screen
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,6 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--height", type=float, metavar="MM", help="of the stimulus's face above the sensor's origin")
     parser.add_argument("--normal", choices=["+x", "-x", "+y", "-y", "+z", "-z"], help="axis along which pressing is +")
     parser.add_argument("--contact-area", type=float, metavar="MM2", help="of finger and surface, for tau_max")
+    parser.add_argument("--stroking-hand", choices=["left", "right"], help="recorded; unknown unless stated")
+    parser.add_argument("--answering-hand", choices=["left", "right"], help="recorded; unknown unless stated")
     parser.add_argument("--out", type=Path, metavar="DIR", help="the session's folder (one below recordings/)")
 
 
@@ -54,6 +56,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         seed,
         forces=options.device is not None,
         contact_area=options.contact_area,
+        stroking_hand=options.stroking_hand,
+        answering_hand=options.answering_hand,
     )
     clock = RealClock() if options.pace == 1.0 else PacedClock(options.pace)
     stamp = datetime.now().strftime("%Y%m%dT%H%M%S")

@@ -11,6 +11,7 @@ from sessions.plan import (
     PROXIMAL_TO_DISTAL,
     Block,
     Frame,
+    Hand,
     SessionPlan,
     Stimulus,
     Trial,
@@ -130,6 +131,8 @@ def plan(
     forces: bool = True,
     frame: Frame | None = None,
     contact_area: float | None = None,
+    stroking_hand: Hand | None = None,
+    answering_hand: Hand | None = None,
 ) -> SessionPlan:
     """Return the plan of one session: who, which stimuli under which labels, in which order.
 
@@ -153,6 +156,8 @@ def plan(
         frame=frame or protocol.face.frame,
         contact_angle=protocol.contact_angle,
         contact_angle_origin="set",
+        stroking_hand=stroking_hand,
+        answering_hand=answering_hand,
     )
     return made if area is None else replace(made, contact_area=area, contact_area_origin="set")
 
