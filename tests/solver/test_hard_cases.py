@@ -39,7 +39,7 @@ poisson = st.sampled_from([0.0, 0.3, 0.45, 0.48, 0.499, 0.4999999])
 tissue = st.builds(Material, young, poisson)
 
 
-@settings(deadline=None, max_examples=30, derandomize=True)
+@settings(deadline=None, max_examples=12, derandomize=True)
 @given(
     finger=st.fixed_dictionaries(
         {
