@@ -9,6 +9,8 @@ from pathlib import Path
 
 from drivers.transducer import SetupError
 
+ROOM = 65536  # bytes kept for a reader that is late, as much as a computer's serial driver keeps
+
 
 class PseudoTerminal:
     """A pair of ends that can be pulled apart and plugged in again under the same path. Linux and macOS only."""
@@ -20,6 +22,7 @@ class PseudoTerminal:
         self._folder = Path(tempfile.mkdtemp(prefix="daq-app-"))
         self.path = str(self._folder / name)
         self._ours = self._theirs = -1
+        self._waiting = bytearray()
         self.plug_in()
 
     @property
@@ -56,9 +59,11 @@ class PseudoTerminal:
         os.close(self._theirs)
         os.close(self._ours)
         self._ours = self._theirs = -1
+        self._waiting.clear()
 
     def heard(self, timeout: float) -> bytes:
         """Return what the other side has sent, waiting up to `timeout` real seconds for it."""
+        self._flush()
         ready, _, _ = select.select([self._ours], [], [], timeout)
         if not ready:
             return b""
@@ -68,9 +73,14 @@ class PseudoTerminal:
             return b""
 
     def say(self, data: bytes) -> None:
-        """Send `data`; what the other side has no room for is lost, as on a line."""
+        """Send `data`. What the other side has not read beyond ROOM bytes is lost, as on a line."""
+        self._waiting += data[: max(ROOM - len(self._waiting), 0)]
+        self._flush()
+
+    def _flush(self) -> None:
+        """Pass on what the system's own few kilobytes have room for."""
         with contextlib.suppress(OSError):
-            os.write(self._ours, data)
+            del self._waiting[: os.write(self._ours, self._waiting)]
 
     def close(self) -> None:
         """Remove the port. Harmless when repeated."""
