@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import LinAlgError
-from scipy.linalg.lapack import dposv
+from scipy.linalg.lapack import dposv, dpotrs
 
 from solver.mesh import Array, Indices
 
@@ -112,6 +112,7 @@ class Reduced:
     load: Array  # (m, l) dead loads as the kept unknowns feel them
     _follow: tuple[Array, ...]  # per part (k, b): inner unknowns = own - follow @ border unknowns
     _own: tuple[Array, ...]  # per part (k, l): inner unknowns under the loads alone
+    _factors: tuple[Array, ...]  # per part (k, k): Cholesky factor of the inner unknowns' stiffness
 
     @staticmethod
     def of(tree: Tree, stiffness: Array, loads: Array | None = None) -> "Reduced":
@@ -122,6 +123,7 @@ class Reduced:
         loads = np.zeros((tree.size, 0)) if loads is None else loads
         follow: list[Array] = []
         own: list[Array] = []
+        factors: list[Array] = []
         passed: list[tuple[Array, Array] | None] = []
         for part in tree.parts:
             k, total = len(part.inner), len(part.inner) + len(part.border)
@@ -139,13 +141,14 @@ class Reduced:
                 values = stiffness[tree.order[part.elements]].ravel()
                 matrix = np.bincount(part.entries, values, total * total + 1).astype(np.float64)[:-1]
                 matrix = matrix.reshape(total, total)
-            solution = _solved(matrix[:k, :k], np.concatenate([matrix[:k, k:], force[:k]], axis=1))
+            factor, solution = _solved(matrix[:k, :k], np.concatenate([matrix[:k, k:], force[:k]], axis=1))
+            factors.append(factor)
             own.append(solution[:, total - k :])
             follow.append(solution[:, : total - k])
             passed.append((matrix[k:, k:] - matrix[k:, :k] @ follow[-1], force[k:] - matrix[k:, :k] @ own[-1]))
         assert passed[-1] is not None
         root, load = passed[-1]
-        return Reduced(tree, (root + root.T) / 2.0, load + loads[tree.kept], tuple(follow), tuple(own))
+        return Reduced(tree, (root + root.T) / 2.0, load + loads[tree.kept], tuple(follow), tuple(own), tuple(factors))
 
     def all_unknowns(self, kept: Array, loaded: bool = False, only: Indices | None = None) -> Array:
         """Return all unknowns (size, c) for the kept ones (m, c): fixed ones 0; with the dead loads where `loaded`.
@@ -163,6 +166,23 @@ class Reduced:
             out[part.inner] = inner + self._own[number].sum(axis=1, keepdims=True) if loaded else inner
         return out
 
+    def under(self, loads: Array, compliance: Array) -> Array:
+        """Return all unknowns (size, c) under `loads` (size, c) alone, which need not be those it was made with.
+
+        `compliance` (m, m) is the inverse of `stiffness`, which the caller has.
+        """
+        passed = loads.copy()
+        for part, follow in zip(self.tree.parts, self._follow, strict=True):
+            passed[part.border] -= follow.T @ passed[part.inner]
+        out = np.zeros(loads.shape)
+        out[self.tree.kept] = compliance @ passed[self.tree.kept]
+        for number in range(len(self.tree.parts) - 1, -1, -1):
+            part, factor = self.tree.parts[number], self._factors[number]
+            if len(part.inner):
+                own = dpotrs(factor, passed[part.inner])[0]
+                out[part.inner] = own - self._follow[number] @ out[part.border]
+        return out
+
     def _needed(self, only: Indices | None) -> list[bool] | None:
         """Return which parts must be unfolded to know the unknowns `only`; None for all."""
         if only is None:
@@ -175,11 +195,11 @@ class Reduced:
         return needed
 
 
-def _solved(matrix: Array, right: Array) -> Array:
-    """Return the solution (k, c) of a symmetric positive definite system."""
+def _solved(matrix: Array, right: Array) -> tuple[Array, Array]:
+    """Return the Cholesky factor (k, k) and the solution (k, c) of a symmetric positive definite system."""
     if not len(matrix):
-        return right
-    _, solution, bad = dposv(matrix.T, right)
+        return matrix, right
+    factor, solution, bad = dposv(matrix.T, right)
     if bad:
         raise LinAlgError("the stiffness inside the body is not positive definite")
-    return np.asarray(solution, np.float64)
+    return np.asarray(factor, np.float64), np.asarray(solution, np.float64)
