@@ -70,6 +70,8 @@ class Prediction:
     mesh: Mesh
     displacement: Array  # (nodes, 2) relative to the bone [mm]
     history: History | None = None
+    normal_force_error: float | None = None  # estimated, of normal_force, relative [-]; None: not estimated
+    tangential_force_error: float | None = None  # likewise of tangential_force; 0 where there is no friction
     warnings: tuple[str, ...] = field(default=())  # one sentence each
 
     def to_dict(self) -> dict[str, Any]:
@@ -83,6 +85,8 @@ class Prediction:
                 "tangential_force",
                 "contact_width",
                 "error_estimate",
+                "normal_force_error",
+                "tangential_force_error",
                 "dofs",
                 "newton_iterations",
                 "wall_s",
