@@ -10,10 +10,15 @@ from drivers.clock import Clock
 from sessions.protocols import plan, protocol
 from sessions.recording import Recording, Setting
 from sessions.report import Planted
+from sessions.runner import SessionEnd
 
 PROTOCOL = "sensotact-friction"
 SUBJECTS = 10
 STROKING = 3  # the subject who strokes on the transducer
+
+
+class StudyCutShort(Exception):
+    """A visit ended before its last trial; what was recorded until then is kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +35,7 @@ class Study:
 def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Study:
     """Run every visit into a folder of its own below `out`. The same seed gives the same people and surfaces.
 
-    Raises RecordingError where `out` cannot be used.
+    Raises RecordingError where `out` cannot be used, StudyCutShort where a visit did not come to its end.
     """
     chosen = protocol(PROTOCOL)
     scored: list[Path] = []
@@ -39,7 +44,8 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
         folder = out / f"{subject}-scores"
         people = SimulatedPeople(_seed(seed, number), clock)
         planned = plan(chosen, subject, _seed(seed, number), forces=False)
-        conduct(planned, folder, people, None, clock, console, subject_simulated=True, settings=[_told(seed)])
+        end = conduct(planned, folder, people, None, clock, console, subject_simulated=True, settings=[_told(seed)])
+        _check(end, folder)
         scored.append(folder)
     subject = f"S{STROKING:02d}"
     folder = out / f"{subject}-forces"
@@ -56,8 +62,14 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
             subject_simulated=True,
             settings=[_told(seed)],
         )
+        _check(end, folder)
         planted = _planted(bench, Recording.open(folder))
     return Study(tuple(scored), folder, planted, end.readings, end.health.lost)
+
+
+def _check(end: SessionEnd, folder: Path) -> None:
+    if not end.complete:
+        raise StudyCutShort(f"{end.reason}; what was recorded is in {folder.parent}")
 
 
 def _seed(study: int, subject: int) -> int:

@@ -33,7 +33,7 @@ class PredictionOptions:
     scene: Scene | None = None  # whose finger, width, materials, receptor and tolerance to take; None: the published
     indentation: float | None = None  # [mm], instead of each block's own
     course: Literal["steady", "history"] = "history"
-    kinematics: Literal["small"] = "small"
+    kinematics: Literal["small", "finite"] = "small"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,7 +122,9 @@ def predict(
     scenes = [row.scene for row in rows if row.scene is not None]
     opposite = [_opposite(scene) for scene in scenes]
     found = answers([*scenes, *opposite], progress)
-    forces = [_force_per_mm(row) for row in rows if row.scene is not None]
+    # A depth is matched on the small-strain finger, whose answer at finite strain would be another one.
+    matches = asked.kinematics == "small"
+    forces = [_force_per_mm(row) if matches else None for row in rows if row.scene is not None]
     depths = matching_depths(
         [scene for scene, force in zip(scenes, forces, strict=True) if force is not None],
         [force for force in forces if force is not None],
@@ -276,11 +278,14 @@ def _filled(
     assert scene is not None  # the caller solved it
     reasons: dict[str, str] = {}
     if depth is None:
-        reasons["matching_depth"] = (
-            "The stroke gives no steady normal force."
-            if row.measured_normal is None
-            else "The model would have to be pressed nearly to its bone, or has no settled state there."
-        )
+        if scene.solve.kinematics == "finite":
+            reasons["matching_depth"] = "The depth that matches is found at small strain only."
+        elif row.measured_normal is None:
+            reasons["matching_depth"] = "The stroke gives no steady normal force."
+        else:
+            reasons["matching_depth"] = (
+                "The model would have to be pressed nearly to its bone, or has no settled state there."
+            )
     if isinstance(opposite, SolveFailure):
         reasons["opposite_sed"] = str(opposite)
     else:

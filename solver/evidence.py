@@ -23,6 +23,12 @@ def model(scene: Scene, finger: FingerModel, contact: Contact, displacement: Arr
     Every entry of `left_out` has `estimate`, the relative change of the SED (or a lower bound of it) that leaving it
     out may have caused, `from`, the numbers of this scene that it rests on, and `how` they make the estimate.
     """
+    force = finger.body.reactions(displacement[:, :, None])[finger.geometry.mesh.held, :, 0].sum(axis=0)
+    length = float(finger.body.touchable.length[contact.touching].sum())
+    touching = int(contact.touching.sum())
+    sticking = int((contact.state == STICK).sum()) / touching if touching else 0.0
+    slide = _elastic_slide(finger, displacement)
+    width = finger.contact_width(contact, finger.skin_displacement(contact)[:, 0])
     return {
         "kinematics": "small strain, plane strain",
         "material": "Hooke, per layer",
@@ -33,11 +39,35 @@ def model(scene: Scene, finger: FingerModel, contact: Contact, displacement: Arr
         "width": "forces are per mm of width",
         "left_out": {
             "finite strain": _finite_strain(finger, displacement),
-            "bone compliance": _bone(scene, finger, displacement),
-            "inertia": _inertia(scene, contact, finger),
-            "viscosity": _viscosity(scene, displacement, finger),
-            "history": _history(scene, contact, finger, displacement),
-            "the third dimension": _width(scene, contact, finger),
+            "bone compliance": _bone(scene, force),
+            "inertia": _inertia(scene, float(contact.normal.sum()), length),
+            "viscosity": _viscosity(scene, slide),
+            "history": _history(scene, sticking, slide),
+            "the third dimension": _width(scene, width),
+        },
+    }
+
+
+def finite_model(scene: Scene, *, force: Array, width: float, sticking: float, slide: float) -> dict[str, Any]:
+    """Return what `model` does for a result at finite strain.
+
+    `force` (2,) of the surface on the skin [N/mm], contact `width` [mm], part of the touching points that stick, and
+    `slide`, the largest sideways displacement of the skin [mm].
+    """
+    return {
+        "kinematics": "finite strain, plane strain",
+        "material": "compressible neo-Hookean, per layer",
+        "element": "Q2/P-1: nine nodes, three modes of ln J condensed in the element",
+        "contact": "unilateral on the deformed skin, Coulomb with |t| <= min(mu p, tau_max) on true tractions",
+        "course": _course(scene),
+        "bone": "driven as a whole",
+        "width": "forces are per mm of width",
+        "left_out": {
+            "bone compliance": _bone(scene, force),
+            "inertia": _inertia(scene, float(force[1]), width),
+            "viscosity": _viscosity(scene, slide),
+            "history": _history(scene, sticking, slide),
+            "the third dimension": _width(scene, width),
         },
     }
 
@@ -86,8 +116,7 @@ def _finite_strain(finger: FingerModel, displacement: Array) -> dict[str, Any]:
     }
 
 
-def _bone(scene: Scene, finger: FingerModel, displacement: Array) -> dict[str, Any]:
-    force = finger.body.reactions(displacement[:, :, None])[finger.geometry.mesh.held, :, 0].sum(axis=0)
+def _bone(scene: Scene, force: Array) -> dict[str, Any]:
     bone = scene.materials.bone
     pressure = float(np.hypot(*force)) / (2.0 * scene.finger.bone_radius)
     yields = pressure * (1.0 - bone.nu**2) / bone.E * 2.0 * scene.finger.bone_radius
@@ -98,9 +127,8 @@ def _bone(scene: Scene, finger: FingerModel, displacement: Array) -> dict[str, A
     }
 
 
-def _inertia(scene: Scene, contact: Contact, finger: FingerModel) -> dict[str, Any]:
-    length = float(finger.body.touchable.length[contact.touching].sum())
-    pressure = float(contact.normal.sum()) / length if length else 0.0
+def _inertia(scene: Scene, normal: float, length: float) -> dict[str, Any]:
+    pressure = normal / length if length else 0.0
     speed = max(scene.loading.speed if scene.loading.direction else 0.0, scene.loading.indentation)
     return {
         "estimate": DENSITY * speed**2 / pressure if pressure else None,
@@ -109,12 +137,12 @@ def _inertia(scene: Scene, contact: Contact, finger: FingerModel) -> dict[str, A
     }
 
 
-def _viscosity(scene: Scene, displacement: Array, finger: FingerModel) -> dict[str, Any]:
-    slide = 2.0 * _elastic_slide(finger, displacement) / scene.loading.speed if scene.loading.direction else 0.0
-    after = sum(g * tau * (np.exp(-slide / tau) - np.exp(-(slide + 1.0) / tau)) for tau, g in RELAXATION)
+def _viscosity(scene: Scene, slide: float) -> dict[str, Any]:
+    lasting = 2.0 * slide / scene.loading.speed if scene.loading.direction else 0.0
+    after = sum(g * tau * (np.exp(-lasting / tau) - np.exp(-(lasting + 1.0) / tau)) for tau, g in RELAXATION)
     return {
         "estimate": float(after) / STAYS,
-        "from": {"slide_s": slide, "relaxation_s": [tau for tau, _ in RELAXATION]},
+        "from": {"slide_s": lasting, "relaxation_s": [tau for tau, _ in RELAXATION]},
         "how": "stress above its relaxed value when sliding has settled, all layers relaxing alike with the times of "
         "Pawluk and Howe (1999) and assumed weights of a fifth each; it would scale all surfaces alike",
     }
@@ -125,13 +153,11 @@ def _elastic_slide(finger: FingerModel, displacement: Array) -> float:
     return float(np.abs(displacement[finger.geometry.mesh.skin, 0]).max())
 
 
-def _history(scene: Scene, contact: Contact, finger: FingerModel, displacement: Array) -> dict[str, Any]:
+def _history(scene: Scene, sticking: float, slide: float) -> dict[str, Any]:
     marched = scene.solve.course == "history" or scene.loading.direction == 0
-    touching = int(contact.touching.sum())
-    sticking = int((contact.state == STICK).sum()) / touching if touching else 0.0
     return {
         "estimate": 0.0,
-        "from": {"sticking_part": sticking, "elastic_slide_mm": _elastic_slide(finger, displacement)},
+        "from": {"sticking_part": sticking, "elastic_slide_mm": slide},
         "how": "the history was marched"
         if marched
         else "no touching point sticks, so nothing of the way here is left once the bone has slid a few times the "
@@ -139,9 +165,7 @@ def _history(scene: Scene, contact: Contact, finger: FingerModel, displacement: 
     }
 
 
-def _width(scene: Scene, contact: Contact, finger: FingerModel) -> dict[str, Any]:
-    skin = finger.skin_displacement(contact)[:, 0]
-    width = finger.contact_width(contact, skin)
+def _width(scene: Scene, width: float) -> dict[str, Any]:
     return {
         "estimate": width / scene.width,
         "from": {"contact_width_mm": width, "finger_width_mm": scene.width},

@@ -178,14 +178,14 @@ class Receptor:
 class Solve:
     """How the scene is to be solved."""
 
-    kinematics: Literal["small"] = "small"  # small strain
+    kinematics: Literal["small", "finite"] = "small"  # small strain (the paper's), or finite strain
     course: Literal["steady", "history"] = "steady"  # "steady": the settled state alone; "history": all the way to it
     tolerance: float | None = None  # relative error asked for in the ending-averaged SED [-]; None: the solver's own
 
     def __post_init__(self) -> None:
         """Check that we can do what is asked for."""
-        if self.kinematics != "small":
-            raise SceneError("solve.kinematics", self.kinematics, 'only "small" (small strain) can be solved')
+        if self.kinematics not in ("small", "finite"):
+            raise SceneError("solve.kinematics", self.kinematics, 'it must be "small" or "finite"')
         if self.course not in ("steady", "history"):
             raise SceneError("solve.course", self.course, 'it must be "steady" or "history"')
         if self.tolerance is not None:

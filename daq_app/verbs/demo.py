@@ -11,10 +11,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from daq_app.cli import WrongValue
+from daq_app.cli import FLAWED, WrongValue
 from daq_app.console import Console, number, table
 from daq_app.derived import analysed, predicted
-from daq_app.study import Study, simulated_study
+from daq_app.study import Study, StudyCutShort, simulated_study
 from drivers.clock import PacedClock, RealClock
 from sessions.analysis import Analysis
 from sessions.analysis.scores import mean_scores
@@ -43,7 +43,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
     out = options.out or Path("demo-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
     clock = RealClock() if options.real_time else PacedClock(PACE)
     console.say(f"SIMULATED study, seed {options.seed}; time runs {clock.factor:g} times as fast as real")
-    study = simulated_study(out, options.seed, clock, console)
+    try:
+        study = simulated_study(out, options.seed, clock, console)
+    except StudyCutShort as cut:
+        console.note(f"daq-app: {cut}")
+        return FLAWED
     recording = Recording.open(study.stroked)
     analysis = analysed(recording, console)
     prediction = predicted(recording, analysis, console)

@@ -21,7 +21,12 @@ HEAD = ["trial", "surface", "mu", "tau_max [kPa]", "SED [kPa]", "error", "model 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the session and what may be asked of the model."""
     parser.add_argument("session", type=Path, metavar="SESSION")
-    parser.add_argument("--kinematics", choices=["small"], default="small", help="small strain (the paper's)")
+    parser.add_argument(
+        "--kinematics",
+        choices=["small", "finite"],
+        default="small",
+        help="small strain (the paper's), or finite strain, where some sticky surfaces have no settled sliding",
+    )
     parser.add_argument(
         "--tau",
         choices=["computed", "as-printed"],
@@ -62,5 +67,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.say(table(rows, head=HEAD) if rows else "nothing to predict: no forces were recorded")
     for row in prediction.trials:
         for reason in dict.fromkeys(row.reasons.values()):
-            console.say(f"{row.trial or (row.stroke or 0) + 1}: {reason}")
+            missing = ", ".join(name for name, why in row.reasons.items() if why == reason)
+            console.say(f"{row.trial or (row.stroke or 0) + 1}: no {missing.replace('_', ' ')}: {reason}")
     return 3 if any(row.sed is None for row in prediction.trials) else 0
