@@ -201,7 +201,7 @@ def _errors(
 
 def _drag(scene: Scene, tangential: float) -> float:
     """Return the drag opposing the slide [N/mm]; without a slide, the size of the tangential force."""
-    return abs(tangential) if scene.loading.direction == 0 else -scene.loading.direction * tangential
+    return abs(tangential) if scene.loading.direction == 0 else 0.0 - scene.loading.direction * tangential  # never -0
 
 
 def _sticking(shape: Shape) -> float:

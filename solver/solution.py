@@ -283,7 +283,9 @@ def _doubts(unbalanced: float) -> tuple[str, ...]:
 
 def _drag(scene: Scene, tangential: float) -> float:
     """Return the drag opposing the slide [N/mm]; without a slide, the size of the tangential force."""
-    return abs(float(tangential)) if scene.loading.direction == 0 else -scene.loading.direction * float(tangential)
+    if scene.loading.direction == 0:
+        return abs(float(tangential))
+    return 0.0 - scene.loading.direction * float(tangential)  # never -0
 
 
 def _error_estimates(scene: Scene, shared: _Shared, numbers: Array) -> tuple[float, float, float]:

@@ -12,7 +12,7 @@ from typing import Any
 from drivers.clock import Clock
 from sessions.plan import Origin
 
-LIBRARIES = ("numpy", "scipy", "h5py", "msgspec")
+LIBRARIES = ("numpy", "scipy", "numba", "h5py", "msgspec", "matplotlib")
 
 
 @dataclass(frozen=True, slots=True)
