@@ -9,7 +9,9 @@ from pathlib import Path
 from daq_app.console import Console
 from daq_app.derived import analysed, predicted
 from sessions.recording import Recording
+from sessions.recording.derived import store_page
 
+PAGE = "report.html"
 EXAMPLE = "daq-app report recordings/P07 -o P07.html --scores recordings/P01 recordings/P02"
 
 
@@ -28,14 +30,17 @@ def run(options: argparse.Namespace, console: Console) -> int:
     visits = [Recording.open(folder) for folder in options.scores]
     analysis = analysed(recording, console)
     prediction = predicted(recording, analysis, console)
-    from sessions.exports.html import write_figures, write_report
+    from sessions.exports import html
     from sessions.report import findings, score_table
 
     report = findings(recording, analysis, prediction, [score_table(visit) for visit in visits])
-    page = options.out or options.session / "report.html"
     console.progress(0.9, "drawing")
-    write_report(report, page)
-    pictures = write_figures(report, options.figures) if options.figures else ()
+    if options.out is None:  # beside the recording it is one more thing made of it, and listed in its manifest
+        page = store_page(options.session, PAGE, html.page(report))
+    else:
+        page = options.out
+        html.write_report(report, page)
+    pictures = html.write_figures(report, options.figures) if options.figures else ()
     console.result({"page": str(page), "pictures": [str(path) for path in pictures], "flaws": len(report.flaws)})
     console.say(f"{page}{' (SIMULATED)' if report.simulated else ''}")
     return 3 if analysis.flaws else 0

@@ -118,6 +118,16 @@ def test_report_is_one_page_that_says_simulated(session, tmp_path, capsys):
     assert "http://" not in text.replace("http://www.w3.org/", "")
 
 
+def test_a_report_kept_in_the_session_is_listed_in_its_manifest_and_verified(session, capsys):
+    assert run(["report", str(session)]) == 0
+    assert run(["verify", str(session)]) == 0
+    assert "report.html" in (session / "MANIFEST.json").read_text()
+    (session / "report.html").write_text("<p>another page</p>")
+    capsys.readouterr()
+    assert run(["verify", str(session), "--json"]) == 3
+    assert any("report.html" in problem for problem in printed(capsys)["problems"])
+
+
 def test_solve_prints_what_the_contract_names(tmp_path, capsys):
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE)
