@@ -21,7 +21,6 @@ from solver.newton import Newton, Pull, Shape
 from solver.receptor import endings
 from solver.scene import Finger, Materials, Receptor
 from solver.sliding import settled
-from solver.stepper import Stepper
 from solver.stiffness import Elastic
 
 # ending-averaged SED [MPa] of two independent codes, which agree to 0.05-0.22 %
@@ -110,22 +109,6 @@ def history_row(level: Meshed, pull: Pull) -> str:
     return f"{span:6.0f} ms, {span / direct:4.0f} times the direct solve, SED differs by {difference:.0e}"
 
 
-def stepper_row(level: Meshed, truth: Meshed, pull: Pull) -> str:
-    """Return the figures of the warm stepper fed with the forces of a course on a finer mesh, without a cap."""
-    stepper = Stepper(level.newton, level.probes, pull.mu)
-    spans: list[float] = []
-    found: list[float] = []
-    true: list[float] = []
-    course = press_and_slide(pull.depth, pull.mu, np.inf, -pull.sense, press=200, slides=60, distance=6.0)
-    for shape in march(truth.newton, course, tolerance=1e-6):
-        begin = perf_counter()
-        found.append(stepper.step(shape.force[1], shape.force[0]))
-        spans.append(1e3 * (perf_counter() - begin))
-        true.append(truth.sed(shape))
-    worst = np.abs(np.subtract(found, true)).max() / max(true)
-    return f"median {median(spans):.2f} ms, p99 {np.percentile(spans, 99):.2f} ms, error {worst:.1%} of peak"
-
-
 def main() -> None:
     """Print the tables."""
     levels = {fineness: Meshed(fineness) for fineness in (5, 8, 12, 16, 24)}
@@ -137,9 +120,6 @@ def main() -> None:
     print("history of 200 substeps:")
     for name, (pull, _) in REFERENCE.items():
         print(f"  {name:9} {history_row(levels[5], pull)}")
-    print("warm stepper, one iteration a reading:")
-    for name, (pull, _) in REFERENCE.items():
-        print(f"  {name:9} {stepper_row(levels[5], levels[12], pull)}")
 
 
 if __name__ == "__main__":

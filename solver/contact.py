@@ -245,12 +245,15 @@ def untouched(body: Touchable, depth: float = 0.0) -> Contact:
     return Contact(state, np.ones(count), zero, zero, body.tangential_free, gap, np.zeros(0), 0)
 
 
-def forced(body: Touchable, normal_force: float) -> Touchable:
-    """Return the body free to move along y under a given normal force [N/mm] instead of being driven to a depth."""
-    count = len(body.gap)
-    up = np.concatenate([np.ones(count), np.zeros(count)])[:, None]
-    return replace(
-        body,
-        motions=np.concatenate([body.motions, up], axis=1),
-        resultants=np.append(body.resultants, normal_force),
-    )
+def forced(body: Touchable, normal_force: float, tangential_force: float | None = None) -> Touchable:
+    """Return the body free to move along y under a given normal force [N/mm] instead of being driven to a depth.
+
+    With a `tangential_force`, of the surface on the body along +x [N/mm], it is free to move along x too. Its motions
+    are the last of `Contact.motion`: up, then along +x.
+    """
+    one, zero = np.ones(len(body.gap)), np.zeros(len(body.gap))
+    motions, resultants = [body.motions, np.r_[one, zero][:, None]], [body.resultants, [normal_force]]
+    if tangential_force is not None:
+        motions.append(np.r_[zero, one][:, None])
+        resultants.append([tangential_force])
+    return replace(body, motions=np.concatenate(motions, axis=1), resultants=np.concatenate(resultants))

@@ -55,6 +55,12 @@ class FingerModel:
         """Return the displacement (2 k, 1) of the skin that may touch, normal first [mm]."""
         return self.body.skin_displacement(np.concatenate([contact.normal, contact.tangential])[:, None])
 
+    def skin_compliance(self) -> Array:
+        """Return the skin's displacement (2 k, 2 k) by forces on it, normal ones first [mm per N/mm]."""
+        touch = self.body.touchable
+        across = touch.normal_by_tangential
+        return np.block([[touch.normal_by_normal, across], [across.T, touch.tangential_by_tangential]])
+
     def displacement(self, contact: Contact) -> Array:
         """Return the displacement (nodes, 2) of all nodes relative to the bone [mm]."""
         return self.body.displacement(self.skin_displacement(contact))[:, :, 0]

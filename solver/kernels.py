@@ -22,12 +22,12 @@ OPEN, STICK, SLIP, CAP = 0, 1, 2, 3
 _FAST = {"contract", "reassoc", "arcp", "nsz"}  # nan and infinity keep their meaning
 
 
-def _compiled(function: Compiled) -> Compiled:
+def compiled(function: Compiled) -> Compiled:
     """Return `function` compiled when first called, kept on disk; numba itself declares no types."""
     return numba.njit(cache=True, fastmath=_FAST)(function)  # pyright: ignore
 
 
-@_compiled
+@compiled
 def assemble(
     u: Array,
     pressure: Array,
@@ -172,7 +172,7 @@ def assemble(
     return least
 
 
-@_compiled
+@compiled
 def advance(
     u: Array,
     pressure: Array,
@@ -215,7 +215,7 @@ def advance(
     return largest
 
 
-@_compiled
+@compiled
 def tributary(x: Array, at: Narrow, out: Array) -> None:
     """Fill `out` (k,) with the length of skin each node stands for, `x` (k,) being positions along the surface.
 
@@ -230,7 +230,7 @@ def tributary(x: Array, at: Narrow, out: Array) -> None:
             out[i + 1] += (0.5 * a - 2.0 * m + 1.5 * b) / 3.0
 
 
-@_compiled
+@compiled
 def impose(
     band: Array,
     force: Array,
@@ -297,7 +297,7 @@ def impose(
                     band[x, skin[other, 0] - x + half] += drag * side * 0.5 / 3.0
 
 
-@_compiled
+@compiled
 def reactions(force: Array, skin: Narrow, rows: Array, step: Array, out: Array) -> None:
     """Fill `out` (k, 2) with the surface's forces on the skin at the end of `step`, linearised."""
     half = (rows.shape[2] - 5) // 2
@@ -311,7 +311,7 @@ def reactions(force: Array, skin: Narrow, rows: Array, step: Array, out: Array) 
             out[i, a] = total
 
 
-@_compiled
+@compiled
 def factorise(band: Array, first: Narrow, last: Narrow) -> float:
     """Replace `band` by its factors L and U without pivoting, four rows at a time; return the least |pivot|.
 
@@ -376,7 +376,7 @@ def factorise(band: Array, first: Narrow, last: Narrow) -> float:
     return least
 
 
-@_compiled
+@compiled
 def substitute(band: Array, first: Narrow, last: Narrow, right: Array) -> None:
     """Solve in place for the right-hand sides `right` (n, c), `band` holding the factors."""
     size, half = band.shape[0], (band.shape[1] - 5) // 2
@@ -397,7 +397,7 @@ def substitute(band: Array, first: Narrow, last: Narrow, right: Array) -> None:
             right[r, s] /= row[half]
 
 
-@_compiled
+@compiled
 def restate(
     state: Narrow,
     sense: Narrow,
@@ -451,7 +451,7 @@ def restate(
     return changed
 
 
-@_compiled
+@compiled
 def energies(
     u: Array,
     grad_x: Array,

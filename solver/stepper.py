@@ -1,109 +1,74 @@
-"""The warm stepper: a measured force in, the state of the finger and its response out, once per reading.
+"""What a live view asks of a warm stepper, and how one is made for a scene: forces in, the state and its SED out."""
 
-The depth and the sideways travel of the surface are unknown and follow from the two forces: Newton on a bordered
-system, with as many iterations per reading as it is given, usually one. Between readings nothing is lost: what one
-iteration leaves over, the next reading's takes up.
-"""
+from typing import Protocol
 
-from dataclasses import replace
-
-import numpy as np
-
-from solver import kernels
-from solver.finite_body import FiniteProbes
-from solver.kernels import OPEN, SLIP, STICK
 from solver.mesh import Array
-from solver.newton import BY_DEPTH, BY_TRAVEL, EQUILIBRIUM, Newton, Pull, Shape
+from solver.mesher import Sizing
+from solver.scene import Scene
 
-SLIDING = 0.995  # part of the friction limit beyond which the tangential force means sliding
-LIGHT = 1e-7  # N/mm: less than this is no touch
-STRIDE = 0.3  # largest change of depth or travel in one iteration [mm]
+FINENESS = {"small": 6.0, "finite": 5.0}  # meshes on which the response is good to about 1 % of its peak
+MARGIN = {"small": 4.0, "finite": 3.0}  # how far above the indentation undeformed skin is looked at for contact
 
 
-class Stepper:
-    """Follows one finger on one surface; holds the last state."""
+class Stepper(Protocol):
+    """Follows one finger on one surface, reading by reading; holds the last state and memory of fixed size.
 
-    def __init__(self, newton: Newton, probes: FiniteProbes, mu: float, tau: float = np.inf) -> None:
-        """Start untouched, for a surface of friction `mu` and traction bound `tau` [MPa]; `probes` hold one ending."""
-        self._newton = newton
-        self._probes = probes
-        self._reaction = np.empty((len(newton.body.skin), 2))
-        self._still = np.zeros(newton.body.size)
-        self.mu, self.tau = mu, tau
-        self.shape = Shape.undeformed(newton.body)
+    >>> from solver.reference import SLIPPERINESS, scene
+    >>> follows = stepper(scene(SLIPPERINESS[0]))
+    >>> sed = [follows.step(0.001 * n, -0.0002 * n) for n in range(1, 50)]
+    >>> 0.0 < sed[0] < sed[-1], bool(0.5 < follows.depth < 1.5)
+    (True, True)
+    """
 
-    def step(self, normal: float, tangential: float, iterations: int = 1) -> float:
+    @property
+    def depth(self) -> float:
+        """Indentation found [mm]."""
+        ...
+
+    @property
+    def travel(self) -> float:
+        """How far the bone has moved along +x while something stuck [mm]; sliding, which forces do not tell, adds 0."""
+        ...
+
+    def step(self, normal: float, tangential: float) -> float:
         """Take one reading and return the SED averaged over the ending [MPa]; nan where the state was lost.
 
         `normal` [N/mm] presses the finger, `tangential` [N/mm] is the surface's pull on it along +x. After nan the next
         reading starts afresh from the untouched finger.
         """
-        newton = self._newton
-        if normal < LIGHT:
-            self.shape = Shape.undeformed(newton.body)
-            return 0.0
-        most = self.mu * normal
-        pull_back = float(np.clip(tangential, -most, most))
-        shape = self._ready(normal, pull_back)
-        origin, before = shape.place(newton.body)[:, 0], shape.pull.travel
-        for _ in range(iterations):
-            moved = self._corrected(shape, normal, pull_back, origin, before)
-            if moved is None:
-                self.shape = Shape.undeformed(newton.body)
-                return float("nan")
-            shape = moved
-        self.shape = shape
-        return float(self._probes.average(newton.body, shape.u)[0])
+        ...
 
-    def _ready(self, normal: float, tangential: float) -> Shape:
-        """Return the last shape with states that can carry the forces: something touches, and slides or does not."""
-        shape = self.shape
-        state, sense, pull = shape.state.copy(), shape.sense.copy(), shape.pull
-        if not shape.touching.any():
-            lowest = int(np.argmin(shape.place(self._newton.body)[:, 1]))
-            state[lowest] = STICK
-        sliding = abs(tangential) > SLIDING * self.mu * normal
-        if sliding:
-            state[state == STICK] = SLIP
-            turned = 1 if tangential > 0.0 else -1
-            sense[:] = turned
-        elif not (state == STICK).any():
-            state[state != OPEN] = STICK
-        turned = int(np.sign(tangential)) if sliding else 0
-        return replace(shape, state=state, sense=sense, pull=Pull(pull.depth, self.mu, self.tau, turned, pull.travel))
+    def row(self) -> Array:
+        """Return the SED of the row of endings as it is now (r,) [MPa], at `receptor.ROW`; nan beyond the finger."""
+        ...
 
-    def _corrected(self, shape: Shape, normal: float, tangential: float, origin: Array, before: float) -> Shape | None:
-        """Return the shape after one iteration towards the forces, None where there is no way."""
-        newton, pull = self._newton, shape.pull
-        if not newton.linearise(shape, pull, origin + pull.travel - before):
-            return None
-        steps = newton.steps
-        here = self._force(steps[:, EQUILIBRIUM].copy(), newton.force)
-        by_depth = self._force(steps[:, BY_DEPTH].copy(), self._still)
-        deeper = along = 0.0
-        if (shape.state == STICK).any():
-            by_travel = self._force(steps[:, BY_TRAVEL].copy(), self._still)
-            matrix = np.array([[by_depth[1], by_travel[1]], [by_depth[0], by_travel[0]]])
-            missing = np.array([normal - here[1], tangential - here[0]])
-            det = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
-            if det == 0.0:
-                return None
-            deeper = (missing[0] * matrix[1, 1] - missing[1] * matrix[0, 1]) / det
-            along = (matrix[0, 0] * missing[1] - matrix[1, 0] * missing[0]) / det
-        elif by_depth[1] != 0.0:
-            deeper = (normal - here[1]) / by_depth[1]
-        most = max(abs(deeper), abs(along))
-        if not np.isfinite(most):
-            return None
-        if most > STRIDE:
-            deeper, along = deeper * STRIDE / most, along * STRIDE / most
-        step = steps[:, EQUILIBRIUM] + deeper * steps[:, BY_DEPTH] + along * steps[:, BY_TRAVEL]
-        pull = pull._replace(depth=pull.depth + deeper, travel=pull.travel + along)
-        after, largest, _ = newton.moved(shape, pull, step, origin + pull.travel - before)
-        return after if largest < 5.0 else None
+    def outline(self) -> Array:
+        """Return the deformed skin (w, 2) [mm] from the palmar cut round the tip, the surface being y = 0."""
+        ...
 
-    def _force(self, step: Array, force: Array) -> Array:
-        """Return the surface's force on the body (2,) at the end of `step`, or its change where `force` is zero."""
-        newton = self._newton
-        kernels.reactions(force, newton.body.skin, newton.rows, step, self._reaction)
-        return self._reaction.sum(axis=0)
+    def forget(self) -> None:
+        """Start afresh from the untouched finger."""
+        ...
+
+
+def stepper(scene: Scene) -> Stepper:
+    """Return a stepper for the finger and the surface of `scene`, on a mesh made for its indentation.
+
+    Forces that press much deeper lose the state. Raises SceneError where the finger cannot be meshed.
+    """
+    kind = scene.solve.kinematics
+    sizing = Sizing(FINENESS[kind], scene.loading.indentation, margin=MARGIN[kind])
+    mu, tau = float(scene.friction.mu), scene.friction.cap
+    # Imported here: only what is asked for is loaded, compiled loops of the other kinematics are not.
+    if kind == "finite":
+        from solver.finite_solution import FiniteFinger
+        from solver.finite_stepper import FiniteStepper
+
+        return FiniteStepper(FiniteFinger.of(scene, sizing), mu, tau)
+    from solver.finger import FingerModel
+    from solver.small_stepper import Condensed, SmallStepper
+
+    follower = SmallStepper(Condensed.of(FingerModel.of(scene, sizing)), mu, tau)
+    follower.step(1e-3, 0.0)  # compiles, or loads what was compiled
+    follower.forget()
+    return follower

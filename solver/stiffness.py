@@ -83,14 +83,18 @@ class Probes:
         """Return du_a/dx_b (p, 2, 2, ...) for displacements (nodes, 2, ...)."""
         return np.einsum("pna...,pnb->pab...", displacement[mesh.elements[self.element]], self.gradient)
 
+    def volume_strain(self, mesh: Mesh, elastic: Elastic, displacement: Array) -> Array:
+        """Return the elements' best fit of the volume strain (p, ...) for displacements (nodes, 2, ...)."""
+        moved = displacement[mesh.elements[self.element]]  # (p, 9, 2, ...)
+        flat = moved.reshape(len(self.element), 18, *moved.shape[3:])
+        row = (self.modes[:, None] @ elastic.dilatation[self.element])[:, 0]  # (p, 18)
+        return np.einsum("pi,pi...->p...", row, flat)
+
     def energy(self, mesh: Mesh, elastic: Elastic, displacement: Array) -> Array:
         """Return the SED (p, ...) [MPa] for displacements (nodes, 2, ...): G eps:eps + lambda/2 theta^2."""
         strain = self.displacement_gradient(mesh, displacement)
         strain = (strain + np.swapaxes(strain, 1, 2)) / 2.0
-        moved = displacement[mesh.elements[self.element]]  # (p, 9, 2, ...)
-        flat = moved.reshape(len(self.element), 18, *moved.shape[3:])
-        row = (self.modes[:, None] @ elastic.dilatation[self.element])[:, 0]  # (p, 18)
-        theta = np.einsum("pi,pi...->p...", row, flat)
+        theta = self.volume_strain(mesh, elastic, displacement)
         wide = (slice(None), *([None] * (theta.ndim - 1)))
         shear, lame = elastic.shear[self.element][wide], elastic.lame[self.element][wide]
         return shear * np.sum(strain * strain, axis=(1, 2)) + lame / 2.0 * theta**2

@@ -1,39 +1,159 @@
-"""The warm stepper finds depth and travel from the forces, reading by reading."""
+"""The warm steppers find depth and travel from the forces, reading by reading."""
+
+import tracemalloc
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
+from solver.contact import CAP, STICK, Course, forced, untouched
+from solver.finger import FingerModel
+from solver.finite_solution import FiniteFinger
+from solver.finite_stepper import FiniteStepper
+from solver.friction import FrictionLaw
 from solver.march import march, press_and_slide
-from solver.stepper import Stepper
-from tests.solver.finite_examples import finger
+from solver.mesher import Sizing
+from solver.receptor import ROW
+from solver.scene import Friction, Loading, Scene, Solve
+from solver.small_stepper import Condensed, SmallStepper
+from solver.stepper import stepper
+
+KINEMATICS = ("small", "finite")
 
 
+@cache
+def meshed(kinematics, fineness):
+    scene = Scene(friction=Friction(0.3), loading=Loading(2.0), solve=Solve(kinematics=kinematics))
+    made = FingerModel if kinematics == "small" else FiniteFinger
+    return made.of(scene, Sizing(fineness, 2.0, margin=4.0))
+
+
+@cache
+def condensed():
+    return Condensed.of(meshed("small", 6))
+
+
+def made(kinematics, mu, tau=np.inf):
+    return SmallStepper(condensed(), mu, tau) if kinematics == "small" else FiniteStepper(meshed("finite", 5), mu, tau)
+
+
+def readings(kinematics, depth, mu, direction):
+    """Yield forces and SED of a course driven by depth, 200 readings of pressing and 60 of sliding at 20 mm/s."""
+    if kinematics == "finite":
+        fine = meshed("finite", 8)
+        course = press_and_slide(depth, mu, np.inf, direction, press=200, slides=60, distance=6.0)
+        for shape in march(fine.newton, course, tolerance=1e-6):
+            yield shape.force[1], shape.force[0], fine.sed_ending(shape)
+        return
+    fine = meshed("small", 12)
+    course, found = Course(fine.body.touchable, FrictionLaw(mu, np.inf)), untouched(fine.body.touchable)
+    for n in range(260):
+        found = course.step(found, depth * min((n + 1) / 200, 1.0), direction * 0.1 * max(n - 199, 0))
+        yield found.normal.sum(), found.tangential.sum(), fine.sed_ending(fine.displacement(found))
+
+
+@pytest.mark.parametrize("kinematics", KINEMATICS)
 @pytest.mark.parametrize(("depth", "mu", "direction"), [(1.5, 0.62, -1), (1.5, 0.24, -1), (2.0, 0.28, 1)])
-def test_one_iteration_a_reading_keeps_the_response_within_two_per_cent_of_its_peak(depth, mu, direction):
-    """The truth is a course driven by depth, 200 readings of pressing and 60 of sliding at 20 mm/s, on a finer mesh."""
-    fine, seen, _ = finger(8)
-    newton, probes, _ = finger(5)
-    stepper = Stepper(newton, probes, mu)
-    course = press_and_slide(depth, mu, np.inf, direction, press=200, slides=60, distance=6.0)
-    truth, found = [], []
-    for shape in march(fine, course, tolerance=1e-6):
-        truth.append(seen.average(fine.body, shape.u)[0])
-        found.append(stepper.step(shape.force[1], shape.force[0]))
-    assert np.abs(np.subtract(found, truth)).max() < 0.02 * max(truth)
+def test_one_call_a_reading_keeps_the_response_within_two_per_cent_of_its_peak(kinematics, depth, mu, direction):
+    follows = made(kinematics, mu)
+    course = list(readings(kinematics, depth, mu, direction))
+    found = [follows.step(normal, tangential) for normal, tangential, _ in course]
+    truth = np.array([sed for _, _, sed in course])
+    assert np.abs(found - truth).max() < 0.02 * truth.max()
+    assert follows.depth == pytest.approx(depth, rel=0.03)
 
 
-def test_a_lifted_finger_has_no_response_and_starts_afresh():
-    newton, probes, _ = finger(5)
-    stepper = Stepper(newton, probes, 0.4)
-    assert stepper.step(0.01, 0.0, iterations=6) > 0.0
-    assert stepper.step(0.0, 0.0) == 0.0
-    assert not stepper.shape.touching.any()
+@pytest.mark.parametrize("kinematics", KINEMATICS)
+def test_a_lifted_finger_has_no_response_and_starts_afresh(kinematics):
+    follows = made(kinematics, 0.4)
+    for part in (0.2, 0.4, 0.6, 0.8, 1.0):
+        assert follows.step(0.01 * part, 0.0) > 0.0
+    assert follows.step(0.0, 0.0) == 0.0
+    assert follows.depth == 0.0
+    undeformed = made(kinematics, 0.4)
+    np.testing.assert_array_equal(follows.outline(), undeformed.outline())
 
 
-def test_forces_held_still_are_met_exactly():
-    newton, probes, _ = finger(5)
-    stepper = Stepper(newton, probes, 0.6)
+def test_forces_held_still_are_met_exactly_at_finite_strain():
+    follows = made("finite", 0.6)
     for part in np.linspace(0.1, 1.0, 10):
-        stepper.step(0.05 * part, 0.01 * part, iterations=3)
-    stepper.step(0.05, 0.01, iterations=8)
-    np.testing.assert_allclose(stepper.shape.force, [0.01, 0.05], rtol=1e-8)
+        follows.step(0.05 * part, 0.01 * part, iterations=3)
+    follows.step(0.05, 0.01, iterations=8)
+    np.testing.assert_allclose(follows.shape.force, [0.01, 0.05], rtol=1e-8)
+
+
+@pytest.mark.parametrize("tau", [np.inf, 0.004])
+def test_the_compiled_search_finds_the_states_and_forces_of_the_plain_one(tau):
+    finger, mu = meshed("small", 6), 0.4
+    touch = finger.body.touchable
+    follows = made("small", mu, tau)
+    before = untouched(touch)
+    first = np.zeros(len(touch.gap), np.int8)
+    first[np.argmin(touch.gap)] = STICK
+    before = replace(before, state=first)
+    for n in range(1, 41):
+        normal, tangential = 0.002 * n, 0.0006 * max(n - 20, 0) * (1 if n < 35 else -1)
+        course = Course(forced(touch, normal, tangential), FrictionLaw(mu, tau))
+        before = course.step(before, 0.0, 0.0)
+        follows.step(normal, tangential)
+        np.testing.assert_array_equal(follows.state, before.state)
+        np.testing.assert_allclose([-follows.depth, follows.travel], before.motion, atol=1e-11)
+        follows_forces = follows.forces()
+        np.testing.assert_allclose(follows_forces[:, 1], before.normal, atol=1e-12)
+        np.testing.assert_allclose(follows_forces[:, 0], before.tangential, atol=1e-12)
+    assert (before.state == CAP).any() == (tau < np.inf)
+
+
+def test_the_condensed_finger_gives_the_energies_and_the_outline_of_the_meshed_one():
+    finger = meshed("small", 6)
+    follows = made("small", 0.4)
+    for n in range(1, 21):
+        sed = follows.step(0.004 * n, -0.001 * n)
+    forces = follows.forces()
+    skin = finger.body.skin_displacement(np.concatenate([forces[:, 1], forces[:, 0]])[:, None])
+    displacement = finger.body.displacement(skin)[:, :, 0]
+    assert sed == pytest.approx(finger.sed_ending(displacement), rel=1e-10)
+    np.testing.assert_allclose(follows.row(), finger.sed_row(displacement), rtol=1e-8)
+    whole = finger.geometry.whole
+    lowered = finger.geometry.mesh.nodes[whole] + displacement[whole] - [0.0, follows.depth]
+    np.testing.assert_allclose(follows.outline(), lowered, atol=1e-12)
+
+
+@pytest.mark.parametrize("kinematics", KINEMATICS)
+def test_the_drawn_skin_lies_on_the_surface_where_it_touches_and_nowhere_below(kinematics):
+    scene = Scene(friction=Friction(0.5), loading=Loading(1.0, "-x"), solve=Solve(kinematics=kinematics))
+    follows = stepper(scene)
+    for n in range(1, 31):
+        follows.step(0.001 * n, 0.0002 * n)
+    height = follows.outline()[:, 1]
+    assert height.min() == pytest.approx(0.0, abs=1e-6)
+    assert (height < 1e-6).sum() > 5
+    assert follows.row().shape == ROW.shape
+
+
+def test_a_force_that_presses_beyond_the_looked_at_skin_loses_the_state_and_says_nan():
+    follows = made("small", 0.3)
+    for n in range(1, 200):
+        if np.isnan(follows.step(0.05 * n, 0.0)):
+            break
+    assert n < 199
+    assert follows.step(0.01, 0.0) > 0.0
+
+
+def test_memory_does_not_grow_with_the_readings():
+    follows = made("small", 0.3)
+
+    def rub():
+        for n in range(1, 200):
+            follows.step(0.0005 * n, 0.0001 * n)
+
+    rub()
+    tracemalloc.start()
+    rub()
+    before = tracemalloc.get_traced_memory()[0]
+    for _ in range(3):
+        rub()
+    after = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert after - before < 2000  # bytes
