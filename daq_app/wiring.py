@@ -33,7 +33,15 @@ from simulators.subject import SimulatedSubject
 from simulators.surface import Surface, paper_surfaces
 from simulators.timetable import TimetableError
 
-__all__ = ["Connected", "SimulatedPeople", "TimetableError", "connected", "planted_surface", "serve_net_ft"]
+__all__ = [
+    "Connected",
+    "SimulatedHand",
+    "SimulatedPeople",
+    "TimetableError",
+    "connected",
+    "planted_surface",
+    "serve_net_ft",
+]
 
 SIMULATED = "sim"
 REPLAY = "replay:"  # and the path of a session folder
@@ -89,6 +97,35 @@ def connected(uri: str, clock: Clock) -> Generator[Connected]:
         box.close()
 
 
+class SimulatedHand:
+    """Mounts and strokes the simulated bench when a session asks for it, and does nothing else: people do the rest."""
+
+    def __init__(self, subject_seed: int, bench: Connected) -> None:
+        """Let the subject of that seed stroke. Raises SetupError where the bench is not simulated in this process."""
+        if bench.bench is None or bench.bench_now is None:
+            raise SetupError("a simulated hand strokes the simulated bench only: connect sim:")
+        self._subject = SimulatedSubject(subject_seed)
+        self._bench = bench.bench
+        self._now = bench.bench_now
+        self._takes: dict[int, int] = {}  # by trial number
+
+    def show(self, command: Command) -> None:
+        """Do what the command asks a hand for."""
+        match command:
+            case AskMount(trial):
+                self._bench.mount(planted_surface(trial))
+            case AskStroke(trial):
+                self._takes[trial.number] = self._takes.get(trial.number, 0) + 1
+                stroke = self._subject.stroke(planted_surface(trial), self._takes[trial.number])
+                self._bench.begin_stroke(stroke, self._now())
+            case _:
+                pass
+
+    def poll(self) -> tuple[Event, ...]:
+        """Return nothing: what a hand does is felt by the transducer."""
+        return ()
+
+
 class SimulatedPeople:
     """Experimenter and subject in one, for a session nobody sits at: they do at once what is asked of them.
 
@@ -99,24 +136,26 @@ class SimulatedPeople:
         """Let the subject of that seed stroke the bench, where there is one."""
         self._subject = SimulatedSubject(subject_seed)
         self._clock = clock
-        self._bench = bench
+        self._hand = None if bench is None or bench.bench is None else SimulatedHand(subject_seed, bench)
         self._takes: dict[int, int] = {}  # by trial number
         self._due: list[tuple[int, Event]] = []  # session clock [ns]
 
     def show(self, command: Command) -> None:
         """Do what the command asks for."""
+        if self._hand is not None:
+            self._hand.show(command)
         match command:
             case AskBegin():
                 self._answer(Begin())
             case AskMount(trial):
-                self._mount(trial)
                 self._answer(StimulusMounted(trial.stimulus.code))
             case AskStroke(trial):
                 self._takes[trial.number] = self._takes.get(trial.number, 0) + 1
-                self._stroke(trial)
+                if self._hand is None:
+                    self._answer(StrokeDone())
             case AskScore(trial):
                 score = self._subject.score(planted_surface(trial), self._takes[trial.number])
-                self._answer(Scored(score), after=JUDGING if self._bench else 0.0)
+                self._answer(Scored(score), after=JUDGING if self._hand else 0.0)
             case AskFinish():
                 self._answer(Finish())
             case _:
@@ -131,17 +170,6 @@ class SimulatedPeople:
 
     def _answer(self, event: Event, after: float = 0.0) -> None:
         self._due.append((self._clock.now_ns() + int(after * 1e9), event))
-
-    def _mount(self, trial: Trial) -> None:
-        if self._bench is not None and self._bench.bench is not None:
-            self._bench.bench.mount(planted_surface(trial))
-
-    def _stroke(self, trial: Trial) -> None:
-        if self._bench is None or self._bench.bench is None or self._bench.bench_now is None:
-            self._answer(StrokeDone())
-            return
-        stroke = self._subject.stroke(planted_surface(trial), self._takes[trial.number])
-        self._bench.bench.begin_stroke(stroke, self._bench.bench_now())
 
 
 def planted_surface(trial: Trial) -> Surface:

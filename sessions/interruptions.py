@@ -19,6 +19,7 @@ class Interruptions:
         """Be the signal handler."""
         self.heard = True
         if self._at_once:
+            self._at_once = False  # once: a second signal must not break the clearing up after the first
             raise KeyboardInterrupt
 
     @contextmanager

@@ -18,7 +18,7 @@ from sessions.course import Step, steps
 from sessions.recording import Acknowledged, LoggedEvent, Recording, RecordingError, SessionWriter
 from sessions.recording.replay import RecordedReadings, health_of
 from sessions.recording.schema import COLUMNS
-from sessions.runner import RunnerSettings, run_session
+from sessions.runner import STOPPED, Ending, RunnerSettings, run_session
 from sessions.steps import Command, Event
 from sessions.verification import differences
 
@@ -189,18 +189,24 @@ class _Player:
         """Say whether the last step was taken."""
         return self._next == len(self._steps)
 
-    def go_on(self) -> bool:
-        """Take the next step when its time has come, and say whether the session is to be stopped in it."""
+    def go_on(self) -> Ending | None:
+        """Take the next step when its time has come, and say why the session is to be ended in it."""
         self._step = None
         if self.done:
-            return True  # the course went another way, and waits for what never comes
+            return "stopped", STOPPED  # the course went another way, and waits for what never comes
         step = self._steps[self._next]
         if self._waiting(step):
-            return False
+            return None
         self._step = step
         self._next += 1
         self._progress(self._next / len(self._steps), "replaying")
-        return step.end is not None and step.end.get("cause") not in {"device", "program"}
+        match step.end:
+            case None | {"cause": "device" | "program"}:
+                return None
+            case {"cause": "client" | "disk" as cause, "reason": str(reason)}:
+                return cause, reason
+            case _:
+                return "stopped", STOPPED
 
     # ---- as an operator
 

@@ -19,6 +19,7 @@ from sessions.steps import Command, Refuse, State
 
 CUT_SHORT = "the recording was cut short in the middle of it"
 OF_TAKES = frozenset({"take_started", "take_kept", "take_discarded"})
+RESUMABLE = frozenset({"device", "client", "disk"})  # causes of an end that cut a session short
 LEAST_GAP_NS = 1_000_000  # where the wall clock shows none: the session clock never stands still or runs backwards
 
 
@@ -68,7 +69,7 @@ def check_resumable(recording: Recording) -> None:
     if numbers != list(range(1, len(numbers) + 1)):
         raise RecordingError(f"{recording.folder} cannot be resumed: its log is damaged; it can still be analysed")
     end = recording.end
-    if end is not None and end.get("cause") != "device":
+    if end is not None and end.get("cause") not in RESUMABLE:
         raise RecordingError(
             f"{recording.folder} has ended ({end.get('reason')}); only one that was cut short is resumed"
         )

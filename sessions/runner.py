@@ -29,8 +29,9 @@ from sessions.steps import (
     Tell,
 )
 
-Cause = Literal["finished", "aborted", "stopped", "device", "program"]
+Cause = Literal["finished", "aborted", "stopped", "device", "client", "disk", "program"]
 STOPPED = "stopped by the user"
+Ending = tuple[Cause, str]  # why a session ends, for programs and for people
 LOSSES = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated")  # counts of Health
 
 
@@ -101,13 +102,13 @@ def run_session(
     detector: Callable[[DetectorSettings], Detector] = ContactDetector,
     settings: RunnerSettings | None = None,
     resumed: Resumed | None = None,
-    stop: Callable[[], bool] = lambda: False,
+    stop: Callable[[], Ending | None] = lambda: None,
     progress: Callable[[Status], None] = lambda _: None,
 ) -> SessionEnd:
     """Run the session to its end, record all of it, and close the writer.
 
-    The session ends when the machine does, when `stop` says so or Ctrl-C is pressed, and when the transducer is lost:
-    each time with a written end that names the reason. With `resumed` a session that was cut short goes on. The
+    The session ends when the machine does, when `stop` gives a reason or Ctrl-C is pressed, and when the transducer is
+    lost: each time with a written end that names the reason. With `resumed` a session that was cut short goes on. The
     transducer is started and stopped, not closed. Raises RecordingError when the disk takes no more; any other error
     of ours is raised again after the end was written.
     """
@@ -155,14 +156,14 @@ class _Run:
         self._resumed = resumed
         self._state, self._first_commands = resumed.at.state, resumed.at.commands
 
-    def to_the_end(self, interrupted: Interruptions, stop: Callable[[], bool]) -> SessionEnd:
+    def to_the_end(self, interrupted: Interruptions, stop: Callable[[], Ending | None]) -> SessionEnd:
         """Run, and write the end whatever it was."""
         try:
             self._write_beginning()
             if self._transducer is not None:
                 with interrupted.raised():  # a device that does not answer may take its time
                     self._transducer.start()
-            cause, reason = self._go_round(lambda: interrupted.heard or stop())
+            cause, reason = self._go_round(lambda: ("stopped", STOPPED) if interrupted.heard else stop())
         except (LinkLost, DeviceFault) as error:
             cause, reason = "device", str(error)
         except KeyboardInterrupt:
@@ -187,13 +188,13 @@ class _Run:
             self._writer.event(*line, commit=False)
         self._writer.event("resumed", data={**self._resumed.data, "run": settings["settings"]})
 
-    def _go_round(self, stop: Callable[[], bool]) -> tuple[Cause, str]:
+    def _go_round(self, stop: Callable[[], Ending | None]) -> Ending:
         """Look at transducer and operator again and again, until there is a reason to end."""
         self._carry_out(self._first_commands)
         while True:
             began_ns = self._clock.now_ns()
-            if stop():
-                return "stopped", STOPPED
+            if (ending := stop()) is not None:
+                return ending
             self._listen()
             for event in self._operator.poll():
                 self._take(event)

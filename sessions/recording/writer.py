@@ -1,7 +1,7 @@
 """The one writer of a session: a commit a second, and at once for every event and score."""
 
 import sqlite3
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -58,6 +58,7 @@ class SessionWriter:
         self._event_count = 0
         self._acknowledged = Acknowledged(time_ns=clock.now_ns())
         self._failure: str | None = None
+        self.safe: Callable[[Sequence[LoggedEvent]], None] = lambda _: None  # told of events once they are safe
 
     @classmethod
     def create(
@@ -193,8 +194,10 @@ class SessionWriter:
             self._fail(error)
         self._block_rows = rows
         self._blocks.clear()
-        self._events.clear()
+        safe, self._events = self._events, []
         self._acknowledged = Acknowledged(self._readings, self._event_count, now_ns)
+        if safe:
+            self.safe(safe)
         return self._acknowledged
 
     def close(self) -> None:

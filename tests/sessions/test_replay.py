@@ -41,7 +41,12 @@ def recorded(folder, *, forces=True, instead=None, stop=lambda _: False, hands=H
     writer = SessionWriter.create(folder, planned, info, provenance(clock), subject_simulated=True, clock=clock)
     device = StandIn(clock, **transducer) if forces else None
     run_session(
-        planned, writer, hands(clock, device, instead), device, clock, stop=lambda: stop(device and device.sent)
+        planned,
+        writer,
+        hands(clock, device, instead),
+        device,
+        clock,
+        stop=lambda: ("stopped", "stopped by the user") if stop(device and device.sent) else None,
     )
     return Recording.open(folder)
 

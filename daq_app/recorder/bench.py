@@ -1,0 +1,240 @@
+"""The transducer as the recorder holds it: opened, streaming while no session runs, lost, and back again."""
+
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+
+from daq_app.recorder.display import Display, six
+from daq_app.recorder.messages import Device, LinkBack, LinkDown, NoDevice, Report, Tared
+from daq_app.wiring import Connected, connected
+from drivers.clock import Clock
+from drivers.readings import ReadingBlock
+from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, Transducer, TransducerInfo
+from sessions.analysis.onset import DetectorSettings, is_quiet
+from sessions.interruptions import interruptions
+from sessions.recording import RecordingError
+from sessions.resuming import check_same_transducer
+
+TRY_AGAIN = 1.0  # between two attempts to reach a transducer that was lost [real s]
+GLANCE = 0.005  # longest wait for readings while no session runs [real s]
+
+
+class NotNow(Exception):
+    """What was asked for is not possible now; the message says why and what to do."""
+
+
+class Tap:
+    """A transducer whose readings are shown on their way into a session."""
+
+    def __init__(self, inner: Transducer, display: Display) -> None:
+        """Show what `inner` gives on `display`."""
+        self._inner = inner
+        self._display = display
+
+    @property
+    def info(self) -> TransducerInfo:
+        """Return who the transducer is."""
+        return self._inner.info
+
+    @property
+    def health(self) -> Health:
+        """Return its totals so far."""
+        return self._inner.health
+
+    def start(self) -> None:
+        """Begin to stream."""
+        self._display.stream_began()
+        self._inner.start()
+
+    def read(self, timeout: float) -> ReadingBlock:
+        """Return the next readings, and show them."""
+        block = self._inner.read(timeout)
+        self._display.take(block)
+        return block
+
+    def stop(self) -> None:
+        """End streaming."""
+        self._inner.stop()
+
+    def close(self) -> None:
+        """Stop, and give everything back."""
+        self._inner.close()
+
+
+class Bench:
+    """At most one transducer. Its readings are shown while no session runs; a session takes it by `lent`."""
+
+    def __init__(self, clock: Clock, display: Display, send: Callable[[Report], None]) -> None:
+        """Hold none yet."""
+        self._clock = clock
+        self._display = display
+        self._send = send
+        self._stack = ExitStack()
+        self._connected: Connected | None = None
+        self._uri: str | None = None  # as asked for
+        self._before: TransducerInfo | None = None  # who it was when it was lost
+        self._again = 0.0  # when to try once more [real s]
+        self._tare: _Tare | None = None
+        self._streaming = False  # for nobody but the display
+
+    @property
+    def uri(self) -> str | None:
+        """Return the address the transducer was asked for at."""
+        return self._uri
+
+    @property
+    def connected(self) -> Connected | None:
+        """Return what is open."""
+        return self._connected
+
+    @property
+    def health(self) -> Health:
+        """Return the transducer's totals; none where there is none."""
+        return Health() if self._connected is None else self._connected.transducer.health
+
+    def connect(self, uri: str, clock: Clock | None = None) -> None:
+        """Open the transducer at `uri` in place of any other.
+
+        Raises what opening raises, NotNow when a stop broke it off; then none is open.
+        """
+        self.disconnect()
+        try:
+            with interruptions() as interrupted, interrupted.raised():  # a device that does not answer takes its time
+                self._open(uri, clock or self._clock)
+        except KeyboardInterrupt:
+            raise NotNow(f"{uri} was not connected: stopped by the user") from None
+        assert self._connected is not None
+        self._send(Device(self._connected.transducer.info, self._connected.frame))
+
+    def disconnect(self) -> None:
+        """Close the transducer."""
+        was = self._uri
+        self._close()
+        self._uri = self._before = None
+        if was is not None:
+            self._send(NoDevice())
+
+    def begin_tare(self, duration: float) -> None:
+        """Measure the zero from now on. Raises NotNow where nothing streams."""
+        if self._connected is None:
+            raise NotNow("no transducer is connected whose zero could be measured; connect one")
+        if not 0.1 <= duration <= 60.0:
+            raise NotNow(f"a zero is measured over 0.1 to 60 s, not {duration:g} s")
+        self._tare = _Tare(duration)
+
+    def stream(self) -> None:
+        """Begin to show what is measured, unless it is shown already."""
+        if self._connected is not None and not self._streaming:
+            self._display.stream_began()
+            self._streaming = True
+            try:
+                self._connected.transducer.start()
+            except (LinkLost, DeviceFault) as error:
+                self._lost(str(error))
+
+    def lent(self) -> Tap | None:
+        """Return the transducer for a session, not streaming; None where there is none."""
+        self._tare = None
+        if self._connected is None:
+            return None
+        self._connected.transducer.stop()
+        self._streaming = False
+        return Tap(self._connected.transducer, self._display)
+
+    def look(self) -> None:
+        """Take what was measured, or try to find a lost transducer again. Raises NotNow when a tare is refused."""
+        if self._connected is None:
+            self._look_for_it()
+            time.sleep(GLANCE)
+            return
+        try:
+            block = self._connected.transducer.read(GLANCE * self._clock.factor)
+        except (LinkLost, DeviceFault) as error:
+            self._lost(str(error))
+            return
+        if not len(block):
+            return
+        self._display.take(block)
+        if self._tare is not None and self._tare.feed(block):
+            tare, self._tare = self._tare, None
+            told = tare.result(self._connected.transducer.info)
+            self._display.zeroed(told.mean)
+            self._send(told)
+
+    def _open(self, uri: str, clock: Clock) -> None:
+        with ExitStack() as stack:
+            opened = stack.enter_context(connected(uri, clock))
+            self._stack = stack.pop_all()
+        self._connected, self._uri = opened, uri
+        self._display.device(opened.transducer.info)
+
+    def _close(self) -> None:
+        self._tare = None
+        self._connected = None
+        self._streaming = False
+        self._display.device(None)
+        self._stack.close()
+
+    def _lost(self, sentence: str) -> None:
+        """Let go of a transducer that fell silent, and look for it again later."""
+        self._before = None if self._connected is None else self._connected.transducer.info
+        self._close()
+        self._again = time.monotonic() + TRY_AGAIN
+        self._send(LinkDown(sentence))
+
+    def lost(self, sentence: str) -> None:
+        """Take the transducer for lost, as a session found it."""
+        if self._connected is not None:
+            self._lost(sentence)
+
+    def _look_for_it(self) -> None:
+        if self._uri is None or time.monotonic() < self._again:
+            return
+        self._again = time.monotonic() + TRY_AGAIN
+        try:
+            self._open(self._uri, self._clock)
+        except (LinkLost, DeviceFault, SetupError):
+            return
+        assert self._connected is not None
+        info = self._connected.transducer.info
+        try:
+            check_same_transducer(self._before, info)
+            same = True
+        except RecordingError:
+            same = False
+        self._send(LinkBack(info, same))
+        self.stream()
+
+
+class _Tare:
+    """A stretch of readings that may become a zero."""
+
+    def __init__(self, duration: float) -> None:
+        self._duration = duration
+        self._blocks: list[ReadingBlock] = []
+
+    def feed(self, block: ReadingBlock) -> bool:
+        """Take readings and say whether they are enough."""
+        self._blocks.append(block)
+        return float(block.time[-1]) - float(self._blocks[0].time[0]) >= self._duration
+
+    def result(self, info: TransducerInfo) -> Tared:
+        """Return the zero. Raises NotNow where something moved."""
+        gathered = ReadingBlock.joined(self._blocks)
+        # Readings come in lumps; the stretch has the length that was asked for.
+        stretch = gathered.between(0, int(np.count_nonzero(gathered.time <= gathered.time[0] + self._duration)))
+        wrench = info.calibration.wrench(stretch.raw, np.zeros(6))
+        settings = DetectorSettings()
+        forces: list[Any] = [wrench[:, axis].tolist() for axis in range(3)]
+        if len(stretch) < settings.baseline_readings or not all(is_quiet(force, settings) for force in forces):
+            raise NotNow("the zero was not measured: something moved or touched; take hands off and zero again")
+        return Tared(
+            six(stretch.raw.mean(axis=0)),
+            six(stretch.raw.std(axis=0, ddof=1)),
+            six(wrench.std(axis=0, ddof=1)),
+            len(stretch),
+            float(stretch.time[-1] - stretch.time[0]),
+        )

@@ -1,0 +1,190 @@
+"""The face of the recorder for window and terminal: start it, send requests, poll reports, close.
+
+    with Recorder.start() as recorder:
+        recorder.send(Connect("sim:?seed=7"))              # -> Device, then Live and HealthReport while it streams
+        recorder.send(Tare())                              # -> Tared, or Failed("Tare", why)
+        recorder.send(StartSession(plan, "recordings/P07", People("simulated hand", 7)))
+        for report in recorder.poll(0.05):                 # waits so long for the first; () when none came
+            match report:
+                case AskMount(trial): ...                  # a command of sessions.steps: ask the experimenter
+                case LoggedEvent(): ...                    # written down and safe: the course so far
+                case Status(safe=safe): ...                # the recording lamp: what the disk has acknowledged
+                case SessionEnded(folder, end): ...        # its end is written; Sealing and Sealed follow
+                case Gone(asked, sentence): ...            # always the last report
+        recorder.send(StimulusMounted("K31"))              # an event of sessions.steps: what somebody did
+
+Requests and reports are the dataclasses of `messages.py`, the events and commands of `sessions.steps`, `LoggedEvent`
+and `Status`. The recorder answers what it cannot do with `Failed(request, sentence)`; events that mean nothing now come
+back as the command `Refuse`. `Stop` is answered within 0.2 s: what waits for a device is broken off, a session gets its
+written end. No call waits, save `poll` for as long as it is told, `close`, and `Recorder.start` for the process to be
+made. `Recorder` may be used by one thread; `wake` is called by another whenever something new can be polled.
+
+The recorder is a child process at the other end of two pipes; nothing listens anywhere. Ctrl-C and the closing of a
+terminal do not reach it. **When the client goes** (ends, is killed, closes the pipe), a session in hand is recorded on
+until the finger has lifted, 30 s at most, then gets a written end whose cause is `client`, and the process ends.
+`ResumeSession(folder)`, sent to a new recorder, goes on at the same trial. **When the recorder goes**, the last report
+is `Gone`, all that was reported as safe is on the disk, and the same `ResumeSession` goes on.
+"""
+
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from daq_app.recorder.messages import REPORTS, REQUESTS, Gone, Report, Request, Shutdown
+from daq_app.recorder.wire import BrokenMessage, Codec, Splitter
+
+PATIENCE = 10.0  # for a recorder that was asked to end; it may be sealing [s]
+CHUNK = 1 << 20
+
+
+class Recorder:
+    """A recorder's process, seen from outside."""
+
+    def __init__(self, process: subprocess.Popen[bytes], wake: Callable[[], None]) -> None:
+        """Use `Recorder.start`."""
+        self._process = process
+        self._wake = wake
+        self._requests = Codec(REQUESTS)
+        self._reports = Codec(REPORTS)
+        self._arrived: deque[Report] = deque()
+        self._to_send: deque[bytes | None] = deque()
+        self._news = threading.Event()
+        self._something_to_send = threading.Event()
+        self._asked_to_end = False
+        self._heard = time.monotonic()
+        self._reader = threading.Thread(target=self._read, name="recorder's reports", daemon=True)
+        self._reader.start()
+        threading.Thread(target=self._write, name="requests to the recorder", daemon=True).start()
+
+    @classmethod
+    def start(cls, pace: float = 1.0, wake: Callable[[], None] = lambda: None, *, debug: bool = False) -> Self:
+        """Start a recorder whose clock runs `pace` times as fast as real (other than 1 on a simulated bench only).
+
+        With `debug` its errors go to our stderr. Raises OSError where no process can be made.
+        """
+        process = subprocess.Popen(
+            [sys.executable, "-m", "daq_app.recorder", repr(pace)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=None if debug else subprocess.DEVNULL,
+            bufsize=0,
+            # Out of reach of Ctrl-C and of a terminal that is closed: a session of its own, on Windows a group.
+            start_new_session=os.name == "posix",
+            creationflags=0x200 if os.name == "nt" else 0,
+        )
+        return cls(process, wake)
+
+    def __enter__(self) -> Self:
+        """Use it inside."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close it."""
+        self.close()
+
+    @property
+    def pid(self) -> int:
+        """Return the number of the recorder's process."""
+        return self._process.pid
+
+    @property
+    def silence(self) -> float:
+        """Return how long nothing was heard of the recorder [s]; more than 1 means that it hangs or sleeps."""
+        return time.monotonic() - self._heard
+
+    def send(self, request: Request) -> None:
+        """Ask for something, or tell what was done. To a recorder that is gone it is sent in vain: `Gone` says so."""
+        self._asked_to_end |= isinstance(request, Shutdown)
+        self._to_send.append(self._requests.packed(request))
+        self._something_to_send.set()
+
+    def poll(self, timeout: float = 0.0) -> tuple[Report, ...]:
+        """Return all reports since the last call, in order, waiting up to `timeout` [s] for the first."""
+        if not self._arrived and timeout > 0.0:
+            self._news.wait(timeout)
+        self._news.clear()
+        return tuple(self._arrived.popleft() for _ in range(len(self._arrived)))
+
+    def close(self, patience: float = PATIENCE) -> None:
+        """End session and recorder, and wait for that; after `patience` [s] it is left to end by itself.
+
+        Harmless when repeated.
+        """
+        if self._process.poll() is None:
+            self.send(Shutdown())
+            try:
+                self._process.wait(patience)
+            except subprocess.TimeoutExpired:
+                self.leave()
+                return
+        self._reader.join(patience)
+        self.leave()
+
+    def leave(self) -> None:
+        """Let go of the recorder: it ends by its rule for a client that is gone."""
+        self._to_send.append(None)
+        self._something_to_send.set()
+
+    def _read(self) -> None:
+        """Take reports until there are no more."""
+        assert self._process.stdout is not None
+        splitter = Splitter()
+        said = ""
+        try:
+            while data := os.read(self._process.stdout.fileno(), CHUNK):
+                found = [self._reports.unpacked(body) for body in splitter.feed(data)]
+                self._heard = time.monotonic()
+                self._arrived.extend(found)
+                if found:
+                    self._news.set()
+                    self._wake()
+        except BrokenMessage as error:
+            said = f"; it said {error}"
+        except OSError:
+            pass
+        self._process.stdout.close()
+        self._arrived.append(self._gone(said))
+        self._news.set()
+        self._wake()
+
+    def _gone(self, said: str) -> Gone:
+        """Return how the recorder ended."""
+        if self._asked_to_end:
+            return Gone(True, "the recorder has ended")
+        try:
+            code = self._process.wait(2.0)
+        except subprocess.TimeoutExpired:
+            code = None
+        why = f"exit code {code}" if code is None or code >= 0 else f"signal {-code}"
+        return Gone(
+            False,
+            f"the recorder has ended unexpectedly ({why}){said}: all that it had acknowledged is safe;"
+            " resume the session to go on at the same trial",
+        )
+
+    def _write(self) -> None:
+        """Send requests; a pipe that is full holds up nobody else."""
+        pipe = self._process.stdin
+        assert pipe is not None
+        try:
+            while True:
+                self._something_to_send.wait()
+                self._something_to_send.clear()
+                while self._to_send:
+                    packed = self._to_send.popleft()
+                    if packed is None:
+                        pipe.close()
+                        return
+                    rest = memoryview(packed)
+                    while rest:
+                        rest = rest[os.write(pipe.fileno(), rest) :]
+        except (OSError, ValueError):
+            return  # it is gone: the reader says so

@@ -1,0 +1,127 @@
+"""What is shown of the transducer while it streams: its readings as a wrench, its health, its overloads."""
+
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.recorder.messages import HealthReport, Live, Report, Six
+from drivers.readings import ReadingBlock
+from drivers.transducer import Health, TransducerInfo
+
+Array = NDArray[np.float64]
+
+LIVE_EVERY = 1 / 60  # least time between two messages of readings [real s]
+HEALTH_EVERY = 0.25  # between two of health [real s]
+RATE_OVER = 1.0  # stretch the rate is measured over [real s]
+UNLOADED: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Display:
+    """Gathers what streams, and sends it now and then. Nothing here touches what is recorded."""
+
+    def __init__(self, send: Callable[[Report], None], factor: float) -> None:
+        """Send through `send`; told time runs `factor` times as fast as real."""
+        self._send = send
+        self._factor = factor
+        self._info: TransducerInfo | None = None
+        self._stream = 0
+        self._waiting: list[ReadingBlock] = []
+        self._zero: Six = UNLOADED
+        self._load = self._peak = np.zeros(6)
+        self._saturated_before = self._saturated_now = 0
+        self._arrived: deque[tuple[float, int]] = deque()  # real time [s] and readings, over the last second
+        self._live_due = self._health_due = 0.0
+
+    def device(self, info: TransducerInfo | None) -> None:
+        """Show this transducer from now on, or none."""
+        self._flush()
+        self._info = info
+        self._zero = UNLOADED
+        self.acknowledge()
+        self._load = np.zeros(6)
+        self._health_due = 0.0
+
+    def stream_began(self) -> None:
+        """Take what comes next as a new stream, whose time and numbers begin anew."""
+        self._flush()
+        self._stream += 1
+        self._arrived.clear()
+        self._saturated_before = self._saturated_now = 0
+
+    def zeroed(self, mean: Six) -> None:
+        """Subtract this zero from now on [raw units]."""
+        self._flush()
+        self._zero = mean
+
+    def acknowledge(self) -> None:
+        """Forget the greatest loads."""
+        self._peak = np.zeros(6)
+        self._saturated_before = self._saturated_now
+        self._health_due = 0.0
+
+    def take(self, block: ReadingBlock) -> None:
+        """Take readings, of the stream that runs."""
+        if len(block) and self._info is not None:
+            self._waiting.append(block)
+            self._arrived.append((time.monotonic(), len(block)))
+
+    def look(self, health: Health) -> None:
+        """Send what is due."""
+        now = time.monotonic()
+        if now >= self._live_due:
+            self._live_due = now + LIVE_EVERY
+            self._flush()
+        if now >= self._health_due:
+            self._health_due = now + HEALTH_EVERY
+            self._tell_health(health, now)
+
+    def _flush(self) -> None:
+        info, block = self._info, ReadingBlock.joined(self._waiting)
+        self._waiting = []
+        if info is None or not len(block):
+            return
+        calibration = info.calibration
+        felt = calibration.wrench(block.raw, np.zeros(6))
+        load = np.abs(felt).max(axis=0) / calibration.rated
+        self._load, self._peak = np.fmax(self._load, load), np.fmax(self._peak, load)
+        self._send(
+            Live(
+                self._stream,
+                block.sequence,
+                block.time,
+                block.received_ns,
+                felt - calibration.wrench(np.array([self._zero]), np.zeros(6)),
+                block.status,
+                self._zero,
+            )
+        )
+
+    def _tell_health(self, health: Health, now: float) -> None:
+        while self._arrived and now - self._arrived[0][0] > RATE_OVER:
+            self._arrived.popleft()
+        span = now - self._arrived[0][0] if self._arrived else 0.0
+        # The first readings of the span came before it began.
+        count = sum(readings for _, readings in self._arrived) - (self._arrived[0][1] if self._arrived else 0)
+        self._saturated_now = health.saturated
+        rated = np.full(6, np.nan) if self._info is None else self._info.calibration.rated
+        unknown = np.isnan(rated)
+        self._send(
+            HealthReport(
+                health,
+                count / span / self._factor if span > 0.2 * RATE_OVER else 0.0,
+                six(np.where(unknown, np.nan, self._load)),
+                six(np.where(unknown, np.nan, self._peak)),
+                tuple(bool(peak > 1.0) for peak in self._peak),
+                self._saturated_now - self._saturated_before,
+            )
+        )
+        self._load = np.zeros(6)
+
+
+def six(values: Array) -> Six:
+    """Return six numbers (6,) as plain ones."""
+    return cast("Six", tuple(float(value) for value in values))

@@ -1,0 +1,235 @@
+"""What recorder and client say to each other: plain data, frozen. `wire.py` packs it.
+
+Beside what stands here, the client sends every event of `sessions.steps` (what experimenter and subject do), and the
+recorder sends every command of `sessions.steps` (what they are asked for), each `LoggedEvent` once it is safe, and
+`Status` ten times a second [session clock].
+"""
+
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.transducer import Health, TransducerInfo
+from sessions import steps
+from sessions.plan import Frame, SessionPlan
+from sessions.recording import LoggedEvent, Setting
+from sessions.runner import SessionEnd, Status
+
+Array = NDArray[np.float64]
+Six = tuple[float, float, float, float, float, float]
+Kind = Literal["people", "simulated hand", "simulated people"]
+
+# ---- to the recorder
+
+
+@dataclass(frozen=True, slots=True)
+class Connect:
+    """Open the transducer at this address and show what it measures; one that was open before is closed."""
+
+    uri: str
+
+
+@dataclass(frozen=True, slots=True)
+class Disconnect:
+    """Close the transducer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tare:
+    """Measure the zero of the bench with nothing touching, for what is shown live. Not during a session."""
+
+    duration: float = 1.0  # [s, device time]
+
+
+@dataclass(frozen=True, slots=True)
+class AcknowledgeOverloads:
+    """Somebody has seen the overloads: forget the greatest loads."""
+
+
+@dataclass(frozen=True, slots=True)
+class People:
+    """Who does what is asked for. Simulated ones need a simulated bench, or a visit that only scores.
+
+    A simulated hand mounts nothing and judges nothing: it strokes when a stroke is asked for, and people do the rest.
+    """
+
+    kind: Kind = "people"
+    seed: int = 0  # of the simulated subject
+
+
+@dataclass(frozen=True, slots=True)
+class StartSession:
+    """Begin a session in `folder`, which is made or is empty; with forces the transducer that is open records it."""
+
+    plan: SessionPlan
+    folder: str
+    people: People = field(default_factory=People)
+    settings: tuple[Setting, ...] = ()  # that shaped it, for its provenance
+
+
+@dataclass(frozen=True, slots=True)
+class ResumeSession:
+    """Go on with the session in `folder`, that was cut short: at the same trial, with the people it began with."""
+
+    folder: str
+    uri: str | None = None  # of its transducer; None: where it was when the session began
+    people: People | None = None  # None: those it began with
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """End at once what is being done, session included, with a written end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shutdown:
+    """End the session, if one runs, then the process."""
+
+
+Request = (
+    Connect | Disconnect | Tare | AcknowledgeOverloads | StartSession | ResumeSession | Stop | Shutdown | steps.Event
+)
+
+# ---- from the recorder
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Device:
+    """The transducer is open."""
+
+    info: TransducerInfo
+    frame: Frame | None  # how its axes lie to the face, where a simulated or recorded bench knows; else None
+
+
+@dataclass(frozen=True, slots=True)
+class NoDevice:
+    """No transducer is open now."""
+
+
+@dataclass(frozen=True, slots=True)
+class HealthReport:
+    """Four times a second, also where no transducer is open: a recorder that is silent for longer hangs or sleeps."""
+
+    health: Health  # totals since the stream began
+    rate: float  # readings a second over the last second of the machine's clock [Hz]; told seconds count as told
+    load: Six  # greatest |Fx .. Tz| since the last report, nothing subtracted, over the rated range [-]; nan: no range
+    peak: Six  # the same since somebody acknowledged overloads
+    overloaded: tuple[bool, ...]  # (6,): the peak exceeded 1; latched until acknowledged
+    saturated: int  # readings the device called invalid since somebody acknowledged
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Live:
+    """What was measured since the last such message, every reading of it; at most 60 a second."""
+
+    stream: int  # grows where time and sequence begin anew
+    sequence: NDArray[np.int64]  # (n,)
+    time: Array  # (n,) [s, device clock]
+    received_ns: NDArray[np.int64]  # (n,) session clock [ns]
+    wrench: Array  # (n, 6) [N, N mm] of the finger on the stimulus, transducer axes, zero subtracted
+    status: NDArray[np.int64]  # (n,) 0 = healthy
+    zero: Six  # raw units, that was subtracted: of the last tare or take; zeros where nothing was measured
+    left_out: int = 0  # readings before these that were not sent, because the client did not fetch them
+
+
+@dataclass(frozen=True, slots=True)
+class Tared:
+    """The zero of the bench was measured, and is subtracted from what is shown live from now on."""
+
+    mean: Six  # raw units
+    spread: Six  # standard deviation, raw units
+    noise: Six  # standard deviation [N, N mm]
+    readings: int
+    duration: float  # [s]
+
+
+@dataclass(frozen=True, slots=True)
+class SessionBegun:
+    """A session is being recorded."""
+
+    folder: str
+    plan: SessionPlan
+    simulated: str | None  # the sentence that heads every file, where something is simulated
+    clock_offset_ns: int  # session clock minus this machine's monotonic clock [ns]; a told clock has none of its own
+    factor: float  # told seconds in one real second [-]
+    events: tuple[LoggedEvent, ...] = ()  # all that was recorded before, of a session that goes on
+
+
+@dataclass(frozen=True, slots=True)
+class SessionEnded:
+    """A session has its written end; what was recorded is safe."""
+
+    folder: str
+    end: SessionEnd
+    resumable: bool  # it can go on, and is not sealed by itself
+
+
+@dataclass(frozen=True, slots=True)
+class Sealing:
+    """The sealed copy of a session is being made; the live file is whole already."""
+
+    folder: str
+
+
+@dataclass(frozen=True, slots=True)
+class Sealed:
+    """A session was sealed."""
+
+    folder: str
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """A request could not be met; nothing else has changed."""
+
+    request: str  # its name
+    sentence: str
+    kind: str = ""  # name of the exception, for an exit code
+
+
+@dataclass(frozen=True, slots=True)
+class LinkDown:
+    """The transducer no longer answers. It is tried again every second."""
+
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinkBack:
+    """The transducer answers again."""
+
+    info: TransducerInfo
+    same: bool  # it is the one that was open before, set and calibrated alike
+
+
+@dataclass(frozen=True, slots=True)
+class Gone:
+    """The recorder's process has ended; said by the client itself, once, as the last message."""
+
+    asked: bool  # by us
+    sentence: str
+
+
+Report = (
+    Device
+    | NoDevice
+    | HealthReport
+    | Live
+    | Tared
+    | SessionBegun
+    | SessionEnded
+    | Sealing
+    | Sealed
+    | Failed
+    | LinkDown
+    | LinkBack
+    | Gone
+    | LoggedEvent
+    | Status
+    | steps.Command
+)
+
+REQUESTS: tuple[type, ...] = get_args(Request)
+REPORTS: tuple[type, ...] = get_args(Report)

@@ -1,0 +1,127 @@
+"""The recorder's ends of its pipes: what is asked for comes in, what is to be shown goes out."""
+
+import os
+import signal
+import threading
+import time
+from collections import deque
+from dataclasses import replace
+
+from daq_app.recorder.messages import REPORTS, REQUESTS, HealthReport, Live, Report, Request, Shutdown, Stop
+from daq_app.recorder.wire import BrokenMessage, Codec, Splitter
+
+POKE_EVERY = 0.05  # between two nudges of the main thread by a stop nobody has answered [s]
+MOST_LIVE = 120  # messages of readings waiting to be fetched; later ones are left out, and counted
+CHUNK = 65_536
+
+
+class Inbox:
+    """Requests as they come, read by a thread; a stop nudges the main thread out of whatever it waits for."""
+
+    def __init__(self, reading: int) -> None:
+        """Read from this file descriptor."""
+        self._reading = reading
+        self._codec = Codec(REQUESTS)
+        self._arrived: deque[Request] = deque()
+        self.client_gone = threading.Event()
+        self.stop_wanted = threading.Event()
+        self.leaving = threading.Event()  # a shutdown was asked for, or nobody is left to ask
+        threading.Thread(target=self._read, name="requests", daemon=True).start()
+
+    def taken(self) -> tuple[Request, ...]:
+        """Return what was asked for since the last call, in order."""
+        return tuple(self._arrived.popleft() for _ in range(len(self._arrived)))
+
+    def _read(self) -> None:
+        splitter = Splitter()
+        try:
+            while data := os.read(self._reading, CHUNK):
+                for body in splitter.feed(data):
+                    self._take(self._codec.unpacked(body))
+        except (OSError, BrokenMessage):
+            pass  # a client that cannot be understood is as good as gone
+        self.client_gone.set()
+        self.leaving.set()
+
+    def _take(self, request: Request) -> None:
+        if isinstance(request, Stop | Shutdown):
+            if isinstance(request, Shutdown):
+                self.leaving.set()
+            self.stop_wanted.set()
+            threading.Thread(target=self._nudge, name="nudge", daemon=True).start()
+        self._arrived.append(request)
+
+    def _nudge(self) -> None:
+        """Break off what the main thread waits for, again and again until it has noticed."""
+        main = threading.main_thread().ident
+        while self.stop_wanted.is_set():
+            if hasattr(signal, "pthread_kill") and main is not None:
+                signal.pthread_kill(main, signal.SIGINT)
+            else:
+                signal.raise_signal(signal.SIGINT)
+            time.sleep(POKE_EVERY)
+
+
+class Outbox:
+    """Reports on their way to the client. Whoever sends never waits, whatever the client does."""
+
+    def __init__(self, writing: int) -> None:
+        """Write to this file descriptor."""
+        self._writing = writing
+        self._codec = Codec(REPORTS)
+        self._waiting: deque[Report] = deque()
+        self._live = 0  # messages of readings among them
+        self._left_out = 0  # readings
+        self._news = threading.Event()
+        self._lock = threading.Lock()
+        self._idle = threading.Event()
+        self._idle.set()
+        self._broken = False
+        threading.Thread(target=self._write, name="reports", daemon=True).start()
+
+    def send(self, report: Report) -> None:
+        """Have a report sent. Readings the client does not fetch are left out, and their number is told."""
+        with self._lock:
+            if self._broken:
+                return
+            if isinstance(report, Live | HealthReport):
+                if self._live >= MOST_LIVE:
+                    self._left_out += len(report.sequence) if isinstance(report, Live) else 0
+                    return
+                self._live += 1
+            if isinstance(report, Live) and self._left_out:
+                report = replace(report, left_out=self._left_out)
+                self._left_out = 0
+            self._waiting.append(report)
+            self._idle.clear()
+        self._news.set()
+
+    def flush(self, patience: float) -> None:
+        """Wait until everything was taken by the client, but not longer than `patience` [s]."""
+        self._idle.wait(patience)
+
+    def _write(self) -> None:
+        while True:
+            self._news.wait()
+            self._news.clear()
+            while (report := self._next()) is not None:
+                packed = memoryview(self._codec.packed(report))
+                try:
+                    while packed:
+                        packed = packed[os.write(self._writing, packed) :]
+                except OSError:
+                    with self._lock:
+                        self._broken = True
+                        self._waiting.clear()
+                        self._idle.set()
+                    return
+
+    def _next(self) -> Report | None:
+        with self._lock:
+            if not self._waiting:
+                self._idle.set()
+                return None
+            report = self._waiting.popleft()
+            if isinstance(report, Live | HealthReport):
+                self._live -= 1
+            return report

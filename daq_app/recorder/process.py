@@ -1,0 +1,109 @@
+"""The recorder's process: it takes requests down one pipe and reports up another, and nothing else reaches it.
+
+One main loop: between sessions it shows what the transducer measures, in a session `run_session` has the loop. When
+the client is gone the session in hand is ended by its rule (`session.py`) and the process ends.
+"""
+
+import os
+import signal
+import sys
+from collections.abc import Callable
+
+from daq_app.recorder.bench import Bench, NotNow
+from daq_app.recorder.display import Display
+from daq_app.recorder.messages import (
+    AcknowledgeOverloads,
+    Connect,
+    Disconnect,
+    Failed,
+    Request,
+    ResumeSession,
+    Shutdown,
+    StartSession,
+    Stop,
+    Tare,
+)
+from daq_app.recorder.pipes import Inbox, Outbox
+from daq_app.recorder.session import Prepared, begun, gone_on, run
+from drivers.clock import Clock, PacedClock, RealClock
+from drivers.transducer import DeviceFault, LinkLost, SetupError
+from sessions.recording import RecordingError
+
+LAST_WORDS = 2.0  # for the client to fetch the last reports [s]
+EXPECTED = (DeviceFault, LinkLost, NotNow, RecordingError, SetupError)  # what has a sentence for people
+
+
+def main(arguments: list[str]) -> None:
+    """Serve the client at stdin and stdout until it goes; the one argument is the pace of the clock [-]."""
+    reading, writing = os.dup(0), os.dup(1)
+    # Whatever prints by mistake must not get between the messages.
+    os.dup2(2, 1)
+    signal.signal(signal.SIGINT, lambda _signal, _frame: None)  # a nudge: it only breaks off waiting
+    pace = float(arguments[0]) if arguments else 1.0
+    outbox = Outbox(writing)
+    inbox = Inbox(reading)
+    clock = RealClock() if pace == 1.0 else PacedClock(pace)
+    try:
+        Recorder(inbox, outbox, clock).serve()
+    finally:
+        outbox.flush(LAST_WORDS)
+    sys.stdout.flush()
+    os._exit(0)  # threads of drivers and pipes have nothing left to do
+
+
+class Recorder:
+    """What the process does."""
+
+    def __init__(self, inbox: Inbox, outbox: Outbox, clock: Clock) -> None:
+        """Serve requests from `inbox`."""
+        self._inbox = inbox
+        self._send = outbox.send
+        self._clock = clock
+        self._display = Display(outbox.send, clock.factor)
+        self._bench = Bench(clock, self._display, outbox.send)
+
+    def serve(self) -> None:
+        """Do what is asked for until the client leaves."""
+        while not self._inbox.leaving.is_set():
+            self._attempt("Tare", self._bench.look)
+            self._display.look(self._bench.health)
+            for request in self._inbox.taken():
+                self._attempt(type(request).__name__, lambda asked=request: self._do(asked))
+        self._bench.disconnect()
+
+    def _do(self, request: Request) -> None:
+        match request:
+            case Connect(uri):
+                self._bench.connect(uri)
+                self._bench.stream()
+            case Disconnect():
+                self._bench.disconnect()
+            case Tare(duration):
+                self._bench.begin_tare(duration)
+            case AcknowledgeOverloads():
+                self._display.acknowledge()
+            case StartSession():
+                self._session(lambda: begun(request, self._bench, self._clock))
+            case ResumeSession():
+                self._session(lambda: gone_on(request, self._bench, self._clock))
+            case Stop() | Shutdown():
+                self._inbox.stop_wanted.clear()
+            case _:
+                raise NotNow("no session is running")
+
+    def _session(self, prepare: Callable[[], Prepared]) -> None:
+        """Run a session; afterwards the transducer is shown as before."""
+        try:
+            run(prepare(), self._bench, self._display, self._inbox, self._send)
+        finally:
+            self._inbox.stop_wanted.clear()
+            self._bench.stream()
+
+    def _attempt(self, name: str, work: Callable[[], None]) -> None:
+        """Do something asked for; what goes wrong is told, and ends nothing else."""
+        try:
+            work()
+        except EXPECTED as error:
+            self._send(Failed(name, " ".join(str(error).split()), type(error).__name__))
+        except Exception as error:  # noqa: BLE001  an error of ours must not take the recorder along
+            self._send(Failed(name, f"unexpected {type(error).__name__} ({error})", type(error).__name__))

@@ -1,0 +1,272 @@
+"""One session inside the recorder: begun or gone on with, run with the client as its operator, and sealed."""
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import msgspec
+
+from daq_app.recorder.bench import Bench, NotNow
+from daq_app.recorder.display import Display
+from daq_app.recorder.messages import (
+    AcknowledgeOverloads,
+    Connect,
+    Disconnect,
+    Failed,
+    People,
+    Report,
+    ResumeSession,
+    Sealed,
+    Sealing,
+    SessionBegun,
+    SessionEnded,
+    Shutdown,
+    StartSession,
+    Stop,
+    Tare,
+)
+from daq_app.recorder.pipes import Inbox
+from daq_app.wiring import SimulatedHand, SimulatedPeople
+from drivers.clock import Clock
+from drivers.transducer import TransducerInfo
+from sessions.plan import SessionPlan
+from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, Setting, provenance
+from sessions.recording.head import simulated_sentence
+from sessions.recording.manifest import is_sealed
+from sessions.recording.provenance import software_versions
+from sessions.resuming import (
+    RESUMABLE,
+    ContinuedClock,
+    check_resumable,
+    check_same_transducer,
+    continued,
+    resumed_data,
+    resumption,
+)
+from sessions.runner import STOPPED, Ending, Operator, Resumed, Status, run_session
+from sessions.steps import Command, Event
+
+LIFT_PATIENCE_NS = 30_000_000_000  # for a finger that touches when the client goes [session clock]
+CLIENT_GONE = "the window or terminal that ran the session is gone"
+Send = Callable[[Report], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """All that a session needs to run."""
+
+    plan: SessionPlan
+    writer: SessionWriter
+    clock: Clock
+    people: People
+    info: TransducerInfo | None
+    clock_offset_ns: int = 0
+    resumed: Resumed | None = None
+    before: tuple[LoggedEvent, ...] = ()  # all that was recorded before
+
+
+def begun(request: StartSession, bench: Bench, clock: Clock) -> Prepared:
+    """Begin to record in a new folder. Raises RecordingError, SetupError or NotNow."""
+    plan, people = request.plan, request.people
+    if plan.forces and bench.connected is None:
+        raise NotNow("a session with forces needs a transducer, and none is connected; connect one")
+    info = bench.connected.transducer.info if plan.forces and bench.connected is not None else None
+    _check_people(people, plan, bench)
+    settings = [*request.settings, *_told(people, bench.uri if info is not None else None)]
+    writer = SessionWriter.create(
+        Path(request.folder),
+        plan,
+        info,
+        provenance(clock, settings),
+        subject_simulated=people.kind != "people",
+        clock=clock,
+    )
+    return Prepared(plan, writer, clock, people, info)
+
+
+def gone_on(request: ResumeSession, bench: Bench, clock: Clock) -> Prepared:
+    """Go on with a session that was cut short; its transducer is opened again, on the session's clock.
+
+    Raises RecordingError, NotNow, and what opening the transducer raises.
+    """
+    folder = Path(request.folder)
+    if is_sealed(folder):
+        raise RecordingError(f"{folder} is sealed: nothing is added to it; begin a new session")
+    recording = Recording.open(folder)
+    check_resumable(recording)
+    factor = float(recording.provenance["clock"]["factor"])
+    if clock.factor != factor:
+        raise NotNow(f"{folder} was recorded at pace {factor:g}: start the recorder with this pace")
+    at, last = resumption(recording.plan, recording.events), recording.last_block()
+    going_on, gap = continued(recording, last, clock, datetime.now(UTC))
+    people = request.people or recorded_people(recording)
+    info = _opened_again(request, recording, bench, going_on)
+    _check_people(people, recording.plan, bench)
+    if simulated_sentence(info, people.kind != "people") != recording.simulated_sentence:
+        raise NotNow("what was simulated at the beginning must be simulated again, and nothing else")
+    writer = SessionWriter.open(folder, going_on)
+    resumed = Resumed(at, resumed_data(gap, info, software_versions()), last)
+    return Prepared(
+        recording.plan, writer, going_on, people, info, going_on.offset_ns, resumed, tuple(recording.events)
+    )
+
+
+def run(prepared: Prepared, bench: Bench, display: Display, inbox: Inbox, send: Send) -> None:
+    """Run the session to its end, send all that happens in it, and seal it unless it can go on."""
+    writer = prepared.writer
+    course = _Course(prepared, bench, display, inbox, send)
+    writer.safe = course.told
+    simulated = simulated_sentence(prepared.info, prepared.people.kind != "people")
+    folder = str(writer.folder)
+    send(
+        SessionBegun(folder, prepared.plan, simulated, prepared.clock_offset_ns, prepared.clock.factor, prepared.before)
+    )
+    end = run_session(
+        prepared.plan,
+        writer,
+        course,
+        bench.lent() if prepared.plan.forces else None,
+        prepared.clock,
+        resumed=prepared.resumed,
+        stop=course.stop,
+        progress=course.progress,
+    )
+    resumable = end.cause in RESUMABLE
+    send(SessionEnded(folder, end, resumable))
+    if end.cause == "device":
+        bench.lost(end.reason)
+    if not resumable:
+        seal(writer.folder, send)
+
+
+def seal(folder: Path, send: Send) -> None:
+    """Seal an ended session. Raises RecordingError."""
+    from sessions.recording.archive import seal as sealed  # HDF5 is slow to load, and nothing waits for it now
+
+    send(Sealing(str(folder)))
+    sealed(folder)
+    send(Sealed(str(folder)))
+
+
+def recorded_people(recording: Recording) -> People:
+    """Return who did what was asked for when the session began."""
+    told = {name: setting["value"] for name, setting in recording.provenance.get("settings", {}).items()}
+    with suppress(msgspec.ValidationError):
+        return msgspec.convert({"kind": told["people"], "seed": told.get("people seed", 0)}, People)
+    return People()
+
+
+def recorded_device(recording: Recording) -> str | None:
+    """Return the address the transducer was asked for at when the session began."""
+    setting = recording.provenance.get("settings", {}).get("device")
+    return None if setting is None else str(setting["value"])
+
+
+class _Course:
+    """Client and simulated people as the runner's operator."""
+
+    def __init__(self, prepared: Prepared, bench: Bench, display: Display, inbox: Inbox, send: Send) -> None:
+        self._bench = bench
+        self._display = display
+        self._inbox = inbox
+        self._send = send
+        self._clock = prepared.clock
+        self._helper = _helper(prepared, bench)
+        self._touching = False
+        self._alone_ns: int | None = None  # when it was noticed that the client has gone
+
+    def show(self, command: Command) -> None:
+        """Send it on; whoever is simulated does it."""
+        self._send(command)
+        if self._helper is not None:
+            self._helper.show(command)
+
+    def poll(self) -> Sequence[Event]:
+        """Return what was done; say no to what is not for now."""
+        self._display.look(self._bench.health)
+        acts: list[Event] = []
+        for request in self._inbox.taken():
+            match request:
+                case AcknowledgeOverloads():
+                    self._display.acknowledge()
+                case Stop() | Shutdown():
+                    pass  # `stop` sees them
+                case Connect() | Disconnect() | Tare() | StartSession() | ResumeSession():
+                    name = type(request).__name__
+                    self._send(Failed(name, f"a session is running: {name} has to wait for its end"))
+                case _:
+                    acts.append(request)
+        return acts if self._helper is None else (*acts, *self._helper.poll())
+
+    def stop(self) -> Ending | None:
+        """Say why the session is to end now: somebody wants it, or the client is gone and no finger touches."""
+        if self._inbox.stop_wanted.is_set():
+            return "stopped", STOPPED
+        if not self._inbox.client_gone.is_set():
+            return None
+        now_ns = self._clock.now_ns()
+        self._alone_ns = now_ns if self._alone_ns is None else self._alone_ns
+        if self._touching and now_ns - self._alone_ns < LIFT_PATIENCE_NS:
+            return None
+        return "client", CLIENT_GONE
+
+    def progress(self, status: Status) -> None:
+        """Send it on."""
+        self._send(status)
+
+    def told(self, events: Sequence[LoggedEvent]) -> None:
+        """Send what became safe, and remember whether a finger touches."""
+        for event in events:
+            self._send(event)
+            if event.kind in ("contact_onset", "finger_lifted"):
+                self._touching = event.kind == "contact_onset"
+            elif event.kind == "take_discarded":
+                self._touching = False
+            elif event.kind == "zeroed":
+                self._display.zeroed(tuple(event.data["mean"]))
+
+
+def _helper(prepared: Prepared, bench: Bench) -> Operator | None:
+    people = prepared.people
+    connected = bench.connected if prepared.plan.forces else None
+    if people.kind == "simulated people":
+        return SimulatedPeople(people.seed, prepared.clock, connected)
+    if people.kind == "simulated hand" and connected is not None:
+        return SimulatedHand(people.seed, connected)
+    return None
+
+
+def _check_people(people: People, plan: SessionPlan, bench: Bench) -> None:
+    """Raise NotNow where simulated people would have to stroke a real bench."""
+    simulated_bench = bench.connected is not None and bench.connected.bench is not None
+    if people.kind == "simulated people" and plan.forces and not simulated_bench:
+        raise NotNow("simulated people stroke the simulated bench only: connect sim:")
+    if people.kind == "simulated hand" and not (plan.forces and simulated_bench):
+        raise NotNow("a simulated hand strokes the simulated bench only: connect sim:, and record forces")
+
+
+def _told(people: People, uri: str | None) -> list[Setting]:
+    """Return what a resumption needs to know and nobody should have to say again."""
+    settings = [Setting("people", people.kind, "", "set")]
+    if people.kind != "people":
+        settings.append(Setting("people seed", people.seed, "", "set"))
+    if uri is not None:
+        settings.append(Setting("device", uri, "", "set"))
+    return settings
+
+
+def _opened_again(
+    request: ResumeSession, recording: Recording, bench: Bench, clock: ContinuedClock
+) -> TransducerInfo | None:
+    """Open the transducer of the session anew, and return who it is; None for a visit that only scores."""
+    if recording.info is None:
+        if request.uri is not None:
+            raise NotNow("the session began without a transducer, and goes on without one")
+        return None
+    bench.connect(request.uri or recorded_device(recording) or recording.info.uri, clock)
+    assert bench.connected is not None
+    info = bench.connected.transducer.info
+    check_same_transducer(recording.info, info)
+    return info

@@ -1,0 +1,281 @@
+"""The recorder's process, driven through its client."""
+
+import itertools
+import os
+import signal
+import socket
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from daq_app.recorder.client import Recorder
+from daq_app.recorder.messages import (
+    Connect,
+    Device,
+    Failed,
+    Gone,
+    HealthReport,
+    Live,
+    NoDevice,
+    People,
+    ResumeSession,
+    Sealed,
+    SessionBegun,
+    SessionEnded,
+    StartSession,
+    Stop,
+    Tare,
+    Tared,
+)
+from sessions.plan import Frame
+from sessions.protocols import plan, protocol
+from sessions.recording import LoggedEvent, Recording
+from sessions.runner import Status
+from sessions.steps import (
+    AskBegin,
+    AskFinish,
+    AskMount,
+    AskScore,
+    AskStroke,
+    Begin,
+    Finish,
+    MeasureZero,
+    Refuse,
+    Scored,
+    StimulusMounted,
+)
+
+PACE = 20.0
+PAPER = protocol("sensotact-friction")
+PLAN = plan(PAPER, "S01", 3, frame=Frame("-z", "set", 20.0, "set"))
+DEADLINE = 60.0  # of a machine that hangs, not of a slow one [s]
+
+
+class Desk:
+    """A client with people in front of it, who do what is asked; `instead` maps a command's type to what they do."""
+
+    def __init__(self, recorder, instead=None):
+        self.recorder = recorder
+        self.instead = instead or {}
+        self.seen = []
+        self.waiting = []
+
+    def until(self, wanted, number=1):
+        """Go on until so many more reports of a kind came, and return the last."""
+        deadline = time.monotonic() + DEADLINE
+        while time.monotonic() < deadline:
+            self.waiting += self.recorder.poll(0.0 if self.waiting else 0.05)
+            while self.waiting:
+                report = self.waiting.pop(0)
+                self.seen.append(report)
+                self.answer(report)
+                number -= isinstance(report, wanted)
+                if number == 0:
+                    return report
+        raise AssertionError(f"no {wanted} came; the last were {[type(r).__name__ for r in self.seen[-8:]]}")
+
+    def answer(self, report):
+        if type(report) in self.instead:
+            self.instead[type(report)](report)
+            return
+        match report:
+            case AskBegin():
+                self.recorder.send(Begin())
+            case AskMount(trial):
+                self.recorder.send(StimulusMounted(trial.stimulus.code))
+            case AskScore(trial):
+                self.recorder.send(Scored(float(trial.stimulus.index)))
+            case AskFinish():
+                self.recorder.send(Finish())
+
+    def of(self, kind):
+        return [report for report in self.seen if isinstance(report, kind)]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A bench session from connecting to sealing: a simulated hand strokes, people do the rest."""
+    folder = tmp_path_factory.mktemp("recorder") / "whole"
+    with Recorder.start(PACE) as recorder:
+        desk = Desk(recorder)
+        recorder.send(Tare())
+        desk.until(Failed)
+        recorder.send(Connect("sim:?seed=7"))
+        desk.until(Device)
+        listening = sockets_of(recorder.pid)
+        recorder.send(Tare(2.0))
+        desk.until(Tared)
+        recorder.send(StartSession(PLAN, str(folder), People("simulated hand", 7)))
+        desk.until(AskStroke)
+        recorder.send(Tare())
+        recorder.send(StimulusMounted("nonsense"))
+        desk.until(Sealed)
+        desk.until(HealthReport, 2)
+    desk.until(Gone)
+    return desk, Recording.open(folder), listening
+
+
+def test_a_session_run_through_the_recorder_is_whole_and_sealed(whole):
+    desk, recording, _ = whole
+    assert recording.losses == recording.flaws == ()
+    assert [record.score for record in recording.trials] == [trial.stimulus.index for trial in PLAN.trials]
+    end = desk.of(SessionEnded)[0]
+    assert (end.end.cause, end.end.complete, end.resumable) == ("finished", True, False)
+    assert (recording.folder / "MANIFEST.json").exists()
+    assert desk.of(Gone)[0].asked
+
+
+def test_the_client_is_told_every_event_of_the_log_once_it_is_safe(whole):
+    desk, recording, _ = whole
+    assert tuple(desk.of(LoggedEvent)) == recording.events
+    order = [report for report in desk.seen if isinstance(report, LoggedEvent | AskStroke | MeasureZero)]
+    for before, after in itertools.pairwise(order):
+        if isinstance(after, AskStroke):
+            assert before.kind == "stroke_asked"
+
+
+def test_the_lamp_is_fed_by_what_the_disk_has_acknowledged(whole):
+    desk, recording, _ = whole
+    told = desk.of(Status)
+    assert told[-1].safe.readings <= len(recording.readings())
+    assert max(status.safe.events for status in told) > 90
+    assert all(status.safe.readings <= status.readings for status in told)
+
+
+def test_every_reading_is_shown_live_as_it_is_recorded(whole):
+    desk, recording, _ = whole
+    live = [report for report in desk.of(Live) if report.stream == 2]
+    shown = np.concatenate([report.sequence for report in live])
+    recorded = recording.readings()
+    assert sum(report.left_out for report in live) == 0
+    np.testing.assert_array_equal(shown, recorded.sequence[: len(shown)])
+    assert len(shown) > 0.99 * len(recorded)
+    zero = np.array(live[-1].zero)
+    assert zero.tolist() == [e for e in recording.events if e.kind == "zeroed"][-1].data["mean"]
+    n = len(live[-1].wrench)
+    wrench = recording.info.calibration.wrench(recorded.raw[len(shown) - n : len(shown)], zero)
+    np.testing.assert_allclose(live[-1].wrench, wrench, rtol=0, atol=1e-9)
+
+
+def test_the_bench_is_shown_before_and_after_a_session_with_its_own_zero(whole):
+    desk, _, _ = whole
+    assert {report.stream for report in desk.of(Live)} == {1, 2, 3}
+    tared = desk.of(Tared)[0]
+    assert tared.duration == pytest.approx(2.0, abs=0.006)  # a reading's step, by a counter good to 0.5 %
+    assert tared.noise[2] == pytest.approx(0.004, rel=0.4)  # planted: 4 mN
+    before = [report for report in desk.of(Live) if report.stream == 1 and report.zero == tared.mean]
+    assert np.abs(np.concatenate([report.wrench[:, 2] for report in before])).max() < 0.05
+
+
+def test_what_is_not_for_now_is_refused_with_a_sentence(whole):
+    desk, _, _ = whole
+    first, second = desk.of(Failed)
+    assert (first.request, first.sentence[:24]) == ("Tare", "no transducer is connect")
+    assert (second.request, second.sentence[:20]) == ("Tare", "a session is running")
+    assert "a mounted stimulus means nothing now" in desk.of(Refuse)[0].sentence
+
+
+@pytest.mark.skipif(not Path("/proc/net/udp").exists(), reason="looks sockets up where Linux tells of them")
+def test_nothing_listens_but_the_simulated_box_on_loopback(whole):
+    _, _, listening = whole
+    assert listening
+    assert {address for address in listening if not address.startswith("0100007F")} == set()
+    with Recorder.start() as recorder:
+        Desk(recorder).until(HealthReport)
+        assert sockets_of(recorder.pid) == []
+
+
+def sockets_of(pid):
+    """Return the local addresses of a process's sockets, as Linux writes them."""
+    if not Path("/proc/net/udp").exists():
+        return []
+    inodes = set()
+    for link in Path(f"/proc/{pid}/fd").iterdir():
+        target = str(link.readlink())
+        if target.startswith("socket:["):
+            inodes.add(target[8:-1])
+    found = []
+    for table in ("tcp", "udp", "tcp6", "udp6"):
+        path = Path(f"/proc/net/{table}")
+        rows = path.read_text().splitlines()[1:] if path.exists() else []
+        found += [row.split()[1] for row in rows if row.split()[9] in inodes]
+    return found
+
+
+def started(desk, folder, people="simulated hand"):
+    """Have a session running, and return once its first stroke is felt."""
+    desk.recorder.send(Connect("sim:?seed=7"))
+    desk.recorder.send(StartSession(PLAN, str(folder), People(people, 7)))
+    while desk.until(LoggedEvent).kind != "contact_onset":
+        pass
+
+
+def wait_for(folder, holds):
+    deadline = time.monotonic() + DEADLINE
+    while not holds(Recording.open(folder)):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def test_a_client_that_goes_leaves_a_session_recorded_until_the_lift_which_a_new_one_resumes(tmp_path):
+    folder = tmp_path / "s"
+    first = Recorder.start(PACE)
+    started(Desk(first), folder)
+    first.leave()
+    wait_for(folder, lambda recording: recording.end is not None)
+    before = Recording.open(folder)
+    kinds = [event.kind for event in before.events]
+    assert kinds[-2:] == ["take_discarded", "ended"]
+    assert kinds.index("finger_lifted") > kinds.index("contact_onset")
+    assert (before.end["cause"], before.end["complete"]) == ("client", False)
+    assert len(before.readings()) == before.end["readings"]
+    with Recorder.start(PACE) as second:
+        desk = Desk(second)
+        second.send(ResumeSession(str(folder)))  # device and people are those it began with
+        begun = desk.until(SessionBegun)
+        assert begun.events == before.events
+        assert desk.until(AskMount).trial.number == 1
+        second.send(Stop())
+        assert desk.until(SessionEnded).end.cause == "stopped"
+    after = Recording.open(folder)
+    assert after.events[: len(before.events)] == before.events
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kill -9 needs POSIX")
+def test_a_recorder_that_is_killed_has_lost_nothing_it_told_of_and_its_session_goes_on(tmp_path):
+    folder = tmp_path / "s"
+    with Recorder.start(PACE) as first:
+        desk = Desk(first)
+        started(desk, folder)
+        os.kill(first.pid, signal.SIGKILL)
+        gone = desk.until(Gone)
+    assert not gone.asked
+    assert "signal 9" in gone.sentence
+    assert "resume the session" in gone.sentence
+    told = desk.of(LoggedEvent)
+    before = Recording.open(folder)
+    assert list(before.events[: len(told)]) == told
+    assert len(before.readings()) >= max(status.safe.readings for status in desk.of(Status))
+    with Recorder.start(PACE) as second:
+        desk = Desk(second)
+        second.send(ResumeSession(str(folder), people=People("simulated people", 7)))
+        end = desk.until(SessionEnded)
+        desk.until(Sealed)
+    assert end.end.complete
+    assert all(record.outcome == "scored" for record in Recording.open(folder).trials)
+
+
+def test_a_stop_breaks_off_a_connection_that_does_not_come_about():
+    with socket.create_server(("127.0.0.1", 0)) as silent, Recorder.start() as recorder:
+        desk = Desk(recorder)
+        recorder.send(Connect(f"net-ft://127.0.0.1?http={silent.getsockname()[1]}"))
+        silent.settimeout(DEADLINE)
+        caller, _ = silent.accept()  # it waits for an answer now
+        recorder.send(Stop())
+        failed = desk.until(Failed)
+        caller.close()
+    assert failed.request == "Connect"
+    assert failed.sentence.endswith("stopped by the user")
+    assert not desk.of(NoDevice)

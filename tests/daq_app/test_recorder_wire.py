@@ -1,0 +1,94 @@
+import itertools
+import math
+from dataclasses import fields, is_dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from stand_ins import INFO
+
+from daq_app.recorder.messages import (
+    REPORTS,
+    REQUESTS,
+    Connect,
+    Device,
+    Failed,
+    HealthReport,
+    Live,
+    People,
+    ResumeSession,
+    SessionBegun,
+    StartSession,
+    Stop,
+)
+from daq_app.recorder.wire import LENGTH, BrokenMessage, Codec, Splitter
+from drivers.transducer import Health
+from sessions.plan import Frame
+from sessions.protocols import plan, protocol
+from sessions.recording import LoggedEvent, Setting
+from sessions.steps import AskScore, Scored, Zeroed
+
+PLAN = plan(protocol("sensotact-friction"), "S01", 3, forces=True)
+SIX = (1.0, 2.0, 3.0, 4.0, 5.0, math.nan)
+ASKED = [
+    Connect("sim:?seed=7"),
+    StartSession(PLAN, "recordings/P07", People("simulated hand", 7), (Setting("seed", 3, "", "set"),)),
+    ResumeSession("recordings/Ä 日", None, None),
+    Stop(),
+    Scored(None, ((1.5, 20.0), (1.75, 30.25)), 1.5, 1, "left", "pen"),
+]
+TOLD = [
+    Device(INFO, Frame("-z", "set", 20.0, "set")),
+    HealthReport(Health(received=7), 200.5, SIX, SIX, (False,) * 6, 0),
+    Live(
+        1, np.arange(3), np.arange(3.0), np.arange(3) * 7, np.arange(18.0).reshape(3, 6), np.zeros(3, int), SIX[:6], 4
+    ),
+    SessionBegun("f", PLAN, None, -5, 1.0, (LoggedEvent(1, 2**60, "zeroed", None, 3, {"mean": [0.1] * 6}),)),
+    AskScore(PLAN.trials[0], ("not at all", "very")),
+    Failed("Tare", "no"),
+]
+
+
+def same(a, b):
+    if isinstance(a, np.ndarray):
+        return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
+    if is_dataclass(a):
+        return type(a) is type(b) and all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+    if isinstance(a, tuple):
+        return len(a) == len(b) and all(itertools.starmap(same, zip(a, b, strict=True)))
+    return a == b or (isinstance(a, float) and math.isnan(a) and math.isnan(b))
+
+
+@pytest.mark.parametrize(("types", "messages"), [(REQUESTS, ASKED), (REPORTS, TOLD)])
+@given(data=st.data())
+def test_messages_come_out_as_they_went_in_however_the_bytes_were_cut(types, messages, data):
+    codec, splitter = Codec(types), Splitter()
+    stream = b"".join(map(codec.packed, messages))
+    cuts = data.draw(st.lists(st.integers(0, len(stream)), max_size=6).map(sorted))
+    bodies = [body for a, b in itertools.pairwise([0, *cuts, len(stream)]) for body in splitter.feed(stream[a:b])]
+    assert all(itertools.starmap(same, zip(messages, map(codec.unpacked, bodies), strict=True)))
+
+
+def test_no_two_messages_of_one_direction_share_a_name():
+    for types in (REQUESTS, REPORTS):
+        assert len({cls.__name__ for cls in types}) == len(types)
+
+
+@given(st.binary(max_size=60))
+def test_bytes_that_are_no_message_are_refused_and_nothing_else(garbage):
+    with pytest.raises(BrokenMessage):
+        Codec([Connect]).unpacked(b"\x92\xa7Connect\xc0" + garbage)
+    with pytest.raises(BrokenMessage):
+        Codec([Connect]).unpacked(Codec([Zeroed]).packed(Zeroed())[LENGTH.size :])
+
+
+def test_a_length_beyond_all_reason_is_refused_before_anything_is_gathered():
+    with pytest.raises(BrokenMessage):
+        Splitter().feed(LENGTH.pack(2**31) + b"x")
+
+
+def test_an_array_of_objects_is_refused():
+    body = Codec([Live]).packed(TOLD[2])[LENGTH.size :].replace(b"\xa3<i8", b"\xa3|O8")
+    with pytest.raises(BrokenMessage):
+        Codec([Live]).unpacked(body)
