@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import LinAlgError
 
 from solver.contact import Touchable
-from solver.dissection import Reduced, Tree
+from solver.dissection import Reduced, Tree, places
 from solver.elements import line
 from solver.materials import Hooke
 from solver.mesh import Array, Indices, Mesh
@@ -115,7 +115,7 @@ def elimination(mesh: Mesh) -> Tree:
     """Return the order in which the body's unknowns are eliminated: all but the skin's, normal ones first."""
     kept = np.concatenate([2 * mesh.skin + 1, 2 * mesh.skin])
     fixed = np.concatenate([2 * mesh.held, 2 * mesh.held + 1])
-    return Tree.of(_unknowns(mesh), mesh.nodes[mesh.elements[:, 8]], fixed, kept)
+    return Tree.of(_unknowns(mesh), places(mesh.elements), fixed, kept)
 
 
 def _touchable(mesh: Mesh, reduced: Reduced, free: Sequence[Motion]) -> Touchable:

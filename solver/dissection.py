@@ -15,7 +15,7 @@ from scipy.linalg.lapack import dposv, dpotrs
 
 from solver.mesh import Array, Indices
 
-LEAF = 12  # elements in a part that is not halved any more: fewer means more Python, more means more arithmetic
+LEAF = 16  # elements in a part that is not halved any more: fewer means more Python, more means more arithmetic
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,12 +40,12 @@ class Tree:
     size: int  # number of unknowns, fixed ones included
 
     @staticmethod
-    def of(elements: Indices, centres: Array, fixed: Indices, kept: Indices) -> "Tree":
-        """Plan the elimination for `elements` (e, n) of unknowns at `centres` (e, 2).
+    def of(elements: Indices, centres: Array, fixed: Indices, kept: Indices, leaf: int = LEAF) -> "Tree":
+        """Plan the elimination for `elements` (e, n) of unknowns at `centres` (e, 2), at most `leaf` in a leaf.
 
         Unknowns in `fixed` take no part (their displacement is zero); those in `kept` are passed on to the end.
         """
-        order, ranges, children = _halved(centres)
+        order, ranges, children = _halved(centres, leaf)
         position = np.empty(len(order), np.int64)
         position[order] = np.arange(len(order))
         size = int(elements.max()) + 1
@@ -81,7 +81,7 @@ class Tree:
         return Tree(order, tuple(parts), kept, size)
 
 
-def _halved(centres: Array) -> tuple[Indices, list[tuple[int, int]], list[tuple[int, ...]]]:
+def _halved(centres: Array, leaf: int) -> tuple[Indices, list[tuple[int, int]], list[tuple[int, ...]]]:
     """Return an order of elements, the range of each part in it, and each part's children; children come first."""
     order = np.arange(len(centres))
     ranges: list[tuple[int, int]] = []
@@ -89,7 +89,7 @@ def _halved(centres: Array) -> tuple[Indices, list[tuple[int, int]], list[tuple[
 
     def halve(low: int, high: int) -> int:
         below: tuple[int, ...] = ()
-        if high - low > LEAF:
+        if high - low > leaf:
             mine = order[low:high]
             along = int(np.argmax(np.ptp(centres[mine], axis=0)))
             middle = (low + high) // 2
@@ -101,6 +101,34 @@ def _halved(centres: Array) -> tuple[Indices, list[tuple[int, int]], list[tuple[
 
     halve(0, len(centres))
     return order, ranges, children
+
+
+def places(elements: Indices) -> Array:
+    """Return where elements (e, 9) stand in rows and columns (e, 2), read off their neighbours.
+
+    In a body much longer than it is thick, or bent like a finger, halves cut by rows and columns share far fewer nodes
+    than halves cut along x or y. Where a mesh has no rows and columns the numbers still say what lies near what.
+    """
+    count = len(elements)
+    sides = elements[:, 4:8].ravel()  # each mid-side node is met by two elements at most
+    order = np.argsort(sides, kind="stable")
+    twice = np.flatnonzero(sides[order][1:] == sides[order][:-1])
+    beside = np.full(4 * count, -1)
+    beside[order[twice]], beside[order[twice + 1]] = order[twice + 1] // 4, order[twice] // 4
+    beside = beside.reshape(count, 4)
+    ways = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])
+    out = np.full((count, 2), np.nan)
+    for seed in range(count):
+        if not np.isnan(out[seed, 0]):
+            continue
+        out[seed] = 0.0
+        edge = np.array([seed])
+        while len(edge):
+            near = beside[edge]
+            new = (near >= 0) & np.isnan(out[near, 0])
+            out[near[new]] = (out[edge][:, None] + ways)[new]
+            edge = np.unique(near[new])
+    return out
 
 
 @dataclass(frozen=True, slots=True, eq=False)

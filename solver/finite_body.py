@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from solver import kernels
 from solver.elements import Q2P1
+from solver.elimination import Plan
 from solver.hyperelastic import Law
 from solver.mesh import Array, Indices, Mesh
 from solver.receptor import Endings
@@ -21,7 +22,7 @@ class FiniteBody:
     """Elements, their unknowns and the skin that may touch; e elements, n unknowns, k nodes of skin.
 
     The centre node of an element meets no other and is eliminated inside it; held nodes are fixed. What is left is
-    numbered as the mesh numbers its nodes, so a mesh numbered column by column has a narrow band.
+    numbered in the order of its elimination, the skin last.
     """
 
     mesh: Mesh
@@ -36,10 +37,8 @@ class FiniteBody:
     lame: Array  # (e,) [MPa]
     nodes: Narrow  # (e, 9)
     unknown: Narrow  # (e, 8, 2) of the outer nodes, -1 where fixed
-    first: Narrow  # (n,) first column of each row of the tangent that is not zero
-    last: Narrow  # (n,) last row of each column that is not zero, fill included
-    half: int  # half the bandwidth
-    skin: Narrow  # (k, 2) unknowns of the skin's nodes
+    plan: Plan  # of the elimination
+    held: Narrow  # (k,) 1 where a node of the skin is held
     middle: Narrow  # (k,) 1 at the middle of an edge of the skin, 0 at its ends
 
     @staticmethod
@@ -60,13 +59,7 @@ class FiniteBody:
         combination = np.asarray(np.linalg.inv(np.linalg.cholesky(mass)), np.float64)
         modes = raw @ np.swapaxes(combination, 1, 2)
 
-        unknown = np.zeros((len(mesh.nodes), 2), np.int64)
-        unknown[mesh.held] = -1
-        unknown[mesh.elements[:, 8]] = -1
-        free = unknown >= 0
-        unknown[free] = np.arange(int(free.sum()))
-        outer = unknown[mesh.elements[:, :8]]
-        first, last = _profile(outer.reshape(len(outer), 16), int(free.sum()))
+        plan = Plan.of(mesh)
         at_middle = (np.arange(len(mesh.skin)) % 2).astype(np.int32)
         return FiniteBody(
             mesh,
@@ -80,36 +73,26 @@ class FiniteBody:
             np.array([law.stiffening for law in laws])[mesh.region],
             np.array([law.lame for law in laws])[mesh.region],
             mesh.elements.astype(np.int32),
-            outer.astype(np.int32),
-            first,
-            last,
-            int((np.arange(len(first)) - first).max()),
-            unknown[mesh.skin].astype(np.int32),
+            plan.unknown.reshape(-1, 8, 2),
+            plan,
+            np.isin(mesh.skin, mesh.held).astype(np.int32),
             at_middle,
         )
 
     @property
+    def skin(self) -> Indices:
+        """Nodes of the skin that may touch (k,)."""
+        return self.mesh.skin
+
+    @property
     def size(self) -> int:
         """Number of unknowns after the centres are eliminated."""
-        return len(self.first)
+        return self.plan.size
 
     @property
     def dofs(self) -> int:
         """Number of unknown displacements, centres included."""
-        return len(self.first) + 2 * len(self.nodes)
-
-
-def _profile(unknown: Indices, size: int) -> tuple[Narrow, Narrow]:
-    """Return the first column of each row, and the last row of each column with the fill of elimination."""
-    low = np.where(unknown >= 0, unknown, size).min(axis=1)
-    first = np.arange(size)
-    spread = np.broadcast_to(low[:, None], unknown.shape)
-    inside = unknown >= 0
-    np.minimum.at(first, unknown[inside], spread[inside])
-    last = np.arange(size)
-    np.maximum.at(last, first, np.arange(size))
-    last = np.maximum.accumulate(last)
-    return first.astype(np.int32), last.astype(np.int32)
+        return self.plan.size + 2 * len(self.nodes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver import kernels
 from solver.finite_solution import FiniteFinger
 from solver.kernels import OPEN, SLIP, STICK
 from solver.mesh import Array
@@ -27,8 +26,6 @@ class FiniteStepper:
         """Start untouched, for a surface of friction `mu` and traction bound `tau` [MPa]."""
         newton = finger.newton
         self._finger, self._newton = finger, newton
-        self._reaction = np.empty((len(newton.body.skin), 2))
-        self._still = np.zeros(newton.body.size)
         self.mu, self.tau = mu, tau
         self.shape = Shape.undeformed(newton.body)
 
@@ -101,11 +98,11 @@ class FiniteStepper:
         if not newton.linearise(shape, pull, origin + pull.travel - before):
             return None
         steps = newton.steps
-        here = self._force(steps[:, EQUILIBRIUM].copy(), newton.force)
-        by_depth = self._force(steps[:, BY_DEPTH].copy(), self._still)
+        here = newton.reaction(steps[:, EQUILIBRIUM]).sum(axis=0)
+        by_depth = newton.reaction(steps[:, BY_DEPTH], still=True).sum(axis=0)
         deeper = along = 0.0
         if (shape.state == STICK).any():
-            by_travel = self._force(steps[:, BY_TRAVEL].copy(), self._still)
+            by_travel = newton.reaction(steps[:, BY_TRAVEL], still=True).sum(axis=0)
             matrix = np.array([[by_depth[1], by_travel[1]], [by_depth[0], by_travel[0]]])
             missing = np.array([normal - here[1], tangential - here[0]])
             det = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
@@ -124,9 +121,3 @@ class FiniteStepper:
         pull = pull._replace(depth=pull.depth + deeper, travel=pull.travel + along)
         after, largest, _ = newton.moved(shape, pull, step, origin + pull.travel - before)
         return after if largest < 5.0 else None
-
-    def _force(self, step: Array, force: Array) -> Array:
-        """Return the surface's force on the body (2,) at the end of `step`, or its change where `force` is zero."""
-        newton = self._newton
-        kernels.reactions(force, newton.body.skin, newton.rows, step, self._reaction)
-        return self._reaction.sum(axis=0)

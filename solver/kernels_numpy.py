@@ -58,13 +58,18 @@ def forces_and_tangents(body: FiniteBody, u: Array, pressure: Array) -> tuple[Ar
     return force.reshape(count, 18), tangent.reshape(count, 18, 18)
 
 
-def system(body: FiniteBody, u: Array, pressure: Array) -> tuple[Array, Array]:
-    """Return the internal forces (n,) and the tangent (n, n) with the elements' centres eliminated."""
+def without_centres(body: FiniteBody, u: Array, pressure: Array) -> tuple[Array, Array]:
+    """Return the forces (e, 16) and tangents (e, 16, 16) of the elements' outer nodes, their centres being free."""
     force, tangent = forces_and_tangents(body, u, pressure)
     inside = np.linalg.inv(tangent[:, 16:, 16:])
     across = tangent[:, :16, 16:] @ inside
     force = force[:, :16] - (across @ force[:, 16:, None])[:, :, 0]
-    tangent = tangent[:, :16, :16] - across @ tangent[:, 16:, :16]
+    return force, tangent[:, :16, :16] - across @ tangent[:, 16:, :16]
+
+
+def system(body: FiniteBody, u: Array, pressure: Array) -> tuple[Array, Array]:
+    """Return the internal forces (n,) and the tangent (n, n) with the elements' centres eliminated."""
+    force, tangent = without_centres(body, u, pressure)
     out, whole = np.zeros(body.size + 1), np.zeros((body.size + 1, body.size + 1))
     at = body.unknown.reshape(-1, 16)  # fixed unknowns, -1, go to the last place and are cut off
     np.add.at(out, at, force)
@@ -72,14 +77,13 @@ def system(body: FiniteBody, u: Array, pressure: Array) -> tuple[Array, Array]:
     return out[:-1], whole[:-1, :-1]
 
 
-def dense(band: Array) -> Array:
-    """Return the matrix (n, n) that a band (n, 2 h + 5) of `solver.kernels` stores."""
-    size, half = len(band), (band.shape[1] - 5) // 2
-    out = np.zeros((size, size))
-    for row in range(size):
-        low, high = max(0, row - half), min(size, row + half + 1)
-        out[row, low:high] = band[row, low - row + half : high - row + half]
-    return out
+def reduced(force: Array, tangent: Array, skin: int) -> tuple[Array, Array]:
+    """Return forces (m,) and stiffness (m, m) of the last `skin` = m unknowns, the others being free to move."""
+    inside = len(force) - skin
+    both = np.concatenate([tangent[:inside, inside:], force[:inside, None]], axis=1)
+    follow: Array = np.linalg.solve(tangent[:inside, :inside], both).astype(np.float64)
+    left = tangent[inside:, :inside] @ follow
+    return force[inside:] - left[:, -1], tangent[inside:, inside:] - left[:, :-1]
 
 
 def tributary(x: Array) -> Array:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver import kernels
+from solver.elimination import Elimination
 from solver.failures import NotConverged
 from solver.finite_body import FiniteBody
 from solver.kernels import OPEN
@@ -20,7 +21,7 @@ from solver.mesh import Array
 
 States = NDArray[np.int32]
 SHORTEST = 1.0 / 16.0  # part of a Newton step below which a body that turns inside out is given up
-EQUILIBRIUM, BY_DEPTH, BY_FRICTION, BY_TRAVEL = 0, 1, 2, 3  # columns of Iteration.steps
+EQUILIBRIUM, BY_DEPTH, BY_FRICTION, BY_TRAVEL = 0, 1, 2, 3  # columns of Newton.steps
 
 
 class Pull(NamedTuple):
@@ -75,56 +76,63 @@ class Newton:
 
     def __init__(self, body: FiniteBody) -> None:
         """Set memory aside for `body`."""
-        size, count, skin = body.size, len(body.nodes), len(body.skin)
+        count, skin = len(body.nodes), len(body.skin)
         self.body = body
-        self.band = np.zeros((size, 2 * body.half + 5))
-        self.force = np.zeros(size)
+        self.tangent = np.zeros((count, 16, 16))
+        self.force = np.zeros(body.size)
         self.fold, self.dilate = np.zeros((count, 2, 17)), np.zeros((count, 3, 18))
         self.volume = np.zeros((count, 3))
-        self.rows = np.zeros((skin, 2, 2 * body.half + 5))
-        self.steps = np.zeros((size, 4))
+        self.inside = Elimination(body.plan)
+        self.steps = np.zeros((2 * skin, 4))  # of the skin
         self.length = np.zeros(skin)
-        self.skin_nodes = body.mesh.skin.astype(np.int32)
-        self.skin_x, self.skin_y = body.mesh.nodes[body.mesh.skin].T.copy()
+        self.skin_x, self.skin_y = body.mesh.nodes[body.skin].T.copy()
+        self._felt = np.zeros(2 * skin)
+        self._free = np.zeros(2 * skin, np.int32)
+        self._matrix, self._right = np.zeros(4 * skin * skin), np.zeros((2 * skin, 4))
 
     def linearise(self, shape: Shape, pull: Pull, anchor: Array) -> bool:
-        """Fill the system at `shape` under `pull` and solve it into `steps` (n, 4); False where it cannot be.
+        """Set up the system at `shape` under `pull`, solve it for the skin's `steps` (2 k, 4); False where it fails.
 
         `anchor` (k,) are the positions along x where nodes stick [mm].
         """
         body = self.body
         least = kernels.assemble(
             shape.u, shape.pressure, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening,
-            body.lame, body.nodes, body.unknown, self.band, self.force, self.fold, self.dilate, self.volume,
+            body.lame, body.nodes, body.unknown, self.tangent, self.force, self.fold, self.dilate, self.volume,
         )  # fmt: skip
-        if not least > 0.0:
+        if not least > 0.0 or not self.inside.factorise(self.tangent):
             return False
-        x = self.skin_x + shape.u[self.skin_nodes, 0]
-        above = self.skin_y + shape.u[self.skin_nodes, 1] - pull.depth
+        self._felt = self.inside.condense(self.force)
+        x = self.skin_x + shape.u[body.skin, 0]
+        above = self.skin_y + shape.u[body.skin, 1] - pull.depth
         kernels.tributary(x, body.middle, self.length)
-        kernels.impose(
-            self.band, self.force, body.skin, body.middle, shape.state, shape.sense, pull.mu, pull.tau, above,
-            x - anchor, self.length, self.rows, self.steps,
+        size = kernels.impose(
+            self.inside.stiffness, self._felt, body.held, body.middle, shape.state, shape.sense, pull.mu, pull.tau,
+            above, x - anchor, self.length, self._free, self._matrix, self._right, self.steps,
         )  # fmt: skip
-        if kernels.factorise(self.band, body.first, body.last) == 0.0:
+        if not kernels.solve(self._matrix, self._right[:size], size):
             return False
-        kernels.substitute(self.band, body.first, body.last, self.steps)
-        return bool(np.isfinite(self.steps[-1, 0]))
+        self.steps[self._free[:size]] = self._right[:size]
+        return bool(np.isfinite(self.steps[:, EQUILIBRIUM]).all())
+
+    def reaction(self, skin: Array, *, still: bool = False) -> Array:
+        """Return the surface's forces on the skin (k, 2) at the end of its step (2 k,), or their change alone."""
+        out = self.inside.stiffness @ skin
+        return (out if still else out + self._felt).reshape(-1, 2)
 
     def moved(
-        self, shape: Shape, pull: Pull, step: Array, anchor: Array, scale: float = 1.0
+        self, shape: Shape, pull: Pull, skin: Array, anchor: Array, scale: float = 1.0
     ) -> tuple[Shape, float, int]:
-        """Return the shape after `step` (n,), its largest displacement [mm], and how many contact states it changed."""
+        """Return the shape after the skin's step (2 k,), its largest move [mm], and how many states it changed."""
         body = self.body
         u, pressure = np.empty_like(shape.u), np.empty_like(shape.pressure)
         largest = kernels.advance(
-            shape.u, shape.pressure, step, scale, body.nodes, body.unknown, body.lame, self.fold, self.dilate,
-            self.volume, u, pressure,
+            shape.u, shape.pressure, self.inside.unfold(skin), scale, body.nodes, body.unknown, body.lame, self.fold,
+            self.dilate, self.volume, u, pressure,
         )  # fmt: skip
-        state, sense, reaction = shape.state.copy(), shape.sense.copy(), np.empty((len(shape.state), 2))
-        kernels.reactions(self.force, body.skin, self.rows, step, reaction)
-        x = self.skin_x + u[self.skin_nodes, 0]
-        above = self.skin_y + u[self.skin_nodes, 1] - pull.depth
+        state, sense, reaction = shape.state.copy(), shape.sense.copy(), self.reaction(skin)
+        x = self.skin_x + u[body.skin, 0]
+        above = self.skin_y + u[body.skin, 1] - pull.depth
         kernels.tributary(x, body.middle, self.length)
         changed = kernels.restate(state, sense, reaction, above, x - anchor, self.length, pull.mu, pull.tau, pull.sense)
         return Shape(u, pressure, state, sense, reaction, pull, shape.iterations + 1), largest, changed
@@ -155,8 +163,8 @@ class Newton:
     def _entered(self, start: Shape, pull: Pull) -> Shape:
         """Return `start` with the states that `pull` brings at once: new contacts, and slip in its direction."""
         state, sense = start.state.copy(), start.sense.copy()
-        x = self.skin_x + start.u[self.skin_nodes, 0]
-        above = self.skin_y + start.u[self.skin_nodes, 1] - pull.depth
+        x = self.skin_x + start.u[self.body.skin, 0]
+        above = self.skin_y + start.u[self.body.skin, 1] - pull.depth
         kernels.tributary(x, self.body.middle, self.length)
         kernels.restate(state, sense, start.reaction, above, x - x, self.length, pull.mu, pull.tau, pull.sense)
         return replace(start, state=state, sense=sense)

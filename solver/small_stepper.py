@@ -11,10 +11,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from solver import kernels_contact
 from solver.contact import OPEN
 from solver.finger import FingerModel
-from solver.kernels_contact import LOST
+from solver.kernels.following import LOST, follow
 from solver.mesh import Array
 from solver.receptor import Endings
 
@@ -131,7 +130,7 @@ class SmallStepper:
         finger = self._finger
         pull = min(max(tangential, -self.mu * normal), self.mu * normal)
         slides = abs(pull) >= SLIDING * self._most(normal)
-        ended = kernels_contact.follow(
+        ended = follow(
             finger.gap, finger.length, finger.compliance, self.mu, self.tau, normal, pull, slides, self._anchor,
             self.state, self._sense, self._force, self._moved, self._motion,
         )  # fmt: skip

@@ -23,7 +23,7 @@ def assembled(body, u, pressure):
     newton = Newton(body)
     least = kernels.assemble(
         u, pressure, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening, body.lame,
-        body.nodes, body.unknown, newton.band, newton.force, newton.fold, newton.dilate, newton.volume,
+        body.nodes, body.unknown, newton.tangent, newton.force, newton.fold, newton.dilate, newton.volume,
     )  # fmt: skip
     return newton, least
 
@@ -36,9 +36,10 @@ def test_compiled_forces_and_tangent_agree_with_the_plain_ones(law):
     body, u = distorted(law)
     pressure = np.random.default_rng(2).normal(0.0, 0.01, (len(body.nodes), 3))
     newton, least = assembled(body, u, pressure)
-    force, tangent = kernels_numpy.system(body, u, pressure)
+    force, _ = kernels_numpy.system(body, u, pressure)
+    _, tangent = kernels_numpy.without_centres(body, u, pressure)
     np.testing.assert_allclose(newton.force, force, atol=1e-13 * np.abs(tangent).max())
-    np.testing.assert_allclose(kernels_numpy.dense(newton.band), tangent, atol=1e-12 * np.abs(tangent).max())
+    np.testing.assert_allclose(np.tril(newton.tangent), np.tril(tangent), atol=1e-12 * np.abs(tangent).max())
     assert least == pytest.approx(np.linalg.det(kernels_numpy.deformation(body, u)).min(), rel=1e-12)
 
 
@@ -58,16 +59,39 @@ def test_forces_are_the_derivative_of_the_energy_and_the_tangent_that_of_the_for
     np.testing.assert_allclose((ahead - behind) / (2 * h), change, atol=1e-7 * np.abs(change).max())
 
 
-@pytest.mark.parametrize("columns", [1, 2, 5])
-def test_band_factors_solve_what_a_dense_solver_solves(columns):
-    body = FiniteBody.of(block(columns=columns, rows=3, distortion=0.1), [NeoHooke(0.08, 0.48)])
-    newton, _ = assembled(body, np.zeros(body.mesh.nodes.shape), np.zeros((len(body.nodes), 3)))
-    matrix = kernels_numpy.dense(newton.band)
-    right = np.random.default_rng(0).normal(size=(body.size, 4))
-    solution = right.copy()
-    assert kernels.factorise(newton.band, body.first, body.last) > 0.0
-    kernels.substitute(newton.band, body.first, body.last, solution)
-    np.testing.assert_allclose(solution, np.linalg.solve(matrix, right), rtol=1e-9, atol=1e-9)
+@pytest.mark.parametrize("columns", [1, 2, 5, 12])
+@pytest.mark.parametrize("held", ["top", "sides and top"])
+def test_the_body_eliminated_part_by_part_is_the_body_solved_at_once(columns, held):
+    body = FiniteBody.of(block(columns=columns, rows=3, distortion=0.1, held=held), [NeoHooke(0.08, 0.48)])
+    u = np.zeros(body.mesh.nodes.shape)
+    newton, _ = assembled(body, u, np.zeros((len(body.nodes), 3)))
+    _, tangent = kernels_numpy.system(body, u, np.zeros((len(body.nodes), 3)))
+    force = np.random.default_rng(0).normal(size=body.size)
+    skin = np.random.default_rng(1).normal(size=2 * len(body.skin))
+    felt, stiffness = kernels_numpy.reduced(force, tangent, len(skin))
+    assert newton.inside.factorise(newton.tangent)
+    np.testing.assert_allclose(newton.inside.condense(force), felt, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(newton.inside.stiffness, stiffness, rtol=1e-9, atol=1e-12 * np.abs(stiffness).max())
+    inside = body.size - len(skin)
+    for still, load in ((False, force), (True, np.zeros(body.size))):
+        expected = np.linalg.solve(tangent[:inside, :inside], -load[:inside] - tangent[:inside, inside:] @ skin)
+        found = newton.inside.unfold(skin, still=still)
+        np.testing.assert_allclose(found, np.r_[expected, skin], rtol=1e-9, atol=1e-9)
+
+
+def test_a_tangent_without_stiffness_cannot_be_eliminated():
+    newton = Newton(FiniteBody.of(block(), [NeoHooke(0.08, 0.48)]))
+    assert not newton.inside.factorise(np.zeros_like(newton.tangent))
+
+
+def test_the_system_of_contact_is_solved_as_a_dense_solver_solves_it():
+    rng = np.random.default_rng(0)
+    for size in range(1, 12):
+        matrix, right = rng.normal(size=(size, size)) + 4.0 * np.eye(size), rng.normal(size=(size, 4))
+        solution = right.copy()
+        assert kernels.solve(np.r_[matrix.ravel(), 7.0], solution, size)
+        np.testing.assert_allclose(solution, np.linalg.solve(matrix, right), rtol=1e-9)
+    assert not kernels.solve(np.zeros(4), np.ones((2, 4)), 2)
 
 
 def test_tributary_lengths_add_up_and_agree_with_the_plain_ones():
@@ -94,7 +118,9 @@ def test_contact_rows_are_the_derivatives_of_their_conditions():
         place = at.place(body)
         length = kernels_numpy.tributary(place[:, 0])
         out = force.copy()
-        for i, (x, y) in enumerate(body.skin):
+        for i in range(len(body.skin)):
+            x = body.size - 2 * len(body.skin) + 2 * i
+            y = x + 1
             if state[i] != OPEN:
                 out[y] = place[i, 1] - pull.depth
             if state[i] == STICK:
@@ -109,7 +135,7 @@ def test_contact_rows_are_the_derivatives_of_their_conditions():
     u = equilibrated(body, u)
     here, shape = conditions(u)
     assert newton.linearise(shape, pull, anchor)
-    step = newton.steps[:, 0] * 1e-5
+    step = newton.inside.unfold(newton.steps[:, 0]) * 1e-5
     u_new = np.empty_like(u)
     kernels.advance(
         u, shape.pressure, step, 1.0, body.nodes, body.unknown, body.lame, newton.fold, newton.dilate, newton.volume,

@@ -1,0 +1,151 @@
+"""The order in which a symmetric body is eliminated down to its skin, as the arrays that the compiled loops ask for."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver import kernels
+from solver.dissection import Tree, places
+from solver.mesh import Array, Indices, Mesh
+
+Narrow = NDArray[np.int32]
+LEAF: Final = 4  # elements in a part that is not halved any more
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """Parts of a body, p of them, children before parents, and the unknowns n that each eliminates.
+
+    Unknowns are numbered in the order of their elimination; those of the skin, m, come last: x, y of each of its nodes.
+    """
+
+    unknown: Narrow  # (e, 16) of the elements' outer nodes, -1 where fixed
+    size: int  # n
+    start: Narrow  # (p,) first unknown eliminated in each part
+    inner: Narrow  # (p,) how many are
+    border: Narrow  # (p,) how many are passed on
+    children: Narrow  # (p, 2) parts joined in each, -1 in a leaf
+    border_at: Narrow  # (p,) where each part's border begins in `numbers` and `place`
+    numbers: Narrow  # unknowns of all borders
+    place: Narrow  # where each of them stands in the front of the parent
+    factor_at: Indices  # (p,) where each part's factor begins
+    wait_at: Indices  # (p,) where each part's border waits for the parent
+    leaf: Narrow  # (p, 2) range of `order` that belongs to each leaf
+    order: Narrow  # (e,) elements, leaf after leaf
+    at: Narrow  # (e, 16) in that order: where an element's unknowns stand in the front of its leaf, -1 where fixed
+    factors: int  # numbers that all factors hold
+    waiting: int  # numbers that wait at once
+
+    @staticmethod
+    def of(mesh: Mesh) -> "Plan":
+        """Plan the elimination of `mesh`, the centres of its elements already eliminated inside them."""
+        raw = (2 * mesh.elements[:, :8, None] + np.arange(2)).reshape(-1, 16)
+        skin = (2 * mesh.skin[:, None] + np.arange(2)).ravel()
+        fixed = np.concatenate([2 * mesh.held, 2 * mesh.held + 1])
+        tree = Tree.of(raw, places(mesh.elements), fixed, skin, LEAF)
+        number = np.full(2 * len(mesh.nodes), -1)
+        sequence = np.concatenate([*(part.inner for part in tree.parts), skin])
+        number[sequence] = np.arange(len(sequence))
+        total = len(sequence)
+        borders = [np.sort(number[part.border]) for part in tree.parts]
+        inner = np.array([len(part.inner) for part in tree.parts])
+        border = np.array([len(b) for b in borders])
+        start = np.concatenate([[0], np.cumsum(inner)[:-1]])
+        border_at = np.concatenate([[0], np.cumsum(border)[:-1]])
+        place = np.zeros(int(border.sum()), np.int32)
+        children = np.full((len(border), 2), -1)
+        leaf = np.zeros((len(border), 2), np.int64)
+        at = np.full((len(tree.order), 16), -1)
+        where = np.full(total + 1, -1)  # the last place is that of fixed unknowns, whose number is -1
+        number[fixed] = -1
+        for p, part in enumerate(tree.parts):
+            where[start[p] : start[p] + inner[p]] = np.arange(inner[p])
+            where[borders[p]] = inner[p] + np.arange(border[p])
+            if part.children:
+                children[p] = part.children
+                for child in part.children:
+                    place[border_at[child] : border_at[child] + border[child]] = where[borders[child]]
+            else:
+                leaf[p] = part.elements.start, part.elements.stop
+                at[part.elements] = where[number[raw[tree.order[part.elements]]]]
+        sizes = inner * (inner + border)
+        wait_at, waiting = _waiting(children, border)
+        return Plan(
+            unknown=_narrow(number[raw]),
+            size=total,
+            start=_narrow(start),
+            inner=_narrow(inner),
+            border=_narrow(border),
+            children=_narrow(children),
+            border_at=_narrow(border_at),
+            numbers=_narrow(np.concatenate(borders)),
+            place=place,
+            factor_at=np.cumsum(sizes) - sizes,
+            wait_at=wait_at,
+            leaf=_narrow(leaf),
+            order=_narrow(tree.order),
+            at=_narrow(at),
+            factors=int(sizes.sum()),
+            waiting=waiting,
+        )
+
+
+def _narrow(numbers: Indices) -> Narrow:
+    return numbers.astype(np.int32)
+
+
+def _waiting(children: Indices, border: Indices) -> tuple[Indices, int]:
+    """Return where each part's border waits for its parent: a place for each generation's first and second child."""
+    level = np.zeros(len(border), np.int64)
+    second = np.zeros(len(border), np.int64)
+    for p in range(len(border) - 1, -1, -1):
+        for turn, child in enumerate(children[p]):
+            if child >= 0:
+                level[child], second[child] = level[p] + 1, turn
+    slot = 2 * level + second
+    room = np.zeros(int(slot.max()) + 1, np.int64)
+    np.maximum.at(room, slot, border * border)
+    return (np.cumsum(room) - room)[slot], int(room.sum())
+
+
+class Elimination:
+    """One body's tangent, eliminated again and again; the memory is set aside once."""
+
+    def __init__(self, plan: Plan) -> None:
+        """Set memory aside for `plan`."""
+        skin = int(plan.border[-1])
+        self.plan = plan
+        self.stiffness = np.zeros((skin, skin))  # what is left of the tangent for the skin
+        self.carried = np.zeros(plan.size)  # L^-1 force, the skin's condensed forces at the end
+        self._still = np.zeros(plan.size)
+        self._factors, self._waiting = np.empty(plan.factors), np.empty(plan.waiting)
+        self._near = np.empty(int(plan.border.max()))
+
+    def factorise(self, tangent: Array) -> bool:
+        """Eliminate the elements' tangents (e, 16, 16), lower halves; False where that is not possible."""
+        p = self.plan
+        return kernels.eliminate(
+            tangent, p.start, p.inner, p.border, p.children, p.border_at, p.place, p.factor_at, p.wait_at, p.leaf,
+            p.order, p.at, self._factors, self._waiting, self.stiffness,
+        )  # fmt: skip
+
+    def condense(self, force: Array) -> Array:
+        """Return the forces (m,) that the skin feels of `force` (n,), all of it being kept for `unfold`."""
+        p = self.plan
+        self.carried[:] = force
+        kernels.condense(
+            self.carried, p.start, p.inner, p.border, p.border_at, p.numbers, p.factor_at, self._factors
+        )  # fmt: skip
+        return self.carried[p.size - len(self.stiffness) :]
+
+    def unfold(self, skin: Array, *, still: bool = False) -> Array:
+        """Return all displacements (n,) for the skin's (m,), balancing the forces condensed last, or none of them."""
+        p = self.plan
+        out = np.empty(p.size)
+        kernels.unfold(
+            self._still if still else self.carried, skin, p.start, p.inner, p.border, p.border_at, p.numbers,
+            p.factor_at, self._factors, self._near, out,
+        )  # fmt: skip
+        return out

@@ -1,0 +1,26 @@
+"""The compiled loops of the finite-strain solver, and the only modules that are compiled (numba, cached on disk).
+
+`solver.kernels_numpy` says the same in plain NumPy; the tests compare the two.
+"""
+
+from solver.kernels.compiling import CAP, OPEN, SLIP, STICK
+from solver.kernels.elements import advance, assemble, energies
+from solver.kernels.fronts import condense, eliminate, unfold
+from solver.kernels.skin import impose, restate, solve, tributary
+
+__all__ = [
+    "CAP",
+    "OPEN",
+    "SLIP",
+    "STICK",
+    "advance",
+    "assemble",
+    "condense",
+    "eliminate",
+    "energies",
+    "impose",
+    "restate",
+    "solve",
+    "tributary",
+    "unfold",
+]
