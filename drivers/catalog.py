@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from drivers.address import Address, AddressError, parse_address
 from drivers.clock import Clock
 from drivers.digital_ft.handshake import identify_digital_ft, open_digital_ft
+from drivers.labjack_u6.handshake import identify_labjack_u6, open_labjack_u6
 from drivers.links import UdpLink
 from drivers.net_ft import handshake
 from drivers.net_ft.device import NetFtTransducer
@@ -50,6 +51,7 @@ DRIVERS: tuple[Driver, ...] = (
     Driver("net-ft", _open_net_ft, _identify_net_ft, ("net-ft://192.168.1.1",)),
     Driver("serial-ft", open_serial_ft, identify_serial_ft, ()),
     Driver("digital-ft", open_digital_ft, identify_digital_ft, ()),
+    Driver("labjack-u6", open_labjack_u6, identify_labjack_u6, ("labjack-u6://",)),
 )
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from drivers.clock import Clock
 from simulators.bench import Bench
 from simulators.faults import Faults
+from simulators.gauges import FT32831
 from simulators.pseudo_terminal import PseudoTerminal
 
 Array = NDArray[np.float64]
@@ -29,17 +30,6 @@ _START_UP = 0.2  # after power-up [s]
 _NAP = 0.005  # longest wait [real s]
 _SHORTEST_NAP = 0.001
 _BURST = 700  # packets at one go after the computer was busy
-# A published calibration of a Nano43 (FT32831), N and N mm per volt of gauge.
-_MATRIX = np.array(
-    [
-        [0.02098, -0.02876, -0.05237, 4.51544, -0.05447, -4.46284],
-        [-0.13719, -5.12368, -0.04217, 2.58695, 0.04008, 2.52214],
-        [2.97639, -0.01655, 3.01180, 0.02275, 3.00141, 0.01232],
-        [-0.80476, -23.09345, 43.58858, 12.00245, -43.41430, 11.27584],
-        [-50.56376, 0.53041, 25.49010, -20.29578, 25.13749, 20.18422],
-        [-1.25627, -38.28410, 0.53176, -37.15623, -0.42515, -37.35515],
-    ]
-)
 
 
 class DigitalFtBox:
@@ -63,7 +53,7 @@ class DigitalFtBox:
         self._rate = RATE * (1.0 + rate_error)
         self._faults = faults or Faults()
         self._rated = np.array(bench.settings.rated)
-        self._gauges = np.linalg.inv(_MATRIX) * COUNTS_PER_VOLT  # counts for one N or N mm
+        self._gauges = np.linalg.inv(FT32831) * COUNTS_PER_VOLT  # counts for one N or N mm
         self._stored = self._calibration()
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
@@ -102,7 +92,7 @@ class DigitalFtBox:
     def _calibration(self) -> bytes:
         """Return the registers of calibration 1."""
         serial = f"SIM{self._bench.seed:05d}".encode()[:8]
-        stated = np.vstack([_MATRIX[:3], _MATRIX[3:] / 1000.0]) * (_COUNTS / COUNTS_PER_VOLT)
+        stated = np.vstack([FT32831[:3], FT32831[3:] / 1000.0]) * (_COUNTS / COUNTS_PER_VOLT)
         ratings = np.concatenate([self._rated[:3], self._rated[3:] / 1000.0])
         names = (
             serial.ljust(8, b"\0") + b"SIMULATED SI-36-0.5".ljust(32, b"\0") + b"DIG\0" + b"2026/11/21".ljust(20, b"\0")

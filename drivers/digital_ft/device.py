@@ -6,6 +6,7 @@ import time
 
 from drivers.digital_ft import wire
 from drivers.links import Link
+from drivers.pacing import Pacing
 from drivers.records import RecordDecoder
 from drivers.transducer import DeviceFault, LinkLost
 
@@ -30,6 +31,10 @@ class DigitalConversation:
     def decoder(self) -> RecordDecoder:
         """Return a decoder for a stream about to begin."""
         return wire.StreamDecoder()
+
+    def numbering(self, rate: float, factor: float) -> Pacing:
+        """Return what numbers the stream: its records carry neither number nor time."""
+        return Pacing(rate, factor)
 
     def begin(self, link: Link) -> bytes:
         """Put the calibration's gains and offsets in force, prove it, and let the transducer stream.

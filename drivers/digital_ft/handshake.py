@@ -10,7 +10,7 @@ from drivers.digital_ft import device, wire
 from drivers.digital_ft.device import DigitalConversation
 from drivers.pacing import GAP
 from drivers.serial_link import Parity, SerialLink, port_of
-from drivers.serial_stream import StreamingTransducer, measured_rate
+from drivers.streaming import StreamingTransducer, measured_rate
 from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo
 
 _MEASURED = 0.5  # for how long the stream is watched to learn its rate [real s]

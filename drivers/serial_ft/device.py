@@ -4,6 +4,7 @@ import contextlib
 import time
 
 from drivers.links import Link
+from drivers.pacing import Pacing
 from drivers.records import RecordDecoder
 from drivers.serial_ft import wire
 from drivers.transducer import DeviceFault, LinkLost
@@ -30,6 +31,10 @@ class ControllerConversation:
     def decoder(self) -> RecordDecoder:
         """Return a decoder for the records asked for."""
         return wire.BinaryDecoder() if self._binary else wire.AsciiDecoder()
+
+    def numbering(self, rate: float, factor: float) -> Pacing:
+        """Return what numbers the stream: its records carry neither number nor time."""
+        return Pacing(rate, factor)
 
     def begin(self, link: Link) -> bytes:
         """Set the controller up and let it stream; return what it streamed already. Raises LinkLost, DeviceFault."""

@@ -13,7 +13,7 @@ from drivers.clock import Clock
 from drivers.pacing import GAP
 from drivers.serial_ft.device import ControllerConversation, banner, prompted
 from drivers.serial_link import SerialLink, port_of
-from drivers.serial_stream import StreamingTransducer, measured_rate
+from drivers.streaming import StreamingTransducer, measured_rate
 from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo
 
 BAUDS = (38400, 9600, 115200, 19200, 57600, 4800)  # tried in this order; published drivers disagree on the usual one

@@ -41,12 +41,13 @@ def net_ft(faults):
 
 SIMULATORS = {"net-ft": net_ft}  # a driver's name: how its simulator is made
 # A serial line has no sequence numbers and one user: repeated, late and stalled records cannot be told on it, and none
-# can ask who is there while it is in use. tests/drivers/test_serial_wires.py holds these to what a line allows.
-WITHOUT_NUMBERS = {"serial-ft", "digital-ft"}
+# can ask who is there while it is in use. tests/drivers/test_serial_wires.py holds these to what a line allows, and
+# tests/drivers/labjack_u6 the one on USB, which has one user too and whose simulator is no address.
+ONE_USER = {"serial-ft", "digital-ft", "labjack-u6"}
 
 
-def test_every_driver_has_a_simulator_here_or_is_held_to_what_a_serial_line_allows():
-    assert {driver.name for driver in DRIVERS} == SIMULATORS.keys() | WITHOUT_NUMBERS
+def test_every_driver_has_a_simulator_here_or_is_held_to_what_its_line_allows():
+    assert {driver.name for driver in DRIVERS} == SIMULATORS.keys() | ONE_USER
 
 
 @pytest.fixture(params=sorted(SIMULATORS))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers import serial_stream
+from drivers import streaming
 from drivers.address import parse_address
 from drivers.clock import Clock, PacedClock
 from drivers.digital_ft import handshake as digital_ft_handshake
@@ -205,7 +205,7 @@ def survives(device, kind):
 
 
 def test_a_device_that_goes_away_is_lost_in_one_sentence(simulator, monkeypatch):
-    monkeypatch.setattr(serial_stream, "_SILENCE", 0.8)
+    monkeypatch.setattr(streaming, "_SILENCE", 0.8)
     device = simulator()
     transducer = device.open()
     transducer.start()

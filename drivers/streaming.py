@@ -1,4 +1,4 @@
-"""A transducer that streams unnumbered records over a line: thread, times, loss and return. Its wire is told to it."""
+"""A transducer that streams records without full numbers: thread, times, loss and return. Its wire is told to it."""
 
 import threading
 import time
@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.clock import Clock
 from drivers.links import Link
-from drivers.pacing import Paced, Pacing
+from drivers.pacing import Paced
 from drivers.readings import ReadingBlock
 from drivers.records import RecordDecoder, Records
 from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, TransducerInfo
@@ -23,6 +24,27 @@ _FIRST = 3.0  # until a device that never sent a record is given up, beyond what
 _QUIET = 0.3  # without a whole record, after which the device is asked to stream again
 _SILENCE = 5.0  # without a whole record, after which it is given up
 _BACK_OFF = (0.05, 0.1, 0.2, 0.4)  # between two tries to bring it back; the last one again and again
+
+
+class Numbering(Protocol):
+    """Gives records their numbers and times; `drivers.pacing.Pacing` where the host's clock must, for one."""
+
+    @property
+    def lost(self) -> int:
+        """Numbers that no record has."""
+        ...
+
+    def take(self, damaged: NDArray[np.int64], received_ns: int) -> Paced:
+        """Place n records that arrived together, broken ones counted before each (n,), and any kept back before."""
+        ...
+
+    def release(self) -> Paced:
+        """Place what was kept back, as at the end of the stream."""
+        ...
+
+    def bridge(self, received_ns: int) -> None:
+        """Let the stream, begun anew, go on at `received_ns` behind a gap of at least one record."""
+        ...
 
 
 class Conversation(Protocol):
@@ -46,6 +68,10 @@ class Conversation(Protocol):
 
     def decoder(self) -> RecordDecoder:
         """Return a decoder for a stream about to begin."""
+        ...
+
+    def numbering(self, rate: float, factor: float, /) -> Numbering:
+        """Return what numbers a stream of `rate` [Hz] by a session clock that runs `factor` times real time."""
         ...
 
 
@@ -113,8 +139,8 @@ class _Arrived:
 class StreamingTransducer:
     """One device at the end of a line that is opened at each start. A thread takes and decodes what comes.
 
-    The records carry neither number nor time: both are made here (see `drivers.pacing`). `counter` is the number.
-    A loss is named by missing numbers; so is the time in which the line was pulled or the device was off.
+    Number and time of each record come from the conversation's numbering. `counter` is the number. A loss is named by
+    missing numbers; so is the time in which the line was pulled or the device was off.
     """
 
     def __init__(
@@ -205,7 +231,7 @@ class StreamingTransducer:
         self._arrived.clear()
         self._stopping.clear()
         self._ended: LinkLost | SetupError | DeviceFault | None = None
-        self._pacing = Pacing(self._info.rate, self._clock.factor)
+        self._pacing = self._conversation.numbering(self._info.rate, self._clock.factor)
         self._unpaced: list[_Arrived] = []  # arrivals that pacing keeps back
         self._ready: list[ReadingBlock] = []
         self._received = self._restarted = self._saturated = 0

@@ -1,0 +1,1 @@
+"""The LabJack U6: six gauge voltages over USB."""

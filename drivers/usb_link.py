@@ -1,0 +1,102 @@
+"""A USB device as a link: requests and their answers on one pair of endpoints, a stream on a third."""
+
+import errno
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import usb.core  # pyright: ignore[reportMissingTypeStubs]
+import usb.util  # pyright: ignore[reportMissingTypeStubs]
+
+from drivers.transducer import LinkLost, SetupError
+
+_core: Any = usb.core  # it carries no types
+_util: Any = usb.util
+BACKEND: Any = None  # of pyusb: None takes the system's; a simulated bus is put here
+_PACKETS = 64  # taken at one go while they come without a pause
+_PAUSE_MS = 2
+_LARGEST = 64  # bytes in a packet of a full-speed bulk endpoint
+_WRITE_MS = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoints:
+    """Addresses of a device's bulk endpoints."""
+
+    requests: int
+    answers: int
+    stream: int
+
+
+class UsbLink:
+    """One device, which nobody else can open meanwhile. What is received after a request is its answer."""
+
+    def __init__(self, device: Any, endpoints: Endpoints, where: str) -> None:  # noqa: ANN401 - pyusb has no types
+        """Take a device that was found. Raises SetupError when another program has it or it is not permitted."""
+        self._device = device
+        self._endpoints = endpoints
+        self._where = where
+        self._asked = False
+        try:
+            try:
+                device.get_active_configuration()
+            except _core.USBError:
+                device.set_configuration()
+            _util.claim_interface(device, 0)
+        except _core.USBError as error:
+            _util.dispose_resources(device)
+            raise SetupError(f"{where} cannot be opened: {_reason(error)}") from None
+
+    def send(self, data: bytes) -> None:
+        """Send a request. Raises LinkLost when the device is gone."""
+        try:
+            self._device.write(self._endpoints.requests, data, _WRITE_MS)
+        except _core.USBError as error:
+            raise LinkLost(f"{self._where} takes no bytes any more: {_reason(error)}") from None
+        self._asked = True
+
+    def receive(self, timeout: float) -> bytes | None:
+        """Return the answer to the request before, or what the stream brings; None when nothing came in `timeout` s."""
+        asked, self._asked = self._asked, False
+        endpoint = self._endpoints.answers if asked else self._endpoints.stream
+        parts: list[bytes] = []
+        wait_ms = max(round(timeout * 1000), 1)
+        while len(parts) < (1 if asked else _PACKETS):
+            try:
+                parts.append(bytes(self._device.read(endpoint, _LARGEST, wait_ms)))
+            except _core.USBTimeoutError:
+                break
+            except _core.USBError as error:
+                if parts:
+                    break  # the next call tells
+                raise LinkLost(f"{self._where} is gone: {_reason(error)}") from None
+            wait_ms = _PAUSE_MS
+        return b"".join(parts) or None
+
+    def close(self) -> None:
+        """Give the device back. Harmless when repeated."""
+        _util.dispose_resources(self._device)
+
+
+def found(vendor: int, product: int) -> Sequence[Any]:
+    """Return the devices of a kind that are plugged in. Raises SetupError where USB cannot be used."""
+    try:
+        devices: Any = _core.find(find_all=True, idVendor=vendor, idProduct=product, backend=BACKEND)
+        return tuple(devices)
+    except _core.NoBackendError:
+        raise SetupError("USB cannot be used: install the system package libusb-1.0-0 (macOS: libusb)") from None
+    except _core.USBError as error:
+        raise SetupError(f"USB cannot be used: {_reason(error)}") from None
+
+
+def _reason(error: OSError) -> str:
+    """Return why it failed and what to do."""
+    match error.errno:
+        case errno.EBUSY:
+            return "another program has it; end that program"
+        case errno.EACCES | errno.EPERM:
+            return "you may not use it; install the udev rule that LabJack gives, then put its plug in again"
+        case errno.ENODEV | errno.EIO | errno.EPIPE:
+            return "it was pulled out or switched off; check its plug"
+        case _:
+            return f"{(error.strerror or 'no reason given').lower()}; check its plug"

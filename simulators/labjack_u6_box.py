@@ -1,0 +1,215 @@
+"""A LabJack U6 with the six gauges of a simulated transducer on its differential inputs; bytes in, bytes out.
+
+Commands, memory and stream after LabJack's U6 User's Guide (sections 3.2 and 5), packed here and nowhere else.
+"""
+
+import threading
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import Clock
+from simulators.bench import Bench
+from simulators.faults import Faults
+from simulators.gauges import FT32831
+
+Array = NDArray[np.float64]
+
+ROOM = 984  # readings the converter keeps for a computer that is late
+_NAP = 0.0005  # [real s]
+_VOLTS_PER_CODE = 3.1572e-4  # this unit's, near the nominal 3.1580578e-4
+_VOLTS_PER_CODE_BELOW = -3.1585e-4
+_ZERO_CODE = 33519.5
+_OFFSETS = np.array([0.31, -0.12, 0.85, 0.06, -0.44, 0.2])  # of the mounted gauges [V]
+_NOTHING_STREAMS = 52
+
+
+class LabJackU6Box:
+    """One converter. Its time, and the bench's, begins when it is made; it is switched by whoever plugs it in."""
+
+    def __init__(self, bench: Bench, clock: Clock, *, serial: int = 360_000_001, faults: Faults | None = None) -> None:
+        """Set up a converter of that serial number."""
+        self.bench = bench
+        self.serial = serial
+        self._clock = clock
+        self._faults = faults or Faults()
+        self._gauges = np.linalg.inv(FT32831)  # V for one N or N mm
+        self._lock = threading.Lock()
+        self._origin_ns = clock.now_ns()
+        self._switch_on()
+
+    def now(self) -> float:
+        """Return the box's and the bench's time [s]: 0 when it was made."""
+        return (self._clock.now_ns() - self._origin_ns) * 1e-9
+
+    @property
+    def is_plugged(self) -> bool:
+        """Whether the computer sees it; it loses its power with the plug."""
+        away = any(self._faults.active(kind, self.now()) for kind in ("unplug", "reboot"))
+        if away:
+            with self._lock:
+                self._switch_on()
+        return not away
+
+    def command(self, request: bytes) -> None:
+        """Take a request; its answer is ready at once."""
+        with self._lock:
+            self._answer = self._answered(request)
+
+    def answer(self) -> bytes | None:
+        """Return the answer to the last request, once."""
+        with self._lock:
+            answer, self._answer = self._answer, None
+        return answer
+
+    def streamed(self, patience: float) -> bytes | None:
+        """Return the next stream packet, or None when none came within `patience` real seconds."""
+        deadline = time.monotonic() + patience
+        while True:
+            with self._lock:
+                self._convert()
+                self._send()
+                if self._leaving:
+                    return self._leaving.pop(0)
+            if time.monotonic() >= deadline or not self.is_plugged:
+                return None
+            time.sleep(_NAP)
+
+    def _switch_on(self) -> None:
+        """Forget what power-off forgets."""
+        self._answer: bytes | None = None
+        self._scan: tuple[list[int], int, float] | None = None  # channels, readings a packet, scans a second
+        self._streams = False
+        self._buffer: list[int] = []  # codes converted and not sent
+        self._leaving: list[bytes] = []
+        self._missed = 0  # scans thrown away since the buffer was full
+        self._report: tuple[int, int] | None = None  # where in the buffer scans are missing, and how many
+
+    def _answered(self, request: bytes) -> bytes:
+        if request == b"\xa8\xa8":
+            error = 48 if self._streams else 50 if self._scan is None else 0
+            if not error:
+                self._begin()
+            return _short(0xA9, error)
+        if request == b"\xb0\xb0":
+            error = 0 if self._streams else _NOTHING_STREAMS
+            self._streams = False
+            return _short(0xB1, error)
+        if len(request) < 8 or not _sums_agree(request):
+            return b"\xb8\xb8"
+        number, body = request[3], request[6:]
+        if number == 0x08:
+            return _long(0x08, self._identity())
+        if number == 0x2D:
+            return _long(0x2D, bytes(2) + self._memory(body[1])) if body[1] <= 9 else _long(0x2D, bytes([26, 0]))
+        if number == 0x11:
+            return _long(0x11, bytes([self._configured(body), 0]))
+        return _long(number, bytes([5, 0]))
+
+    def _identity(self) -> bytes:
+        data = bytearray(32)
+        data[3:5] = bytes([45, 1])  # firmware 1.45
+        data[9:13] = self.serial.to_bytes(4, "little")
+        data[13:15] = (6).to_bytes(2, "little")
+        data[31] = 4
+        return bytes(data)
+
+    def _memory(self, block: int) -> bytes:
+        """Return four numbers of 32 bits before and 32 behind the point."""
+        gains = (1.0, 0.1, 0.01, 0.001)
+        first = 0 if block in (0, 2) else 2
+        numbers = [0.0] * 4
+        if block in (0, 1):
+            numbers = [x for g in gains[first : first + 2] for x in (_VOLTS_PER_CODE * g, -10.58 * g)]
+        elif block in (2, 3):
+            numbers = [x for g in gains[first : first + 2] for x in (_VOLTS_PER_CODE_BELOW * g, _ZERO_CODE)]
+        return b"".join(round(x * 2**32).to_bytes(8, "little", signed=True) for x in numbers)
+
+    def _configured(self, body: bytes) -> int:
+        """Take the settings of a stream; return the error code, 0 for none."""
+        count, _, samples, _, _, flags = body[:6]
+        interval = int.from_bytes(body[6:8], "little")
+        channels = [(body[8 + 2 * i], body[9 + 2 * i]) for i in range(count)] if len(body) == 8 + 2 * count else []
+        if self._streams:
+            return 48
+        if not channels or any(options != 0x80 or channel % 2 or channel > 10 for channel, options in channels):
+            return 49
+        if not 1 <= samples <= 25:
+            return 56
+        rate = (48e6 if flags & 8 else 4e6) / (256 if flags & 2 else 1) / max(interval, 1)
+        if interval == 0 or rate * count > 50_000:
+            return 58
+        self._scan = ([channel // 2 for channel, _ in channels], samples, rate)
+        return 0
+
+    def _begin(self) -> None:
+        self._streams = True
+        self._begun = self.now()
+        self._done = 0  # scans converted since
+        self._sent = 0  # packets of this stream
+        self._buffer, self._leaving, self._missed, self._report = [], [], 0, None
+
+    def _convert(self) -> None:
+        """Convert what is due. A full buffer throws the newest away until half of it is sent, then says how many."""
+        if not self._streams or self._scan is None:
+            return
+        gauges, _, rate = self._scan
+        due = int((self.now() - self._begun) * rate)
+        times = self._begun + np.arange(self._done, due) / rate
+        self._done = max(due, self._done)
+        room = (ROOM - len(self._buffer)) // len(gauges)
+        if self._missed and room > ROOM // len(gauges) // 2:
+            # One scan of ones stands for those lost; the guide counts it among them.
+            self._report = (len(self._buffer), self._missed)
+            self._buffer += [0xFFFF] * len(gauges)
+            self._missed = 0
+        kept = 0 if self._missed else min(len(times), room)
+        self._missed += len(times) - kept
+        self._buffer += self._codes(times[:kept])[:, gauges].ravel().tolist()
+
+    def _send(self) -> None:
+        """Pack what fills a packet; while some are missing packets say 59, the one that tells how many says 60."""
+        if self._leaving or self._scan is None or len(self._buffer) < (samples := self._scan[1]):
+            return
+        codes, self._buffer = self._buffer[:samples], self._buffer[samples:]
+        told, error = 0, 59 if self._missed else 0
+        if self._report is not None:
+            at, missing = self._report
+            self._report = (at - samples, missing) if at >= samples else None
+            told, error = (0, 59) if at >= samples else (missing, 60)
+        data = told.to_bytes(4, "little") + bytes([self._sent % 256, error])
+        data += b"".join(code.to_bytes(2, "little") for code in codes) + bytes([min(len(self._buffer) // 4, 255), 0])
+        self._sent += 1
+        self._leaving += self._faults.route(self.now(), [(self.now(), _long(0xC0, data, 0xF9))])
+
+    def _codes(self, times: Array) -> NDArray[np.int64]:
+        """Return what the converter makes of the six gauges at `times` (n,) [s], shape (n, 6)."""
+        volts = self.bench.wrench(times) @ self._gauges.T + _OFFSETS
+        forced = np.array([self._faults.active("saturate", time) for time in times.tolist()], bool)
+        volts[forced, 2] = 11.0
+        slope = np.where(volts < 0.0, -_VOLTS_PER_CODE_BELOW, _VOLTS_PER_CODE)
+        return np.clip(np.rint(_ZERO_CODE + volts / slope), 0, 65535).astype(np.int64)
+
+
+def _short(command: int, error: int) -> bytes:
+    body = bytes([command, error, 0])
+    return bytes([_folded(body)]) + body
+
+
+def _long(number: int, data: bytes, command: int = 0xF8) -> bytes:
+    sixteen = (sum(data) % 65536).to_bytes(2, "little")
+    head = bytes([command, len(data) // 2, number]) + sixteen
+    return bytes([_folded(head)]) + head + data
+
+
+def _sums_agree(request: bytes) -> bool:
+    whole = (sum(request[6:]) % 65536).to_bytes(2, "little")
+    return request[0] == _folded(request[1:6]) and request[4:6] == whole
+
+
+def _folded(data: bytes) -> int:
+    """Return the sum of bytes with its carry added in again, twice."""
+    total = sum(data)
+    total = total // 256 + total % 256
+    return total // 256 + total % 256

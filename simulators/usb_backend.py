@@ -1,0 +1,153 @@
+"""A USB bus with simulated converters on it, as pyusb sees one."""
+
+import errno
+from collections.abc import Iterator, Sequence
+from types import SimpleNamespace
+from typing import Any, cast
+
+import usb.backend  # pyright: ignore[reportMissingTypeStubs]
+import usb.core  # pyright: ignore[reportMissingTypeStubs]
+
+from simulators.labjack_u6_box import LabJackU6Box
+
+_core: Any = usb.core
+_Backend: Any = usb.backend.IBackend
+_ENDPOINTS = (0x01, 0x82, 0x83)
+
+
+class SimulatedBus(_Backend):
+    """What `usb.core.find(backend=...)` takes. One handle at a time may hold a converter."""
+
+    def __init__(self, boxes: Sequence[LabJackU6Box]) -> None:
+        """Put the boxes on the bus."""
+        self._boxes = tuple(boxes)
+        self._held: dict[int, object] = {}  # by the box's place: the handle that claimed it
+
+    def enumerate_devices(self) -> Iterator[int]:
+        """Return the places at which something is plugged in."""
+        return iter([place for place, box in enumerate(self._boxes) if box.is_plugged])
+
+    def get_device_descriptor(self, dev: int) -> SimpleNamespace:
+        """Return what a U6 tells of itself."""
+        return SimpleNamespace(
+            bLength=18,
+            bDescriptorType=1,
+            bcdUSB=0x0200,
+            bDeviceClass=0xFF,
+            bDeviceSubClass=0,
+            bDeviceProtocol=0,
+            bMaxPacketSize0=64,
+            idVendor=0x0CD5,
+            idProduct=0x0006,
+            bcdDevice=0x0100,
+            iManufacturer=0,
+            iProduct=0,
+            iSerialNumber=0,
+            bNumConfigurations=1,
+            address=dev + 1,
+            bus=1,
+            port_number=dev + 1,
+            port_numbers=(dev + 1,),
+            speed=2,
+        )
+
+    def get_configuration_descriptor(self, dev: int, config: int) -> SimpleNamespace:
+        """Return the only configuration."""
+        if config:
+            raise IndexError(config)
+        return SimpleNamespace(
+            bLength=9,
+            bDescriptorType=2,
+            wTotalLength=39,
+            bNumInterfaces=1,
+            bConfigurationValue=1,
+            iConfiguration=0,
+            bmAttributes=0x80,
+            bMaxPower=250,
+            extra_descriptors=[],
+        )
+
+    def get_interface_descriptor(self, dev: int, intf: int, alt: int, config: int) -> SimpleNamespace:
+        """Return the only interface."""
+        if intf or alt or config:
+            raise IndexError(alt)
+        return SimpleNamespace(
+            bLength=9,
+            bDescriptorType=4,
+            bInterfaceNumber=0,
+            bAlternateSetting=0,
+            bNumEndpoints=len(_ENDPOINTS),
+            bInterfaceClass=0xFF,
+            bInterfaceSubClass=0,
+            bInterfaceProtocol=0,
+            iInterface=0,
+            extra_descriptors=[],
+        )
+
+    def get_endpoint_descriptor(self, dev: int, ep: int, intf: int, alt: int, config: int) -> SimpleNamespace:
+        """Return one of the three bulk endpoints."""
+        return SimpleNamespace(
+            bLength=7,
+            bDescriptorType=5,
+            bEndpointAddress=_ENDPOINTS[ep],
+            bmAttributes=2,
+            wMaxPacketSize=64,
+            bInterval=0,
+            bRefresh=0,
+            bSynchAddress=0,
+            extra_descriptors=[],
+        )
+
+    def open_device(self, dev: int) -> SimpleNamespace:
+        """Return a handle."""
+        return SimpleNamespace(place=dev)
+
+    def close_device(self, dev_handle: SimpleNamespace) -> None:
+        """Give a handle back, and what it holds."""
+        if self._held.get(dev_handle.place) is dev_handle:
+            del self._held[dev_handle.place]
+
+    def set_configuration(self, dev_handle: SimpleNamespace, config_value: int) -> None:
+        """Take the only configuration."""
+
+    def get_configuration(self, dev_handle: SimpleNamespace) -> int:
+        """Return the configuration that is active."""
+        self._box(dev_handle)
+        return 1
+
+    def claim_interface(self, dev_handle: SimpleNamespace, intf: int) -> None:
+        """Hold the device. Raises USBError when another handle does."""
+        self._box(dev_handle)
+        if self._held.setdefault(dev_handle.place, dev_handle) is not dev_handle:
+            raise _core.USBError("Resource busy", -6, errno.EBUSY)
+
+    def release_interface(self, dev_handle: SimpleNamespace, intf: int) -> None:
+        """Let go."""
+        self.close_device(dev_handle)
+
+    def bulk_write(self, dev_handle: SimpleNamespace, ep: int, intf: int, data: Any, timeout: int) -> int:  # noqa: ANN401
+        """Send a request."""
+        self._box(dev_handle).command(bytes(data))
+        return len(data)
+
+    def bulk_read(self, dev_handle: SimpleNamespace, ep: int, intf: int, buff: Any, timeout: int) -> int:  # noqa: ANN401
+        """Fill `buff` with an answer or a stream packet. Raises USBTimeoutError when there is none in `timeout` ms."""
+        box = self._box(dev_handle)
+        data = box.answer() if ep == _ENDPOINTS[1] else box.streamed(timeout * 1e-3)
+        if data is None:
+            self._box(dev_handle)
+            raise _core.USBTimeoutError("Operation timed out", -7, errno.ETIMEDOUT)
+        buff[: len(data)] = type(buff)("B", data)
+        return len(data)
+
+    def is_kernel_driver_active(self, dev_handle: SimpleNamespace, intf: int) -> bool:
+        """Tell that the system has no driver for it."""
+        return False
+
+    def _box(self, dev_handle: SimpleNamespace) -> LabJackU6Box:
+        """Return the box of a handle. Raises USBError when it was pulled out."""
+        box = cast("LabJackU6Box", self._boxes[dev_handle.place])
+        if not box.is_plugged:
+            self.close_device(dev_handle)
+            raise _core.USBError("No such device (it may have been disconnected)", -4, errno.ENODEV)
+        return box

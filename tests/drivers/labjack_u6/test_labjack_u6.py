@@ -1,0 +1,332 @@
+"""The LabJack U6: bytes packed by hand, the driver on a simulated converter behind pyusb, and another client."""
+
+import threading
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers import usb_link
+from drivers.address import parse_address
+from drivers.catalog import open_transducer, reachable
+from drivers.clock import PacedClock, RealClock
+from drivers.labjack_u6 import wire
+from drivers.labjack_u6.device import ScanCount
+from drivers.labjack_u6.handshake import identify_labjack_u6
+from drivers.readings import ReadingBlock
+from drivers.transducer import DeviceFault, LinkLost, SetupError
+from simulators.bench import RATED, Bench
+from simulators.faults import Fault, Faults
+from simulators.gauges import FT32831
+from simulators.labjack_u6_box import LabJackU6Box
+from simulators.stroke import Stroke
+from simulators.surface import paper_surfaces
+from simulators.usb_backend import SimulatedBus
+
+NOMINAL = wire.Constants(3.1580578e-4, -3.158058e-4, 33523.0)
+GOLDEN_PACKET = bytes.fromhex("F1 F9 1C C0 F8 22 00 00 00 00 00 00" + "F3 82" * 24 + "00 00")  # 0 V everywhere
+CAL = """<?xml version="1.0"?><FTSensor Serial="SIM00003" BodyStyle="Nano43" Family="DAQ" NumGages="6"
+CalFileVersion="1.0"><Calibration PartNumber="SIMULATED SI-36-0.5" CalDate="12/14/2020" ForceUnits="N"
+TorqueUnits="N-mm" DistUnits="mm" OutputMode="Ground Referenced Differential" OutputRange="20">{axes}
+</Calibration></FTSensor>"""
+
+
+@pytest.fixture
+def cal(tmp_path):
+    """The calibration file of the simulated gauges."""
+    axes = "".join(
+        f'<Axis Name="{name}" values="{" ".join(map(repr, row))}" max="{rated}" scale="1"/>'
+        for name, row, rated in zip(("Fx", "Fy", "Fz", "Tx", "Ty", "Tz"), FT32831.tolist(), RATED, strict=True)
+    )
+    path = tmp_path / "SIM00003.cal"
+    path.write_text(CAL.format(axes=axes))
+    return path
+
+
+@pytest.fixture
+def plugged(monkeypatch):
+    """Return a function that plugs simulated converters in; no thread may be left when they are pulled."""
+    before = set(threading.enumerate())
+
+    def plug(*boxes):
+        monkeypatch.setattr(usb_link, "BACKEND", SimulatedBus(boxes))
+        return boxes[0]
+
+    yield plug
+    assert set(threading.enumerate()) <= before, "a thread was left running"
+
+
+def box(clock, *timetable, serial=360_000_001):
+    return LabJackU6Box(Bench(3), clock, serial=serial, faults=Faults(timetable, seed=1))
+
+
+def readings(transducer, device, until):
+    blocks = []
+    while device.now() < until:
+        blocks.append(transducer.read(0.1))
+    transducer.stop()
+    return ReadingBlock.joined([*blocks, transducer.read(0.0)])
+
+
+@pytest.mark.parametrize(
+    ("rate", "clock"), [(200, "00 20 4E"), (500, "00 40 1F"), (1000, "08 80 BB"), (60, "0A 35 0C")]
+)
+def test_scan_rates_are_set_as_another_library_sets_them(rate, clock):
+    assert wire.configure_stream(wire.scan_clock(rate))[11:14] == bytes.fromhex(clock)
+
+
+def test_requests_are_those_another_library_packs():
+    head, channels = "C2 F8 0A 11 AB 03 06 01 18 00 00 00 20 4E", "00 80 02 80 04 80 06 80 08 80 0A 80"
+    assert wire.configure_stream(wire.scan_clock(200)) == bytes.fromhex(head + channels)
+
+
+def test_plain_requests_are_those_another_library_packs():
+    assert wire.read_identity() == bytes.fromhex("0B F8 0A 08") + bytes(22)
+    assert wire.read_memory(0) == bytes.fromhex("27 F8 01 2D 00 00 00 00")
+    assert wire.read_memory(2) == bytes.fromhex("29 F8 01 2D 02 00 00 02")
+
+
+def test_answers_are_read_as_packed_by_hand():
+    wire.check_configured(bytes.fromhex("0B F8 01 11 00 00 00 00"))
+    with pytest.raises(DeviceFault, match="a stream is active"):
+        wire.check_configured(bytes.fromhex("3B F8 01 11 30 00 30 00"))
+    assert wire.normal_error(bytes.fromhex("A9 A9 00 00"), 0xA9) == 0
+    assert wire.normal_error(bytes.fromhex("D9 A9 30 00"), 0xA9) == 48
+    with pytest.raises(DeviceFault, match="garbled"):
+        wire.check_configured(b"\xb8\xb8")
+
+
+def test_constants_are_signed_numbers_of_32_bits_before_and_behind_the_point():
+    positive = bytes.fromhex("57B2140000000000 A637BD69F5FFFFFF") + bytes(16)
+    negative = bytes.fromhex("A84DEBFFFFFFFFFF 00000000F3820000") + bytes(16)
+
+    def answer(data):
+        body = bytes(2) + data
+        whole = (sum(body) & 0xFFFF).to_bytes(2, "little")
+        head = bytes([0xF8, 0x11, 0x2D]) + whole
+        total = sum(head)
+        return bytes([(total & 0xFF) + (total >> 8)]) + head + body
+
+    constants = wire.parse_constants(answer(positive), answer(negative))
+    assert constants.positive_slope == pytest.approx(3.1580578e-4, rel=1e-5)
+    assert constants.negative_slope == pytest.approx(-3.158058e-4, rel=1e-5)
+    assert constants.centre == 33523.0
+    with pytest.raises(DeviceFault, match="no calibration constants"):
+        wire.parse_constants(answer(bytes(32)), answer(bytes(32)))
+
+
+def test_a_packet_packed_by_hand_is_four_scans_of_nothing():
+    records = wire.StreamDecoder(NOMINAL).feed(GOLDEN_PACKET)
+    assert records.raw.tolist() == [[0.0] * 6] * 4
+    assert records.status.tolist() == records.damaged.tolist() == [0] * 4
+
+
+def packets(count, seed=5):
+    """Return sound packets of a simulated converter."""
+    clock = PacedClock(200.0)
+    device = LabJackU6Box(Bench(seed), clock)
+    device.command(wire.configure_stream(wire.scan_clock(1000)))
+    device.command(wire.START)
+    found = []
+    while len(found) < count:
+        found += filter(None, [device.streamed(0.1)])
+    return found
+
+
+STREAM = b"".join(packets(5))
+
+
+@given(cuts=st.lists(st.integers(0, len(STREAM)), max_size=12).map(sorted))
+def test_scans_do_not_depend_on_how_the_stream_was_cut(cuts):
+    whole, cut = wire.StreamDecoder(NOMINAL), wire.StreamDecoder(NOMINAL)
+    expected = whole.feed(STREAM)
+    found = [cut.feed(STREAM[a:b]) for a, b in zip([0, *cuts], [*cuts, len(STREAM)], strict=True)]
+    assert len(expected.status) == 20
+    np.testing.assert_array_equal(np.concatenate([part.raw for part in found]), expected.raw)
+    assert cut.malformed == whole.malformed == 0
+
+
+@given(garbage=st.binary(max_size=200), at=st.integers(0, len(STREAM)))
+def test_garbage_raises_nothing_and_is_counted(garbage, at):
+    decoder = wire.StreamDecoder(NOMINAL)
+    records = decoder.feed(STREAM[:at] + garbage + STREAM[at:])
+    assert len(records.status) + int(records.damaged.sum()) <= 20
+    if len(garbage) >= wire.STREAM_PACKET and len(records.status) == 20:
+        assert decoder.malformed >= 4
+
+
+def test_a_lost_packet_is_four_lost_scans_and_the_gauges_stay_in_place():
+    five = packets(5)
+    kept = wire.StreamDecoder(NOMINAL).feed(b"".join(five))
+    records = wire.StreamDecoder(NOMINAL).feed(b"".join(five[:2] + five[3:]))
+    assert records.damaged.tolist() == [0] * 8 + [4] + [0] * 7
+    np.testing.assert_array_equal(records.raw, np.delete(kept.raw, slice(8, 12), axis=0))
+
+
+def test_losses_that_let_the_packet_counter_go_round_are_found_by_the_clock():
+    count, period_ns = ScanCount(1000.0), 1_000_000
+    count.take(np.zeros(4, np.int64), 4 * period_ns)
+    gone = 2 * 1024 + 40  # two rounds of 256 packets of four scans, and ten packets
+    paced = count.take(np.array([40, 0, 0, 0]), (4 + gone + 4) * period_ns)
+    assert paced.sequence.tolist() == [4 + gone + k for k in (1, 2, 3, 4)]
+    assert count.lost == gone
+
+
+def test_it_says_who_it_is_and_what_it_rests_on(plugged, cal):
+    device = plugged(box(RealClock()))
+    uri = f"labjack-u6://?cal={cal}"
+    info = open_transducer(uri, RealClock()).info
+    assert info.simulated
+    assert info.serial == info.calibration.serial == "SIM00003"
+    assert info.calibration.rated.tolist() == list(RATED)
+    assert info.rate == 1000.0
+    assert str(device.serial) in info.settings["converter"]
+    assert "3.1572e-04" in f"{float(info.settings['constants'].split()[0]):.4e}"
+    assert identify_labjack_u6(parse_address(uri), 1.0).model == info.model
+
+
+def test_an_undisturbed_stream_is_whole_evenly_timed_and_feels_what_the_bench_exerts(plugged, cal):
+    clock = PacedClock(4.0)
+    device = plugged(box(clock))
+    transducer = open_transducer(f"labjack-u6://?cal={cal}&rate=500", clock)
+    transducer.start()
+    device.bench.mount(paper_surfaces()["stickiness", 80])
+    planted = device.bench.begin_stroke(Stroke(7.81, 17.5, approach=0.3, stick=0.3, slide=1.0), device.now() + 0.6)
+    block = readings(transducer, device, planted.end + 0.3)
+    transducer.close()
+    info, health = transducer.info, transducer.health
+    assert health.received == len(block)
+    assert health.lost == health.malformed == health.restarted == health.saturated == 0
+    assert block.sequence.tolist() == list(range(1, len(block) + 1))
+    np.testing.assert_allclose(np.diff(block.time), 1.0 / 500.0, rtol=1e-9)
+    bias = block.raw[block.time < 0.4].mean(axis=0)
+    assert np.abs(bias).max() > 0.5, "gauges are never at 0 V when mounted"
+    wrench = info.calibration.wrench(block.raw, bias)
+    assert -wrench[:, 2].min() == pytest.approx(planted.peak_normal_force, abs=0.05)
+    assert wrench[:, 0].max() == pytest.approx(planted.mu * planted.peak_normal_force, abs=0.05)
+
+
+@pytest.mark.parametrize("kind", ["lose", "corrupt", "shorten", "saturate", "unplug"])
+def test_it_survives_each_fault_and_accounts_for_every_reading(plugged, cal, kind):
+    clock = PacedClock(2.0)
+    whole = kind in ("saturate", "unplug")
+    device = plugged(box(clock, Fault(kind, 0.5, 1.0, share=1.0 if whole else 0.3)))
+    transducer = open_transducer(f"labjack-u6://?cal={cal}", clock)
+    transducer.start()
+    block = readings(transducer, device, 3.0 if kind == "unplug" else 1.6)
+    health = transducer.health
+    transducer.close()
+    assert health.received == len(block)
+    assert health.received + health.lost == block.sequence[-1]
+    assert np.all(np.diff(block.time) > 0)
+    assert block.time[-1] > 1.2, "it did not go on after the fault"
+    assert (health.saturated > 0) == (kind == "saturate")
+    assert (health.malformed > 0) == (kind in ("corrupt", "shorten"))
+    assert (health.lost > 0) == (kind != "saturate")
+    assert health.restarted == (kind == "unplug")
+    if kind == "saturate":
+        assert set(block.status[block.status > 0].tolist()) == {1 << 10}, "gauge 2, and no other"
+
+
+def test_what_an_overflow_cost_is_told_by_the_converter_and_counted(plugged, cal, monkeypatch):
+    clock = RealClock()
+    device = plugged(box(clock))
+    transducer = open_transducer(f"labjack-u6://?cal={cal}&rate=2000", clock)
+    held = threading.Event()
+    receive = usb_link.UsbLink.receive
+
+    def late(link, timeout):
+        if held.is_set():
+            held.clear()
+            threading.Event().wait(0.3)  # the computer is busy; the converter holds 82 ms
+        return receive(link, timeout)
+
+    monkeypatch.setattr(usb_link.UsbLink, "receive", late)
+    transducer.start()
+    while device.now() < 0.3:
+        transducer.read(0.05)
+    held.set()
+    until = device.now() + 1.0
+    readings(transducer, device, until)
+    health = transducer.health
+    transducer.close()
+    assert health.restarted == 0
+    assert health.lost > 200
+    # What the converter still held when it was stopped, 164 scans at most, is dropped at the end.
+    assert 0 <= device._done - (health.received + health.lost) <= 170
+
+
+def test_two_converters_are_told_apart_by_serial_number_and_neither_is_taken_unasked(plugged, cal):
+    plugged(box(RealClock(), serial=11), box(RealClock(), serial=22))
+    with pytest.raises(SetupError, match="several are plugged in; add serial= one of 11, 22"):
+        open_transducer(f"labjack-u6://?cal={cal}", RealClock())
+    info = open_transducer(f"labjack-u6://?cal={cal}&serial=22", RealClock()).info
+    assert "serial number 22" in info.settings["converter"]
+    with pytest.raises(LinkLost, match="no LabJack U6 33 is plugged in"):
+        open_transducer(f"labjack-u6://?cal={cal}&serial=33", RealClock())
+
+
+def test_a_converter_in_use_is_not_disturbed(plugged, cal):
+    device = plugged(box(RealClock()))
+    uri = f"labjack-u6://?cal={cal}"
+    transducer = open_transducer(uri, RealClock())
+    transducer.start()
+    (found,) = [one for one in reachable([uri], patience=1.0) if one.uri == uri]
+    assert found.info is None
+    assert "another program has it" in str(found.problem)
+    block = readings(transducer, device, device.now() + 0.3)
+    assert len(block)
+    assert transducer.health.lost == transducer.health.restarted == 0
+
+
+def test_a_missing_calibration_is_asked_for_in_one_sentence(plugged):
+    plugged(box(RealClock()))
+    with pytest.raises(SetupError, match="add cal=FILE"):
+        open_transducer("labjack-u6://", RealClock())
+    with pytest.raises(SetupError, match="360000001 is there; add cal=FILE"):
+        identify_labjack_u6(parse_address("labjack-u6://"), 1.0)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_another_client_reads_the_same_volts_from_the_simulated_converter():
+    """LabJackPython, the maker's client, with its transport replaced by the simulated converter."""
+    u6, base = pytest.importorskip("u6"), pytest.importorskip("LabJackPython")
+    device = LabJackU6Box(Bench(3), RealClock())
+
+    class Client(u6.U6):
+        def write(self, data, _modbus=False, checksum=True):
+            if checksum:
+                base.setChecksum(data)
+            device.command(bytes(data))
+
+        def read(self, length, stream=False, _modbus=False):
+            data = device.streamed(1.0) if stream else device.answer()
+            return data if stream else list(data[:length])
+
+    client = Client(autoOpen=False)
+    client.handle, client.devType = 1, 6
+    assert client.configU6()["SerialNumber"] == device.serial
+    client.getCalibrationData()
+    client.streamConfig(
+        NumChannels=6,
+        ChannelNumbers=[0, 2, 4, 6, 8, 10],
+        ChannelOptions=[0x80] * 6,
+        ResolutionIndex=1,
+        SamplesPerPacket=24,
+        ScanFrequency=1000,
+    )
+    client.streamStart()
+    client.streamSamplesPerPacket = 24
+    packet = device.streamed(1.0)
+    theirs = client.processStreamData(packet, numBytes=62)
+    constants = wire.parse_constants(*_memory(device))
+    ours = wire.StreamDecoder(constants).feed(packet).raw
+    for gauge in range(6):
+        np.testing.assert_allclose(theirs[f"AIN{2 * gauge}"], ours[:, gauge], atol=1e-9)
+
+
+def _memory(device):
+    for block in (0, 2):
+        device.command(wire.read_memory(block))
+        yield device.answer()
