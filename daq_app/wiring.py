@@ -28,7 +28,7 @@ from sessions.steps import (
 )
 from simulators.bench import Bench
 from simulators.net_ft_box import NetFtBox
-from simulators.serving import serve_net_ft
+from simulators.serving import serve_digital_ft, serve_net_ft, serve_serial_ft
 from simulators.subject import SimulatedSubject
 from simulators.surface import Surface, paper_surfaces
 from simulators.timetable import TimetableError
@@ -40,7 +40,9 @@ __all__ = [
     "TimetableError",
     "connected",
     "planted_surface",
+    "serve_digital_ft",
     "serve_net_ft",
+    "serve_serial_ft",
 ]
 
 SIMULATED = "sim"

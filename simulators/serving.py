@@ -1,12 +1,14 @@
-"""A simulated box served to anybody's client, on the device's own ports where they are free."""
+"""A simulated box served to anybody's client: on the device's own ports where they are free, or on a serial port."""
 
 from pathlib import Path
 
-from drivers.clock import PacedClock, RealClock
+from drivers.clock import Clock, PacedClock, RealClock
 from drivers.transducer import SetupError
+from simulators.digital_ft_box import DigitalFtBox
 from simulators.faults import Faults
 from simulators.net_ft_box import NetFtBox
-from simulators.timetable import ScriptedBench, load_timetable, usual_timetable
+from simulators.serial_ft_box import SerialFtBox
+from simulators.timetable import ScriptedBench, Timetable, load_timetable, usual_timetable
 
 
 def serve_net_ft(
@@ -24,17 +26,17 @@ def serve_net_ft(
     Without `http_port` it takes 80, or a free port where 80 is refused. Time runs `factor` times as fast as real.
     Raises SetupError when a port is in use or the script is missing, TimetableError when the script is wrong.
     """
-    timetable = usual_timetable() if script is None else load_timetable(script)
+    timetable = _timetable(script)
 
     def box(port: int) -> NetFtBox:
         return NetFtBox(
             ScriptedBench(seed, timetable),
-            RealClock() if factor == 1.0 else PacedClock(factor),
+            _clock(factor),
             rate=rate,
             rdt_port=rdt_port,
             tcp_port=tcp_port,
             http_port=port,
-            faults=Faults(timetable.faults, seed=seed, repeat=timetable.repeat),
+            faults=_faults(timetable, seed),
         )
 
     if http_port is None:
@@ -48,3 +50,36 @@ def serve_net_ft(
     served = box(http_port)
     served.start()
     return served
+
+
+def serve_serial_ft(
+    *, baud: int = 38400, seed: int = 0, factor: float = 1.0, script: Path | None = None
+) -> SerialFtBox:
+    """Return a stand-alone controller that serves on a pseudo-terminal of `baud` bits a second until it is closed.
+
+    Raises SetupError where there are no pseudo-terminals or the script is missing, TimetableError when it is wrong.
+    """
+    timetable = _timetable(script)
+    box = SerialFtBox(ScriptedBench(seed, timetable), _clock(factor), baud=baud, faults=_faults(timetable, seed))
+    box.start()
+    return box
+
+
+def serve_digital_ft(*, seed: int = 0, factor: float = 1.0, script: Path | None = None) -> DigitalFtBox:
+    """Return an RS-485 transducer that serves on a pseudo-terminal until it is closed. Raises as `serve_serial_ft`."""
+    timetable = _timetable(script)
+    box = DigitalFtBox(ScriptedBench(seed, timetable), _clock(factor), faults=_faults(timetable, seed))
+    box.start()
+    return box
+
+
+def _timetable(script: Path | None) -> Timetable:
+    return usual_timetable() if script is None else load_timetable(script)
+
+
+def _clock(factor: float) -> Clock:
+    return RealClock() if factor == 1.0 else PacedClock(factor)
+
+
+def _faults(timetable: Timetable, seed: int) -> Faults:
+    return Faults(timetable.faults, seed=seed, repeat=timetable.repeat)
