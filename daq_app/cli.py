@@ -23,6 +23,7 @@ VERBS = {
     "predict": "predict the receptor's strain-energy density for each trial",
     "solve": "run the solver on a scene file",
     "report": "write a session's report as one page",
+    "export": "write a session as CSV, BIDS, HDF5 or NWB",
     "simulate": "serve the other end of a wire, to try a driver without hardware",
     "verify": "check every checksum of a session and recompute every derived number",
 }
@@ -39,6 +40,7 @@ _FAILED = (
     "drivers.transducer.DeviceFault",
     "drivers.transducer.LinkLost",
     "drivers.transducer.SetupError",
+    "sessions.exports.ExportError",
     "sessions.exports.html.ReportError",
     "sessions.import_csv.ImportRefused",
     "sessions.recording.errors.RecordingError",

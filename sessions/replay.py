@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from difflib import SequenceMatcher
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +15,16 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import Health, LinkLost, TransducerInfo
 from sessions.course import Step, steps
 from sessions.recording import Acknowledged, LoggedEvent, Recording, RecordingError, SessionWriter
+from sessions.recording.digests import digest_of
+from sessions.recording.reader import TELL_LOSSES
 from sessions.recording.replay import RecordedReadings, health_of
-from sessions.recording.schema import COLUMNS
 from sessions.runner import STOPPED, Ending, RunnerSettings, run_session
 from sessions.steps import Command, Event
 from sessions.verification import differences
 
 SLICE = 0.02  # longest wait before a stop is noticed [s]
 PART = 16_384  # readings written at once
-LATER = frozenset({"log_torn"})  # written by sealing, not by the course
+LATER = TELL_LOSSES  # written by sealing and the like, not by the course
 Progress = Callable[[float, str], None]  # part done (0 to 1), what is happening
 
 
@@ -74,10 +74,14 @@ def different_events(recorded: Recording, replayed: Recording) -> Iterator[str]:
 
 def different_readings(recorded: Recording, replayed: Recording) -> Iterator[str]:
     """Yield a sentence for each column of the readings that is not what it was."""
-    (then, before), (now, after) = _digests(recorded), _digests(replayed)
-    if then != now:
-        yield f"the recording holds {then} readings and the replay {now}"
-    yield from (f"{name} of the readings came out otherwise" for name in COLUMNS if before[name] != after[name])
+    before, after = (digest_of(made.blocks(), ()) for made in (recorded, replayed))
+    if before.readings != after.readings:
+        yield f"the recording holds {before.readings} readings and the replay {after.readings}"
+    yield from (
+        f"{name} of the readings came out otherwise"
+        for name, digest in before.columns.items()
+        if digest != after.columns[name]
+    )
 
 
 class _Rewriter(SessionWriter):
@@ -89,7 +93,7 @@ class _Rewriter(SessionWriter):
     def follow(self, recording: Recording) -> None:
         """Take the instants from the log of `recording`."""
         self._log = [event for event in recording.events if event.kind not in LATER]
-        self._torn = [event.data for event in recording.events if event.kind in LATER]
+        self._later = [event for event in recording.events if event.kind in LATER]
         self._cut = not any(event.kind == "ended" for event in self._log)
         self._told = 0
         self._closing = False
@@ -127,8 +131,8 @@ class _Rewriter(SessionWriter):
     def finish(self) -> None:
         """Write down what sealing said of a torn log, and close."""
         with suppress(RecordingError):  # closed already, by a session that came to its end
-            for data in self._torn:
-                super().event("log_torn", data=data)
+            for event in self._later:
+                super().event(event.kind, data=event.data)
         self.close()
 
 
@@ -339,14 +343,3 @@ def _name(event: LoggedEvent) -> str:
 
 def _plain(event: LoggedEvent) -> dict[str, Any]:
     return {"time_ns": event.time_ns, "readings": event.readings, "data": event.data}
-
-
-def _digests(recording: Recording) -> tuple[int, dict[str, str]]:
-    """Return how many readings there are, and the SHA-256 of each of their columns."""
-    sums = {name: sha256() for name in COLUMNS}
-    count = 0
-    for block in recording.blocks():
-        count += len(block)
-        for name, digest in sums.items():
-            digest.update(getattr(block, name).tobytes())
-    return count, {name: digest.hexdigest() for name, digest in sums.items()}

@@ -2,18 +2,14 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
+from sessions.recording.description import description
 from sessions.recording.errors import RecordingError
 from sessions.recording.folding import fold_log
-from sessions.recording.head import info_to_dict, plan_to_dict
-from sessions.recording.log import TrialRecord
 from sessions.recording.manifest import changed_files, is_sealed, list_in_manifest
 from sessions.recording.reader import Recording
 from sessions.recording.schema import (
     DESCRIPTION_FILE,
-    FORMAT,
-    FORMAT_VERSION,
     LIVE_FILE,
     MANIFEST_FILE,
     SEALED_FILE,
@@ -42,7 +38,7 @@ def seal(folder: Path) -> None:
         unequal = next(differences(recording), None)
         if unequal is not None:
             raise RecordingError(f"{folder} could not be sealed: {unequal}; the live file is untouched, seal it again")
-        write_whole(folder / DESCRIPTION_FILE, json.dumps(_description(recording), indent=1).encode() + b"\n")
+        write_whole(folder / DESCRIPTION_FILE, json.dumps(description(recording), indent=1).encode() + b"\n")
         for name in SEALED:
             (folder / name).chmod(0o444)
         list_in_manifest(folder, SEALED, recording.simulated_sentence)
@@ -71,40 +67,3 @@ def _clear_unfinished(folder: Path) -> None:
         if (folder / name).exists():
             (folder / name).chmod(0o644)  # some systems remove no read-only file
             (folder / name).unlink()
-
-
-def _description(recording: Recording) -> dict[str, Any]:
-    """Return what `session.json` says: all but the readings and the events."""
-    return {
-        **({"SIMULATED": recording.simulated_sentence} if recording.simulated_sentence else {}),
-        "format": {"name": FORMAT, "version": FORMAT_VERSION},
-        "plan": plan_to_dict(recording.plan),
-        "transducer": info_to_dict(recording.info) if recording.info else None,
-        "provenance": dict(recording.provenance),
-        "trials": [_trial(record) for record in recording.trials],
-        "readings": sum(len(block) for block in recording.blocks()),
-        "events": len(recording.events),
-        "ended": recording.end,
-        "losses": list(recording.losses),
-        "flaws": list(recording.flaws),
-    }
-
-
-def _trial(record: TrialRecord) -> dict[str, Any]:
-    """Return a trial as `session.json` tells it."""
-    return {
-        "number": record.trial.number,
-        "block": record.trial.block,
-        "descriptor": record.trial.stimulus.descriptor,
-        "index": record.trial.stimulus.index,
-        "code": record.trial.stimulus.code,
-        "outcome": record.outcome,
-        "score": record.score,
-        "take": record.take.number if record.take else None,
-        "start_ns": record.start_ns,
-        "stop_ns": record.stop_ns,
-        "other_takes": [
-            {"number": take.number, "start_ns": take.start_ns, "stop_ns": take.stop_ns, "discarded": take.discarded}
-            for take in record.other_takes
-        ],
-    }

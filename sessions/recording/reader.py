@@ -31,6 +31,8 @@ from sessions.recording.schema import (
 )
 from sessions.recording.torn import log_tail
 
+# Kinds of events that sealing, resuming and restoring add, each with a sentence on what is missing.
+TELL_LOSSES = frozenset({"log_torn", "not_restored"})
 # What the counts in a "losses" event mean for whoever uses the readings; repeated ones were dropped without harm.
 LOSS_SENTENCES = {
     "lost": "{} readings never arrived",
@@ -70,7 +72,7 @@ class Recording:
                 events = _events(connection, losses)
         except sqlite3.Error as error:
             raise RecordingError(f"{path} cannot be read ({error}); restore the folder from a copy") from error
-        losses += [event.data["sentence"] for event in events if event.kind == "log_torn"]
+        losses += [event.data["sentence"] for event in events if event.kind in TELL_LOSSES]
         if _end(events) is None:
             losses.append("the session has no end: it was cut short, or is still running")
         try:

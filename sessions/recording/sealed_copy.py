@@ -7,8 +7,9 @@
 # pyright: reportUnknownArgumentType=false, reportAttributeAccessIssue=false, reportIndexIssue=false
 # h5py brings no types; every array is given its type where it leaves this file.
 
+import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.recording.head import calibration_hash, info_to_dict, json_text, plan_to_dict
+from sessions.recording.head import calibration_hash, info_to_dict, plan_to_dict
 from sessions.recording.reader import Recording
 from sessions.recording.schema import COLUMNS, FORMAT, FORMAT_VERSION, SEALED_FILE
 
@@ -44,8 +45,11 @@ class DataSet:
     note: str
 
 
-def write_copy(recording: Recording, path: Path) -> None:
-    """Write the copy of a recording to a new file at `path`. Raises OSError."""
+def write_copy(
+    recording: Recording, path: Path, more: Iterable[DataSet] = (), progress: Callable[[float], None] | None = None
+) -> None:
+    """Write the copy of a recording, and what else belongs in it, to a new file at `path`. Raises OSError."""
+    expected = max((event.readings for event in recording.events), default=0) or 1
     with h5py.File(path, "w", libver=LIBVER) as file:
         if recording.simulated_sentence:
             file.attrs["SIMULATED"] = _attribute(recording.simulated_sentence)
@@ -58,10 +62,14 @@ def write_copy(recording: Recording, path: Path) -> None:
                 values = getattr(block, name)
                 column.resize(len(column) + len(values), axis=0)
                 column[-len(values) :] = values
-        for made in data_sets(recording):
+            if progress is not None:
+                progress(min(len(readings["time"]) / expected, 1.0))
+        for made in (*data_sets(recording), *more):
             kind = made.values.dtype
             if kind.kind == "S":
-                kind = h5py.string_dtype("utf-8", kind.itemsize)
+                # Some readers (GNU Octave) know no UTF-8; most texts need none.
+                plain = all(text.isascii() for text in made.values.tolist())
+                kind = h5py.string_dtype("ascii" if plain else "utf-8", kind.itemsize)
             # An empty data set has no chunks, and so nothing to protect.
             protected = {"chunks": made.values.shape, "fletcher32": True} if made.values.size else {}
             written = file.create_dataset(made.name, data=made.values.astype(kind), **protected)
@@ -90,11 +98,11 @@ def data_sets(recording: Recording) -> tuple[DataSet, ...]:
 
 def _head(recording: Recording) -> Iterator[DataSet]:
     info = recording.info
-    yield DataSet("head/plan", _texts([json_text(plan_to_dict(recording.plan))]), "", "JSON")
-    yield DataSet("head/transducer", _texts([json_text(info_to_dict(info) if info else None)]), "", "JSON")
-    yield DataSet("head/provenance", _texts([json_text(dict(recording.provenance))]), "", "JSON")
-    yield DataSet("head/losses", _texts(recording.losses), "", "what storage lost, a sentence each")
-    yield DataSet("head/flaws", _texts(recording.flaws), "", "what went wrong while recording, a sentence each")
+    yield DataSet("head/plan", texts([_plain_json(plan_to_dict(recording.plan))]), "", "JSON")
+    yield DataSet("head/transducer", texts([_plain_json(info_to_dict(info) if info else None)]), "", "JSON")
+    yield DataSet("head/provenance", texts([_plain_json(dict(recording.provenance))]), "", "JSON")
+    yield DataSet("head/losses", texts(recording.losses), "", "what storage lost, a sentence each")
+    yield DataSet("head/flaws", texts(recording.flaws), "", "what went wrong while recording, a sentence each")
 
 
 def _calibration(recording: Recording) -> Iterator[DataSet]:
@@ -104,19 +112,19 @@ def _calibration(recording: Recording) -> Iterator[DataSet]:
     unit = f"N (rows 1 to 3) and N mm (rows 4 to 6) for {calibration.raw_unit}"
     yield DataSet("calibration/matrix", calibration.matrix.astype("<f8"), unit, "wrench = matrix (raw - bias)")
     yield DataSet("calibration/rated", calibration.rated.astype("<f8"), "N and N mm", "rated range; NaN where unknown")
-    yield DataSet("calibration/raw_unit", _texts([calibration.raw_unit]), "", "unit of /readings/raw")
-    yield DataSet("calibration/serial", _texts([calibration.serial]), "", "serial number the matrix is true for")
-    yield DataSet("calibration/sha256", _texts([calibration_hash(calibration)]), "", "of the matrix's 36 float64")
+    yield DataSet("calibration/raw_unit", texts([calibration.raw_unit]), "", "unit of /readings/raw")
+    yield DataSet("calibration/serial", texts([calibration.serial]), "", "serial number the matrix is true for")
+    yield DataSet("calibration/sha256", texts([calibration_hash(calibration)]), "", "of the matrix's 36 float64")
 
 
 def _events(recording: Recording) -> Iterator[DataSet]:
     events = recording.events
     yield DataSet("events/number", _whole([e.number for e in events]), "", "from 1")
     yield DataSet("events/time_ns", _whole([e.time_ns for e in events]), "ns", "session clock")
-    yield DataSet("events/kind", _texts([e.kind for e in events]), "", "what happened")
+    yield DataSet("events/kind", texts([e.kind for e in events]), "", "what happened")
     yield DataSet("events/trial", _whole([e.trial or 0 for e in events]), "", "number of the trial; 0 for none")
     yield DataSet("events/readings", _whole([e.readings for e in events]), "", "readings recorded before it")
-    yield DataSet("events/data", _texts([json_text(e.data) for e in events]), "", "what else is known, as JSON")
+    yield DataSet("events/data", texts([_plain_json(e.data) for e in events]), "", "what else is known, as JSON")
 
 
 def _trials(recording: Recording) -> Iterator[DataSet]:
@@ -125,15 +133,15 @@ def _trials(recording: Recording) -> Iterator[DataSet]:
     stimuli = [trial.stimulus for trial in trials]
     scores = np.array([math.nan if r.score is None else r.score for r in records], "<f8")
     yield DataSet("trials/number", _whole([t.number for t in trials]), "", "from 1, in the planned order")
-    yield DataSet("trials/block", _texts([t.block for t in trials]), "", "name of the block")
-    yield DataSet("trials/descriptor", _texts([s.descriptor for s in stimuli]), "", "what was judged")
+    yield DataSet("trials/block", texts([t.block for t in trials]), "", "name of the block")
+    yield DataSet("trials/descriptor", texts([s.descriptor for s in stimuli]), "", "what was judged")
     yield DataSet(
         "trials/index", _whole([s.index for s in stimuli]), "", "the maker's number of the stimulus, 0 to 100"
     )
-    yield DataSet("trials/code", _texts([s.code for s in stimuli]), "", "label on the stimulus")
+    yield DataSet("trials/code", texts([s.code for s in stimuli]), "", "label on the stimulus")
     yield DataSet("trials/direction", _whole([t.direction for t in trials]), "", "+1 proximal to distal, -1 back")
     yield DataSet("trials/repetition", _whole([t.repetition for t in trials]), "", "from 1")
-    yield DataSet("trials/outcome", _texts([r.outcome for r in records]), "", "scored, not answered, skipped or open")
+    yield DataSet("trials/outcome", texts([r.outcome for r in records]), "", "scored, not answered, skipped or open")
     yield DataSet("trials/score", scores, "", "0 to 100; NaN unless the outcome is scored")
     yield DataSet(
         "trials/take", _whole([r.take.number if r.take else 0 for r in records]), "", "that counts; 0 for none"
@@ -178,7 +186,12 @@ def _whole(values: Sequence[int]) -> NDArray[np.int64]:
     return np.array(values, "<i8")
 
 
-def _texts(values: Sequence[str]) -> NDArray[np.bytes_]:
+def _plain_json(value: object) -> str:
+    """Return JSON in ASCII alone: what is beyond it is escaped."""
+    return json.dumps(value, allow_nan=False, separators=(",", ":"))
+
+
+def texts(values: Sequence[str]) -> NDArray[np.bytes_]:
     """Return texts as UTF-8 of the longest one's length."""
     return np.array([value.encode() for value in values], "S") if values else np.empty(0, "S1")
 

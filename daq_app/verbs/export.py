@@ -1,0 +1,46 @@
+"""Write a session in a format of others: csv, bids, hdf5 or nwb.
+
+Numbers kept in the session (analysis.json, prediction.json) go with it; the analysis is made where none was kept. An
+export as csv, bids or hdf5 can be imported again and is the session it was.
+"""
+
+import argparse
+from pathlib import Path
+
+from daq_app.cli import FLAWED
+from daq_app.console import Console
+from daq_app.derived import ANALYSIS, PREDICTION
+from sessions.analysis import analyse
+from sessions.exports import FORMATS, ExportSource, export
+from sessions.recording import Recording
+from sessions.recording.derived import load_derived
+from sessions.recording.provenance import software_versions
+
+EXAMPLE = "daq-app export recordings/P07 --format csv --out P07-csv"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the session, the format and where it goes."""
+    parser.add_argument("session", type=Path, metavar="SESSION")
+    parser.add_argument("--format", required=True, choices=sorted(FORMATS), help="what is written")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="a new folder (exports/SESSION-FORMAT)")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Export, and name what the session had lost."""
+    recording = Recording.open(options.session)
+    folder = options.out or Path("exports") / f"{options.session.resolve().name}-{options.format}"
+    analysis = load_derived(options.session, ANALYSIS)
+    if analysis is None:
+        analysis = {"made_by": software_versions(), **analyse(recording).to_dict()}
+    source = ExportSource(recording, analysis, load_derived(options.session, PREDICTION))
+    export(source, options.format, folder, lambda part: console.progress(part, f"writing {options.format}"))
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    losses = list(recording.losses)
+    console.result({"folder": str(folder), "files": [str(path) for path in files], "losses": losses})
+    if recording.simulated_sentence:
+        console.say(recording.simulated_sentence)
+    for sentence in losses:
+        console.say(sentence)
+    console.say(f"{folder}: {len(files)} files, {sum(path.stat().st_size for path in files) / 1e6:.1f} MB")
+    return FLAWED if losses else 0

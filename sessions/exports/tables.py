@@ -1,0 +1,259 @@
+"""A session as tables: trials, answers, strokes, friction, predictions; every column with its unit and its meaning."""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+from sessions.exports import ExportSource
+from sessions.recording import Recording
+
+Cell = str | int | float | None
+
+AXES = (("Fx", "N"), ("Fy", "N"), ("Fz", "N"), ("Tx", "N mm"), ("Ty", "N mm"), ("Tz", "N mm"))
+_SUFFIXES = {"mm/s": "mm_per_s", "N/mm": "N_per_mm", "N mm": "Nmm", "mm2": "mm2"}
+_PAIRS = {"steady": ("start", "stop"), "mu_interval": ("low", "high"), "mu_dynamic_interval": ("low", "high")}
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column; None in it is a number that honesty does not allow, or a thing that is not there."""
+
+    name: str
+    unit: str  # "" for none
+    meaning: str
+    values: tuple[Cell, ...]
+
+    @property
+    def heading(self) -> str:
+        """The name with the unit at its end.
+
+        >>> Column("speed", "mm/s", "", ()).heading
+        'speed_mm_per_s'
+        """
+        return f"{self.name}_{_SUFFIXES.get(self.unit, self.unit)}" if self.unit else self.name
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Rows of one kind of thing."""
+
+    name: str
+    meaning: str
+    columns: tuple[Column, ...]
+
+    @property
+    def rows(self) -> list[tuple[Cell, ...]]:
+        """The table row by row."""
+        return list(zip(*(column.values for column in self.columns), strict=True))
+
+
+def tables(source: ExportSource) -> tuple[Table, ...]:
+    """Return every table of a session but those of events and readings; predictions only where they were stored."""
+    analysis, prediction = source.analysis, source.prediction
+    made = (
+        trials(source.recording),
+        answers(source.recording),
+        positions(source.recording),
+        _of("strokes", "a row for each stroke", analysis["strokes"], _STROKE),
+        _of("friction", "what the model is given: a row for each trial with a stroke", analysis["friction"], _FRICTION),
+        _of(
+            "flaws", "what is wrong with the recording or with a stroke", [_named(f) for f in analysis["flaws"]], _FLAW
+        ),
+    )
+    if prediction is None:
+        return made
+    rows = [{key: value for key, value in row.items() if key != "solver"} for row in prediction["trials"]]
+    return (*made, _of("predictions", "what the finite-element finger predicts for each trial", rows, _PREDICTION))
+
+
+def trials(recording: Recording) -> Table:
+    """Return a row for each planned trial, in the plan's order."""
+    records = recording.trials
+    zeros = [_zero(recording, record.trial.number, record.start_ns) for record in records]
+
+    def column(name: str, unit: str, meaning: str, values: Iterable[Cell]) -> Column:
+        return Column(name, unit, meaning, tuple(values))
+
+    return Table(
+        "trials",
+        "a row for each planned trial",
+        (
+            column("trial", "", "number over the whole session", (r.trial.number for r in records)),
+            column("block", "", "name of its block", (r.trial.block for r in records)),
+            column("descriptor", "", "what was judged", (r.trial.stimulus.descriptor for r in records)),
+            column(
+                "index", "", "the maker's number of the stimulus; no score", (r.trial.stimulus.index for r in records)
+            ),
+            column("code", "", "label on the stimulus", (r.trial.stimulus.code for r in records)),
+            column("direction", "", "+1 proximal to distal, -1 back", (r.trial.direction for r in records)),
+            column("repetition", "", "from 1", (r.trial.repetition for r in records)),
+            column("outcome", "", "scored, not answered, skipped or open", (r.outcome for r in records)),
+            column("score", "", "the subject's answer, 0 to 100", (r.score for r in records)),
+            column("take", "", "number of the take that counts", (r.take.number if r.take else None for r in records)),
+            column("start", "ns", "first instant of that take, session clock", (r.start_ns for r in records)),
+            column("stop", "ns", "first instant after it", (r.stop_ns for r in records)),
+            *(
+                column(f"zero_{axis}", unit, "of the wrench in the take's unloaded stretch", (z[i] for z in zeros))
+                for i, (axis, unit) in enumerate(AXES)
+            ),
+        ),
+    )
+
+
+def answers(recording: Recording) -> Table:
+    """Return a row for each answer a subject gave, with all that was recorded of it but its positions."""
+    scored = [event for event in recording.events if event.kind == "scored"]
+    rows = [
+        {"trial": event.trial, "time": event.time_ns, **{k: v for k, v in event.data.items() if k != "positions"}}
+        for event in scored
+    ]
+    return _of("answers", "a row for each answer, those of discarded takes too", rows, _ANSWER)
+
+
+def positions(recording: Recording) -> Table:
+    """Return a row for each position the subject's mark had on the line."""
+    rows = [
+        {"trial": event.trial, "instant": instant, "position": position}
+        for event in recording.events
+        if event.kind == "scored"
+        for instant, position in event.data.get("positions") or ()
+    ]
+    return _of("positions", "every position of the mark on the line before an answer", rows, _POSITION)
+
+
+def _zero(recording: Recording, trial: int, start_ns: int | None) -> tuple[float | None, ...]:
+    """Return the wrench of the last unloaded stretch measured in the take that counts; None for each where none was."""
+    zero: tuple[float | None, ...] = (None,) * 6
+    for event in recording.events:
+        after = start_ns is not None and event.time_ns >= start_ns
+        if event.kind == "zeroed" and event.trial == trial and after and recording.info is not None:
+            zero = tuple((recording.info.calibration.matrix @ event.data["mean"]).tolist())
+    return zero
+
+
+def _named(flaw: Mapping[str, Any]) -> dict[str, Any]:
+    return {"flaw": flaw["name"], **{key: value for key, value in flaw.items() if key != "name"}}
+
+
+def _of(name: str, meaning: str, rows: Sequence[Mapping[str, Any]], told: Mapping[str, tuple[str, str]]) -> Table:
+    """Return plain data as a table: the columns told first, then any others the rows hold."""
+    flat = [dict(_flat(row)) for row in rows]
+    names = dict.fromkeys(name for pair in map(_names, told) for name in pair)
+    names.update(dict.fromkeys(name for row in flat for name in row))
+    found: list[Column] = []
+    for column in names:
+        unit, what = told.get(column) or told.get(column.rsplit("_", 1)[0]) or ("", "see docs/session-format.md")
+        found.append(Column(column, unit, what, tuple(row.get(column) for row in flat)))
+    if flat:  # what is in no row of this session is left out
+        found = [column for column in found if column.name in flat[0] or any(v is not None for v in column.values)]
+    return Table(name, meaning, tuple(found))
+
+
+def _names(column: str) -> tuple[str, ...]:
+    return tuple(f"{column}_{end}" for end in _PAIRS[column]) if column in _PAIRS else (column,)
+
+
+def _flat(row: Mapping[str, Any]) -> Iterable[tuple[str, Cell]]:
+    """Yield the cells of a row: pairs and stimuli as several, texts joined, other lists as JSON."""
+    for name, value in row.items():
+        if name in _PAIRS:
+            yield from zip(_names(name), value or (None, None), strict=True)
+        elif isinstance(value, list | tuple) and all(isinstance(part, str) for part in cast("Sequence[Any]", value)):
+            yield name, "; ".join(cast("Sequence[str]", value)) or None
+        elif isinstance(value, Mapping) and name == "stimulus":
+            yield from ((f"{name}_{part}", cell) for part, cell in cast("Mapping[str, Cell]", value).items())
+        elif isinstance(value, Mapping):
+            yield name, "; ".join(f"{part}: {why}" for part, why in cast("Mapping[str, Any]", value).items()) or None
+        elif isinstance(value, list | tuple):
+            yield name, json.dumps(value, ensure_ascii=False) if value else None
+        elif isinstance(value, bool):
+            yield name, "true" if value else "false"
+        else:
+            yield name, value
+
+
+_STROKE = {
+    "trial": ("", "number of its trial"),
+    "onset": ("s", "first contact, device clock"),
+    "lift": ("s", "end of contact, device clock"),
+    "steady": ("s", "steady window, device clock"),
+    "break_away": ("s", "end of the stick phase, device clock"),
+    "direction": ("", "+1 proximal to distal, -1 back, as measured"),
+    "direction_from": ("", "what the direction was told from"),
+    "speed": ("mm/s", "of the centre of pressure over the steady window"),
+    "speed_error": ("mm/s", "standard error of the speed"),
+    "mu_static": ("", "height of the static peak of T/N"),
+    "mu_dynamic": ("", "mean of T/N over the steady window"),
+    "mu_dynamic_sd": ("", "standard deviation of T/N over the steady window"),
+    "mu_dynamic_interval": ("", "confidence interval of mu_dynamic"),
+    "mu_max": ("", "greatest T/N"),
+    "tau_max": ("MPa", "greatest tangential force over the contact area"),
+    "normal_force": ("N", "mean over the steady window"),
+    "tangential_force": ("N", "mean over the steady window"),
+    "peak_normal": ("N", "greatest normal force"),
+    "peak_tangential": ("N", "greatest tangential force"),
+    "readings": ("", "how many in the steady window"),
+    "zero": ("", "where the zero of the forces came from"),
+    "zero_drift": ("N", "how far the zero moved from before the stroke to after it"),
+    "flaws": ("", "names of what is wrong with it"),
+    "reasons": ("", "for each number left out, why"),
+}
+_FRICTION = {
+    "trial": ("", "number of the trial"),
+    "mu": ("", "coefficient of friction the model is given"),
+    "mu_interval": ("", "its confidence interval, where it is a mean"),
+    "tau_max": ("MPa", "traction bound the model is given"),
+    "contact_area": ("mm2", "that tau_max was told for"),
+    "speed": ("mm/s", "of the stroke"),
+    "direction": ("", "+1 proximal to distal, -1 back, as measured"),
+    "rule": ("", "which T/N mu is"),
+    "flaws": ("", "names of what is wrong with the stroke"),
+}
+_FLAW = {
+    "flaw": ("", "its name"),
+    "sentence": ("", "what it is"),
+    "grade": ("", "note, doubtful or refused"),
+    "trial": ("", "number of the trial it belongs to"),
+    "stroke": ("", "position of the stroke it belongs to, from 0"),
+}
+_ANSWER = {
+    "trial": ("", "number of the trial"),
+    "time": ("ns", "when the answer was recorded, session clock"),
+    "score": ("", "the answer, 0 to 100; none where the subject gave none"),
+    "first_touch": ("s", "when the line was first touched, session clock"),
+    "corrections": ("", "how often the answer was changed"),
+    "hand": ("", "that answered"),
+    "input_device": ("", "with which the answer was given"),
+}
+_POSITION = {
+    "trial": ("", "number of the trial"),
+    "instant": ("s", "session clock"),
+    "position": ("", "on the line, 0 to 100"),
+}
+_PREDICTION = {
+    "trial": ("", "number of the trial"),
+    "stroke": ("", "position of the stroke it was made for, from 0"),
+    "block": ("", "name of the trial's block"),
+    "stimulus_descriptor": ("", "what was judged"),
+    "stimulus_index": ("", "the maker's number of the stimulus"),
+    "stimulus_code": ("", "label on the stimulus"),
+    "mu": ("", "coefficient of friction the model was given"),
+    "mu_rule": ("", "which T/N that is"),
+    "tau_max": ("MPa", "traction bound the model was given"),
+    "indentation": ("mm", "of the model's finger"),
+    "direction": ("", "+1 proximal to distal, -1 back"),
+    "speed": ("mm/s", "of the slide"),
+    "sed": ("MPa", "strain-energy density averaged over the ending (mJ/mm3)"),
+    "error_estimate": ("", "relative, of sed"),
+    "normal_per_mm": ("N/mm", "the model's normal force"),
+    "tangential_per_mm": ("N/mm", "the model's tangential force"),
+    "normal_force": ("N", "the same times the finger's width"),
+    "tangential_force": ("N", "the same times the finger's width"),
+    "measured_normal": ("N", "mean over the steady window"),
+    "measured_tangential": ("N", "mean over the steady window"),
+    "matching_depth": ("mm", "indentation at which the model presses as was measured"),
+    "opposite_sed": ("MPa", "slid the other way"),
+    "wall_s": ("", "time the solve took, in s"),
+    "reasons": ("", "for each number left out, why"),
+}

@@ -1,0 +1,48 @@
+"""The description of a session, `session.json`: all that is known of it besides readings and events."""
+
+from typing import Any
+
+from sessions.recording.digests import digest_of
+from sessions.recording.head import info_to_dict, plan_to_dict
+from sessions.recording.log import TrialRecord
+from sessions.recording.reader import Recording
+from sessions.recording.schema import FORMAT, FORMAT_VERSION
+
+
+def description(recording: Recording) -> dict[str, Any]:
+    """Return what `session.json` says: all but the readings and the events, and the digest of those."""
+    digest = digest_of(recording.blocks(), recording.events)
+    return {
+        **({"SIMULATED": recording.simulated_sentence} if recording.simulated_sentence else {}),
+        "format": {"name": FORMAT, "version": FORMAT_VERSION},
+        "plan": plan_to_dict(recording.plan),
+        "transducer": info_to_dict(recording.info) if recording.info else None,
+        "provenance": dict(recording.provenance),
+        "trials": [_trial(record) for record in recording.trials],
+        "readings": digest.readings,
+        "events": len(recording.events),
+        "sha256": {"columns": digest.columns, "events": digest.events},
+        "ended": recording.end,
+        "losses": list(recording.losses),
+        "flaws": list(recording.flaws),
+    }
+
+
+def _trial(record: TrialRecord) -> dict[str, Any]:
+    """Return a trial as `session.json` tells it."""
+    return {
+        "number": record.trial.number,
+        "block": record.trial.block,
+        "descriptor": record.trial.stimulus.descriptor,
+        "index": record.trial.stimulus.index,
+        "code": record.trial.stimulus.code,
+        "outcome": record.outcome,
+        "score": record.score,
+        "take": record.take.number if record.take else None,
+        "start_ns": record.start_ns,
+        "stop_ns": record.stop_ns,
+        "other_takes": [
+            {"number": take.number, "start_ns": take.start_ns, "stop_ns": take.stop_ns, "discarded": take.discarded}
+            for take in record.other_takes
+        ],
+    }

@@ -1,0 +1,421 @@
+"""One contract for every export in the list: whole, marked where simulated, the same session when imported again."""
+
+import builtins
+import gzip
+import importlib
+import json
+import math
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from recordings import PLAN, begun, plainly_read, readings
+from stand_ins import INFO, ToldClock
+from test_runner import Session
+
+from drivers.readings import ReadingBlock
+from sessions.analysis import analyse
+from sessions.exports import FORMATS, ExportError, ExportSource, export
+from sessions.exports.tables import tables
+from sessions.import_csv import ImportRefused, import_csv
+from sessions.import_session import exported, import_session
+from sessions.recording import Recording, RecordingError
+from sessions.recording.archive import problems, seal
+from sessions.recording.provenance import software_versions
+
+AGAIN = [name for name, module in FORMATS.items() if hasattr(importlib.import_module(module), "read")]
+
+
+def whole(folder):
+    """Ten trials of a simulated subject, two readings lost."""
+    Session(folder, lost=(700, 701)).run()
+    seal(folder)
+
+
+def torn(folder):
+    """Nothing simulated, texts beyond ASCII, lost readings, a silence, odd numbers, a damaged block, and no end."""
+    clock = ToldClock()
+    writer = begun(folder, info=replace(INFO, simulated=False), clock=clock)
+    writer.event("take_started", 1, {"take": 1}, time_ns=50)
+    for first, later, received in ((0, 0.0, 100), (110, 0.0, 200), (210, 30.0, 300), (310, 30.0, 400)):
+        block = readings(first, 100, received_ns=received)
+        raw = block.raw + 0.1
+        raw[3] = [math.nan, 1e-7, -2.5e-13, -0.0, 5e-324, 1.7976931348623157e308]
+        writer.readings(replace(block, raw=raw, time=block.time + later))
+        writer.commit()
+    writer.event("scored", 1, {"score": 42.5, "positions": [[1.25, 40.0], [1.5, 42.5]], "hand": "left"})
+    writer.event("told", data={"sentence": 'tab\tline\nquote " äöü, 漢'})
+    writer.close()
+    import sqlite3
+
+    with sqlite3.connect(folder / "session.sqlite") as file:
+        file.execute("UPDATE blocks SET crc32 = crc32 + 1 WHERE number = 4")
+
+
+def scores_only(folder):
+    """A visit without a transducer."""
+    Session(folder, forces=False).run()
+
+
+def foreign(folder):
+    """A CSV file of somebody else's, without trials."""
+    time = np.arange(400) / 100.0
+    force = -np.interp(time, [0.0, 1.0, 1.5, 2.5, 3.0, 4.0], [0.0, 0.0, 2.0, 2.0, 0.0, 0.0])
+    rows = [f"{t!r},{f / 2!r},0,{f!r},0,0,0" for t, f in zip(time.tolist(), force.tolist(), strict=True)]
+    path = folder.with_suffix(".csv")
+    path.write_text("\n".join(["t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm", *rows]))
+    import_csv(path, folder)
+
+
+MADE = {make.__name__: make for make in (whole, torn, scores_only, foreign)}
+
+
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory):
+    room = tmp_path_factory.mktemp("sessions")
+    found = {}
+    for name, make in MADE.items():
+        make(room / name)
+        recording = Recording.open(room / name)
+        analysis = {"made_by": software_versions(), **analyse(recording).to_dict()}
+        prediction = {"trials": [{"trial": 1, "sed": 0.009, "stimulus": {"index": 80}, "solver": {"dofs": 9}}]}
+        found[name] = ExportSource(recording, analysis, prediction if name == "whole" else None)
+    return found
+
+
+class Exports(dict):
+    """Exports by format and session, written when first asked for."""
+
+    def __init__(self, sources, room):
+        self.sources, self.room = sources, room
+
+    def __missing__(self, key):
+        form, name = key
+        self[key] = export(self.sources[name], form, self.room / f"{form}-{name}")
+        return self[key]
+
+
+@pytest.fixture(scope="module")
+def exports(sources, tmp_path_factory):
+    return Exports(sources, tmp_path_factory.mktemp("exports"))
+
+
+def files(folder):
+    return sorted(path for path in folder.rglob("*") if path.is_file())
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_every_file_of_a_simulated_session_says_so(exports, form):
+    for path in files(exports[form, "whole"]):
+        content = path.read_bytes()
+        if path.suffix == ".tsv":
+            header, *rows = content.decode().splitlines()
+            assert header.split("\t")[-1] == "simulated"
+            assert all(row.split("\t")[-1] == "1" for row in rows)
+        elif path.suffix == ".gz":
+            assert all(row.split("\t")[-1] == "1" for row in gzip.decompress(content).decode().splitlines())
+        else:
+            assert b"SIMULATED" in content, path
+    assert files(exports[form, "whole"])
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_no_file_of_a_real_session_says_that_it_was_simulated(exports, form):
+    for path in files(exports[form, "torn"]):
+        content = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
+        assert b"SIMULATED" not in content
+        assert b"simulated\t" not in content
+
+
+@pytest.mark.parametrize("form", AGAIN)
+@pytest.mark.parametrize("name", MADE)
+def test_an_exported_session_comes_back_whole(sources, exports, tmp_path, form, name):
+    recorded = sources[name].recording
+    made = import_session(exported(exports[form, name]), tmp_path / "s")
+    again = Recording.open(tmp_path / "s")
+    for column in ("sequence", "counter", "status", "time", "received_ns", "raw"):
+        assert getattr(again.readings(), column).tobytes() == getattr(recorded.readings(), column).tobytes()
+    kept = [event for event in again.events if event.kind != "not_restored"]
+    assert [(e.time_ns, e.kind, e.trial, e.data) for e in kept] == [
+        (e.time_ns, e.kind, e.trial, e.data) for e in recorded.events
+    ]
+    assert again.plan == recorded.plan
+    assert again.trials == recorded.trials
+    assert again.simulated_sentence == recorded.simulated_sentence
+    assert again.flaws == recorded.flaws
+    assert {k: v for k, v in again.provenance.items() if k != "restored_from"} == recorded.provenance
+    if recorded.info is not None:
+        assert again.info.calibration.matrix.tolist() == recorded.info.calibration.matrix.tolist()
+        assert replace(again.info, calibration=recorded.info.calibration) == recorded.info
+    assert set(recorded.losses) <= set(again.losses)
+    assert made.readings == len(recorded.readings())
+    assert [analyse(again).to_dict()[part] for part in ("strokes", "friction")] == [
+        analyse(recorded).to_dict()[part] for part in ("strokes", "friction")
+    ]
+
+
+@pytest.mark.parametrize("form", AGAIN)
+def test_what_was_lost_before_an_export_is_named_after_it_comes_back(exports, tmp_path, form):
+    made = import_session(exported(exports[form, "torn"]), tmp_path / "s")
+    assert made.differences == (
+        "block 4 of the readings is damaged and left out (its bytes do not give the CRC-32 stored with them)",
+    )
+    assert made.differences[0] in Recording.open(tmp_path / "s").losses
+    seal(tmp_path / "s")
+    assert made.differences[0] in problems(tmp_path / "s")
+
+
+@pytest.mark.parametrize("name", ["whole", "torn"])
+def test_the_csv_holds_every_number_of_the_live_file_to_the_last_bit(sources, exports, name):
+    recorded = plainly_read(sources[name].recording.folder)
+    lines = (exports["csv", name] / "readings.csv").read_text().splitlines()
+    rows = [line.split(",") for line in lines if not line.startswith("#")]
+    assert rows[0][:6] == ["sequence", "counter", "status", "time_s", "received_ns", "raw_1_counts"]
+    assert rows[0][11:] == ["Fx_N", "Fy_N", "Fz_N", "Tx_Nmm", "Ty_Nmm", "Tz_Nmm"]
+    kept = recorded if name == "whole" else recorded[:300]  # the damaged block is left out
+    assert len(rows) - 1 == len(kept)
+    for row, reading in zip(rows[1:], kept, strict=True):
+        found = (*map(int, row[:3]), float(row[3]), int(row[4]), *map(float, row[5:11]))
+        assert repr(found) == repr(reading)  # as text NaN is equal to itself
+    # 1e-6 N and 1e-3 N mm a count: the calibration of the stand-in.
+    wrench = [float(number) for number in rows[1][11:]]
+    assert wrench == pytest.approx([r * s for r, s in zip(kept[0][5:], [1e-6] * 3 + [1e-3] * 3, strict=True)])
+
+
+@pytest.mark.parametrize("form", AGAIN)
+def test_a_number_changed_after_the_export_is_named_when_it_is_imported(exports, tmp_path, form):
+    folder = shutil.copytree(exports[form, "whole"], tmp_path / "export")
+    if form == "csv":
+        path = folder / "readings.csv"
+        lines = path.read_text().splitlines(keepends=True)
+        cells = lines[500].split(",")
+        lines[500] = ",".join([*cells[:7], repr(float(cells[7]) + 1.0), *cells[8:]])
+        path.write_text("".join(lines))
+        named = "since it was exported: raw of the readings is not what it was"
+    elif form == "bids":
+        (path,) = folder.glob("sub-*/beh/*_events.tsv")
+        path.write_text(path.read_text().replace('"score":', '"score":1', 1))
+        named = "since it was exported: the event log is not what it was"
+    else:
+        with h5py.File(folder / "session.h5", "r") as file:
+            chunk = file["readings/raw"].id.get_chunk_info(0)
+        content = bytearray((folder / "session.h5").read_bytes())
+        content[chunk.byte_offset + 100] ^= 1
+        (folder / "session.h5").write_bytes(content)
+        with pytest.raises(ImportRefused, match=r"session.h5 is damaged .*export the session anew"):
+            import_session(exported(folder), tmp_path / "s")
+        assert not (tmp_path / "s").exists()
+        return
+    made = import_session(exported(folder), tmp_path / "s")
+    assert made.differences == (named,)
+    assert named in Recording.open(tmp_path / "s").losses
+
+
+@pytest.mark.parametrize("form", ["csv", "bids"])
+def test_a_row_taken_out_of_an_export_is_named(exports, tmp_path, form):
+    folder = shutil.copytree(exports[form, "foreign"], tmp_path / "export")
+    (path,) = folder.glob("readings.csv" if form == "csv" else "sub-*/beh/*_physio.tsv.gz")
+    text = path.read_text() if form == "csv" else gzip.decompress(path.read_bytes()).decode()
+    lines = text.splitlines(keepends=True)
+    text = "".join(lines[:200] + lines[201:])
+    path.write_bytes(text.encode() if form == "csv" else gzip.compress(text.encode()))
+    made = import_session(exported(folder), tmp_path / "s")
+    assert made.differences[0] == "since it was exported: there were 400 readings and there are 399"
+
+
+@pytest.mark.parametrize("form", AGAIN)
+def test_an_export_that_is_no_longer_whole_is_refused_and_leaves_nothing(exports, tmp_path, form):
+    folder = shutil.copytree(exports[form, "whole"], tmp_path / "export")
+    victims = [path for path in files(folder) if path.name.endswith(("readings.csv", "physio.tsv.gz", "session.h5"))]
+    content = victims[0].read_bytes()
+    victims[0].write_bytes(content[: len(content) // 2 - 7])
+    with pytest.raises(ImportRefused, match="export the session anew") as refusal:
+        import_session(exported(folder), tmp_path / "s")
+    assert "\n" not in str(refusal.value)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["export"]
+
+
+def test_a_session_folder_is_not_imported_over_again(sources):
+    with pytest.raises(ImportRefused, match="is a session folder already"):
+        exported(sources["whole"].recording.folder)
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_nothing_is_written_over(sources, tmp_path, form):
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(ExportError, match="not empty"):
+        export(sources["whole"], form, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_an_export_that_was_stopped_leaves_nothing(sources, tmp_path, form):
+    def stop(_):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        export(sources["whole"], form, tmp_path / "out", stop)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_every_float_column_has_a_unit_or_is_known_to_have_none(sources):
+    bare = {"score", "corrections", "position", "error_estimate", "wall_s"}
+    for table in tables(sources["whole"]):
+        for column in table.columns:
+            if any(isinstance(value, float) for value in column.values) and not column.unit:
+                assert column.name in bare or column.name.startswith("mu"), (table.name, column.name)
+
+
+def test_the_readme_tells_every_column_of_every_csv(exports):
+    folder = exports["csv", "whole"]
+    page = (folder / "README.md").read_text()
+    for path in folder.glob("*.csv"):
+        header = next(line for line in path.read_text().splitlines() if not line.startswith("#"))
+        assert f"## {path.name}" in page
+        for name in header.split(","):
+            assert f"| `{name}` |" in page
+
+
+# ---- BIDS
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_the_official_validator_finds_no_error_in_a_bids_export(exports, name):
+    validator = Path(sys.executable).with_name("bids-validator-deno")
+    if not validator.exists():
+        pytest.skip("bids-validator-deno is not installed")
+    run = subprocess.run(
+        [validator, "-r", "--format", "json", "--max-rows", "-1", exports["bids", name]],
+        capture_output=True,
+        text=True,
+        check=False,
+        encoding="utf-8",
+    )
+    told = json.loads(run.stdout)
+    every = [
+        *told["issues"]["issues"],
+        *(i for d in told.get("derivativesSummary", {}).values() for i in d["issues"]["issues"]),
+    ]
+    assert [issue for issue in every if issue["severity"] == "error"] == []
+    assert told["summary"]["totalFiles"] > 0
+    assert run.returncode == 0
+
+
+def test_a_reading_that_never_arrived_is_a_row_of_its_own_and_a_silence_begins_a_new_file(exports):
+    beh = exports["bids", "torn"] / "sub-S01" / "beh"
+    first, second = (
+        gzip.decompress((beh / f"sub-S01_task-madeup_recording-{part}_physio.tsv.gz").read_bytes())
+        .decode()
+        .splitlines()
+        for part in (1, 2)
+    )
+    missing = [row for row in first if row.startswith("n/a")]
+    assert len(first) == 210  # 0 to 99, ten that never arrived, 110 to 209
+    assert len(missing) == 10
+    assert set(missing[0].split("\t")) == {"n/a"}
+    assert [int(row.split("\t")[0]) for row in second] == list(range(210, 310))
+    starts = [
+        json.loads((beh / f"sub-S01_task-madeup_recording-{part}_physio.json").read_text())["StartTime"]
+        for part in (1, 2)
+    ]
+    assert starts == pytest.approx([50e-9, 250e-9])  # received at 100 and 300 ns, the first event at 50
+
+
+def test_the_derivatives_tell_what_made_them(exports):
+    told = json.loads((exports["bids", "whole"] / "derivatives/daq-app/dataset_description.json").read_text())
+    assert told["DatasetType"] == "derivative"
+    assert told["GeneratedBy"][0]["Name"] == "daq-app"
+    assert f"numpy {np.__version__}" in told["GeneratedBy"][0]["Description"]
+    made = exports["bids", "whole"] / "derivatives/daq-app/sub-S01/beh"
+    assert (made / "sub-S01_task-sensotactfriction_desc-friction_beh.tsv").is_file()
+    assert (made / "sub-S01_task-sensotactfriction_desc-predictions_beh.tsv").is_file()
+
+
+# ---- HDF5
+
+
+def test_the_hdf5_export_opens_in_hdf5_1_8_and_holds_the_strokes_with_units(sources, exports):
+    path = exports["hdf5", "whole"] / "session.h5"
+    assert path.read_bytes()[8] == 2  # superblock version; 1.8 reads up to 2
+    strokes = sources["whole"].analysis["strokes"]
+    with h5py.File(path) as file:
+        assert file["strokes/mu_dynamic"][...].tolist() == [stroke["mu_dynamic"] for stroke in strokes]
+        assert file["strokes/tau_max"].attrs["unit"] == b"MPa"
+        assert json.loads(file["derived/analysis"][0]) == json.loads(json.dumps(sources["whole"].analysis))
+
+
+# ---- NWB
+
+
+def test_nwb_holds_what_was_recorded(sources, exports):
+    pynwb = pytest.importorskip("pynwb")
+    for name in ("whole", "torn"):
+        recorded = sources[name].recording
+        block: ReadingBlock = recorded.readings()
+        with pynwb.NWBHDF5IO(exports["nwb", name] / "session.nwb", "r") as io:
+            file = io.read()
+            assert file.acquisition["raw"].data[...].tobytes() == block.raw.tobytes()
+            assert file.acquisition["received_ns"].data[...].tolist() == block.received_ns.tolist()
+            assert file.acquisition["raw"].timestamps is not None  # readings are missing in both: there is no one rate
+            assert file.acquisition["forces"].data[5, 0] == pytest.approx(block.raw[5, 0] * 1e-6)
+            assert file.acquisition["events"]["kind"][...].tolist() == [event.kind for event in recorded.events]
+            if name == "whole":
+                assert file.trials["score"][...].tolist() == [trial.score for trial in recorded.trials]
+            assert json.loads(file.notes)["plan"]["subject"] == "S01"
+
+
+@pytest.mark.parametrize("name", ["whole", "scores_only"])
+def test_the_nwb_inspector_finds_no_violation(exports, name):
+    inspector = pytest.importorskip("nwbinspector")
+    found = list(inspector.inspect_nwbfile(nwbfile_path=exports["nwb", name] / "session.nwb"))
+    grave = [message for message in found if message.importance.name != "BEST_PRACTICE_SUGGESTION"]
+    assert grave == []
+
+
+def test_without_pynwb_one_sentence_says_what_to_install(sources, tmp_path, monkeypatch):
+    load = builtins.__import__
+
+    def refuse(name, *rest, **more):
+        if name.startswith("pynwb"):
+            raise ImportError(name)
+        return load(name, *rest, **more)
+
+    monkeypatch.setattr(builtins, "__import__", refuse)
+    with pytest.raises(ExportError, match=r"pip install daq-app\[nwb\]"):
+        export(sources["whole"], "nwb", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_full_folder_for_an_import_is_refused(exports, tmp_path):
+    (tmp_path / "mine").write_text("")
+    with pytest.raises(RecordingError, match="not empty"):
+        import_session(exported(exports["csv", "whole"]), tmp_path)
+
+
+def test_the_plan_of_these_tests_has_texts_beyond_ascii():
+    assert not json.dumps(PLAN.blocks[0].scale_ends, ensure_ascii=False).isascii()
+
+
+def test_an_infinite_number_which_bids_does_not_know_is_named_when_it_comes_back(tmp_path):
+    writer = begun(tmp_path / "s")
+    block = readings(0, 20)
+    raw = block.raw.copy()
+    raw[7, 2] = math.inf
+    writer.readings(replace(block, raw=raw))
+    writer.event("ended", data={"reason": "done"})
+    writer.close()
+    source = ExportSource(
+        Recording.open(tmp_path / "s"), {"made_by": {}, "strokes": [], "friction": [], "flaws": []}, None
+    )
+    for form, named in (
+        ("csv", ()),
+        ("hdf5", ()),
+        ("bids", ("since it was exported: raw of the readings is not what it was",)),
+    ):
+        made = import_session(exported(export(source, form, tmp_path / form)), tmp_path / f"{form}-again")
+        assert made.differences == named
