@@ -10,6 +10,7 @@ from drivers.labjack_u6.handshake import identify_labjack_u6, open_labjack_u6
 from drivers.links import UdpLink
 from drivers.net_ft import handshake
 from drivers.net_ft.device import NetFtTransducer
+from drivers.nidaq.handshake import identify_nidaq, open_nidaq
 from drivers.serial_ft.handshake import identify_serial_ft, open_serial_ft
 from drivers.transducer import DeviceFault, LinkLost, SetupError, Transducer, TransducerInfo
 
@@ -52,6 +53,7 @@ DRIVERS: tuple[Driver, ...] = (
     Driver("serial-ft", open_serial_ft, identify_serial_ft, ()),
     Driver("digital-ft", open_digital_ft, identify_digital_ft, ()),
     Driver("labjack-u6", open_labjack_u6, identify_labjack_u6, ("labjack-u6://",)),
+    Driver("nidaq", open_nidaq, identify_nidaq, ()),
 )
 
 

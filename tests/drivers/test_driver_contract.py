@@ -42,8 +42,8 @@ def net_ft(faults):
 SIMULATORS = {"net-ft": net_ft}  # a driver's name: how its simulator is made
 # A serial line has no sequence numbers and one user: repeated, late and stalled records cannot be told on it, and none
 # can ask who is there while it is in use. tests/drivers/test_serial_wires.py holds these to what a line allows, and
-# tests/drivers/labjack_u6 the one on USB, which has one user too and whose simulator is no address.
-ONE_USER = {"serial-ft", "digital-ft", "labjack-u6"}
+# tests/drivers/labjack_u6 and nidaq the gauges, whose simulators are no addresses.
+ONE_USER = {"serial-ft", "digital-ft", "labjack-u6", "nidaq"}
 
 
 def test_every_driver_has_a_simulator_here_or_is_held_to_what_its_line_allows():

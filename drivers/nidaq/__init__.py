@@ -1,0 +1,1 @@
+"""Six gauge voltages through NI-DAQmx."""
