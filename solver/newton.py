@@ -21,6 +21,10 @@ from solver.mesh import Array
 
 States = NDArray[np.int32]
 SHORTEST = 1.0 / 16.0  # part of a Newton step below which a body that turns inside out is given up
+ROUNDS = 12  # of changes of contact states within one linear system: dense, of the skin alone, and so cheap
+NEAR = 0.1  # step below which the tangent of the state before is tried again [mm]
+FAST = 0.02  # fall of the steps' size, below which a new tangent is kept
+SLOW = 0.3  # the same, above which a kept one is given up
 EQUILIBRIUM, BY_DEPTH, BY_FRICTION, BY_TRAVEL = 0, 1, 2, 3  # columns of Newton.steps
 
 
@@ -81,39 +85,55 @@ class Newton:
         self.tangent = np.zeros((count, 16, 16))
         self.force = np.zeros(body.size)
         self.fold, self.dilate = np.zeros((count, 2, 17)), np.zeros((count, 3, 18))
-        self.volume = np.zeros((count, 3))
+        self.core, self.volume = np.zeros((count, 3)), np.zeros((count, 3))
         self.inside = Elimination(body.plan)
         self.steps = np.zeros((2 * skin, 4))  # of the skin
         self.length = np.zeros(skin)
         self.skin_x, self.skin_y = body.mesh.nodes[body.skin].T.copy()
-        self._felt = np.zeros(2 * skin)
+        self._felt, self._reaction = np.zeros(2 * skin), np.zeros((skin, 2))
+        self._state, self._sense = np.zeros(skin, np.int32), np.zeros(skin, np.int32)
+        self._tangent_at: Shape | None = None  # what was found with the tangent that is there
         self._free = np.zeros(2 * skin, np.int32)
         self._matrix, self._right = np.zeros(4 * skin * skin), np.zeros((2 * skin, 4))
 
-    def linearise(self, shape: Shape, pull: Pull, anchor: Array) -> bool:
+    def linearise(self, shape: Shape, pull: Pull, anchor: Array, rounds: int = 0) -> bool:
         """Set up the system at `shape` under `pull`, solve it for the skin's `steps` (2 k, 4); False where it fails.
 
-        `anchor` (k,) are the positions along x where nodes stick [mm].
+        `anchor` (k,) are the positions along x where nodes stick [mm]. The states of contact are changed up to `rounds`
+        times until none contradicts the linearised body.
         """
         body = self.body
+        self._tangent_at = None
         least = kernels.assemble(
             shape.u, shape.pressure, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening,
-            body.lame, body.nodes, body.unknown, self.tangent, self.force, self.fold, self.dilate, self.volume,
+            body.lame, body.nodes, body.unknown, self.tangent, self.force, self.fold, self.core, self.dilate,
+            self.volume,
         )  # fmt: skip
         if not least > 0.0 or not self.inside.factorise(self.tangent):
             return False
+        return self._touch(shape, pull, anchor, rounds)
+
+    def relinearise(self, shape: Shape, pull: Pull, anchor: Array, rounds: int) -> bool:
+        """Do the same with the forces at `shape`, but the tangent and its factors that are there already."""
+        body = self.body
+        least = kernels.forces(
+            shape.u, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening, body.lame,
+            body.nodes, body.unknown, self.force, self.fold, self.core, self.volume,
+        )  # fmt: skip
+        return least > 0.0 and self._touch(shape, pull, anchor, rounds)
+
+    def _touch(self, shape: Shape, pull: Pull, anchor: Array, rounds: int) -> bool:
+        body = self.body
         self._felt = self.inside.condense(self.force)
+        self._state[:], self._sense[:] = shape.state, shape.sense
         x = self.skin_x + shape.u[body.skin, 0]
         above = self.skin_y + shape.u[body.skin, 1] - pull.depth
-        kernels.tributary(x, body.middle, self.length)
-        size = kernels.impose(
-            self.inside.stiffness, self._felt, body.held, body.middle, shape.state, shape.sense, pull.mu, pull.tau,
-            above, x - anchor, self.length, self._free, self._matrix, self._right, self.steps,
+        solved = kernels.settle(
+            self.inside.stiffness, self._felt, body.held, body.middle, self._state, self._sense, pull.mu, pull.tau,
+            pull.sense, x, above, anchor, rounds, self.length, self._free, self._matrix, self._right, self.steps,
+            self._reaction,
         )  # fmt: skip
-        if not kernels.solve(self._matrix, self._right[:size], size):
-            return False
-        self.steps[self._free[:size]] = self._right[:size]
-        return bool(np.isfinite(self.steps[:, EQUILIBRIUM]).all())
+        return solved and bool(np.isfinite(self.steps[:, EQUILIBRIUM]).all())
 
     def reaction(self, skin: Array, *, still: bool = False) -> Array:
         """Return the surface's forces on the skin (k, 2) at the end of its step (2 k,), or their change alone."""
@@ -130,7 +150,7 @@ class Newton:
             shape.u, shape.pressure, self.inside.unfold(skin), scale, body.nodes, body.unknown, body.lame, self.fold,
             self.dilate, self.volume, u, pressure,
         )  # fmt: skip
-        state, sense, reaction = shape.state.copy(), shape.sense.copy(), self.reaction(skin)
+        state, sense, reaction = self._state.copy(), self._sense.copy(), self.reaction(skin)
         x = self.skin_x + u[body.skin, 0]
         above = self.skin_y + u[body.skin, 1] - pull.depth
         kernels.tributary(x, body.middle, self.length)
@@ -138,17 +158,25 @@ class Newton:
         return Shape(u, pressure, state, sense, reaction, pull, shape.iterations + 1), largest, changed
 
     def settle(self, start: Shape, pull: Pull, tolerance: float = 1e-8, limit: int = 25) -> Shape:
-        """Return the equilibrium under `pull`, from `start`. Newton ends at a step below `tolerance` [mm].
+        """Return the equilibrium under `pull`, from `start`, its displacements good to `tolerance` [mm].
 
-        Raises NotConverged where `limit` iterations do not do it or the body would turn inside out.
+        Tangents are kept, factors and all, where steps are small or fall fast. What is still missing is judged from how
+        the steps fall: with a new tangent as the square, with a kept one in proportion. Raises NotConverged where `limit` iterations do not do
+        it or the body would turn inside out.
         """
         anchor = start.place(self.body)[:, 0] + (pull.travel - start.pull.travel)
         shape = before = self._entered(start, pull)
-        scale = 1.0
+        kept = self._tangent_at is start
+        scale, last, new = 1.0, 0.0, False
         for _ in range(limit):
-            if not self.linearise(shape, pull, anchor):
+            if kept:
+                if not self.relinearise(shape, pull, anchor, ROUNDS):
+                    kept = False
+                    continue
+                before = shape
+            elif not self.linearise(shape, pull, anchor, ROUNDS):
                 scale /= 2.0  # the last step went too far
-                if shape is before or scale < SHORTEST or not self.linearise(before, pull, anchor):
+                if shape is before or scale < SHORTEST or not self.linearise(before, pull, anchor, ROUNDS):
                     raise NotConverged("the body would turn inside out")
                 shape = before
             elif shape is not before:
@@ -156,8 +184,17 @@ class Newton:
             shape, largest, changed = self.moved(before, pull, self.steps[:, EQUILIBRIUM].copy(), anchor, scale)
             if not largest < 1e3:
                 raise NotConverged("the displacements grow without bound")
-            if largest < tolerance and not changed and scale == 1.0:
+            fall = min(largest / last, 1.0) if last > 0.0 else 1.0
+            left = fall * fall if not kept else 1.0 if new else min(2.0 * fall, 1.0)
+            if largest * left < tolerance and not changed and scale == 1.0:
+                self._tangent_at = shape
                 return shape
+            new = not kept
+            if kept:
+                kept = largest < NEAR if last == 0.0 else fall < SLOW
+            else:
+                kept = fall < FAST and scale == 1.0
+            last = largest
         raise NotConverged(f"no equilibrium within {limit} iterations")
 
     def _entered(self, start: Shape, pull: Pull) -> Shape:

@@ -16,14 +16,14 @@ def settled(
     tolerance: float = 1e-8,
     stop: Callable[[], bool] = lambda: False,
 ) -> Shape:
-    """Return the sliding state under `pull` (sense +1 or -1), from undeformed in two steps, or from `start` in one.
+    """Return the sliding state under `pull` (sense +1 or -1), from undeformed or from `start`, in one step.
 
     A step that fails is halved, depth, friction and bound together. Raises NotConverged where that does not help,
     Cancelled where `stop` says so.
     """
     shape = Shape.undeformed(newton.body) if start is None else start
     begin = shape.pull if start is not None else Pull(0.0, pull.mu, pull.tau, pull.sense)
-    done, part = 0.0, 0.5 if start is None else 1.0
+    done, part = 0.0, 1.0
     used = 0
     while done < 1.0:
         if stop():

@@ -4,9 +4,9 @@
 """
 
 from solver.kernels.compiling import CAP, OPEN, SLIP, STICK
-from solver.kernels.elements import advance, assemble, energies
+from solver.kernels.elements import advance, assemble, energies, forces
 from solver.kernels.fronts import condense, eliminate, unfold
-from solver.kernels.skin import impose, restate, solve, tributary
+from solver.kernels.skin import impose, restate, settle, solve, tributary
 
 __all__ = [
     "CAP",
@@ -18,8 +18,10 @@ __all__ = [
     "condense",
     "eliminate",
     "energies",
+    "forces",
     "impose",
     "restate",
+    "settle",
     "solve",
     "tributary",
     "unfold",

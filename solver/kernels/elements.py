@@ -22,6 +22,7 @@ def assemble(
     tangent: Array,
     force: Array,
     fold: Array,
+    core: Array,
     dilate: Array,
     volume: Array,
 ) -> float:
@@ -31,7 +32,7 @@ def assemble(
     from `u` alone. `grad_x`, `grad_y` (e, q, 9), `weight` (e, q), `modes` (e, q, 3, orthonormal over the element);
     `shear`, `stiffening`, `lame` (e,); `nodes` (e, 9), `unknown` (e, 8, 2), -1 where fixed.
     Filled: `tangent` (e, 16, 16) of the outer nodes, lower half, `force` (n,), `fold` (e, 2, 17)
-    (centre = -(fold @ (outer unknowns, 1))),
+    (centre = -(fold @ (outer unknowns, 1))), `core` (e, 3) of the centre's stiffness inverted (xx, xy, yy),
     `dilate` (e, 3, 18) derivative of the modes of ln J, `volume` (e, 3) those modes.
     Where det F is not positive, the arrays are left half filled.
     """
@@ -128,6 +129,7 @@ def assemble(
         # the centre node meets no other element: rows 16 and 17 are eliminated
         det = full[16, 16] * full[17, 17] - full[17, 16] * full[17, 16]
         k00, k01, k11 = full[17, 17] / det, -full[17, 16] / det, full[16, 16] / det
+        core[e, 0], core[e, 1], core[e, 2] = k00, k01, k11
         for i in range(16):
             fold[e, 0, i] = k00 * full[16, i] + k01 * full[17, i]
             fold[e, 1, i] = k01 * full[16, i] + k11 * full[17, i]
@@ -141,6 +143,85 @@ def assemble(
             if row >= 0:
                 mine = fx[i // 2] if i % 2 == 0 else fy[i // 2]
                 force[row] += mine - c0 * fold[e, 0, 16] - c1 * fold[e, 1, 16]
+    return least
+
+
+@compiled
+def forces(
+    u: Array,
+    grad_x: Array,
+    grad_y: Array,
+    weight: Array,
+    modes: Array,
+    shear: Array,
+    stiffening: Array,
+    lame: Array,
+    nodes: Narrow,
+    unknown: Narrow,
+    force: Array,
+    fold: Array,
+    core: Array,
+    volume: Array,
+) -> float:
+    """Fill the internal forces at displacements `u` for a tangent that `assemble` made elsewhere; return the least det F.
+
+    Of that tangent are `fold` and `core`, by which the centres are eliminated. Filled: `force` (n,), the last column of
+    `fold`, and `volume`.
+    """
+    force[:] = 0.0
+    least = np.inf
+    ux, uy = np.empty(9), np.empty(9)
+    fx, fy = np.empty(9), np.empty(9)
+    inverse = np.empty((9, 4))  # transposed, at each quadrature point
+    for e in range(nodes.shape[0]):
+        for i in range(9):
+            ux[i], uy[i] = u[nodes[e, i], 0], u[nodes[e, i], 1]
+        fx[:] = 0.0
+        fy[:] = 0.0
+        v0 = v1 = v2 = 0.0
+        for q in range(9):
+            gx, gy = grad_x[e, q], grad_y[e, q]
+            f00, f01, f10, f11 = 1.0, 0.0, 0.0, 1.0
+            for i in range(9):
+                f00 += ux[i] * gx[i]
+                f01 += ux[i] * gy[i]
+                f10 += uy[i] * gx[i]
+                f11 += uy[i] * gy[i]
+            j = f00 * f11 - f01 * f10
+            least = min(least, j)
+            if not j > 0.0:
+                return least
+            w = weight[e, q]
+            log = np.log(j)
+            v0 += w * modes[e, q, 0] * log
+            v1 += w * modes[e, q, 1] * log
+            v2 += w * modes[e, q, 2] * log
+            g = w * shear[e]
+            if stiffening[e] > 0.0:
+                excess = f00 * f00 + f01 * f01 + f10 * f10 + f11 * f11 - 2.0 - 2.0 * log
+                g *= np.exp(stiffening[e] * excess)
+            a00, a01, a10, a11 = f11 / j, -f10 / j, -f01 / j, f00 / j
+            inverse[q, 0], inverse[q, 1], inverse[q, 2], inverse[q, 3] = a00, a01, a10, a11
+            p00, p01, p10, p11 = g * (f00 - a00), g * (f01 - a01), g * (f10 - a10), g * (f11 - a11)
+            for i in range(9):
+                fx[i] += p00 * gx[i] + p01 * gy[i]
+                fy[i] += p10 * gx[i] + p11 * gy[i]
+        volume[e, 0], volume[e, 1], volume[e, 2] = v0, v1, v2
+        for q in range(9):
+            gx, gy = grad_x[e, q], grad_y[e, q]
+            push = lame[e] * weight[e, q] * (modes[e, q, 0] * v0 + modes[e, q, 1] * v1 + modes[e, q, 2] * v2)
+            p00, p01 = push * inverse[q, 0], push * inverse[q, 1]
+            p10, p11 = push * inverse[q, 2], push * inverse[q, 3]
+            for i in range(9):
+                fx[i] += p00 * gx[i] + p01 * gy[i]
+                fy[i] += p10 * gx[i] + p11 * gy[i]
+        fold[e, 0, 16] = core[e, 0] * fx[8] + core[e, 1] * fy[8]
+        fold[e, 1, 16] = core[e, 1] * fx[8] + core[e, 2] * fy[8]
+        for i in range(16):
+            row = unknown[e, i // 2, i % 2]
+            if row >= 0:
+                mine = fx[i // 2] if i % 2 == 0 else fy[i // 2]
+                force[row] += mine - fold[e, 0, i] * fx[8] - fold[e, 1, i] * fy[8]
     return least
 
 

@@ -207,3 +207,66 @@ def restate(
             changed += 1
         state[i], sense[i] = now, turned
     return changed
+
+
+@compiled
+def settle(
+    stiffness: Array,
+    force: Array,
+    held: Narrow,
+    at: Narrow,
+    state: Narrow,
+    sense: Narrow,
+    mu: float,
+    tau: float,
+    direction: int,
+    x: Array,
+    above: Array,
+    anchor: Array,
+    rounds: int,
+    length: Array,
+    free: Narrow,
+    matrix: Array,
+    right: Array,
+    steps: Array,
+    reaction: Array,
+) -> bool:
+    """Solve the skin's system of contact for `steps`, its states changed up to `rounds` times until none contradicts it.
+
+    That is the contact of the linearised body, exact where the rounds suffice. `x` (k,) are positions along the surface,
+    `anchor` (k,) those where nodes stick; filled beside `steps`: `reaction` (k, 2). For the rest see `impose` and
+    `restate`. False where a system cannot be solved.
+    """
+    size = state.shape[0]
+    tributary(x, at, length)
+    for turn in range(rounds + 1):
+        count = impose(
+            stiffness, force, held, at, state, sense, mu, tau, above, x - anchor, length, free, matrix, right, steps
+        )
+        if not solve(matrix, right[:count], count):
+            return False
+        for r in range(count):
+            steps[free[r]] = right[r]
+        for i in range(2 * size):
+            total = force[i]
+            for c in range(2 * size):
+                total += stiffness[i, c] * steps[c, 0]
+            reaction[i // 2, i % 2] = total
+        if turn == rounds:
+            break
+        ahead = x + steps[::2, 0]
+        if (
+            restate(
+                state, sense, reaction, above + steps[1::2, 0], ahead - anchor, _lengths(ahead, at), mu, tau, direction
+            )
+            == 0
+        ):
+            break
+    return True
+
+
+@compiled
+def _lengths(x: Array, at: Narrow) -> Array:
+    out = np.empty_like(x)
+    tributary(x, at, out)
+    return out

@@ -23,7 +23,7 @@ def assembled(body, u, pressure):
     newton = Newton(body)
     least = kernels.assemble(
         u, pressure, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening, body.lame,
-        body.nodes, body.unknown, newton.tangent, newton.force, newton.fold, newton.dilate, newton.volume,
+        body.nodes, body.unknown, newton.tangent, newton.force, newton.fold, newton.core, newton.dilate, newton.volume,
     )  # fmt: skip
     return newton, least
 
@@ -41,6 +41,26 @@ def test_compiled_forces_and_tangent_agree_with_the_plain_ones(law):
     np.testing.assert_allclose(newton.force, force, atol=1e-13 * np.abs(tangent).max())
     np.testing.assert_allclose(np.tril(newton.tangent), np.tril(tangent), atol=1e-12 * np.abs(tangent).max())
     assert least == pytest.approx(np.linalg.det(kernels_numpy.deformation(body, u)).min(), rel=1e-12)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=str)
+def test_forces_for_a_tangent_kept_from_another_state_agree_with_the_plain_ones(law):
+    body, u = distorted(law)
+    newton, _ = assembled(body, u, newton_pressure(body, u))
+    _, tangent = kernels_numpy.forces_and_tangents(body, u, newton_pressure(body, u))
+    other = distorted(law, seed=5)[1]
+    least = kernels.forces(
+        other, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening, body.lame, body.nodes,
+        body.unknown, newton.force, newton.fold, newton.core, newton.volume,
+    )  # fmt: skip
+    force, _ = kernels_numpy.forces_and_tangents(body, other, newton_pressure(body, other))
+    centre = np.linalg.solve(tangent[:, 16:, 16:], force[:, 16:, None])
+    expected, free = np.zeros(body.size), body.unknown.reshape(-1, 16) >= 0
+    left = force[:, :16] - (tangent[:, :16, 16:] @ centre)[:, :, 0]
+    np.add.at(expected, body.unknown.reshape(-1, 16)[free], left[free])
+    np.testing.assert_allclose(newton.force, expected, atol=1e-13 * np.abs(tangent).max())
+    np.testing.assert_allclose(newton.fold[:, :, 16], centre[:, :, 0], atol=1e-12)
+    assert least == pytest.approx(np.linalg.det(kernels_numpy.deformation(body, other)).min(), rel=1e-12)
 
 
 @pytest.mark.parametrize("law", LAWS, ids=str)

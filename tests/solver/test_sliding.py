@@ -133,3 +133,23 @@ def test_turning_the_unloaded_body_by_a_right_angle_stores_nothing():
 def pressure_of(body, u):
     J = np.linalg.det(kernels_numpy.deformation(body, u))
     return body.lame[:, None] * np.einsum("eq,eqm,eq->em", body.weight, body.modes, np.log(J))
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7])
+def test_displacements_are_as_good_as_was_asked_for_whichever_state_they_start_from(tolerance):
+    newton, _, _ = finger(5)
+    start = None
+    for name in ("slip 100", "slip 0", "slip 55", "stick 0 at d1.0", "press d2.0"):
+        pull = REFERENCE[name][0]
+        alone = settled(newton, pull, None, tolerance)
+        after = settled(newton, pull, start, tolerance)
+        true = settled(newton, pull, alone, 1e-13)
+        assert np.abs(alone.u - true.u).max() < tolerance
+        assert np.abs(after.u - true.u).max() < tolerance
+        start = settled(newton, pull, after, tolerance)  # leaves its tangent behind for the next surface
+
+
+def test_contact_settled_within_a_linear_system_takes_the_whole_depth_in_one_step_of_few_iterations():
+    newton, _, _ = finger(8, margin=3.0)
+    for name in ("slip 0", "slip 55", "slip 100", "stick 0"):
+        assert settled(newton, REFERENCE[name][0], tolerance=1e-5).iterations <= 6
