@@ -161,8 +161,8 @@ class Newton:
         """Return the equilibrium under `pull`, from `start`, its displacements good to `tolerance` [mm].
 
         Tangents are kept, factors and all, where steps are small or fall fast. What is still missing is judged from how
-        the steps fall: with a new tangent as the square, with a kept one in proportion. Raises NotConverged where `limit` iterations do not do
-        it or the body would turn inside out.
+        the steps fall: with a new tangent as the square, with a kept one in proportion. Raises NotConverged where
+        `limit` iterations do not do it or the body would turn inside out.
         """
         anchor = start.place(self.body)[:, 0] + (pull.travel - start.pull.travel)
         shape = before = self._entered(start, pull)
@@ -185,15 +185,13 @@ class Newton:
             if not largest < 1e3:
                 raise NotConverged("the displacements grow without bound")
             fall = min(largest / last, 1.0) if last > 0.0 else 1.0
-            left = fall * fall if not kept else 1.0 if new else min(2.0 * fall, 1.0)
+            left = min((2.0 * fall) ** 2, 1.0) if not kept else 1.0 if new else min(2.0 * fall, 1.0)
             if largest * left < tolerance and not changed and scale == 1.0:
                 self._tangent_at = shape
                 return shape
             new = not kept
-            if kept:
-                kept = largest < NEAR if last == 0.0 else fall < SLOW
-            else:
-                kept = fall < FAST and scale == 1.0
+            still = largest < NEAR if last == 0.0 else fall < SLOW
+            kept = still if kept else fall < FAST and scale == 1.0
             last = largest
         raise NotConverged(f"no equilibrium within {limit} iterations")
 

@@ -163,7 +163,7 @@ def forces(
     core: Array,
     volume: Array,
 ) -> float:
-    """Fill the internal forces at displacements `u` for a tangent that `assemble` made elsewhere; return the least det F.
+    """Fill the internal forces at displacements `u` for a tangent assembled elsewhere; return the least det F.
 
     Of that tangent are `fold` and `core`, by which the centres are eliminated. Filled: `force` (n,), the last column of
     `fold`, and `volume`.

@@ -231,11 +231,11 @@ def settle(
     steps: Array,
     reaction: Array,
 ) -> bool:
-    """Solve the skin's system of contact for `steps`, its states changed up to `rounds` times until none contradicts it.
+    """Solve the skin's system of contact for `steps`, changing states up to `rounds` times until none contradicts it.
 
-    That is the contact of the linearised body, exact where the rounds suffice. `x` (k,) are positions along the surface,
-    `anchor` (k,) those where nodes stick; filled beside `steps`: `reaction` (k, 2). For the rest see `impose` and
-    `restate`. False where a system cannot be solved.
+    That is the contact of the linearised body, exact where the rounds suffice. `x` (k,) are positions along the
+    surface, `anchor` (k,) those where nodes stick; filled beside `steps`: `reaction` (k, 2). For the rest see
+    `impose` and `restate`. False where a system cannot be solved.
     """
     size = state.shape[0]
     tributary(x, at, length)
