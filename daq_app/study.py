@@ -44,7 +44,7 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
         folder = out / f"{subject}-scores"
         people = SimulatedPeople(_seed(seed, number), clock)
         planned = plan(chosen, subject, _seed(seed, number), forces=False)
-        end = conduct(planned, folder, people, None, clock, console, subject_simulated=True, settings=[_told(seed)])
+        end = conduct(planned, folder, people, None, clock, console, settings=[_told(seed)])
         _check(end, folder)
         scored.append(folder)
     subject = f"S{STROKING:02d}"
@@ -59,7 +59,6 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
             bench.transducer,
             clock,
             console,
-            subject_simulated=True,
             settings=[_told(seed)],
         )
         _check(end, folder)

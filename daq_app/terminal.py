@@ -46,6 +46,7 @@ class Terminal:
         self._out = out or sys.stderr
         self._asked: Command | None = None
         self._lines: deque[str] = deque()
+        self.closed = False  # nobody can type any more
         # A daemon: a blocked read of stdin must not keep the program alive.
         threading.Thread(target=self._read, args=(lines or sys.stdin,), daemon=True).start()
         self._print(HELP)
@@ -118,4 +119,4 @@ class Terminal:
     def _read(self, lines: TextIO) -> None:
         for line in lines:
             self._lines.append(line)
-        self._lines.append("abort the terminal was closed")
+        self.closed = True

@@ -87,8 +87,8 @@ class Recorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close it."""
-        self.close()
+        """Close it; where somebody pressed Ctrl-C without waiting."""
+        self.close(0.0 if kind is KeyboardInterrupt else PATIENCE)
 
     @property
     def pid(self) -> int:

@@ -151,6 +151,7 @@ class SessionBegun:
 
     folder: str
     plan: SessionPlan
+    people: Kind
     simulated: str | None  # the sentence that heads every file, where something is simulated
     clock_offset_ns: int  # session clock minus this machine's monotonic clock [ns]; a told clock has none of its own
     factor: float  # told seconds in one real second [-]

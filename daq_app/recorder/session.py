@@ -28,7 +28,7 @@ from daq_app.recorder.messages import (
     Tare,
 )
 from daq_app.recorder.pipes import Inbox
-from daq_app.wiring import SimulatedHand, SimulatedPeople
+from daq_app.wiring import SimulatedHand, SimulatedPeople, planted_surface
 from drivers.clock import Clock
 from drivers.transducer import TransducerInfo
 from sessions.plan import SessionPlan
@@ -120,9 +120,8 @@ def run(prepared: Prepared, bench: Bench, display: Display, inbox: Inbox, send: 
     writer.safe = course.told
     simulated = simulated_sentence(prepared.info, prepared.people.kind != "people")
     folder = str(writer.folder)
-    send(
-        SessionBegun(folder, prepared.plan, simulated, prepared.clock_offset_ns, prepared.clock.factor, prepared.before)
-    )
+    kind, offset_ns = prepared.people.kind, prepared.clock_offset_ns
+    send(SessionBegun(folder, prepared.plan, kind, simulated, offset_ns, prepared.clock.factor, prepared.before))
     end = run_session(
         prepared.plan,
         writer,
@@ -239,7 +238,10 @@ def _helper(prepared: Prepared, bench: Bench) -> Operator | None:
 
 
 def _check_people(people: People, plan: SessionPlan, bench: Bench) -> None:
-    """Raise NotNow where simulated people would have to stroke a real bench."""
+    """Raise NotNow where simulated people would have to stroke a real bench, SetupError where it lacks a surface."""
+    if people.kind != "people":
+        for trial in plan.trials:
+            planted_surface(trial)
     simulated_bench = bench.connected is not None and bench.connected.bench is not None
     if people.kind == "simulated people" and plan.forces and not simulated_bench:
         raise NotNow("simulated people stroke the simulated bench only: connect sim:")

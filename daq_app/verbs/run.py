@@ -5,20 +5,19 @@ Experimenter and subject answer at this terminal, or are simulated (on the simul
 
 import argparse
 import secrets
-from contextlib import nullcontext
 from dataclasses import asdict, replace
 from datetime import datetime
 from pathlib import Path
 
+from daq_app.attending import attended, opened
 from daq_app.cli import DONE, FLAWED, WrongValue
-from daq_app.conduct import conduct
 from daq_app.console import Console
-from daq_app.terminal import Terminal
-from daq_app.wiring import SimulatedPeople, connected
-from drivers.clock import PacedClock, RealClock
+from daq_app.recorder.client import Recorder
+from daq_app.recorder.messages import People, StartSession
 from sessions.plan import Frame
 from sessions.protocols import plan, protocol
 from sessions.recording import Setting
+from sessions.resuming import RESUMABLE
 
 EXAMPLE = "daq-app run sensotact-friction --device sim:?seed=7 --subject P07 --headless --simulate-subject 7 --pace 20"
 
@@ -59,30 +58,20 @@ def run(options: argparse.Namespace, console: Console) -> int:
         stroking_hand=options.stroking_hand,
         answering_hand=options.answering_hand,
     )
-    clock = RealClock() if options.pace == 1.0 else PacedClock(options.pace)
     stamp = datetime.now().strftime("%Y%m%dT%H%M%S")
     folder = options.out or Path("recordings") / f"{options.subject}_{planned.protocol}_{stamp}"
-    with connected(options.device, clock) if options.device else nullcontext() as bench:
+    simulated = options.simulate_subject
+    people = People() if simulated is None else People("simulated people", simulated)
+    settings = (Setting("seed", seed, "", "default" if options.seed is None else "set"),)
+    with Recorder.start(options.pace, debug=options.debug) as recorder:
+        bench = opened(recorder, options.device) if options.device else None
         frame = _frame(options, planned.frame if bench is None else bench.frame or planned.frame)
-        planned = replace(planned, frame=frame)
-        people = (
-            Terminal(forces=planned.forces)
-            if options.simulate_subject is None
-            else SimulatedPeople(options.simulate_subject, clock, bench)
-        )
-        end = conduct(
-            planned,
-            folder,
-            people,
-            None if bench is None else bench.transducer,
-            clock,
-            console,
-            subject_simulated=options.simulate_subject is not None,
-            settings=[Setting("seed", seed, "", "default" if options.seed is None else "set")],
-        )
-    console.result({"session": str(folder), "end": asdict(end), "seed": seed})
+        asked = StartSession(replace(planned, frame=frame), str(folder.absolute()), people, settings)
+        outcome = attended(recorder, asked, console)
+    end = outcome.end
+    console.result({"session": str(folder), "end": asdict(end), "sealed": outcome.sealed, "seed": seed})
     console.say(f"{folder}: {end.reason}; {end.readings} readings, {end.health.lost} lost")
-    if end.cause == "device":
+    if end.cause in RESUMABLE:
         console.note(
             f"it is not sealed yet: 'daq-app resume {folder}' goes on at the same trial, with --end it is ended"
         )

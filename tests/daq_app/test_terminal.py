@@ -1,0 +1,98 @@
+"""A person at a terminal: what is typed there, and what becomes of a session when the terminal goes."""
+
+import io
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from daq_app.terminal import Terminal
+from sessions.protocols import plan, protocol
+from sessions.recording import Recording
+from sessions.steps import Abort, AskMount, AskScore, AskStroke, Pause, Redo, Scored, StimulusMounted, StrokeDone
+
+TRIAL = plan(protocol("sensotact-friction"), "S01", 3).trials[0]
+ENDS = ("not at all", "very")
+
+
+def meant(command, line, *, forces=True):
+    """Return what a line means after a command, and what is said about it."""
+    out = io.StringIO()
+    terminal = Terminal(forces=forces, lines=io.StringIO(f"{line}\n"), out=out)
+    while not terminal.closed:
+        time.sleep(0.001)
+    terminal.show(command)
+    return terminal.poll(), out.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("command", "line", "event"),
+    [
+        (AskMount(TRIAL), "", StimulusMounted(TRIAL.stimulus.code)),
+        (AskScore(TRIAL, ENDS), "37.5", Scored(37.5)),
+        (AskScore(TRIAL, ENDS), "-", Scored(None)),
+        (AskScore(TRIAL, ENDS), "redo wrong finger", Redo("wrong finger")),
+        (AskStroke(TRIAL), "abort ill", Abort("ill")),
+        (AskStroke(TRIAL), "pause", Pause()),
+    ],
+)
+def test_a_line_means_what_was_asked_for(command, line, event):
+    assert meant(command, line)[0] == (event,)
+
+
+def test_enter_reports_a_stroke_only_where_no_transducer_feels_it():
+    assert meant(AskStroke(TRIAL), "", forces=False)[0] == (StrokeDone(),)
+    events, said = meant(AskStroke(TRIAL), "")
+    assert events == ()
+    assert "Nothing is waiting for Enter now" in said
+
+
+@pytest.fixture
+def at_a_terminal(tmp_path):
+    """A session on the simulated bench whose people are at a terminal; it waits for the first stimulus."""
+    folder = tmp_path / "s"
+    words = ["run", "sensotact-friction", "--device", "sim:", "--subject", "P01", "--out", str(folder)]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "daq_app", *words],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        process_group=0,
+    )
+    said = ""
+    for waited_for in ("Press Enter to begin.", "press Enter."):
+        while waited_for not in said:
+            letter = process.stderr.read(1)
+            assert letter, said
+            said += letter
+        process.stdin.write("\n" * waited_for.endswith("begin."))
+        process.stdin.flush()
+    yield folder, process
+    process.kill()
+    process.communicate()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals a group of processes")
+def test_ctrl_c_at_the_terminal_ends_and_seals_the_session(at_a_terminal):
+    folder, process = at_a_terminal
+    os.killpg(process.pid, signal.SIGINT)
+    out, said = process.communicate()
+    assert process.returncode == 3
+    assert re.search(r"stopping\n(.*\n)*sealing", said)
+    assert "stopped by the user" in out
+    assert (folder / "MANIFEST.json").exists()
+    assert Recording.open(folder).end["cause"] == "stopped"
+
+
+def test_a_terminal_that_closes_leaves_a_session_that_can_be_resumed(at_a_terminal):
+    folder, process = at_a_terminal
+    out, said = process.communicate()  # closes its stdin
+    assert process.returncode == 3
+    assert "is gone" in out
+    assert "daq-app resume" in said
+    assert Recording.open(folder).end["cause"] == "client"
