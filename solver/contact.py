@@ -107,6 +107,7 @@ class Course:
         self._patience = 20 + 4 * len(body.gap) if patience is None else patience
         self._system: _System | None = None
         self._entering = SLIP  # what a point is first thought to do when it comes to touch
+        self._resultants = body.resultants
 
     def sliding(self, depth: float, direction: int, guess: States | None = None) -> Contact:
         """Return the settled sliding state of a body driven `depth` [mm] into the surface and along +x or -x.
@@ -128,11 +129,13 @@ class Course:
                     raise
         raise AssertionError  # there is always a guess
 
-    def step(self, before: Contact, depth: float, travel: float) -> Contact:
+    def step(self, before: Contact, depth: float, travel: float, resultants: Array | None = None) -> Contact:
         """Return the state after the body was driven to `depth` and `travel` along +x [mm], coming from `before`.
 
-        Backward Euler: a point sticks where it was, or slips from there against its friction force.
+        Backward Euler: a point sticks where it was, or slips from there against its friction force. `resultants` (r,)
+        [N/mm] take the place of the body's own where the forces along its free motions change with time.
         """
+        self._resultants = self.body.resultants if resultants is None else resultants
         try:
             return self._consistent(depth, travel, before.shift, before.state, before.sense, free=True)
         except ContactLost:  # points that come to touch are then first thought to stick, not to slip
@@ -186,7 +189,7 @@ class Course:
         tangential[system.capped] = sense[system.capped] * self.law.bound(body.length[system.capped])
         lifted = body.gap + body.normal_free - depth + body.normal_by_tangential @ tangential
         moved = body.tangential_free + travel + body.tangential_by_tangential @ tangential
-        missing = body.resultants - body.motions[len(state) :].T @ tangential
+        missing = self._resultants - body.motions[len(state) :].T @ tangential
         answer = system.solve(np.concatenate([-lifted[on], (anchor - moved)[stuck], missing]))
         normal = np.zeros(len(state))
         normal[on] = answer[: len(on)]

@@ -121,7 +121,7 @@ def _bone(scene: Scene, force: Array) -> dict[str, Any]:
     pressure = float(np.hypot(*force)) / (2.0 * scene.finger.bone_radius)
     yields = pressure * (1.0 - bone.nu**2) / bone.E * 2.0 * scene.finger.bone_radius
     return {
-        "estimate": 2.0 * yields / scene.loading.indentation,
+        "estimate": 2.0 * yields / scene.loading.depth,
         "from": {"bone_pressure_MPa": pressure, "bone_shortening_mm": yields},
         "how": "the bone's own shortening under the force on it, as part of the indentation, twice for an energy",
     }
@@ -129,7 +129,7 @@ def _bone(scene: Scene, force: Array) -> dict[str, Any]:
 
 def _inertia(scene: Scene, normal: float, length: float) -> dict[str, Any]:
     pressure = normal / length if length else 0.0
-    speed = max(scene.loading.speed if scene.loading.direction else 0.0, scene.loading.indentation)
+    speed = max(scene.loading.speed if scene.loading.direction else 0.0, scene.loading.depth)
     return {
         "estimate": DENSITY * speed**2 / pressure if pressure else None,
         "from": {"mean_pressure_MPa": pressure, "speed_mm_s": speed},

@@ -36,6 +36,14 @@ class NoSteadyState(SolveFailure):
     kind = "no_steady_state"
 
 
+def beyond_friction(drag: float, most: float, normal_force: float) -> NoSteadyState:
+    """Return the failure of a `drag` asked for where the finger slides from `most` on [N/mm]."""
+    return NoSteadyState(
+        f"A drag of {drag:.4g} N/mm lies outside the friction limit: pressed with {normal_force:.4g} N/mm, the finger "
+        f"slides from {most:.4g} N/mm on; ask for less drag, or leave it out to let the finger slide."
+    )
+
+
 class NotConverged(SolveFailure):
     """The equations have not been solved; whether they have a solution is not known."""
 

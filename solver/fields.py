@@ -40,7 +40,7 @@ def fields_of(prediction: Prediction) -> Fields:
     kept, place = np.unique(pairs, return_inverse=True)
     place = place.reshape(count, 9)
     mean = np.bincount(place.ravel(), sed) / np.bincount(place.ravel())
-    lowered = mesh.nodes + prediction.displacement - [0.0, scene.loading.indentation]
+    lowered = mesh.nodes + prediction.displacement - [0.0, prediction.indentation]
     outline = Outline.of(scene.finger)
     arcs = np.linspace(outline.palmar_cut, outline.dorsal_cut, 241)
     depths = {"skin": 0.0, "epidermis": scene.finger.epidermis, "dermis": scene.finger.epidermis + scene.finger.dermis}
@@ -50,7 +50,7 @@ def fields_of(prediction: Prediction) -> Fields:
         nodes=lowered[kept % len(mesh.nodes)],
         triangles=place[:, _SPLIT].reshape(-1, 3),
         sed=mean,
-        outlines=drawn | {"bone": outline.bone(arcs) - [0.0, scene.loading.indentation]},
+        outlines=drawn | {"bone": outline.bone(arcs) - [0.0, prediction.indentation]},
         patch=_moved(prediction, lowered, _patch(outline, prediction)),
     )
 

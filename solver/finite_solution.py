@@ -5,16 +5,17 @@ exist (`solver.existence`); the course is marched.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
 from scipy.linalg import LinAlgError
 
-from solver import evidence, kernels_numpy
+from solver import evidence, finite_forced, kernels_numpy
 from solver.existence import steady
-from solver.failures import Cancelled, NotConverged, SolveFailure
+from solver.failures import Cancelled, NotConverged, SolveFailure, beyond_friction
 from solver.finite_body import FiniteBody, FiniteProbes
+from solver.finite_forced import Given
 from solver.grid import MeshError
 from solver.hyperelastic import NeoHooke
 from solver.kernels import CAP, OPEN, SLIP, STICK
@@ -29,7 +30,9 @@ from solver.stiffness import Elastic
 
 MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
 SAFETY = 1.0  # of the error estimate; see docs/solver.md for what was measured
-PRESSES = 40  # steps of the pre-indentation
+PRESSES = 40  # steps of the pre-indentation, and of a drag that grows
+ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
+COARSE = 5.0  # mesh on which it is looked how deep a given force presses
 STRIDE = 0.1  # of the bone while it slides, by the indentation [-]
 LONGEST = 8.0  # slide after which a course that has not settled is given up, by the indentation [-]
 SETTLED = 1e-10  # relative change of the ending's SED in a step, with every touching point slipping
@@ -73,20 +76,46 @@ class FiniteFinger:
 
     def settled(self, scene: Scene, stop: Callable[[], bool]) -> Shape:
         """Return the settled state of a scene. Raises NoSteadyState, NotConverged, Cancelled."""
+        if scene.normal_force is not None:
+            return self._settled_under(scene, scene.normal_force, stop)
         pull = _pull(scene)
         if scene.loading.direction == 0 and scene.friction.mu > 0.0:
             press = [pull._replace(depth=pull.depth * (i + 1) / PRESSES) for i in range(PRESSES)]
             return list(march(self.newton, press, stop=stop))[-1]
         return steady(self.newton, pull._replace(sense=-(scene.loading.direction or 1)), self.geometry.whole, stop=stop)
 
+    def _settled_under(self, scene: Scene, force: float, stop: Callable[[], bool]) -> Shape:
+        """Return the settled state under the forces of a scene, depth and shift found. Raises as `settled`."""
+        direction, drag = scene.loading.direction, scene.tangential_force
+        if direction == 0 and scene.friction.mu > 0.0:
+            return _course(scene, self, stop)[-1]
+        sliding = self._sliding_under(scene, force, stop)
+        most = abs(float(sliding.force[0]))
+        if drag is None or most * (1.0 - ALL_SLIPS) <= drag <= most * (1.0 + ALL_SLIPS):
+            return sliding
+        if drag > most:
+            raise beyond_friction(drag, most, force)
+        return _course(scene, self, stop)[-1]
 
-def answers(scenes: Sequence[Scene], fineness: float, progress: Progress | None = None) -> list[Answer]:
+    def _sliding_under(self, scene: Scene, force: float, stop: Callable[[], bool]) -> Shape:
+        """Return settled sliding under the normal force of a scene, reached as the force grows."""
+        start = finite_forced.untouched(self.newton, float(scene.friction.mu), scene.friction.cap)
+        start = replace(start, pull=start.pull._replace(sense=-(scene.loading.direction or 1)))
+        grows = [Given(force * part, None) for part in (0.02, 0.1, 0.25, 0.5, 0.75, 1.0)]
+        *_, shape = finite_forced.march(self.newton, start, Given(0.0, None), grows, stop)
+        return steady(self.newton, shape.pull, self.geometry.whole, start=shape, stop=stop)
+
+
+def answers(
+    scenes: Sequence[Scene], expected: float, fineness: float, progress: Progress | None = None
+) -> list[Answer]:
     """Return the predictions of scenes that share a finger, or why there is none, on a mesh of that fineness.
 
-    Raises SceneError where the finger cannot be meshed, Cancelled where `progress` (told the part done) says so.
+    `expected` is the depth [mm] that they reach, or about it where forces are given. Raises SceneError where the finger
+    cannot be meshed, Cancelled where `progress` (told the part done) says so.
     """
-    depth = max(scene.loading.indentation for scene in scenes)
     begun = perf_counter()
+    depth = max((_depth_reached(scene, expected) for scene in scenes), default=expected)
     fine = FiniteFinger.of(scenes[0], Sizing(fineness, depth, margin=MARGIN))
     setup = perf_counter() - begun
     coarse = [FiniteFinger.of(scenes[0], Sizing(fineness / 2.0, depth, s, margin=MARGIN)) for s in (False, True)]
@@ -106,8 +135,19 @@ def answers(scenes: Sequence[Scene], fineness: float, progress: Progress | None 
     return found
 
 
+def _depth_reached(scene: Scene, expected: float) -> float:
+    """Return the depth [mm] of a scene; under a given force, where a coarse mesh finds it, else what was expected."""
+    if scene.normal_force is None:
+        return scene.loading.depth
+    never = replace(scene, loading=replace(scene.loading, tangential_force=None))
+    try:
+        return FiniteFinger.of(scene, Sizing(COARSE, expected, margin=MARGIN)).settled(never, lambda: False).pull.depth
+    except SolveFailure:
+        return expected
+
+
 def _pull(scene: Scene) -> Pull:
-    return Pull(scene.loading.indentation, float(scene.friction.mu), scene.friction.cap)
+    return Pull(scene.loading.depth, float(scene.friction.mu), scene.friction.cap)
 
 
 def _predicted(
@@ -120,11 +160,12 @@ def _predicted(
         way = _course(scene, finger, stop)
         shape = way[-1]
     sed = finger.sed_ending(shape)
+    driven = scene.driven(shape.pull.depth)
     body = finger.newton.body
     skin = _skin(finger, shape)
     force = shape.force
     row = Row(ROW, finger.row.average(body, shape.u))
-    checks = _audits(scene, finger, shape)
+    checks = _audits(driven, finger, shape)
     if way:
         checks["course_against_direct"] = abs(finger.sed_ending(direct) / sed - 1.0)
     solved = perf_counter()
@@ -138,6 +179,8 @@ def _predicted(
         normal_force=float(force[1]),
         tangential_force=drag,
         contact_width=width,
+        indentation=shape.pull.depth,
+        shift=-shape.pull.travel if scene.loading.dragged else None,
         error_estimate=sed_error,
         normal_force_error=normal_error,
         tangential_force_error=tangential_error,
@@ -148,7 +191,7 @@ def _predicted(
         estimate_s=perf_counter() - solved,
         row=row,
         model=evidence.finite_model(
-            scene, force=force, width=width, sticking=_sticking(shape), slide=_slide(finger, shape)
+            driven, force=force, width=width, sticking=_sticking(shape), slide=_slide(finger, shape)
         ),
         audits=checks,
         skin=skin,
@@ -160,24 +203,73 @@ def _predicted(
 
 
 def _course(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool]) -> list[Shape]:
-    """Return the states from first touch to settled sliding, or to the end of the press where nothing slides."""
-    end, direction = _pull(scene), scene.loading.direction
-    press = [end._replace(depth=end.depth * (i + 1) / PRESSES) for i in range(PRESSES)]
-    shapes = list(march(finger.newton, press, stop=stop))
-    if direction == 0:
-        return shapes
-    stride = STRIDE * end.depth
-    sed = finger.sed_ending(shapes[-1])
-    for step in range(1, int(LONGEST / STRIDE) + 1):
-        pull = end._replace(travel=-direction * stride * step)
-        shapes += march(finger.newton, [pull], shapes[-1], stop=stop)
-        before, sed = sed, finger.sed_ending(shapes[-1])
-        if not (shapes[-1].state == STICK).any() and abs(sed - before) <= SETTLED * sed:
-            return shapes
+    """Return the states from first touch to the last settled slide, or to the end of the press or drag."""
+    drag = scene.tangential_force
+    if scene.normal_force is None:
+        for direction in set(scene.loading.directions[:-1]):  # a slide that never settles is refused with its limits
+            steady(finger.newton, _pull(scene)._replace(sense=-direction), finger.geometry.whole, stop=stop)
+        way = _Driven(scene, finger, stop)
+    else:
+        way = _Forced(scene, scene.normal_force, finger, stop)
+        if drag is not None:
+            way.drag(-scene.loading.direction * drag)
+            return way.shapes
+    for direction in scene.loading.directions:
+        _settle(way, scene, direction)
+    return way.shapes
+
+
+def _settle(way: "_Driven | _Forced", scene: Scene, direction: int) -> None:
+    """Slide until the response does not change any more. Raises NotConverged where it still does."""
+    depth = way.shapes[-1].pull.depth
+    sed = way.finger.sed_ending(way.shapes[-1])
+    for _ in range(int(LONGEST / STRIDE)):
+        way.slide(direction * STRIDE * depth)
+        before, sed = sed, way.finger.sed_ending(way.shapes[-1])
+        if not (way.shapes[-1].state == STICK).any() and abs(sed - before) <= SETTLED * sed:
+            return
     raise NotConverged(
-        f"After {LONGEST * end.depth:.3g} mm of sliding at {end.depth:.3g} mm of indentation and mu = {end.mu:.3g} "
+        f"After {LONGEST * depth:.3g} mm of sliding at {depth:.3g} mm of indentation and mu = {scene.friction.mu:.3g} "
         "the response still changes: no settled state was reached."
     )
+
+
+class _Driven:
+    """A course driven by depth and travel, pressed when made."""
+
+    def __init__(self, scene: Scene, finger: FiniteFinger, stop: Callable[[], bool]) -> None:
+        self.finger, self._stop = finger, stop
+        self._pull = _pull(scene)
+        pulls = [self._pull._replace(depth=self._pull.depth * (i + 1) / PRESSES) for i in range(PRESSES)]
+        self.shapes = list(march(self.finger.newton, pulls, stop=self._stop))
+
+    def slide(self, distance: float) -> None:
+        """Move the bone by `distance` along +x [mm]."""
+        self._pull = self._pull._replace(travel=self._pull.travel - distance)
+        self.shapes += march(self.finger.newton, [self._pull], self.shapes[-1], stop=self._stop)
+
+
+class _Forced:
+    """A course under a given normal force, and a given travel or drag; pressed when made."""
+
+    def __init__(self, scene: Scene, normal: float, finger: FiniteFinger, stop: Callable[[], bool]) -> None:
+        self.finger, self._stop = finger, stop
+        self._given = Given(0.0, 0.0 if scene.loading.dragged else None)
+        self.shapes = [finite_forced.untouched(finger.newton, float(scene.friction.mu), scene.friction.cap)]
+        self._go([self._given._replace(normal=normal * (i + 1) / PRESSES) for i in range(PRESSES)])
+        del self.shapes[0]
+
+    def _go(self, aims: list[Given]) -> None:
+        self.shapes += finite_forced.march(self.finger.newton, self.shapes[-1], self._given, aims, self._stop)
+        self._given = aims[-1]
+
+    def slide(self, distance: float) -> None:
+        """Move the bone by `distance` along +x [mm]."""
+        self._go([self._given._replace(travel=self._given.travel - distance)])
+
+    def drag(self, pull: float) -> None:
+        """Let the surface's pull along +x grow to `pull` [N/mm]."""
+        self._go([self._given._replace(tangential=pull * (i + 1) / PRESSES) for i in range(PRESSES)])
 
 
 def _errors(
@@ -265,7 +357,7 @@ def _audits(scene: Scene, finger: FiniteFinger, shape: Shape) -> dict[str, float
         "equilibrium_x": abs(float(bone[0] + shape.force[0])) / total,
         "equilibrium_y": abs(float(bone[1] + shape.force[1])) / total,
         "inner_forces": float(np.abs(inner[free]).max()) / total,
-        "penetration": max(-float(height.min()), 0.0) / scene.loading.indentation,
+        "penetration": max(-float(height.min()), 0.0) / scene.loading.depth,
         "tension": max(-float(normal.min(initial=0.0)), 0.0) / push,
         "cone_violation": max(float((np.abs(tangential) - limit).max(initial=0.0)), 0.0) / push,
         "smallest_det_F": float(np.linalg.det(kernels_numpy.deformation(body, shape.u)).min()),
@@ -276,10 +368,13 @@ def _history(scene: Scene, finger: FiniteFinger, way: Sequence[Shape]) -> Histor
     body, speed = finger.newton.body, scene.loading.speed
     travel = np.array([-shape.pull.travel for shape in way])
     depth = np.array([shape.pull.depth for shape in way])
+    gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(travel)))])
+    drags = scene.loading.dragged
+    after = np.arange(1, len(way) - PRESSES + 1) / PRESSES if drags else gone[PRESSES:] / speed
     skins = [_skin(finger, shape) for shape in way]
     slipping = np.array([1.0 - _sticking(shape) if shape.touching.any() else 0.0 for shape in way])
     return History(
-        time=depth / scene.loading.indentation + np.abs(travel) / speed,
+        time=np.concatenate([np.arange(1, PRESSES + 1) / PRESSES, 1.0 + after]),
         bone_x=travel,
         bone_y=-depth,
         sed_ending=np.array([finger.sed_ending(shape) for shape in way]),

@@ -9,14 +9,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.finite_forced import Given, corrected
 from solver.finite_solution import FiniteFinger
 from solver.kernels import OPEN, SLIP, STICK
 from solver.mesh import Array
-from solver.newton import BY_DEPTH, BY_TRAVEL, EQUILIBRIUM, Pull, Shape
+from solver.newton import Pull, Shape
 
 SLIDING = 0.995  # part of the friction limit beyond which the tangential force means sliding
 LIGHT = 1e-7  # N/mm: less than this is no touch
-STRIDE = 0.3  # largest change of depth or travel in one iteration [mm]
+FURTHEST = 5.0  # displacement in one iteration beyond which the state is lost [mm]
 
 
 class FiniteStepper:
@@ -58,11 +59,11 @@ class FiniteStepper:
         shape = self._ready(normal, pull_back)
         origin, before = shape.place(newton.body)[:, 0], shape.pull.travel
         for _ in range(iterations):
-            moved = self._corrected(shape, normal, pull_back, origin, before)
-            if moved is None or moved.state[0] != OPEN or moved.state[-1] != OPEN:
+            done = corrected(newton, shape, Given(normal, pull_back), origin, before)
+            if done is None or done[1] > FURTHEST or done[0].state[0] != OPEN or done[0].state[-1] != OPEN:
                 self.forget()
                 return float("nan")
-            shape = moved
+            shape = done[0]
         self.shape = shape
         return self._finger.sed_ending(shape)
 
@@ -91,33 +92,3 @@ class FiniteStepper:
             state[state != OPEN] = STICK
         turned = int(np.sign(tangential)) if sliding else 0
         return replace(shape, state=state, sense=sense, pull=Pull(pull.depth, self.mu, self.tau, turned, pull.travel))
-
-    def _corrected(self, shape: Shape, normal: float, tangential: float, origin: Array, before: float) -> Shape | None:
-        """Return the shape after one iteration towards the forces, None where there is no way."""
-        newton, pull = self._newton, shape.pull
-        if not newton.linearise(shape, pull, origin + pull.travel - before):
-            return None
-        steps = newton.steps
-        here = newton.reaction(steps[:, EQUILIBRIUM]).sum(axis=0)
-        by_depth = newton.reaction(steps[:, BY_DEPTH], still=True).sum(axis=0)
-        deeper = along = 0.0
-        if (shape.state == STICK).any():
-            by_travel = newton.reaction(steps[:, BY_TRAVEL], still=True).sum(axis=0)
-            matrix = np.array([[by_depth[1], by_travel[1]], [by_depth[0], by_travel[0]]])
-            missing = np.array([normal - here[1], tangential - here[0]])
-            det = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
-            if det == 0.0:
-                return None
-            deeper = (missing[0] * matrix[1, 1] - missing[1] * matrix[0, 1]) / det
-            along = (matrix[0, 0] * missing[1] - matrix[1, 0] * missing[0]) / det
-        elif by_depth[1] != 0.0:
-            deeper = (normal - here[1]) / by_depth[1]
-        most = max(abs(deeper), abs(along))
-        if not np.isfinite(most):
-            return None
-        if most > STRIDE:
-            deeper, along = deeper * STRIDE / most, along * STRIDE / most
-        step = steps[:, EQUILIBRIUM] + deeper * steps[:, BY_DEPTH] + along * steps[:, BY_TRAVEL]
-        pull = pull._replace(depth=pull.depth + deeper, travel=pull.travel + along)
-        after, largest, _ = newton.moved(shape, pull, step, origin + pull.travel - before)
-        return after if largest < 5.0 else None

@@ -2,12 +2,11 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from solver.contact import OPEN, SLIP, ContactLost, Course, forced
+from solver.contact import ContactLost
 from solver.finger import FingerModel
 from solver.friction import FrictionLaw
 from solver.mesher import Sizing
+from solver.pressing import depth_of, sliding_under
 from solver.scene import Scene
 
 FINENESS = 8.0  # good to some tenths of a per cent of the depth
@@ -27,16 +26,19 @@ def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> 
     return tuple(_depth(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True))
 
 
+def expected_depth(scene: Scene) -> float:
+    """Return the indentation [mm], or about what a given force will lead to, for which meshes are made."""
+    if scene.normal_force is None:
+        return scene.loading.depth
+    depth = matching_depths((scene,), (scene.normal_force,))[0]
+    return DEEPEST * scene.finger.pulp_thickness() if depth is None else depth
+
+
 def _depth(finger: FingerModel, scene: Scene, normal_force: float, deepest: float) -> float | None:
-    touch = finger.body.touchable
-    course = Course(forced(touch, normal_force), FrictionLaw(float(scene.friction.mu), scene.friction.cap))
-    for part in (0.3, 0.6, 0.1, 0.9):  # first guesses of the depth, for which points touch
-        guess = np.where(touch.gap < part * deepest, SLIP, OPEN).astype(np.int8)
-        try:
-            found = course.sliding(0.0, scene.loading.direction or 1, guess)
-        except ContactLost:
-            continue
-        depth = -float(found.motion[-1])
-        inside = not (found.touching[0] or found.touching[-1])
-        return depth if inside and 0.0 < depth <= deepest else None
-    return None
+    law = FrictionLaw(float(scene.friction.mu), scene.friction.cap)
+    try:
+        found = sliding_under(finger.body.touchable, law, normal_force, scene.loading.direction or 1, deepest)
+    except ContactLost:
+        return None
+    inside = not (found.touching[0] or found.touching[-1])
+    return depth_of(found) if inside and depth_of(found) <= deepest else None

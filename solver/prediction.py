@@ -57,6 +57,8 @@ class Prediction:
     normal_force: float  # of the surface on the finger along +y [N/mm]
     tangential_force: float  # drag opposing the slide [N/mm]
     contact_width: float  # from the first to the last touching point, along the surface [mm]
+    indentation: float  # of the bone, asked for or found under a given force [mm]
+    shift: float | None  # of the bone along +x, found under a given drag [mm]; None where it slides or is only pressed
     error_estimate: float  # of sed_ending, relative [-]
     dofs: int  # unknown displacements
     newton_iterations: int  # solutions of a linear system with trial contact states
@@ -84,6 +86,8 @@ class Prediction:
                 "normal_force",
                 "tangential_force",
                 "contact_width",
+                "indentation",
+                "shift",
                 "error_estimate",
                 "normal_force_error",
                 "tangential_force_error",

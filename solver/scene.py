@@ -5,7 +5,7 @@ X points distally along the finger axis, -Y is palmar, and the origin is the cen
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 Slide = Literal["+x", "-x", "none"]
@@ -141,23 +141,66 @@ class Friction:
 
 @dataclass(frozen=True, slots=True)
 class Loading:
-    """How the bone is driven: down by the indentation within 1 s, then along the surface."""
+    """How the bone is driven: down within 1 s, by an indentation or a force, then along the surface.
 
-    indentation: float  # [mm]
-    slide: Slide = "+x"  # "+x": proximal to distal; "-x": distal to proximal
+    Instead of a slide until nothing changes, a drag can be given: after the press it grows within 1 s, and how far the
+    bone shifts is found.
+    """
+
+    indentation: float | None = None  # [mm]; left out where a normal force is given
+    slide: Slide | tuple[Literal["+x", "-x"], ...] = "+x"  # "+x": proximal to distal; several: one after the other
     speed: float = 15.0  # [mm/s]; rescales time and nothing else in an elastic finger
+    normal_force: float | None = None  # in place of the indentation
+    tangential_force: float | None = None  # in place of sliding on: a drag opposing the slide, positive
+    force_unit: Literal["N/mm", "N"] = "N/mm"  # of both forces; "N": of the whole finger, by its width
 
     def __post_init__(self) -> None:
-        """Check ranges."""
-        _within("loading.indentation", self.indentation, 1e-9, 20.0, "mm")
-        if self.slide not in ("+x", "-x", "none"):
-            raise SceneError("loading.slide", self.slide, 'it must be "+x", "-x" or "none"')
+        """Check ranges, and that depth or force says how far the bone goes down, and one thing only."""
+        if (self.indentation is None) == (self.normal_force is None):
+            allowed = "give either an indentation or a normal force"
+            raise SceneError("loading.indentation", self.indentation, allowed)
+        if self.indentation is not None:
+            _within("loading.indentation", self.indentation, 1e-9, 20.0, "mm")
+        if self.normal_force is not None:
+            _within("loading.normal_force", self.normal_force, 1e-9, 1e6)
+        if self.force_unit not in ("N/mm", "N"):
+            raise SceneError("loading.force_unit", self.force_unit, 'it must be "N/mm" or "N"')
+        way = self.slide if isinstance(self.slide, tuple) else (self.slide,)
+        single = ("+x", "-x", "none") if len(way) == 1 else ("+x", "-x")
+        if not way or any(leg not in single for leg in way):
+            allowed = 'it must be "+x", "-x" or "none", or a list of "+x" and "-x"'
+            raise SceneError("loading.slide", self.slide, allowed)
         _within("loading.speed", self.speed, 1e-6, 1e4, "mm/s")
+        if self.tangential_force is not None:
+            _within("loading.tangential_force", self.tangential_force, 0.0, 1e6)
+            if self.indentation is not None:
+                allowed = "it needs a normal force, not an indentation"
+                raise SceneError("loading.tangential_force", self.tangential_force, allowed)
+            if self.slide not in ("+x", "-x"):
+                raise SceneError("loading.slide", self.slide, 'with a tangential force it must be "+x" or "-x"')
+
+    @property
+    def dragged(self) -> bool:
+        """Whether a tangential force is given."""
+        return self.tangential_force is not None
+
+    @property
+    def directions(self) -> tuple[int, ...]:
+        """+1 for every slide along +x, -1 along -x, in their order; none when the bone is pressed only."""
+        way = self.slide if isinstance(self.slide, tuple) else (self.slide,)
+        return tuple({"+x": 1, "-x": -1}[leg] for leg in way if leg != "none")
 
     @property
     def direction(self) -> int:
-        """+1 when the bone slides along +x, -1 along -x, 0 when it is pressed only."""
-        return {"+x": 1, "-x": -1, "none": 0}[self.slide]
+        """+1 when the bone slides along +x at last, -1 along -x, 0 when it is pressed only."""
+        return self.directions[-1] if self.directions else 0
+
+    @property
+    def depth(self) -> float:
+        """The indentation [mm] of a loading that gives one. Raises ValueError where a force is given instead."""
+        if self.indentation is None:
+            raise ValueError("a force is given: the depth must be found first")
+        return self.indentation
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,6 +258,36 @@ class Scene:
         if self.receptor.depth + half > skin + 1e-9:
             raise SceneError("receptor.depth", self.receptor.depth, f"the ending must end within {skin:g} mm of skin")
         room = self.finger.pulp_thickness()
-        if self.loading.indentation >= room:
+        if self.loading.indentation is not None and self.loading.indentation >= room:
             allowed = f"it must stay below the {room:.3g} mm of tissue between first touch and bone"
             raise SceneError("loading.indentation", self.loading.indentation, allowed)
+        drag, push = self.loading.tangential_force, self.loading.normal_force
+        if drag is not None and push is not None and drag > self.friction.mu * push * (1.0 + 1e-12):
+            allowed = f"friction carries at most mu times the normal force, {self.friction.mu * push:.4g}"
+            raise SceneError("loading.tangential_force", drag, allowed)
+
+    @property
+    def normal_force(self) -> float | None:
+        """The normal force asked for [N/mm], None where a depth is."""
+        return self._per_mm(self.loading.normal_force)
+
+    @property
+    def tangential_force(self) -> float | None:
+        """The drag asked for, opposing the slide [N/mm], None where the bone slides until nothing changes."""
+        return self._per_mm(self.loading.tangential_force)
+
+    def _per_mm(self, force: float | None) -> float | None:
+        return force / self.width if force is not None and self.loading.force_unit == "N" else force
+
+    @property
+    def loading_per_mm(self) -> Loading:
+        """The loading with its forces in N/mm."""
+        forces = {"normal_force": self.normal_force, "tangential_force": self.tangential_force}
+        return replace(self.loading, **forces, force_unit="N/mm")
+
+    def driven(self, depth: float) -> "Scene":
+        """Return the scene with its bone driven to `depth` [mm], where a normal force was asked for."""
+        loading = self.loading
+        if loading.indentation is not None:
+            return self
+        return replace(self, loading=Loading(depth, "none" if loading.dragged else loading.slide, loading.speed))

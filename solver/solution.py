@@ -11,13 +11,15 @@ from scipy.linalg import LinAlgError
 from solver.audits import audits, course_audits
 from solver.contact import NAMES, SLIP, Contact, ContactLost, Course
 from solver.evidence import model, warnings
-from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure
+from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.finger import FingerModel
 from solver.friction import FrictionLaw
 from solver.grid import MeshError
+from solver.matching import DEEPEST, expected_depth
 from solver.mesh import Array
 from solver.mesher import FINEST, Sizing
 from solver.prediction import History, Prediction, Row, Skin
+from solver.pressing import depth_of, sliding_under
 from solver.receptor import ROW
 from solver.scene import Scene, SceneError
 from solver.stepping import March, march
@@ -31,6 +33,7 @@ FROM_MESHES = 0.3
 FROM_FINENESS = 0.07
 UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]
 DOUBTED = 1e-8  # and from which it is told
+ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
 ROUGH = 1e-10  # and from which round-off is taken out of the displacements
 
 _Answer = Prediction | SolveFailure
@@ -82,9 +85,10 @@ def _solve_group(scenes: list[Scene], progress: Progress | None) -> list[_Answer
     """Refine until every scene's estimate meets its tolerance, or the finest mesh is reached."""
     asked = [s.solve.tolerance for s in scenes]
     strictest = min((a for a in asked if a is not None), default=None)
-    fineness = DEFAULT if strictest is None else coarsest_for(scenes[0], strictest)
+    depth = max(expected_depth(scene) for scene in scenes)
+    fineness = DEFAULT if strictest is None else coarsest_for(scenes[0].driven(depth), strictest)
     while True:
-        done = _on_mesh(scenes, fineness, progress)
+        done = _on_mesh(scenes, depth, fineness, progress)
         missed = [_misses(answer, tolerance) for answer, tolerance in zip(done, asked, strict=True)]
         finer = [n for n in FINENESS if n > fineness]
         if not finer or not any(missed):
@@ -97,13 +101,13 @@ def _solve_group(scenes: list[Scene], progress: Progress | None) -> list[_Answer
     ]
 
 
-def _on_mesh(scenes: list[Scene], fineness: float, progress: Progress | None) -> list[_Answer]:
+def _on_mesh(scenes: list[Scene], depth: float, fineness: float, progress: Progress | None) -> list[_Answer]:
     if scenes[0].solve.kinematics == "finite":
         # Imported here: small strain, the default, need not wait for the compiled loops to be loaded.
         from solver.finite_solution import answers as finite_answers
 
-        return finite_answers(scenes, fineness, progress)
-    return _solve_on(scenes, fineness, progress)
+        return finite_answers(scenes, depth, fineness, progress)
+    return _solve_on(scenes, depth, fineness, progress)
 
 
 def coarsest_for(scene: Scene, tolerance: float) -> float:
@@ -128,9 +132,8 @@ class _Shared:
     widest: bool  # whether contact was looked for wherever it can be
 
 
-def _solve_on(scenes: list[Scene], fineness: float, progress: Progress | None) -> list[_Answer]:
+def _solve_on(scenes: list[Scene], depth: float, fineness: float, progress: Progress | None) -> list[_Answer]:
     """Solve all scenes on one mesh, and on two coarser ones for the estimate; look wider where contact reaches out."""
-    depth = max(scene.loading.indentation for scene in scenes)
     done: list[_Answer | None] = []
     for margin in (1.0, 4.0, WIDE):
         begun = perf_counter()
@@ -176,11 +179,30 @@ def _law(scene: Scene) -> FrictionLaw:
 
 
 def settled(scene: Scene, finger: FingerModel) -> Contact:
-    """Return the settled state, without its history where it has none left. Raises ContactLost, NotConverged."""
-    law, touch = _law(scene), finger.body.touchable
-    if scene.loading.direction == 0 and not law.frictionless:
-        return march(touch, law, scene.loading).instants[-1].contact
-    return Course(touch, law).sliding(scene.loading.indentation, scene.loading.direction or 1)
+    """Return the settled state, without its history where it has none left.
+
+    Raises ContactLost, NotConverged, and NoSteadyState where a given drag is more than friction carries.
+    """
+    law, touch, loading = _law(scene), finger.body.touchable, scene.loading_per_mm
+    if loading.direction == 0 and not law.frictionless:
+        return march(touch, law, loading).instants[-1].contact
+    if loading.normal_force is None:
+        return Course(touch, law).sliding(loading.depth, loading.direction or 1)
+    deepest = DEEPEST * scene.finger.pulp_thickness()
+    found = sliding_under(touch, law, loading.normal_force, loading.direction or 1, deepest)
+    if loading.tangential_force is None:
+        return found
+    most = float(np.abs(found.tangential.sum()))
+    if loading.tangential_force > most * (1.0 + 1e-9):
+        raise beyond_friction(loading.tangential_force, most, loading.normal_force)
+    if loading.tangential_force > most * (1.0 - ALL_SLIPS):
+        return found
+    return march(touch, law, loading).instants[-1].contact
+
+
+def indentation(scene: Scene, contact: Contact) -> float:
+    """Return the depth [mm] of a state of `scene`: the one asked for, or the one found under a given force."""
+    return scene.loading.depth if scene.normal_force is None else depth_of(contact)
 
 
 def _direct(scene: Scene, shared: _Shared) -> Contact | None:
@@ -199,9 +221,9 @@ def _direct(scene: Scene, shared: _Shared) -> Contact | None:
         why = str(lost)
     if not shared.widest:
         return None
-    if direction == 0:
+    if direction == 0 or scene.normal_force is not None:
         raise _no_answer(scene, why, 0.0)
-    contact, limit = followed(finger.body.touchable, _law(scene), scene.loading.indentation, direction)
+    contact, limit = followed(finger.body.touchable, _law(scene), scene.loading.depth, direction)
     if contact is None:
         raise _no_answer(scene, why, limit)
     return contact
@@ -217,11 +239,11 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Pred
     way: March | None = None
     direct = contact
     if scene.solve.course == "history":
-        way = march(finger.body.touchable, law, scene.loading, progress)
+        way = march(finger.body.touchable, law, scene.loading_per_mm, progress)
         contact = way.instants[-1].contact
     skin = finger.skin_displacement(contact)
     displacement = finger.body.displacement(skin)[:, :, 0]
-    depth = scene.loading.indentation
+    depth = indentation(scene, contact)
     if finger.reaches_out(contact, displacement, depth):
         return None
     checks = audits(finger, law, contact, depth, displacement)
@@ -239,12 +261,12 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Pred
     if way is not None:
         checks |= course_audits(finger, way)
         checks["course_against_direct"] = abs(finger.sed_ending(finger.displacement(direct)) / sed - 1.0)
-    left = model(scene, finger, contact, displacement)
+    left = model(scene.driven(depth), finger, contact, displacement)
     history = None if way is None else _history(scene, finger, way)
     row = Row(ROW, finger.sed_row(displacement))
     solved = perf_counter()
     numbers = np.array([sed, contact.normal.sum(), contact.tangential.sum()])
-    of_sed, of_normal, of_tangential = _error_estimates(scene, shared, numbers)
+    of_sed, of_normal, of_tangential = _error_estimates(scene, shared, contact, numbers)
     return Prediction(
         scene=scene,
         sed_ending=sed,
@@ -252,6 +274,8 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Pred
         normal_force=float(contact.normal.sum()),
         tangential_force=_drag(scene, contact.tangential.sum()),
         contact_width=finger.contact_width(contact, skin[:, 0]),
+        indentation=depth,
+        shift=float(contact.motion[-1]) if scene.loading.dragged and len(contact.motion) > 1 else None,
         error_estimate=of_sed,
         normal_force_error=of_normal,
         tangential_force_error=of_tangential,
@@ -288,17 +312,18 @@ def _drag(scene: Scene, tangential: float) -> float:
     return 0.0 - scene.loading.direction * float(tangential)  # never -0
 
 
-def _error_estimates(scene: Scene, shared: _Shared, numbers: Array) -> tuple[float, float, float]:
-    """Return how far SED, normal and tangential force `numbers` (3,) may be off, relative.
+def _error_estimates(scene: Scene, shared: _Shared, contact: Contact, numbers: Array) -> tuple[float, float, float]:
+    """Return how far SED, normal and tangential force `numbers` (3,) of `contact` may be off, relative.
 
     The same scene is solved on a mesh with elements twice as long, and on that mesh moved along the skin by half an
     element, so that the edges of contact fall differently between nodes.
     """
     try:
         others = [numbers_on(finger, settled(scene, finger)) for finger in shared.coarse]
-    except (ContactLost, NotConverged):
+    except (ContactLost, SolveFailure):
         return 1.0, 1.0, 1.0  # so near a limit that a coarser mesh has no state: nothing is known of the error
-    found = estimates(scene, shared.fineness, numbers, np.array(others))
+    depth = indentation(scene, contact)
+    found = estimates(scene.driven(depth), shared.fineness, numbers, np.array(others))
     return float(found[0]), float(found[1]), float(found[2])
 
 
@@ -325,7 +350,7 @@ def _least(scene: Scene, fineness: float) -> float:
 
     Where half the contact is shorter than `fineness` of the smallest elements, it is as if it were less.
     """
-    half = sqrt(2.0 * scene.loading.indentation / scene.finger.tip_radius)  # by the tip's radius
+    half = sqrt(2.0 * scene.loading.depth / scene.finger.tip_radius)  # by the tip's radius
     return FROM_FINENESS / min(fineness, half / FINEST) ** 1.5
 
 
@@ -369,10 +394,16 @@ def _folded(finger: FingerModel, contact: Contact) -> bool:
     return bool(np.prod(finger.stretches(finger.displacement(contact)), axis=0).min() <= 0.0)
 
 
+def _pressed(scene: Scene) -> str:
+    """Say how hard or deep the finger is pressed."""
+    force = scene.normal_force
+    return f"{scene.loading.depth:g} mm indentation" if force is None else f"a normal force of {force:g} N/mm"
+
+
 def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotConverged:
     """Return the failure that says what is known."""
     mu = float(scene.friction.mu)
-    at = f"{scene.loading.indentation:g} mm indentation and mu = {mu:g}"
+    at = f"{_pressed(scene)} and mu = {mu:g}"
     if scene.friction.tau_max is not None:
         at += f" with tau_max = {scene.friction.tau_max:g} MPa"
     if scene.loading.direction == 0 or limit_mu <= 0.0:

@@ -2,6 +2,7 @@
 
 from typing import Protocol
 
+from solver.matching import expected_depth
 from solver.mesh import Array
 from solver.mesher import Sizing
 from solver.scene import Scene
@@ -52,12 +53,12 @@ class Stepper(Protocol):
 
 
 def stepper(scene: Scene) -> Stepper:
-    """Return a stepper for the finger and the surface of `scene`, on a mesh made for its indentation.
+    """Return a stepper for the finger and the surface of `scene`, on a mesh made for its indentation or force.
 
     Forces that press much deeper lose the state. Raises SceneError where the finger cannot be meshed.
     """
     kind = scene.solve.kinematics
-    sizing = Sizing(FINENESS[kind], scene.loading.indentation, margin=MARGIN[kind])
+    sizing = Sizing(FINENESS[kind], expected_depth(scene), margin=MARGIN[kind])
     mu, tau = float(scene.friction.mu), scene.friction.cap
     # Imported here: only what is asked for is loaded, compiled loops of the other kinematics are not.
     if kind == "finite":

@@ -1,19 +1,22 @@
-"""The course in time: the bone comes down over 1 s, then slides until nothing changes any more."""
+"""The course in time: the bone comes down over 1 s, then slides until nothing changes any more, or is dragged."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from solver.contact import CAP, SLIP, Contact, ContactLost, Course, Touchable, untouched
+from solver.contact import CAP, SLIP, STICK, Contact, ContactLost, Course, Touchable, forced, untouched
 from solver.failures import Cancelled, NotConverged
 from solver.friction import FrictionLaw
 from solver.scene import Loading
 
 PRESSING_TIME = 1.0  # of the pre-indentation [s]
 PRESSING_STEPS = 25
+DRAGGING_TIME = 1.0  # within which a given tangential force grows [s]
+DRAGGING_STEPS = 25
 FURTHEST = 25.0  # travel after which sliding that has not settled is given up, in indentations
-SMALLEST = 1e-4  # step below which a step that failed is given up, in indentations
+HALVINGS = 13  # how often a step that failed is cut in two before it is given up
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,29 +31,51 @@ class Instant:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class March:
-    """The way from first touch to the settled state."""
+    """The way from first touch to the last state."""
 
     instants: tuple[Instant, ...]
-    settled_after: float | None  # sliding travel after which nothing changed [mm]; None without a slide
+    settled_after: float | None  # travel of the last slide after which nothing changed [mm]; None without a slide
     iterations: int
+
+
+class Aim(NamedTuple):
+    """What drives the bone at an instant."""
+
+    time: float  # [s]
+    press: float  # depth [mm], or normal force where that is given [N/mm]
+    along: float  # travel along +x [mm], or the surface's pull along +x where that is given [N/mm]
+
+    def towards(self, other: "Aim", part: float) -> "Aim":
+        """Return what lies `part` of the way to `other`."""
+        return Aim(*(a + part * (b - a) for a, b in zip(self, other, strict=True)))
 
 
 Progress = Callable[[float], bool]  # told the part done, 0 to 1; False asks to stop
 
 
 def march(body: Touchable, law: FrictionLaw, loading: Loading, progress: Progress | None = None) -> March:
-    """Drive `body` down and along, step by step (backward Euler), until sliding has settled.
+    """Drive `body` down and along, step by step (backward Euler), until every slide of `loading` has settled.
 
-    Raises NotConverged where a step cannot be made or sliding does not settle, Cancelled where `progress` says so.
+    Forces of `loading` are per mm. A given drag must be less than what friction carries. Raises NotConverged where a
+    step cannot be made or sliding does not settle, Cancelled where `progress` says so.
     """
-    course = Course(body, law)
-    way = [Instant(0.0, 0.0, 0.0, untouched(body))]
+    way = _Way(body, law, loading)
+    press = loading.depth if loading.normal_force is None else loading.normal_force
     for number in range(1, PRESSING_STEPS + 1):
         part = number / PRESSING_STEPS
-        _advance(course, way, loading, loading.indentation * part, 0.0, PRESSING_TIME * part)
+        way.go(Aim(PRESSING_TIME * part, press * part, 0.0))
         _report(progress, part / 2.0)
-    settled = None if loading.direction == 0 else _slide(course, way, loading, progress)
-    return March(tuple(way), settled, sum(instant.contact.iterations for instant in way))
+    settled = None
+    if loading.tangential_force is not None:
+        pull = -loading.direction * loading.tangential_force
+        for number in range(1, DRAGGING_STEPS + 1):
+            part = number / DRAGGING_STEPS
+            way.go(Aim(PRESSING_TIME + DRAGGING_TIME * part, press, pull * part))
+            _report(progress, (1.0 + part) / 2.0)
+    else:
+        for direction in loading.directions:
+            settled = _slide(way, direction, loading.speed, progress)
+    return March(tuple(way.instants), settled, sum(instant.contact.iterations for instant in way.instants))
 
 
 def _report(progress: Progress | None, part: float) -> None:
@@ -58,22 +83,71 @@ def _report(progress: Progress | None, part: float) -> None:
         raise Cancelled
 
 
-def _slide(course: Course, way: list[Instant], loading: Loading, progress: Progress | None) -> float:
+class _Way:
+    """The states so far, and how the next one is found."""
+
+    def __init__(self, body: Touchable, law: FrictionLaw, loading: Loading) -> None:
+        self._by_force = loading.normal_force is not None
+        self._by_drag = loading.tangential_force is not None
+        start = untouched(body)
+        if self._by_force:
+            body = forced(body, 0.0, 0.0 if self._by_drag else None)
+            # under a force something touches from the first
+            state = start.state.copy()
+            state[np.argmin(start.gap)] = SLIP if law.frictionless else STICK
+            start = replace(start, state=state, motion=np.zeros(len(body.resultants)))
+        self.course = Course(body, law)
+        self.instants = [Instant(0.0, 0.0, 0.0, start)]
+        self.aim = Aim(0.0, 0.0, 0.0)
+
+    def go(self, aim: Aim, halvings: int = HALVINGS) -> None:
+        """Append the state at `aim`, in smaller steps where one of that size fails."""
+        before = self.instants[-1].contact
+        try:
+            contact = self._step(before, aim)
+        except ContactLost as lost:
+            if halvings == 0:
+                start = self.instants[-1]
+                place = f"at {start.depth:.4g} mm indentation, after {abs(start.travel):.4g} mm of sliding"
+                raise NotConverged(
+                    f"No state of contact was found {place}: {lost}, in steps down to the smallest."
+                ) from lost
+            self.go(self.aim.towards(aim, 0.5), halvings - 1)
+            self.go(aim, halvings - 1)
+            return
+        depth = -float(contact.motion[0]) if self._by_force else aim.press
+        travel = float(contact.motion[1]) if self._by_drag else aim.along
+        self.instants.append(Instant(aim.time, depth, travel, contact))
+        self.aim = aim
+
+    def _step(self, before: Contact, aim: Aim) -> Contact:
+        if not self._by_force:
+            return self.course.step(before, aim.press, aim.along)
+        if self._by_drag:
+            return self.course.step(before, 0.0, 0.0, np.array([aim.press, aim.along]))
+        return self.course.step(before, 0.0, aim.along, np.array([aim.press]))
+
+
+def _slide(way: _Way, direction: int, speed: float, progress: Progress | None) -> float:
     """Append the sliding states and return the travel after which they did not change."""
-    step, distance = 0.01 * loading.indentation, 0.0
-    largest = 0.06 * loading.indentation
-    while distance < FURTHEST * loading.indentation:
-        before = way[-1].contact
-        if _settled(before, loading.direction, course.law):
-            plateau = max(1.3 * distance, distance + loading.indentation)
+    begun, depth = way.aim, way.instants[-1].depth
+    step, distance = 0.01 * depth, 0.0
+    largest = 0.06 * depth
+
+    def at(distance: float) -> Aim:
+        return Aim(begun.time + distance / speed, begun.press, begun.along + direction * distance)
+
+    while distance < FURTHEST * depth:
+        if _settled(way.instants[-1].contact, direction, way.course.law):
+            plateau = max(1.3 * distance, distance + depth)
             for part in np.linspace(distance, plateau, 5)[1:]:
-                _advance(course, way, loading, loading.indentation, float(part), None)
+                way.go(at(float(part)))
             return distance
         distance += step
-        _advance(course, way, loading, loading.indentation, distance, None)
+        way.go(at(distance))
         step = min(step * 1.2, largest)
-        _report(progress, 0.5 + 0.5 * distance / (FURTHEST * loading.indentation))
-    message = f"sliding had not settled after {distance:.1f} mm at {loading.indentation:g} mm indentation"
+        _report(progress, 0.5 + 0.5 * distance / (FURTHEST * depth))
+    message = f"sliding had not settled after {distance:.1f} mm at {depth:.4g} mm indentation"
     raise NotConverged(f"{message}: the drag still grew, as it does where the finger wedges itself in.")
 
 
@@ -82,25 +156,3 @@ def _settled(contact: Contact, direction: int, law: FrictionLaw) -> bool:
     slips = (contact.state == SLIP) | (contact.state == CAP)
     along = contact.sense == -direction
     return bool((~contact.touching | (slips & (along | law.frictionless))).all())
-
-
-def _advance(
-    course: Course, way: list[Instant], loading: Loading, depth: float, distance: float, time: float | None
-) -> None:
-    """Append the state at `depth` after sliding `distance`, in smaller steps where one of that size fails."""
-    start = way[-1]
-    when = PRESSING_TIME + distance / loading.speed if time is None else time
-    try:
-        contact = course.step(start.contact, depth, distance * loading.direction)
-    except ContactLost as lost:
-        begun = abs(start.travel)
-        if max(depth - start.depth, distance - begun) < SMALLEST * loading.indentation:
-            place = f"at {depth:.4g} mm indentation, after {distance:.4g} mm of sliding"
-            raise NotConverged(
-                f"No state of contact was found {place}: {lost}, in steps down to the smallest."
-            ) from lost
-        middle = None if time is None else (start.time + time) / 2.0
-        _advance(course, way, loading, (start.depth + depth) / 2.0, (begun + distance) / 2.0, middle)
-        _advance(course, way, loading, depth, distance, time)
-        return
-    way.append(Instant(when, depth, distance * loading.direction, contact))

@@ -57,7 +57,7 @@ def deepest(scene: Scene, law: FrictionLaw) -> float | None:
             body, meshed = _body(scene, depth, FINENESS), depth
         return followed(body, law, depth, scene.loading.direction)[0] is not None
 
-    low, high = 1e-3 * scene.loading.indentation, scene.loading.indentation
+    low, high = 1e-3 * scene.loading.depth, scene.loading.depth
     if not slides(low):
         return None
     while high > 1.02 * low:

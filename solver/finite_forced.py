@@ -1,0 +1,138 @@
+"""A body at finite strain under given forces: the depth, and under a given drag the travel too, are unknowns.
+
+Newton on the bordered system: the columns that say how the body follows depth and travel come with every linear solve,
+and from them follows which change of both makes up for the forces that are missing.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from solver.failures import Cancelled, NotConverged
+from solver.kernels import SLIP, STICK
+from solver.mesh import Array
+from solver.newton import BY_DEPTH, BY_TRAVEL, EQUILIBRIUM, Newton, Pull, Shape
+
+STRIDE = 0.3  # largest change of depth or travel in one iteration [mm]
+HALVINGS = 8  # how often a step that failed is cut in two before it is given up
+
+
+class Given(NamedTuple):
+    """What drives the bone: the normal force, and the surface's pull along +x or the surface's travel."""
+
+    normal: float  # [N/mm]
+    tangential: float | None  # [N/mm]; None: `travel` is given instead
+    travel: float = 0.0  # of the surface along +x relative to the bone [mm]
+
+    def towards(self, other: "Given", part: float) -> "Given":
+        """Return what lies `part` of the way to `other`, which gives the same kind of thing."""
+        tangential = other.tangential
+        if tangential is not None:
+            begun = 0.0 if self.tangential is None else self.tangential
+            tangential = begun + part * (tangential - begun)
+        normal = self.normal + part * (other.normal - self.normal)
+        return Given(normal, tangential, self.travel + part * (other.travel - self.travel))
+
+
+def corrected(
+    newton: Newton, shape: Shape, given: Given, origin: Array, before: float
+) -> tuple[Shape, float, int] | None:
+    """Return the shape after one iteration towards the forces, its largest displacement, and changed contact states.
+
+    `origin` (k,) are the positions along x where the skin's nodes were when the surface had travelled `before`. None
+    where there is no way.
+    """
+    pull = shape.pull
+    if given.tangential is None:
+        pull = pull._replace(travel=given.travel)
+    if not newton.linearise(shape, pull, origin + pull.travel - before):
+        return None
+    steps = newton.steps
+    here = newton.reaction(steps[:, EQUILIBRIUM]).sum(axis=0)
+    by_depth = newton.reaction(steps[:, BY_DEPTH], still=True).sum(axis=0)
+    deeper = along = 0.0
+    if given.tangential is not None and (shape.state == STICK).any():
+        by_travel = newton.reaction(steps[:, BY_TRAVEL], still=True).sum(axis=0)
+        matrix = np.array([[by_depth[1], by_travel[1]], [by_depth[0], by_travel[0]]])
+        missing = np.array([given.normal - here[1], given.tangential - here[0]])
+        det = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
+        if det == 0.0:
+            return None
+        deeper = (missing[0] * matrix[1, 1] - missing[1] * matrix[0, 1]) / det
+        along = (matrix[0, 0] * missing[1] - matrix[1, 0] * missing[0]) / det
+    elif by_depth[1] != 0.0:
+        deeper = (given.normal - here[1]) / by_depth[1]
+    most = max(abs(deeper), abs(along))
+    if not np.isfinite(most):
+        return None
+    if most > STRIDE:
+        deeper, along = deeper * STRIDE / most, along * STRIDE / most
+    step = steps[:, EQUILIBRIUM] + deeper * steps[:, BY_DEPTH] + along * steps[:, BY_TRAVEL]
+    pull = pull._replace(depth=pull.depth + deeper, travel=pull.travel + along)
+    after, largest, changed = newton.moved(shape, pull, step, origin + pull.travel - before)
+    return after, max(largest, abs(deeper), abs(along)), changed
+
+
+def balanced(newton: Newton, start: Shape, given: Given, tolerance: float = 1e-8, limit: int = 30) -> Shape:
+    """Return the equilibrium under `given`, one backward Euler step from `start`, whose pull has friction and sense.
+
+    Raises NotConverged where `limit` iterations do not do it.
+    """
+    origin, before = start.place(newton.body)[:, 0], start.pull.travel
+    shape = start
+    for _ in range(limit):
+        done = corrected(newton, shape, given, origin, before)
+        if done is None:
+            raise NotConverged("the body would turn inside out, or nothing holds it along the surface")
+        shape, largest, changed = done
+        if not largest < 1e3:
+            raise NotConverged("the displacements grow without bound")
+        if largest < tolerance and not changed:
+            return shape
+    raise NotConverged(f"no equilibrium within {limit} iterations")
+
+
+def march(
+    newton: Newton, start: Shape, begin: Given, course: Iterable[Given], stop: Callable[[], bool] = lambda: False
+) -> Iterator[Shape]:
+    """Yield the equilibrium at each aim of `course`, from `start`, which is that at `begin`.
+
+    A step that fails is cut in two. Raises NotConverged, saying where, and Cancelled where `stop` says so.
+    """
+    shape = start
+    for aim in course:
+        done, part = 0.0, 1.0
+        while done < 1.0:
+            if stop():
+                raise Cancelled
+            try:
+                there = min(done + part, 1.0)
+                shape = balanced(newton, _touching(newton, shape), begin.towards(aim, there))
+            except NotConverged as reason:
+                part /= 2.0
+                if part < 0.5**HALVINGS:
+                    raise NotConverged(
+                        f"the course ended at {shape.pull.depth:.3g} mm of indentation and "
+                        f"{abs(shape.pull.travel):.3g} mm of travel: {reason}, in steps down to the smallest"
+                    ) from reason
+            else:
+                done = there
+        begin = aim
+        yield shape
+
+
+def untouched(newton: Newton, mu: float, tau: float) -> Shape:
+    """Return the undeformed body over a surface with this friction."""
+    return replace(Shape.undeformed(newton.body), pull=Pull(0.0, mu, tau))
+
+
+def _touching(newton: Newton, shape: Shape) -> Shape:
+    """Return the shape with its lowest node on the surface, where nothing touches yet."""
+    if shape.touching.any():
+        return shape
+    state = shape.state.copy()
+    lowest = int(np.argmin(shape.place(newton.body)[:, 1]))
+    state[lowest] = STICK if shape.pull.mu > 0.0 and shape.pull.tau > 0.0 else SLIP
+    return replace(shape, state=state)

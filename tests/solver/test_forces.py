@@ -1,0 +1,124 @@
+"""Forces in place of depth and slide: what they lead to is found, and a course may turn round."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.failures import NoSteadyState
+from solver.reference import SLIPPERINESS, STICKINESS, scene
+from solver.scene import Friction, Loading, Scene, SceneError, Solve
+from solver.solution import solve
+
+KINEMATICS = ("small", "finite")
+COARSE = 0.5  # tolerance that the coarsest mesh meets
+
+
+def published(kinematics, course="steady"):
+    return replace(scene(SLIPPERINESS[4]), solve=Solve(kinematics, course, COARSE))
+
+
+def loaded(given, **changes):
+    return replace(given, loading=replace(given.loading, indentation=None, **changes))
+
+
+@pytest.mark.parametrize("kinematics", KINEMATICS)
+def test_the_force_of_a_driven_finger_presses_it_to_the_same_depth(kinematics):
+    driven = solve(published(kinematics))
+    found = solve(loaded(published(kinematics), normal_force=driven.normal_force))
+    assert found.normal_force == pytest.approx(driven.normal_force, rel=1e-9)
+    assert found.indentation == pytest.approx(1.5, rel=2e-3)  # the meshes are made for about the same depth
+    assert found.sed_ending == pytest.approx(driven.sed_ending, rel=5e-3)
+    assert found.shift is None
+
+
+@pytest.mark.parametrize("kinematics", KINEMATICS)
+def test_a_course_under_a_normal_force_ends_in_the_settled_state_found_directly(kinematics):
+    found = solve(loaded(published(kinematics, "history"), normal_force=1.2, force_unit="N"))
+    assert found.audits["course_against_direct"] < 1e-9
+    assert found.normal_force == pytest.approx(1.2 / 15.0, rel=1e-9)
+    np.testing.assert_allclose(found.history.normal_force[found.history.time >= 1.0], 0.08, rtol=1e-8)
+
+
+@pytest.mark.parametrize("kinematics", KINEMATICS)
+def test_a_drag_below_the_limit_shifts_the_finger_until_the_skin_carries_it(kinematics):
+    given = loaded(published(kinematics, "history"), normal_force=0.1, tangential_force=0.01)
+    found = solve(given)
+    assert found.normal_force == pytest.approx(0.1, rel=1e-8)
+    assert found.tangential_force == pytest.approx(0.01, rel=1e-6)
+    assert "stick" in found.skin.state
+    assert found.shift < 0.0  # towards -x, where it slides
+    assert max(found.audits[name] for name in ("equilibrium_x", "equilibrium_y", "tension", "cone_violation")) < 1e-9
+    np.testing.assert_allclose(found.history.time[-1], 2.0)
+
+
+@pytest.mark.parametrize("kinematics", KINEMATICS)
+def test_a_drag_of_the_friction_limit_is_the_settled_slide_and_more_is_refused_in_a_sentence(kinematics):
+    given = replace(published(kinematics), friction=Friction(0.24, 0.004), solve=Solve(kinematics))
+    given = loaded(given, normal_force=0.1)
+    sliding = solve(given)
+    most = sliding.tangential_force  # below mu N, since part of the skin slips at the bound
+    assert most < 0.999 * 0.24 * 0.1
+    same = solve(loaded(given, normal_force=0.1, tangential_force=most))
+    assert same.sed_ending == pytest.approx(sliding.sed_ending, rel=1e-6)
+    with pytest.raises(NoSteadyState, match=r"outside the friction limit.*slides from 0\.0"):
+        solve(loaded(given, normal_force=0.1, tangential_force=(most + 0.024) / 2))
+
+
+def test_small_strain_under_forces_has_the_work_of_the_bone_in_elastic_energy_and_friction():
+    found = solve(loaded(published("small", "history"), normal_force=0.1, tangential_force=0.015))
+    assert found.audits["course_work_balance"] < 1e-12
+    assert found.audits["course_least_dissipation"] > -1e-12
+
+
+@pytest.mark.parametrize(
+    ("change", "key"),
+    [
+        ({"indentation": 1.0, "normal_force": 0.1}, "loading.indentation"),
+        ({}, "loading.indentation"),
+        ({"normal_force": -0.1}, "loading.normal_force"),
+        ({"normal_force": 0.1, "force_unit": "kg"}, "loading.force_unit"),
+        ({"indentation": 1.0, "tangential_force": 0.1}, "loading.tangential_force"),
+        ({"normal_force": 0.1, "tangential_force": 0.0501}, "loading.tangential_force"),
+        ({"normal_force": 0.1, "tangential_force": 0.01, "slide": "none"}, "loading.slide"),
+        ({"normal_force": 0.1, "tangential_force": 0.01, "slide": ("+x", "-x")}, "loading.slide"),
+        ({"indentation": 1.0, "slide": ()}, "loading.slide"),
+        ({"indentation": 1.0, "slide": ("+x", "none")}, "loading.slide"),
+    ],
+)
+def test_loads_that_contradict_each_other_or_the_friction_are_refused(change, key):
+    with pytest.raises(SceneError) as refused:
+        Scene(friction=Friction(0.5), loading=Loading(**change))
+    assert refused.value.key == key
+
+
+@pytest.mark.parametrize("kinematics", KINEMATICS)
+def test_a_finger_that_slides_there_and_back_ends_as_if_it_had_slid_back_only(kinematics):
+    there_and_back = published(kinematics, "history")
+    there_and_back = replace(there_and_back, loading=replace(there_and_back.loading, slide=("-x", "+x", "-x")))
+    found = solve(there_and_back)
+    once = solve(published(kinematics))
+    assert found.sed_ending == pytest.approx(once.sed_ending, rel=1e-9)
+    assert found.audits["course_against_direct"] < 1e-9
+    drag = found.history.tangential_force
+    assert drag.min() == pytest.approx(-solve(opposite(kinematics)).tangential_force, rel=1e-9)
+    assert (np.diff(found.history.time) > 0.0).all()
+    assert np.sign(np.diff(found.history.bone_x[found.history.time > 1.0])).min() == -1.0
+
+
+def opposite(kinematics):
+    return replace(published(kinematics), loading=replace(published(kinematics).loading, slide="+x"))
+
+
+def test_friction_takes_work_in_every_step_of_a_reversal():
+    given = replace(scene(STICKINESS[0]), solve=Solve("small", "history", COARSE))
+    found = solve(replace(given, loading=replace(given.loading, slide=("+x", "-x"))))
+    assert found.audits["course_work_balance"] < 1e-12
+    assert found.audits["course_least_dissipation"] > -1e-12
+
+
+def test_at_finite_strain_a_leg_without_a_settled_state_is_refused_with_its_limits():
+    given = replace(scene(STICKINESS[4]), solve=Solve("finite", "history", COARSE))
+    with pytest.raises(NoSteadyState) as refused:  # the skin folds when it slides along +x at 2 mm
+        solve(replace(given, loading=replace(given.loading, slide=("+x", "-x"))))
+    assert refused.value.limit_mu < 0.5
