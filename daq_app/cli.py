@@ -43,6 +43,7 @@ _FAILED = (
     "sessions.exports.ExportError",
     "sessions.exports.html.ReportError",
     "sessions.import_csv.ImportRefused",
+    "sessions.plan.Blinded",
     "sessions.recording.errors.RecordingError",
     "solver.failures.SolveFailure",
 )

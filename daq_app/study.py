@@ -86,7 +86,7 @@ def _planted(bench: Connected, recording: Recording) -> tuple[Planted, ...]:
     rows: list[Planted] = []
     for record in recording.trials:
         stimulus = record.trial.stimulus
-        stroke = strokes.get((stimulus.descriptor, stimulus.index))
+        stroke = strokes.get((stimulus.descriptor, stimulus.known_index))
         if stroke is not None:
             rows.append(Planted(record.trial.number, stroke.mu, stroke.tau_max, stroke.speed, stroke.direction))
     return tuple(rows)

@@ -14,14 +14,20 @@ from sessions.recording import Recording
 from sessions.recording.replay import ReplayTransducer
 from sessions.steps import (
     AskBegin,
+    AskChoice,
     AskFinish,
     AskMount,
+    AskNumber,
+    AskRest,
     AskScore,
     AskStroke,
     Begin,
+    Chosen,
     Command,
     Event,
     Finish,
+    NumberGiven,
+    Resume,
     Scored,
     StimulusMounted,
     StrokeDone,
@@ -48,6 +54,7 @@ __all__ = [
 SIMULATED = "sim"
 REPLAY = "replay:"  # and the path of a session folder
 JUDGING = 0.8  # from lift to score [s]; an unloaded stretch in which drift shows
+INPUT = "simulated"
 _OPTIONS = frozenset({"seed", "rate"})
 
 
@@ -155,9 +162,10 @@ class SimulatedPeople:
                 self._takes[trial.number] = self._takes.get(trial.number, 0) + 1
                 if self._hand is None:
                     self._answer(StrokeDone())
-            case AskScore(trial):
-                score = self._subject.score(planted_surface(trial), self._takes[trial.number])
-                self._answer(Scored(score), after=JUDGING if self._hand else 0.0)
+            case AskScore() | AskNumber() | AskChoice():
+                self._answer(self._judgement(command), after=self._judging)
+            case AskRest(None):
+                self._answer(Resume())
             case AskFinish():
                 self._answer(Finish())
             case _:
@@ -170,6 +178,27 @@ class SimulatedPeople:
         self._due = [(due, event) for due, event in self._due if due > now_ns]
         return done
 
+    def _judgement(self, command: AskScore | AskNumber | AskChoice) -> Event:
+        """Return what the subject answers."""
+        at = self._clock.now_ns() * 1e-9 + self._judging
+        match command:
+            case AskScore(trial):
+                score = self._judged(trial)
+                return Scored(score, ((at, score),), at, 0, None, INPUT)
+            case AskNumber(trial):
+                number = self._subject.number(planted_surface(trial), self._takes[trial.number])
+                return NumberGiven(number, at, 0, None, INPUT)
+            case AskChoice(first, second):
+                more = self._judged(first) > self._judged(second)
+                return Chosen("first" if more else "second", at, 0, None, INPUT)
+
+    @property
+    def _judging(self) -> float:
+        return JUDGING if self._hand else 0.0
+
+    def _judged(self, trial: Trial) -> float:
+        return self._subject.score(planted_surface(trial), self._takes[trial.number])
+
     def _answer(self, event: Event, after: float = 0.0) -> None:
         self._due.append((self._clock.now_ns() + int(after * 1e9), event))
 
@@ -177,7 +206,7 @@ class SimulatedPeople:
 def planted_surface(trial: Trial) -> Surface:
     """Return the simulated surface of a trial, stroked as the trial asks. Raises SetupError where there is none."""
     stimulus = trial.stimulus
-    surface = paper_surfaces().get((stimulus.descriptor, stimulus.index))
+    surface = paper_surfaces().get((stimulus.descriptor, stimulus.known_index))
     if surface is None:
         raise SetupError(
             f"the simulated bench has no surface '{stimulus.descriptor} {stimulus.index}': it holds the ten of "

@@ -1,41 +1,32 @@
 """The course of a recorded session, step by step: what its log says happened, when, and after how many readings."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import msgspec
-
+from sessions.event_log import made
 from sessions.recording import LoggedEvent
-from sessions.steps import (
-    Abort,
-    Begin,
-    Event,
-    Finish,
-    Pause,
-    Redo,
-    Resume,
-    Scored,
-    Skip,
-    StimulusMounted,
-    StrokeDone,
-)
+from sessions.steps import Event
 
-# What experimenter and subject do. All else that happens comes of the readings, and is found in them once more.
-ACTS: dict[str, type[Event]] = {
-    "begin": Begin,
-    "stimulus_mounted": StimulusMounted,
-    "stroke_done": StrokeDone,
-    "scored": Scored,
-    "redo": Redo,
-    "skip": Skip,
-    "pause": Pause,
-    "resume": Resume,
-    "abort": Abort,
-    "finish": Finish,
-}
-NOTICED = frozenset({"zeroed", "contact_onset", "finger_lifted"})  # in the readings, by the runner
+# What experimenter and subject do. All else that happens comes of readings and clock, and is found in them once more.
+ACTS = frozenset(
+    {
+        "begin",
+        "stimulus_mounted",
+        "stroke_done",
+        "scored",
+        "number_given",
+        "chosen",
+        "note",
+        "redo",
+        "skip",
+        "pause",
+        "resume",
+        "abort",
+        "finish",
+    }
+)
+NOTICED = frozenset({"zeroed", "contact_onset", "finger_lifted", "settled", "rest_over"})  # by the runner
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +46,12 @@ def steps(events: Sequence[LoggedEvent]) -> tuple[Step, ...]:
     found: list[Step] = []
     for i, event in enumerate(events):
         place = event.readings, event.time_ns
-        kind = event.data.get("event") if event.kind == "refused" else event.kind
+        refused = event.kind == "refused"
+        kind = event.data.get("event") if refused else event.kind
         if event.kind == "ended":
             found.append(Step(*place, end=event.data))
-        elif kind in ACTS:
-            found.append(Step(*place, act=_act(str(kind), event)))
+        elif kind is not None and kind in ACTS:
+            found.append(Step(*place, act=made(kind, event.data["given"] if refused else event.data)))
         elif kind in NOTICED:
             found.append(Step(*place))
         elif event.kind == "losses" and not _at_the_end(events, i):
@@ -70,23 +62,6 @@ def steps(events: Sequence[LoggedEvent]) -> tuple[Step, ...]:
         last = events[-1] if events else LoggedEvent(0, 0, "", None, 0, {})
         found.append(Step(last.readings, last.time_ns, end={}))
     return tuple(found)
-
-
-def _act(kind: str, event: LoggedEvent) -> Event:
-    """Return what was done; of what was refused the log keeps the sentence, which names what matters."""
-    if event.kind != "refused":
-        return msgspec.convert(dict(event.data), ACTS[kind])
-    sentence = str(event.data.get("sentence", ""))
-    if kind == "scored":
-        outside = re.search(r"; (\S+) does not$", sentence)
-        return Scored(float(outside[1]) if outside else None)
-    if kind == "stimulus_mounted":
-        wrong = re.search(r", not (.*)$", sentence)
-        return StimulusMounted(wrong[1] if wrong else "")
-    if kind in {"redo", "skip", "abort"}:
-        reason = "" if sentence.startswith("say why") else "not recorded"
-        return msgspec.convert({"reason": reason}, ACTS[kind])
-    return msgspec.convert({}, ACTS[kind])
 
 
 def _at_the_end(events: Sequence[LoggedEvent], position: int) -> bool:

@@ -1,4 +1,8 @@
-"""What is made of readings while they come: the zero of a take, then touch and lift. Readings are never altered."""
+"""What is made of readings while they come: the zero of a take, touch and lift, and when the finger stays off.
+
+Readings are never altered. The rule of a take: it begins with an unloaded stretch of at least `zero_duration`, so
+before any contact, and ends no earlier than `after_lift` seconds after the last lift.
+"""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -11,9 +15,10 @@ from drivers.transducer import TransducerInfo
 from sessions.analysis.forces import normal_force
 from sessions.analysis.onset import ContactEvent, DetectorSettings, Onset, is_quiet
 from sessions.plan import Frame
-from sessions.steps import ContactOnset, FingerLifted, Zeroed
+from sessions.steps import ContactOnset, FingerLifted, Settled, Zeroed
 
 Array = NDArray[np.float64]
+Noticed = Zeroed | ContactOnset | FingerLifted | Settled
 
 
 class Detector(Protocol):
@@ -34,8 +39,12 @@ class TakeWatch:
         zero_duration: float,
         detection: DetectorSettings,
         make_detector: Callable[[DetectorSettings], Detector],
+        after_lift: float = 0.5,
     ) -> None:
-        """Begin to measure the zero over `zero_duration` seconds; what `make_detector` makes watches from then on."""
+        """Begin to measure the zero over `zero_duration` seconds; what `make_detector` makes watches from then on.
+
+        The finger stays off when nothing touched for `after_lift` seconds.
+        """
         self._info = info
         self._frame = frame
         self._duration = zero_duration
@@ -43,8 +52,10 @@ class TakeWatch:
         self._make_detector = make_detector
         self._detector: Detector | None = None
         self._stretch = ReadingBlock.empty()
+        self._after_lift = after_lift
+        self._lifted: float | None = None  # when the finger left [s, device time]; None while it touches, or stayed off
 
-    def feed(self, block: ReadingBlock) -> tuple[Zeroed | ContactOnset | FingerLifted, ...]:
+    def feed(self, block: ReadingBlock) -> tuple[Noticed, ...]:
         """Take readings and return what they tell, in order."""
         if not len(block):
             return ()
@@ -80,14 +91,20 @@ class TakeWatch:
             noise=float(normal.std(ddof=1)),
         )
 
-    def _touches(self, detector: Detector, block: ReadingBlock) -> tuple[ContactOnset | FingerLifted, ...]:
-        found = detector.feed(block.time, self._normal_force(block))
-        return tuple(
-            ContactOnset(event.time, event.noticed)
-            if isinstance(event, Onset)
-            else FingerLifted(event.time, event.noticed)
-            for event in found
-        )
+    def _touches(self, detector: Detector, block: ReadingBlock) -> tuple[Noticed, ...]:
+        found: list[Noticed] = []
+        for event in detector.feed(block.time, self._normal_force(block)):
+            if isinstance(event, Onset):
+                found.append(ContactOnset(event.time, event.noticed))
+                self._lifted = None
+            else:
+                found.append(FingerLifted(event.time, event.noticed))
+                self._lifted = event.time
+        last = float(block.time[-1])
+        if self._lifted is not None and last - self._lifted >= self._after_lift:
+            found.append(Settled(last))
+            self._lifted = None
+        return tuple(found)
 
     def _normal_force(self, block: ReadingBlock) -> Array:
         return normal_force(self._info.calibration.wrench(block.raw, np.zeros(6)), self._frame)

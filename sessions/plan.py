@@ -5,8 +5,16 @@ from typing import Literal
 
 Origin = Literal["measured", "set", "default"]  # where a value came from; a default was chosen by nobody
 Hand = Literal["left", "right"]
+Phase = Literal["pre-evaluation", "practice", "main"]  # only the trials of "main" are the experiment's
+Answer = Literal["line", "number", "choice", "none"]  # on a 0 to 100 line, a free number, which of two, nothing
+SubjectSees = Literal["instruction", "trial count", "code", "forces"]
+ExperimenterSees = Literal["trial count", "answer", "forces"]
 PROXIMAL_TO_DISTAL = 1
 DISTAL_TO_PROXIMAL = -1
+
+
+class Blinded(ValueError):
+    """What was asked for needs to know which stimulus bears which code, and that is still sealed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,8 +22,15 @@ class Stimulus:
     """One surface to be stroked."""
 
     descriptor: str  # "stickiness" or "slipperiness", or what a protocol names
-    index: int  # its maker's number on the descriptor, 0 to 100; not a score
+    index: int | None  # its maker's number on the descriptor, 0 to 100; not a score; None while blinded
     code: str  # opaque label on its back, all that experimenter and subject are shown
+
+    @property
+    def known_index(self) -> int:
+        """Return the index. Raises Blinded while it is sealed."""
+        if self.index is None:
+            raise Blinded(f"which stimulus bears the code {self.code} is sealed: 'daq-app unblind' opens the key")
+        return self.index
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,18 +42,28 @@ class Trial:
     stimulus: Stimulus
     direction: int  # +1 proximal to distal, -1 distal to proximal
     repetition: int  # from 1
+    phase: Phase = "main"
+    answer: Answer = "line"  # what the subject gives when the stroke is done
+    compared_with: int | None = (
+        None  # where one of two is chosen: number of the trial just before, whose answer is none
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """The trials of one descriptor, with what the subject is told."""
+    """The trials of one descriptor in one phase, with what the subject is told."""
 
     name: str
     instruction: str
     direction: int  # +1 proximal to distal, -1 distal to proximal
     indentation: float  # depth the model presses the finger to in this block [mm]
-    scale_ends: tuple[str, str]  # what a score of 0 and of 100 mean
+    scale_ends: tuple[str, str]  # what a score of 0 and of 100 mean; empty where no line is shown
     trials: tuple[Trial, ...]
+    phase: Phase = "main"
+    question: str = ""  # asked when an answer is due; on a line its ends may say all
+    strokes_allowed: int = 1  # in a trial; every further one is recorded and flagged
+    ticks: int = 0  # marks on the line between its ends
+    indentation_origin: Origin = "set"
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,13 +77,38 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True)
+class Rests:
+    """When the subject rests: never, unless it says so."""
+
+    after_trials: int | None = None  # of a block; None: not within a block
+    between_blocks: bool = False  # practice and its block are not parted
+    duration: float | None = None  # [s]; None: until the experimenter goes on
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What is shown to whom, besides what each must know to act."""
+
+    subject: tuple[SubjectSees, ...] = ("instruction",)
+    experimenter: tuple[ExperimenterSees, ...] = ("trial count", "answer", "forces")
+
+
+@dataclass(frozen=True, slots=True)
+class Finger:
+    """The subject's own finger, as far as it was measured or stated; the model's default stands in for the rest."""
+
+    tip_radius: float | None = None  # of the fingertip's outline [mm]
+    width: float | None = None  # of the contact, across the finger [mm]
+
+
+@dataclass(frozen=True, slots=True)
 class SessionPlan:
     """All that is decided before the subject sits down."""
 
     protocol: str
     subject: str  # a code, never a name
     seed: int
-    order_rule: str  # how stimulus orders were made, e.g. "shuffled"
+    order_rule: str  # how stimulus orders were made, e.g. "shuffled" or "williams, row 3 of 10"
     blocks: tuple[Block, ...]  # none for an imported recording
     forces: bool  # True when strokes are recorded by a transducer, False for a scores-only visit
     frame: Frame
@@ -68,6 +118,18 @@ class SessionPlan:
     contact_angle_origin: Origin = "default"
     stroking_hand: Hand | None = None  # None: nobody stated it
     answering_hand: Hand | None = None
+    finger: Finger = Finger()
+    rests: Rests = Rests()
+    shown: Shown = Shown()
+    study: str | None = None  # name of the study the subject is enrolled in
+    order_row: int | None = None  # of the study's design, from 1
+    order_seed: int | None = None  # that orders were made from, where it is not `seed`
+    key_sha256: str | None = None  # of the sealed key; None: not blinded
+
+    @property
+    def blinded(self) -> bool:
+        """Say whether the plan hides which stimulus bears which code."""
+        return any(trial.stimulus.index is None for trial in self.trials)
 
     @property
     def trials(self) -> tuple[Trial, ...]:

@@ -8,7 +8,7 @@ from drivers.clock import Clock
 from drivers.readings import ReadingBlock
 from drivers.transducer import DeviceFault, Health, LinkLost, Transducer
 from sessions.analysis.onset import ContactDetector, DetectorSettings
-from sessions.event_log import kind_of, line_of
+from sessions.event_log import data_of, kind_of, line_of
 from sessions.interruptions import Interruptions, interruptions
 from sessions.live import Detector, TakeWatch
 from sessions.machine import advance, start, trial_in_hand
@@ -17,13 +17,17 @@ from sessions.recording import Acknowledged, RecordingError, SessionWriter
 from sessions.resuming import Resumption, Seam
 from sessions.steps import (
     Abort,
+    AskRest,
     Command,
     Ended,
     Event,
     MeasureZero,
     Ready,
     Refuse,
+    Resting,
+    RestOver,
     Scoring,
+    Settling,
     Stroking,
     Taring,
     Tell,
@@ -54,6 +58,7 @@ class RunnerSettings:
     tick: float = 0.02  # between two looks at transducer and operator [s, session clock]
     zero_duration: float = 0.5  # unloaded stretch before each take [s, device time]
     zero_patience: float = 5.0  # waiting for it, until somebody is told [s, session clock]
+    after_lift: float = 0.5  # the finger stays off, before a take ends [s, device time]
     losses_every: float = 1.0  # least time between two reports of lost readings [s, session clock]
     status_every: float = 0.1  # between two calls of `progress` [s, session clock]
     detection: DetectorSettings = field(default_factory=DetectorSettings)  # of the live detector, and of a quiet zero
@@ -150,6 +155,7 @@ class _Run:
         self._seam: Seam | None = None
         self._reported = Health()
         self._due_ns: dict[str, int] = dict.fromkeys(("losses", "status", "zero"), clock.now_ns())
+        self._rested_ns: int | None = None  # when the rest is over [session clock]
 
     def go_on(self, resumed: Resumed) -> None:
         """Begin where a session that was cut short left off."""
@@ -196,6 +202,8 @@ class _Run:
             if (ending := stop()) is not None:
                 return ending
             self._listen()
+            if isinstance(self._state, Resting) and self._rested_ns is not None and began_ns >= self._rested_ns:
+                self._take(RestOver())
             for event in self._operator.poll():
                 self._take(event)
             if isinstance(self._state, Ended):
@@ -235,14 +243,21 @@ class _Run:
         self._state, commands = advance(before, event)
         refusals = [command for command in commands if isinstance(command, Refuse)]
         if refusals:
-            data = {"event": kind_of(event), "sentence": refusals[0].sentence}
+            data = {"event": kind_of(event), "sentence": refusals[0].sentence, "given": data_of(event)}
             self._writer.event("refused", trial_in_hand(before), data)
             self._operator.show(refusals[0])
             return
-        self._writer.event(kind_of(event), trial_in_hand(before), asdict(event), commit=False)
-        if not isinstance(self._state, Taring | Ready | Stroking | Scoring):
+        logged = self._writer.event(kind_of(event), trial_in_hand(before), data_of(event), commit=False)
+        self._begin_rest(commands, logged.time_ns)
+        if not isinstance(self._state, Taring | Ready | Stroking | Scoring | Settling):
             self._watch = None
         self._carry_out(commands)
+
+    def _begin_rest(self, commands: Sequence[Command], at_ns: int) -> None:
+        """Reckon a rest from the event it follows, whose instant a replay knows."""
+        for command in commands:
+            if isinstance(command, AskRest):
+                self._rested_ns = None if command.duration is None else at_ns + round(command.duration * 1e9)
 
     def _carry_out(self, commands: Sequence[Command]) -> None:
         """Write commands down, make that safe, and only then let anybody see them."""
@@ -262,7 +277,12 @@ class _Run:
             raise AssertionError("a zero is measured only where there is a transducer")
         settings = self._settings
         self._watch = TakeWatch(
-            transducer.info, self._plan.frame, settings.zero_duration, settings.detection, self._detector
+            transducer.info,
+            self._plan.frame,
+            settings.zero_duration,
+            settings.detection,
+            self._detector,
+            settings.after_lift,
         )
         self._due_ns["zero"] = self._clock.now_ns() + round(settings.zero_patience * 1e9)
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from sessions.plan import Block, SessionPlan, Trial
+from sessions.plan import Block, Hand, SessionPlan, Trial
 
 # ---- where a session is
 
@@ -43,6 +43,24 @@ class Place:
     def last(self) -> bool:
         """Say whether the trial in hand is the last."""
         return self.index == len(self.progress) - 1
+
+    @property
+    def first_of_two(self) -> bool:
+        """Say whether the trial in hand is the first of two that are compared."""
+        return not self.last and self.plan.trials[self.index + 1].compared_with == self.trial.number
+
+    @property
+    def rest_due(self) -> bool:
+        """Say whether the plan asks for a rest before the trial in hand."""
+        rests, trial, block = self.plan.rests, self.trial, self.block
+        if self.index == 0 or trial.compared_with is not None:
+            return False
+        done = block.trials.index(trial)
+        if done == 0:
+            return rests.between_blocks and self.at(self.index - 1).block.phase != "practice"
+        # Two that are compared make one trial in the subject's eyes.
+        counted = sum(earlier.compared_with is None for earlier in block.trials[:done])
+        return rests.after_trials is not None and counted % rests.after_trials == 0
 
     def at(self, index: int) -> "Place":
         """Return the place with another trial in hand."""
@@ -93,15 +111,33 @@ class Scoring:
     """The stroke is done and the subject judges."""
 
     place: Place
-    touching: bool = False  # True during a further stroke, which nobody asked for
+    touching: bool = False  # True during a further stroke
+    strokes: int = 1  # begun in this take
+    settled: bool = False  # the finger has been off long enough for the take to end
+
+
+@dataclass(frozen=True, slots=True)
+class Settling:
+    """All of the trial is done; the take runs on until the finger has been off for a moment."""
+
+    place: Place
+    touching: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Resting:
+    """A rest that the plan asks for, before the trial in hand; no take is open."""
+
+    place: Place
 
 
 @dataclass(frozen=True, slots=True)
 class Paused:
-    """Nothing is asked of anybody. No take is open, but for one whose stroke is done and waits for its score."""
+    """Nothing is asked of anybody. No take is open, but for one whose stroke is done and waits for its answer."""
 
     place: Place
     scoring: bool
+    strokes: int = 1  # begun in the take that waits
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +155,7 @@ class Ended:
     complete: bool  # True when every trial was done or skipped
 
 
-State = Idle | Mounting | Taring | Ready | Stroking | Scoring | Paused | Closing | Ended
+State = Idle | Mounting | Taring | Ready | Stroking | Scoring | Settling | Resting | Paused | Closing | Ended
 
 # ---- what may happen
 
@@ -167,32 +203,71 @@ class FingerLifted:
 
 
 @dataclass(frozen=True, slots=True)
+class Settled:
+    """The finger has been off for a moment since the last lift, so that the take may end."""
+
+    time: float = 0.0  # of the reading at which it had [s, device time]
+
+
+@dataclass(frozen=True, slots=True)
 class StrokeDone:
     """The experimenter says that the stroke is done, in a visit without a transducer."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scored:
-    """The subject has judged. What an input device cannot tell is empty or None."""
+    """The subject has judged on the line. What an input device cannot tell is empty or None."""
 
     score: float | None  # 0 to 100; None: the subject gave no answer
     positions: tuple[tuple[float, float], ...] = ()  # every one on the line: (session clock [s], 0 to 100), in order
     first_touch: float | None = None  # session clock [s]
     corrections: int | None = None  # how often the subject changed an answer given
-    hand: Literal["left", "right"] | None = None  # that answered
+    hand: Hand | None = None  # that answered
     input_device: str | None = None  # such as a pen, a finger on the screen
 
 
 @dataclass(frozen=True, slots=True)
+class NumberGiven:
+    """The subject has given a number on a scale of its own (free modulus)."""
+
+    number: float | None  # above 0; None: the subject gave no answer
+    first_touch: float | None = None  # of a key or the field [s, session clock]
+    corrections: int | None = None  # how often the subject changed an answer given
+    hand: Hand | None = None  # that answered
+    input_device: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """The subject has said which of two stimuli has more of what is asked."""
+
+    choice: Literal["first", "second"] | None  # None: the subject gave no answer
+    first_touch: float | None = None  # [s, session clock]
+    corrections: int | None = None  # how often the subject changed an answer given
+    hand: Hand | None = None  # that answered
+    input_device: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """The experimenter writes something down; nothing else changes."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class Redo:
-    """The trial in hand is to be done again; just before a trial begins, the one before it."""
+    """The trial in hand is to be done again; just before a trial begins, the one before it.
+
+    Of two stimuli that are compared both are presented again.
+    """
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class Skip:
-    """The trial in hand is to be left out."""
+    """The trial in hand is to be left out, and with the first of two that are compared also the second."""
 
     reason: str
 
@@ -204,7 +279,12 @@ class Pause:
 
 @dataclass(frozen=True, slots=True)
 class Resume:
-    """The rest is over."""
+    """The experimenter goes on, after a pause or a rest."""
+
+
+@dataclass(frozen=True, slots=True)
+class RestOver:
+    """The time of a rest is up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,12 +305,17 @@ Event = (
     | Zeroed
     | ContactOnset
     | FingerLifted
+    | Settled
     | StrokeDone
     | Scored
+    | NumberGiven
+    | Chosen
+    | Note
     | Redo
     | Skip
     | Pause
     | Resume
+    | RestOver
     | Abort
     | Finish
 )
@@ -275,14 +360,41 @@ class AskStroke:
     """Have the subject stroke."""
 
     trial: Trial
+    allowed: int = 1  # strokes; every further one is flagged
 
 
 @dataclass(frozen=True, slots=True)
 class AskScore:
-    """Have the subject judge."""
+    """Have the subject judge on the line from 0 to 100; answered by Scored."""
 
     trial: Trial
     scale_ends: tuple[str, str]
+    ticks: int = 0  # marks between the ends
+    question: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class AskNumber:
+    """Have the subject give a number on a scale of its own; answered by NumberGiven."""
+
+    trial: Trial
+    question: str
+
+
+@dataclass(frozen=True, slots=True)
+class AskChoice:
+    """Have the subject say which of two; answered by Chosen."""
+
+    first: Trial
+    second: Trial  # the trial in hand
+    question: str
+
+
+@dataclass(frozen=True, slots=True)
+class AskRest:
+    """Let the subject rest; Resume goes on at any time."""
+
+    duration: float | None  # [s], after which it goes on by itself; None: until the experimenter goes on
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,6 +411,14 @@ class DiscardTake:
 
     trial: int
     take: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class LeaveOut:
+    """A trial that was not begun is left out together with the one before it."""
+
+    trial: int
     reason: str
 
 
@@ -337,8 +457,12 @@ Command = (
     | MeasureZero
     | AskStroke
     | AskScore
+    | AskNumber
+    | AskChoice
+    | AskRest
     | KeepTake
     | DiscardTake
+    | LeaveOut
     | AskFinish
     | Tell
     | Refuse

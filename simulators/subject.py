@@ -63,6 +63,14 @@ class SimulatedSubject:
         marked = 50.0 + self._gain * (judged - 50.0) + self._offset + float(draw.normal(0.0, settings.judgement_noise))
         return round(min(max(marked, 0.0), 100.0), 1)
 
+    def number(self, surface: Surface, repetition: int = 1) -> float:
+        """Return the number on the subject's own scale: judgements in equal ratios, above 0, of any size.
+
+        Ten points on the line are a factor of 1.25; the modulus is the subject's own (log-uniform from 1 to 20).
+        """
+        modulus = 20.0 ** np.random.default_rng([self.seed, 5]).uniform()
+        return float(f"{modulus * 1.25 ** (self.score(surface, repetition) / 10.0):.3g}")
+
     def _draw(self, surface: Surface, repetition: int, purpose: int) -> np.random.Generator:
         """Return a source of chance of this subject, this surface and this purpose alone."""
         name = int.from_bytes(surface.descriptor.encode(), "big")

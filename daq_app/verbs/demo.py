@@ -97,7 +97,7 @@ def _rows(
             "speed": speeds.get(row.trial),
             "sed": row.sed,
             "error_estimate": row.error_estimate,
-            "mean_score": means.get((row.stimulus.descriptor, row.stimulus.index)),
+            "mean_score": means.get((row.stimulus.descriptor, row.stimulus.known_index)),
         }
         for row in prediction.trials
         if row.stimulus is not None and row.trial is not None

@@ -71,12 +71,15 @@ class Relation:
 
 
 def score_table(recording: "Recording") -> ScoreTable:
-    """Return the answers of one session."""
+    """Return the scores on the line that one session's experiment gave; practice and pre-evaluation are left out.
+
+    Raises Blinded while the stimuli's key is sealed.
+    """
     subject = recording.plan.subject
     scores = tuple(
-        Score(subject, record.trial.stimulus.descriptor, record.trial.stimulus.index, record.score)
+        Score(subject, record.trial.stimulus.descriptor, record.trial.stimulus.known_index, record.score)
         for record in recording.trials
-        if record.score is not None
+        if record.score is not None and record.trial.phase == "main"
     )
     return ScoreTable(str(recording.folder.resolve()), subject, recording.simulated, scores)
 

@@ -133,7 +133,7 @@ def _add_trials(file: "NWBFile", recording: Recording, first_ns: int) -> None:
     for name, what in (
         ("number", "of the trial"),
         ("descriptor", "what was judged"),
-        ("index", "the maker's number of the stimulus"),
+        ("index", "the maker's number of the stimulus; -1: sealed"),
         ("outcome", "scored or not answered"),
         ("score", "the subject's answer, 0 to 100; NaN: none"),
     ):
@@ -145,7 +145,7 @@ def _add_trials(file: "NWBFile", recording: Recording, first_ns: int) -> None:
             stop_time=(stop - first_ns) * 1e-9,
             number=record.trial.number,
             descriptor=record.trial.stimulus.descriptor,
-            index=record.trial.stimulus.index,
+            index=-1 if record.trial.stimulus.index is None else record.trial.stimulus.index,
             outcome=record.outcome,
             score=math.nan if record.score is None else record.score,
         )

@@ -7,6 +7,7 @@ from typing import Any, cast
 
 from sessions.exports import ExportSource
 from sessions.recording import Recording
+from sessions.recording.log import OUTCOMES
 
 Cell = str | int | float | None
 
@@ -88,8 +89,12 @@ def trials(recording: Recording) -> Table:
             column("code", "", "label on the stimulus", (r.trial.stimulus.code for r in records)),
             column("direction", "", "+1 proximal to distal, -1 back", (r.trial.direction for r in records)),
             column("repetition", "", "from 1", (r.trial.repetition for r in records)),
-            column("outcome", "", "scored, not answered, skipped or open", (r.outcome for r in records)),
+            column("phase", "", "main; or practice, pre-evaluation", (r.trial.phase for r in records)),
+            column("compared_with", "", "trial with the first of two", (r.trial.compared_with for r in records)),
+            column("outcome", "", OUTCOMES, (r.outcome for r in records)),
             column("score", "", "the subject's answer, 0 to 100", (r.score for r in records)),
+            column("free_number", "", "the subject's answer on a scale of its own", (r.number for r in records)),
+            column("choice", "", "the subject's answer: first or second of two", (r.choice for r in records)),
             column("take", "", "number of the take that counts", (r.take.number if r.take else None for r in records)),
             column("start", "ns", "first instant of that take, session clock", (r.start_ns for r in records)),
             column("stop", "ns", "first instant after it", (r.stop_ns for r in records)),

@@ -4,9 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from sessions.plan import SessionPlan, Trial
+from sessions.plan import Answer, SessionPlan, Trial
 
-Outcome = Literal["scored", "not answered", "skipped", "open"]
+Outcome = Literal["scored", "numbered", "chosen", "presented", "not answered", "skipped", "open"]
+OUTCOMES = "scored, numbered, chosen, presented (no answer asked for), not answered, skipped or open"
+Choice = Literal["first", "second"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,15 +39,17 @@ class TrialRecord:
     """What came of one planned trial."""
 
     trial: Trial
-    outcome: Outcome  # "open": the session ended before the trial was done
+    outcome: Outcome  # "presented": no answer was asked for; "open": the session ended before the trial was done
     take: Take | None  # the take that counts
     other_takes: tuple[Take, ...]  # discarded ones, and one the recording ended in; their readings are kept too
-    score: float | None  # the subject's answer, 0 to 100; None unless outcome is "scored"
+    score: float | None  # the subject's answer on the line, 0 to 100; None unless outcome is "scored"
+    number: float | None = None  # on a scale of the subject's own; None unless outcome is "numbered"
+    choice: Choice | None = None  # of the two compared; None unless outcome is "chosen"
 
     @property
     def answered(self) -> bool:
-        """Say whether the subject gave a score."""
-        return self.outcome == "scored"
+        """Say whether the subject gave an answer."""
+        return self.outcome in ("scored", "numbered", "chosen")
 
     @property
     def start_ns(self) -> int | None:
@@ -67,32 +71,53 @@ def _record(trial: Trial, events: Sequence[LoggedEvent]) -> TrialRecord:
     """Follow the events of one trial; a later outcome replaces an earlier one."""
     takes: dict[int, Take] = {}
     outcome: Outcome = "open"
-    score: float | None = None
+    answer: Any = None
     kept: int | None = None
     for event in events:
         number = event.data.get("take")
         match event.kind:
             case "take_started":
                 takes[event.data["take"]] = Take(event.data["take"], event.time_ns, None, 0, None)
-                outcome, score, kept = "open", None, None
+                outcome, answer, kept = "open", None, None
             case "contact_onset" | "stroke_done" if takes:
                 last = max(takes)
                 takes[last] = replace(takes[last], strokes=takes[last].strokes + 1)
-            case "scored":
-                score = event.data["score"]
+            case "scored" | "number_given" | "chosen":
+                answer = event.data[_ANSWERS[event.kind]]
             case "take_kept" if number in takes:
                 takes[number] = replace(takes[number], stop_ns=event.time_ns)
-                outcome, kept = ("scored" if score is not None else "not answered"), number
+                outcome, kept = _OUTCOMES[trial.answer] if answer is not None else _unanswered(trial), number
             case "take_discarded" if number in takes:
                 stop = takes[number].stop_ns  # a take that was kept first ended when it was kept
                 takes[number] = replace(
                     takes[number], stop_ns=event.time_ns if stop is None else stop, discarded=event.data["reason"]
                 )
-                outcome, score, kept = ("skipped" if outcome == "skipped" else "open"), None, None
-            case "skip":
+                outcome, answer, kept = ("skipped" if outcome == "skipped" else "open"), None, None
+            case "skip" | "left_out":
                 outcome = "skipped"
             case _:
                 pass
     counts = takes[kept] if kept is not None else None
     others = tuple(take for take in takes.values() if take is not counts)
-    return TrialRecord(trial, outcome, counts, others, score if outcome == "scored" else None)
+    return TrialRecord(
+        trial,
+        outcome,
+        counts,
+        others,
+        score=answer if outcome == "scored" else None,
+        number=answer if outcome == "numbered" else None,
+        choice=answer if outcome == "chosen" else None,
+    )
+
+
+_ANSWERS = {"scored": "score", "number_given": "number", "chosen": "choice"}
+_OUTCOMES: Mapping[Answer, Outcome] = {
+    "line": "scored",
+    "number": "numbered",
+    "choice": "chosen",
+    "none": "presented",
+}
+
+
+def _unanswered(trial: Trial) -> Outcome:
+    return "presented" if trial.answer == "none" else "not answered"

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.recording.head import calibration_hash, info_to_dict, plan_to_dict
+from sessions.recording.log import OUTCOMES
 from sessions.recording.reader import Recording
 from sessions.recording.schema import COLUMNS, FORMAT, FORMAT_VERSION, SEALED_FILE
 
@@ -132,17 +133,23 @@ def _trials(recording: Recording) -> Iterator[DataSet]:
     trials = [record.trial for record in records]
     stimuli = [trial.stimulus for trial in trials]
     scores = np.array([math.nan if r.score is None else r.score for r in records], "<f8")
+    numbers = np.array([math.nan if r.number is None else r.number for r in records], "<f8")
+    choices = _whole([{None: 0, "first": 1, "second": 2}[r.choice] for r in records])
     yield DataSet("trials/number", _whole([t.number for t in trials]), "", "from 1, in the planned order")
     yield DataSet("trials/block", texts([t.block for t in trials]), "", "name of the block")
     yield DataSet("trials/descriptor", texts([s.descriptor for s in stimuli]), "", "what was judged")
-    yield DataSet(
-        "trials/index", _whole([s.index for s in stimuli]), "", "the maker's number of the stimulus, 0 to 100"
-    )
+    indices = _whole([-1 if s.index is None else s.index for s in stimuli])
+    yield DataSet("trials/index", indices, "", "the maker's number of the stimulus, 0 to 100; -1 where it was sealed")
     yield DataSet("trials/code", texts([s.code for s in stimuli]), "", "label on the stimulus")
     yield DataSet("trials/direction", _whole([t.direction for t in trials]), "", "+1 proximal to distal, -1 back")
     yield DataSet("trials/repetition", _whole([t.repetition for t in trials]), "", "from 1")
-    yield DataSet("trials/outcome", texts([r.outcome for r in records]), "", "scored, not answered, skipped or open")
+    yield DataSet("trials/phase", texts([t.phase for t in trials]), "", "main; or practice, pre-evaluation")
+    yield DataSet("trials/outcome", texts([r.outcome for r in records]), "", OUTCOMES)
     yield DataSet("trials/score", scores, "", "0 to 100; NaN unless the outcome is scored")
+    yield DataSet("trials/free_number", numbers, "", "on the subject's own scale; NaN unless the outcome is numbered")
+    yield DataSet("trials/choice", choices, "", "1 or 2 of the two compared; 0 unless the outcome is chosen")
+    compared = [t.compared_with or 0 for t in trials]
+    yield DataSet("trials/compared_with", _whole(compared), "", "number of the first of two; 0 for none")
     yield DataSet(
         "trials/take", _whole([r.take.number if r.take else 0 for r in records]), "", "that counts; 0 for none"
     )

@@ -19,7 +19,7 @@ def _experiment(
     block: Block, means: Sequence[MeanScore], tables: Sequence[ScoreTable], seds: Mapping[tuple[str, int], float]
 ) -> Experiment:
     descriptor = block.trials[0].stimulus.descriptor
-    indices = tuple(sorted({trial.stimulus.index for trial in block.trials}))
+    indices = tuple(sorted({trial.stimulus.known_index for trial in block.trials}))
     own = tuple(mean for mean in means if mean.descriptor == descriptor and mean.index in indices)
     predicted = {index: seds[block.name, index] for index in indices if (block.name, index) in seds}
     return Experiment(

@@ -40,7 +40,7 @@ def people(recording: Recording, tables: Sequence[ScoreTable]) -> tuple[Fact, ..
 
 def _block(block: Block) -> str:
     way = "proximal to distal" if block.direction == PROXIMAL_TO_DISTAL else "distal to proximal"
-    indices = ", ".join(str(i) for i in sorted({trial.stimulus.index for trial in block.trials}))
+    indices = ", ".join(str(i) for i in sorted({trial.stimulus.known_index for trial in block.trials}))
     ends = f"0 “{block.scale_ends[0]}”, 100 “{block.scale_ends[1]}”"
     return f"{block.instruction} Stimuli {indices}, stroked {way}; scale: {ends}."
 

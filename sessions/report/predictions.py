@@ -42,7 +42,7 @@ def fields(found: SessionPrediction | None) -> tuple[Field, ...]:
     for row in found.trials:
         if row.prediction is not None and row.stimulus is not None and row.block is not None:
             before = chosen.get(row.block)
-            if before is None or before.stimulus is None or before.stimulus.index < row.stimulus.index:
+            if before is None or before.stimulus is None or before.stimulus.known_index < row.stimulus.known_index:
                 chosen[row.block] = row
     made = [_field(name, row) for name, row in chosen.items()]
     return tuple(field for field in made if field is not None)
@@ -128,7 +128,7 @@ def _field(experiment: str, row: TrialPrediction) -> Field | None:
     drawn, skin = picture
     return Field(
         experiment=experiment,
-        index=row.stimulus.index,
+        index=row.stimulus.known_index,
         nodes=_pairs(drawn.nodes),
         triangles=tuple((int(a), int(b), int(c)) for a, b, c in drawn.triangles),
         sed=_numbers(drawn.sed),

@@ -107,6 +107,7 @@ def test_the_events_of_a_trial_come_in_their_order(whole):
         "finger_lifted",
         "score_asked",
         "scored",
+        "settled",
         "take_kept",
     ]
 
