@@ -11,7 +11,7 @@ from solver.dissection import Tree, places
 from solver.mesh import Array, Indices, Mesh
 
 Narrow = NDArray[np.int32]
-LEAF: Final = 4  # elements in a part that is not halved any more
+LEAF: Final = 8  # elements in a part that is not halved any more
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,6 +30,7 @@ class Plan:
     border_at: Narrow  # (p,) where each part's border begins in `numbers` and `place`
     numbers: Narrow  # unknowns of all borders
     place: Narrow  # where each of them stands in the front of the parent
+    run: Narrow  # where in its border the run of neighbours ends that are neighbours there too
     factor_at: Indices  # (p,) where each part's factor begins
     wait_at: Indices  # (p,) where each part's border waits for the parent
     leaf: Narrow  # (p, 2) range of `order` that belongs to each leaf
@@ -82,6 +83,7 @@ class Plan:
             border_at=_narrow(border_at),
             numbers=_narrow(np.concatenate(borders)),
             place=place,
+            run=_narrow(_runs(place, border)),
             factor_at=np.cumsum(sizes) - sizes,
             wait_at=wait_at,
             leaf=_narrow(leaf),
@@ -94,6 +96,16 @@ class Plan:
 
 def _narrow(numbers: Indices) -> Narrow:
     return numbers.astype(np.int32)
+
+
+def _runs(place: Narrow, border: Indices) -> Indices:
+    """Return for each unknown of each border where in that border the run of consecutive places it lies in ends."""
+    number = np.arange(len(place))
+    owner = np.repeat(np.arange(len(border)), border)
+    last = np.ones(len(place), bool)
+    last[:-1] = (np.diff(place) != 1) | (np.diff(owner) != 0)
+    ends = np.flatnonzero(last)
+    return ends[np.searchsorted(ends, number)] + 1 - np.repeat(np.cumsum(border) - border, border)
 
 
 def _waiting(children: Indices, border: Indices) -> tuple[Indices, int]:
@@ -127,7 +139,7 @@ class Elimination:
         """Eliminate the elements' tangents (e, 16, 16), lower halves; False where that is not possible."""
         p = self.plan
         return kernels.eliminate(
-            tangent, p.start, p.inner, p.border, p.children, p.border_at, p.place, p.factor_at, p.wait_at, p.leaf,
+            tangent, p.start, p.inner, p.border, p.children, p.border_at, p.place, p.run, p.factor_at, p.wait_at, p.leaf,
             p.order, p.at, self._factors, self._waiting, self.stiffness,
         )  # fmt: skip
 

@@ -6,6 +6,8 @@ of its inner unknowns (k, eliminated in it) and its border (b, passed on to its 
 U = D L^T are kept, (k, k + b) numbers each part, upper half; the border's rows (b, b) wait in `waiting` for the parent.
 """
 
+import numpy as np
+
 from solver.kernels.compiling import Array, Narrow, Wide, compiled
 
 
@@ -18,6 +20,7 @@ def eliminate(
     children: Narrow,
     border_at: Narrow,
     place: Narrow,
+    run: Narrow,
     factor_at: Wide,
     wait_at: Wide,
     leaf: Narrow,
@@ -60,14 +63,20 @@ def eliminate(
             size = border[child]
             below = waiting[wait_at[child] : wait_at[child] + size * size].reshape(size, size)
             where = place[border_at[child] : border_at[child] + size]
+            ends = run[border_at[child] : border_at[child] + size]
             for i in range(size):
                 r = where[i]
                 if r < k:
                     target, offset = top[r], 0
                 else:
                     target, offset = rest[r - k], k
-                for j in range(i, size):
-                    target[where[j] - offset] += below[i, j]
+                j = i
+                while j < size:  # neighbours stay neighbours for long runs
+                    first, count = where[j] - offset, ends[j] - j
+                    into, part = target[first : first + count], below[i, j : j + count]
+                    for c in range(count):
+                        into[c] += part[c]
+                    j += count
         if not _factorised(top, rest):
             return False
     m = skin.shape[0]
@@ -86,37 +95,41 @@ def _factorised(top: Array, rest: Array) -> bool:
     and the nearest cache. What a pair's second row holds before its diagonal is of no meaning.
     """
     k, b = top.shape[0], rest.shape[0]
+    over = np.empty(k)  # one over the pivots
     for r in range(0, k - 1, 2):
         one, two = top[r, r:], top[r + 1, r:]
-        _update_two(top, r, r, one, two)
+        _update_two(top, over, r, r, one, two)
         if one[0] == 0.0:
             return False
-        factor = one[1] / one[0]
+        over[r] = 1.0 / one[0]
+        factor = one[1] * over[r]
         for c in range(1, one.shape[0]):
             two[c] -= factor * one[c]
         if two[1] == 0.0:
             return False
+        over[r + 1] = 1.0 / two[1]
     if k % 2 == 1:
-        _update_one(top, k - 1, k - 1, top[k - 1, k - 1 :])
+        _update_one(top, over, k - 1, k - 1, top[k - 1, k - 1 :])
         if top[k - 1, k - 1] == 0.0:
             return False
+        over[k - 1] = 1.0 / top[k - 1, k - 1]
     for r in range(0, b - 1, 2):
-        _update_two(top, k, k + r, rest[r, r:], rest[r + 1, r:])
+        _update_two(top, over, k, k + r, rest[r, r:], rest[r + 1, r:])
     if b % 2 == 1:
-        _update_one(top, k, k + b - 1, rest[b - 1, b - 1 :])
+        _update_one(top, over, k, k + b - 1, rest[b - 1, b - 1 :])
     return True
 
 
 @compiled
-def _update_two(top: Array, count: int, r: int, one: Array, two: Array) -> None:
+def _update_two(top: Array, over: Array, count: int, r: int, one: Array, two: Array) -> None:
     """Take from rows r and r + 1 of a front, both given from column r on, what the first `count` rows hold of them."""
     size = one.shape[0]
     p = 0
     while p + 4 <= count:
-        d0, d1, d2, d3 = top[p, p], top[p + 1, p + 1], top[p + 2, p + 2], top[p + 3, p + 3]
+        d0, d1, d2, d3 = over[p], over[p + 1], over[p + 2], over[p + 3]
         s0, s1, s2, s3 = top[p, r:], top[p + 1, r:], top[p + 2, r:], top[p + 3, r:]
-        a0, a1, a2, a3 = s0[0] / d0, s1[0] / d1, s2[0] / d2, s3[0] / d3
-        b0, b1, b2, b3 = s0[1] / d0, s1[1] / d1, s2[1] / d2, s3[1] / d3
+        a0, a1, a2, a3 = s0[0] * d0, s1[0] * d1, s2[0] * d2, s3[0] * d3
+        b0, b1, b2, b3 = s0[1] * d0, s1[1] * d1, s2[1] * d2, s3[1] * d3
         for c in range(size):
             x0, x1, x2, x3 = s0[c], s1[c], s2[c], s3[c]
             one[c] -= a0 * x0 + a1 * x1 + a2 * x2 + a3 * x3
@@ -124,7 +137,7 @@ def _update_two(top: Array, count: int, r: int, one: Array, two: Array) -> None:
         p += 4
     while p < count:
         s0 = top[p, r:]
-        a0, b0 = s0[0] / top[p, p], s0[1] / top[p, p]
+        a0, b0 = s0[0] * over[p], s0[1] * over[p]
         for c in range(size):
             one[c] -= a0 * s0[c]
             two[c] -= b0 * s0[c]
@@ -132,11 +145,11 @@ def _update_two(top: Array, count: int, r: int, one: Array, two: Array) -> None:
 
 
 @compiled
-def _update_one(top: Array, count: int, r: int, one: Array) -> None:
+def _update_one(top: Array, over: Array, count: int, r: int, one: Array) -> None:
     """Take from row r of a front, given from column r on, what the first `count` rows hold of it."""
     for p in range(count):
         s0 = top[p, r:]
-        a0 = s0[0] / top[p, p]
+        a0 = s0[0] * over[p]
         for c in range(one.shape[0]):
             one[c] -= a0 * s0[c]
 
