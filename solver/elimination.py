@@ -139,8 +139,8 @@ class Elimination:
         """Eliminate the elements' tangents (e, 16, 16), lower halves; False where that is not possible."""
         p = self.plan
         return kernels.eliminate(
-            tangent, p.start, p.inner, p.border, p.children, p.border_at, p.place, p.run, p.factor_at, p.wait_at, p.leaf,
-            p.order, p.at, self._factors, self._waiting, self.stiffness,
+            tangent, p.start, p.inner, p.border, p.children, p.border_at, p.place, p.run, p.factor_at, p.wait_at,
+            p.leaf, p.order, p.at, self._factors, self._waiting, self.stiffness,
         )  # fmt: skip
 
     def condense(self, force: Array) -> Array:
