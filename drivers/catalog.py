@@ -41,6 +41,7 @@ def _open_net_ft(address: Address, clock: Clock) -> Transducer:
         connect=lambda: UdpLink(address.host, place.rdt_port),
         still_there=lambda: handshake.answers(place),
         clock=clock,
+        request=handshake.start_request(place),
     )
 
 

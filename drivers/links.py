@@ -75,6 +75,25 @@ class UdpLink:
         self._socket.close()
 
 
+def tcp_answer(host: str, port: int, request: bytes, size: int, patience: float) -> bytes:
+    """Return the `size` bytes that answer a request, or as many as came, within `patience` real seconds.
+
+    Raises SetupError when the host cannot be found, LinkLost when nothing answers there.
+    """
+    where = f"{host}, TCP port {port}"
+    answer = b""
+    try:
+        with socket.create_connection((_resolved(host), port), timeout=patience) as connection:
+            connection.sendall(request)
+            while len(answer) < size and (more := connection.recv(size - len(answer))):
+                answer += more
+    except TimeoutError:
+        raise LinkLost(f"{where} gave no answer within {patience:g} s; check the address and the tcp port") from None
+    except OSError as error:
+        raise LinkLost(f"nothing answers at {where}: {_reason(error)}; check the address and the tcp port") from None
+    return answer
+
+
 @dataclass(frozen=True, slots=True)
 class HttpAnswer:
     """What a web page answered."""

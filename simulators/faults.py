@@ -1,13 +1,30 @@
 """What can go wrong on the way from a box, and in the box, on a timetable and from a seed."""
 
 import heapq
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
-Kind = Literal["lose", "repeat", "reorder", "corrupt", "shorten", "delay", "stall", "saturate", "reboot", "unplug"]
+Array = NDArray[np.float64]
+
+Kind = Literal[
+    "lose",
+    "repeat",
+    "reorder",
+    "corrupt",
+    "shorten",
+    "delay",
+    "stall",
+    "saturate",
+    "drift",
+    "miscalibrate",
+    "steal",
+    "reboot",
+    "unplug",
+]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 _ON_THE_WAY: tuple[Kind, ...] = ("lose", "repeat", "reorder", "corrupt", "shorten", "delay")
 
@@ -18,8 +35,10 @@ class Fault:
 
     On the way, for a share of the datagrams: `lose`, `repeat` (sent twice), `reorder` (swapped with the next),
     `corrupt` (other bytes, same length), `shorten` (fewer bytes), `delay` (sent later). In the box: `stall` (the same
-    reading again and again), `saturate` (status says the values are invalid), `reboot` (switched off, then on),
-    `unplug` (nothing comes through, and the box does not notice).
+    reading again and again), `saturate` (status says the values are invalid), `drift` (the zero of every axis walks off
+    by `share` of its range, and stays there), `miscalibrate` (it feels the wrench `1 + share` times as large as its
+    calibration says), `steal` (another client takes the stream each time it is asked for; networked box only),
+    `reboot` (switched off, then on), `unplug` (nothing comes through, and the box does not notice).
     """
 
     kind: Kind
@@ -54,6 +73,18 @@ class Faults:
     def active(self, kind: Kind, time: float) -> bool:
         """Tell whether a fault of the box itself is on at `time` [s]."""
         return self._at(kind, time) is not None
+
+    def felt(self, wrench: Array, times: Array, rated: Sequence[float]) -> Array:
+        """Return what is felt of a wrench (n, 6) at `times` (n,) [s] by a device that drifts or is wrongly calibrated."""
+        local = times % self._repeat if self._repeat > 0.0 else times
+        for fault in self._timetable:
+            if fault.kind == "drift":
+                part = np.clip((local - fault.start) / (fault.stop - fault.start), 0.0, 1.0)
+                wrench = wrench + fault.share * part[:, None] * np.array(rated)
+            elif fault.kind == "miscalibrate":
+                on = (local >= fault.start) & (local < fault.stop)
+                wrench = wrench * np.where(on, 1.0 + fault.share, 1.0)[:, None]
+        return wrench
 
     def route(self, now: float, datagrams: Iterable[tuple[float, bytes]]) -> list[bytes]:
         """Return what really leaves by `now` [s] when the box sends `datagrams`, each at its time [s].

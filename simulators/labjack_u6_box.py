@@ -185,7 +185,9 @@ class LabJackU6Box:
 
     def _codes(self, times: Array) -> NDArray[np.int64]:
         """Return what the converter makes of the six gauges at `times` (n,) [s], shape (n, 6)."""
-        volts = self.bench.wrench(times) @ self._gauges.T + _OFFSETS
+        volts = (
+            self._faults.felt(self.bench.wrench(times), times, self.bench.settings.rated) @ self._gauges.T + _OFFSETS
+        )
         forced = np.array([self._faults.active("saturate", time) for time in times.tolist()], bool)
         volts[forced, 2] = 11.0
         slope = np.where(volts < 0.0, -_VOLTS_PER_CODE_BELOW, _VOLTS_PER_CODE)

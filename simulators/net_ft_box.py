@@ -15,6 +15,7 @@ from drivers.transducer import SetupError
 from simulators.bench import Bench
 from simulators.faults import Faults
 from simulators.net_ft_electronics import Electronics
+from simulators.net_ft_pages import AXIA, NET_FT, Product
 
 HOST = "127.0.0.1"
 _BURST = 200  # records sent at one go after the computer was busy, so as not to drown the reader
@@ -53,15 +54,18 @@ class NetFtBox:
         faults: Faults | None = None,
         first_tick: int = 0,
         first_record: int = 1,
+        product: Product = NET_FT,
     ) -> None:
         """Set up a box that streams at `rate` [Hz] by an oscillator wrong by `rate_error` [-]. Port 0 is a free one.
 
-        `first_tick` is its counter when it starts, as if it had run for long; `first_record` the first number of the
+        `product` says which box it is. `first_tick` is its counter when it starts, as if it had run for long; `first_record` the first number of the
         first stream. Both serve to see them wrap.
         """
         self._clock = clock
         self._faults = faults or Faults()
-        self._inside = Electronics(bench, self._faults, rate=rate, rate_error=rate_error, first_tick=first_tick)
+        self._inside = Electronics(
+            bench, self._faults, rate=rate, rate_error=rate_error, first_tick=first_tick, product=product
+        )
         self._wanted = ((socket.SOCK_DGRAM, "rdt", rdt_port), (socket.SOCK_STREAM, "tcp", tcp_port))
         self._wanted += ((socket.SOCK_STREAM, "http", http_port),)
         self._first_record = first_record
@@ -162,6 +166,9 @@ class NetFtBox:
         if stream.left == 0:
             datagrams += [(now, b"".join(stream.waiting))] if stream.waiting else []
             self._stream = None
+        if self._faults.active("steal", now):  # another client has it; whoever asks next takes it back
+            self._stream = None
+            return
         for datagram in self._faults.route(now, datagrams):
             with contextlib.suppress(BlockingIOError, ConnectionError):  # a network drops what it cannot carry
                 self._bound[0].sendto(datagram, stream.to)
@@ -182,9 +189,10 @@ class NetFtBox:
             return
         command, count = struct.unpack(">HI", request[2:])
         pages = self._inside.pages
+        starts = (0x0001, 0x0002, 0x0003) if pages.product is AXIA else (0x0002, 0x0003)
         if command == 0x0000:
             self._stream = None
-        elif command in (0x0002, 0x0003) and pages.streams:
+        elif command in starts and pages.streams:
             size = pages.buffered if command == 0x0003 else 1
             tick = (self._inside.tick(self.now()) // pages.step + 1) * pages.step  # the same ticks whenever it is asked
             self._stream = _Stream(asker, tick, self._first_record, count or None, size)

@@ -10,24 +10,32 @@ from numpy.typing import NDArray
 
 from simulators.bench import Bench
 from simulators.faults import Faults
-from simulators.net_ft_pages import COUNTS, TICKS, Pages
+from simulators.net_ft_pages import COUNTS, NET_FT, Pages, Product
 
 Array = NDArray[np.float64]
 
-_SATURATED = 1 << 31 | 1 << 17
 _REASONS = {200: "OK", 302: "Found", 404: "Not Found"}
 
 
 class Electronics:
     """The box without its ports. Times are the bench's [s]; a reading after its number is 32 bytes."""
 
-    def __init__(self, bench: Bench, faults: Faults, *, rate: int, rate_error: float, first_tick: int) -> None:
+    def __init__(
+        self,
+        bench: Bench,
+        faults: Faults,
+        *,
+        rate: int,
+        rate_error: float,
+        first_tick: int,
+        product: Product = NET_FT,
+    ) -> None:
         """Switch on at time 0 with the counter at `first_tick`, running wrong by `rate_error` [-]."""
         self._bench = bench
         self._faults = faults
         self._rated = np.array(bench.settings.rated)
-        self.pages = Pages(f"SIM{bench.seed:05d}", self._rated, rate)
-        self._ticks_a_second = TICKS * (1.0 + rate_error)
+        self.pages = Pages(f"SIM{bench.seed:05d}", self._rated, rate, product)
+        self._ticks_a_second = product.ticks * (1.0 + rate_error)
         self._bias = np.zeros(6)  # software bias [N, N mm]
         self._powered = 0.0  # when the counter stood at _first_tick [s]
         self._first_tick = first_tick
@@ -90,10 +98,10 @@ class Electronics:
 
     def _felt(self, times: Array) -> tuple[list[int], NDArray[np.int64]]:
         """Return the status (n) and the six counts (n, 6) at `times` (n,)."""
-        wrench = self._bench.wrench(times)
+        wrench = self._faults.felt(self._bench.wrench(times), times, self._bench.settings.rated)
         forced = np.array([self._faults.active("saturate", time) for time in times.tolist()], bool)
         wrench[forced] = self._rated  # what a clipped converter shows
         over = forced | np.any(np.abs(wrench) > self._rated, axis=1)
         counts = (np.clip(wrench, -self._rated, self._rated) - self._bias) * self.pages.counts_per_wrench
         whole = np.clip(np.rint(counts), -(2**31), 2**31 - 1).astype(np.int64)
-        return [_SATURATED if above else 0 for above in over.tolist()], whole
+        return [self.pages.product.saturated if above else 0 for above in over.tolist()], whole

@@ -1,5 +1,6 @@
 """What the simulated networked box remembers, and shows and lets be set on its web pages."""
 
+from dataclasses import dataclass
 from urllib.parse import parse_qsl, urlsplit
 from xml.sax.saxutils import escape
 
@@ -8,7 +9,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-TICKS = 7000  # of the box's own sampling in a second
 COUNTS = 1_000_000  # counts in one unit of force, and in one of torque
 
 _FORCES = {  # code: name, newtons
@@ -34,11 +34,26 @@ _SETTABLE = {  # page: variables it accepts
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Product:
+    """Which box is simulated."""
+
+    name: str
+    ticks: float  # of its own sampling in a second
+    saturated: int  # status of a reading out of range
+    converter: str  # what its pages say of its converter's rate; nothing where they do not
+
+
+NET_FT = Product("SIMULATED Net F/T", 7000.0, 1 << 31 | 1 << 17, "")
+AXIA = Product("SIMULATED Ethernet Axia80", 7812.5, 1 << 31 | 1 << 30, "7812")
+
+
 class Pages:
     """The box's settings, kept over a reboot as the real one keeps them."""
 
-    def __init__(self, serial: str, rated: Array, rate: int) -> None:
+    def __init__(self, serial: str, rated: Array, rate: int, product: Product = NET_FT) -> None:
         """Begin with the maker's settings: N and N-m, no filter, no bias."""
+        self.product = product
         self._serial = serial
         self._rated = rated  # (6,) [N, N mm]
         self._kept = {"setuserfilter": "0", "setpke": "0", "cfgnam": "Nano43 SI-36-0.5", "cfgid": "default"}
@@ -47,7 +62,7 @@ class Pages:
         self.torque_code = 3
         self.buffered = 10  # records in a datagram of buffered streaming
         self.streams = True
-        self.step = TICKS
+        self.step = 1
         self._set_rate(rate)
 
     @property
@@ -78,7 +93,7 @@ class Pages:
         force, torque = _FORCES[self.force_code], _TORQUES[self.torque_code]
         rated = self._rated / np.repeat([force[1], torque[1]], 3)
         elements = {
-            "prodname": "SIMULATED Net F/T",
+            "prodname": self.product.name,
             "mfgtxdmdl": "SI-36-0.5",
             "runstat": f"0x{status:08x}",
             "runft": _listed(counts),
@@ -88,7 +103,7 @@ class Pages:
             "setpke": self._kept["setpke"],
             "setmce": 0,
             "setcfgsel": 0,
-            "setrate": TICKS,
+            "setrate": int(self.product.ticks),
             "cfgid": self._kept["cfgid"],
             "cfgnam": self._kept["cfgnam"],
             "cfgcalsel": 0,
@@ -106,9 +121,11 @@ class Pages:
             "scfgtau": "degrees",
             "cfgtfx": _listed([0] * 6),
             "comrdte": "Enabled" if self.streams else "Disabled",
-            "comrdtrate": TICKS // self.step,
+            "comrdtrate": int(self.product.ticks / self.step),
             "comrdtbsiz": self.buffered,
         }
+        if self.product.converter:
+            elements["setadcrate"] = self.product.converter
         return _page("netft", elements)
 
     def _set(self, name: str, text: str) -> None:
@@ -123,7 +140,7 @@ class Pages:
             value = int(text)
         except ValueError:
             return
-        if name == "comrdtrate" and 1 <= value <= TICKS:
+        if name == "comrdtrate" and 1 <= value <= self.product.ticks:
             self._set_rate(value)
         elif name == "comrdtbsiz" and 1 <= value <= 40:
             self.buffered = value
@@ -137,8 +154,8 @@ class Pages:
             self._kept[name] = text
 
     def _set_rate(self, asked: int) -> None:
-        """Send every so-many-th tick, at `asked` readings a second or the next higher rate that divides 7000."""
-        self.step = TICKS // asked
+        """Send every so-many-th tick, at `asked` readings a second or the next higher rate that divides the ticks."""
+        self.step = int(self.product.ticks // asked)
 
 
 def _listed(values: list[int] | list[str]) -> str:

@@ -21,9 +21,10 @@ STREAM_PACKET = 14 + 2 * GAUGES * SCANS  # bytes
 HIGHEST_RATE = 8000  # scans a second; the converter makes 50 000 readings a second at its lowest resolution
 LIMIT = 10.0  # of a gauge's voltage [V]: beyond, and at the ends of the converter, it is saturated
 
-SATURATED = 0x3F00  # status: bit 8 + i says that gauge i is at its limit; bits 0 to 7 are the packet's error code
+SATURATED = 0x3F00  # status: bit 8 + i says that gauge i is at its limit; bits 0 to 7 are an error of its packet
 STREAM_IS_OFF = 52  # answer to a stop when nothing streams
-_RECOVERING = 60  # error code of the packet that tells how many scans an overflow cost
+_DRAINING = 59  # error code of packets while an overflow is being recovered from: their scans are sound
+_RECOVERED = 60  # error code of the packet that tells how many scans an overflow cost
 _DUMMY = 0xFFFF  # all six gauges of the scan that stands for those lost
 
 START = bytes([0xA8, 0xA8])
@@ -179,12 +180,12 @@ class StreamDecoder:
             self._lost += SCANS * ((packet[10] - self._next) % 256)
             self._next = (packet[10] + 1) % 256
             for scan in np.frombuffer(packet, "<u2", GAUGES * SCANS, 12).reshape(SCANS, GAUGES):
-                if packet[11] == _RECOVERING and np.all(scan == _DUMMY):
+                if packet[11] == _RECOVERED and np.all(scan == _DUMMY):
                     # The User's Guide: the number of lost scans includes this one.
                     self._lost += int.from_bytes(packet[6:8], "little")
                     continue
                 scans.append(scan)
-                errors.append(packet[11])
+                errors.append(0 if packet[11] in (_DRAINING, _RECOVERED) else packet[11])
                 damaged.append(self._lost)
                 self._lost = 0
         codes = np.array(scans, np.uint16).reshape(-1, GAUGES)

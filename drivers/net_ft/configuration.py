@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.calibration import Calibration
-from drivers.net_ft.wire import COUNTER_RATE, status_words
+from drivers.net_ft.wire import AXIA, COUNTER_RATE, NET_FT, Family
 from drivers.transducer import SetupError
 
 _POUND = 4.4482216152605  # [N]
@@ -50,6 +50,8 @@ class Configuration:
     """What the box says of itself and of the configuration in force."""
 
     product: str
+    family: Family
+    ticks: float  # of the box's own sampling in a second [Hz]
     serial: str  # of the calibration in force; empty where the box states none
     model: str  # of the transducer, as the box states it, which is not always right
     counts_per_force: float  # counts in one force unit
@@ -74,6 +76,8 @@ def parse_configuration(page: bytes) -> Configuration:
     """Return what netftapi2.xml says. Raises SetupError where a needed element is missing, double or makes no sense."""
     found = _elements(page)
     product = _one(found, "prodname")
+    family = AXIA if "axia" in product.lower() else NET_FT
+    ticks = _ticks(_optional(found, "setadcrate")) if family is AXIA else COUNTER_RATE
     force, torque = _one(found, "scfgfu"), _one(found, "scfgtu")
     rated = _ratings(found)
     settings = {
@@ -81,10 +85,15 @@ def parse_configuration(page: bytes) -> Configuration:
         "filter": _filter(_optional(found, "setuserfilter")),
         "stored bias [gauge counts]": " ".join(re.split(r"[;,\s]+", _optional(found, "setbias"))),
         "tool transform": _transform(found),
-        "status at opening": _status(_optional(found, "runstat")),
+        "status at opening": _status(_optional(found, "runstat"), family),
+        "records in a datagram, when buffered": _optional(found, "comrdtbsiz"),
     }
+    if family is AXIA:
+        settings["time"] = "its counter is taken to tick at its converter's rate, which is not verified"
     return Configuration(
         product=product,
+        family=family,
+        ticks=ticks,
         serial=_optional(found, "cfgcalsn"),
         model=_optional(found, "mfgtxdmdl"),
         counts_per_force=_positive("cfgcpf", _one(found, "cfgcpf")),
@@ -92,21 +101,22 @@ def parse_configuration(page: bytes) -> Configuration:
         newtons=_unit("force", force, _FORCE),
         newton_millimetres=_unit("torque", torque, _TORQUE),
         rated=rated,
-        rate=_rate(_optional(found, "comrdtrate")),
+        rate=_rate(_optional(found, "comrdtrate"), ticks),
         streams=_optional(found, "comrdte").lower() != "disabled",
         settings={name: value for name, value in settings.items() if value},
     )
 
 
-def true_rate(stated: float) -> float:
+def true_rate(stated: float, ticks: float = COUNTER_RATE) -> float:
     """Return the rate the box really streams at when it is set to, or shows, `stated` [Hz].
 
-    It can only send every k-th of its 7000 readings a second, rounds up to such a rate, and shows it as a whole number.
+    It can only send every k-th of its own readings, `ticks` a second, rounds up to such a rate, and shows it as a whole
+    number.
 
     >>> true_rate(200), round(true_rate(150), 2), round(true_rate(152), 2)
     (200.0, 152.17, 152.17)
     """
-    return COUNTER_RATE / math.floor(COUNTER_RATE / stated + 1e-9)
+    return ticks / max(math.floor(ticks / stated + 1e-9), 1)
 
 
 def _elements(page: bytes) -> dict[str, list[str]]:
@@ -194,9 +204,17 @@ def _ratings(found: Mapping[str, list[str]]) -> tuple[float, ...]:
     return values if len(values) == 6 and all(math.isfinite(v) and v > 0.0 for v in values) else ()
 
 
-def _rate(text: str) -> float:
+def _rate(text: str, ticks: float) -> float:
     value = _number(text)
-    return true_rate(value) if 1.0 <= value <= COUNTER_RATE else math.nan
+    return true_rate(value, ticks) if 1.0 <= value <= max(ticks, COUNTER_RATE) else math.nan
+
+
+def _ticks(text: str) -> float:
+    """Return the rate of an Axia's converter [Hz], which it states as a whole number. Raises SetupError for another."""
+    known = {"488": 488.28125, "976": 976.5625, "1953": 1953.125, "3906": 3906.25, "7812": 7812.5}
+    if text not in known:
+        raise SetupError(f"the box says its converter runs at {text[:20]!r} Hz, not at one of {', '.join(known)}")
+    return known[text]
 
 
 def _filter(code: str) -> str:
@@ -215,7 +233,7 @@ def _transform(found: Mapping[str, list[str]]) -> str:
     return f"{' '.join(values)} [{units}]"
 
 
-def _status(text: str) -> str:
+def _status(text: str, family: Family) -> str:
     if not re.fullmatch(r"0x[0-9a-fA-F]{1,8}", text):
         return text
-    return "; ".join(status_words(int(text, 16))) or "healthy"
+    return "; ".join(family.words(int(text, 16))) or "healthy"

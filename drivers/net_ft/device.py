@@ -9,7 +9,7 @@ import numpy as np
 
 from drivers.clock import Clock
 from drivers.links import Link
-from drivers.net_ft.wire import SATURATED, START, STOP, decode
+from drivers.net_ft.wire import AXIA, NET_FT, START, STOP, decode
 from drivers.readings import ReadingBlock
 from drivers.sequence import SequenceAccount
 from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, TransducerInfo
@@ -27,14 +27,24 @@ _THEFT_SPAN = 3.0
 class NetFtTransducer:
     """One box, through a link that is opened at each start. A thread drains the link; readings are decoded when read.
 
-    Time is (counter - first counter) / 7000 Hz, by the box's own oscillator (good to 0.5 %). After a reboot of the
+    Time is (counter - first counter) / counter rate, by the box's own oscillator (good to 0.5 %). After a reboot of the
     box, sequence and time go on behind a gap whose length is taken from the session's clock.
     """
 
     def __init__(
-        self, info: TransducerInfo, connect: Callable[[], Link], still_there: Callable[[], bool], clock: Clock
+        self,
+        info: TransducerInfo,
+        connect: Callable[[], Link],
+        still_there: Callable[[], bool],
+        clock: Clock,
+        request: bytes = START,
     ) -> None:
-        """Take an identified box. `still_there` tells whether it answers at all, to explain a silence."""
+        """Take an identified box. `still_there` tells whether it answers at all, to explain a silence.
+
+        `request` asks for the stream.
+        """
+        self._request = request
+        self._invalid = (AXIA if "axia" in info.model.lower() else NET_FT).invalid
         self._info = info
         self._connect = connect
         self._still_there = still_there
@@ -159,7 +169,7 @@ class NetFtTransducer:
     def _listen(self, link: Link) -> None:
         """Take datagrams until told to stop, or until the box has been silent for too long."""
         receive, keep, now_ns = link.receive, self._pending.append, self._clock.now_ns
-        link.send(START)
+        link.send(self._request)
         # Silence is counted in waits that brought nothing, so that a computer too busy to look is not taken for it.
         silence = asked = 0.0
         streaming = False
@@ -184,7 +194,7 @@ class NetFtTransducer:
                         f"{self._info.uri} stopped sending {_THEFTS} times within {_THEFT_SPAN:g} s; "
                         "another program on the network probably takes its stream: end that program"
                     )
-            link.send(START)
+            link.send(self._request)
             asked, streaming = silence, False
 
     def _digest(self, *, end: bool = False) -> None:
@@ -209,7 +219,7 @@ class NetFtTransducer:
         kept = records[verdict.kept]
         status = kept["status"].astype(np.int64)
         self._received += len(kept)
-        self._saturated += int(np.count_nonzero(status & SATURATED))
+        self._saturated += int(np.count_nonzero(status & self._invalid))
         self._ready.append(
             ReadingBlock(
                 sequence=verdict.sequence,

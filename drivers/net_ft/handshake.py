@@ -1,16 +1,22 @@
-"""Finding out who answers at a net-ft address, and setting its rate, over its web pages."""
+"""Finding out who answers at a net-ft address, and setting what the address asks for: web pages and command port."""
 
 import math
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, replace
 
-from drivers.address import Address, check_options
-from drivers.links import http_get
+import numpy as np
+
+from drivers.address import Address, AddressError, check_options
+from drivers.links import http_get, tcp_answer
+from drivers.net_ft import wire
 from drivers.net_ft.configuration import Configuration, parse_configuration, true_rate
 from drivers.net_ft.wire import COUNTER_RATE
 from drivers.transducer import LinkLost, SetupError, TransducerInfo
 
 PATIENCE = 3.0  # for one web page [real s]; a healthy box answers within 0.1 s
-_OPTIONS = frozenset({"rdt", "tcp", "http", "rate"})
+_SETTLING = 0.05  # after a bias was asked for [real s]
+_OPTIONS = frozenset({"rdt", "tcp", "http", "rate", "mode", "bias", "latch"})
+_WORDS = {"mode": ("single", "buffered"), "bias": ("keep", "set"), "latch": ("keep", "reset")}  # the first: untold
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +26,11 @@ class Where:
     address: Address
     http_port: int
     rdt_port: int
+    tcp_port: int
     rate: int | None  # asked for in the address [Hz]; None leaves the box as it is
+    buffered: bool = False  # several records a datagram: fewer datagrams, later
+    set_bias: bool = False  # what is felt at opening reads as zero from then on
+    reset_latch: bool = False  # of the monitor condition
 
 
 def where(address: Address) -> Where:
@@ -28,12 +38,19 @@ def where(address: Address) -> Where:
     check_options(address, _OPTIONS)
     if not address.host:
         raise SetupError(f"{address.uri} names no host; write for example net-ft://192.168.1.1")
-    address.number("tcp", 49151, 1, 65535)
+    chosen = {name: address.options.get(name, words[0]) for name, words in _WORDS.items()}
+    for name, word in chosen.items():
+        if word not in _WORDS[name]:
+            raise AddressError(f"{address.uri}: {name}={word} must be {' or '.join(_WORDS[name])}")
     return Where(
         address,
         http_port=address.number("http", 80, 1, 65535),
         rdt_port=address.number("rdt", 49152, 1, 65535),
+        tcp_port=address.number("tcp", 49151, 1, 65535),
         rate=address.number("rate", 0, 1, int(COUNTER_RATE)) or None,
+        buffered=chosen["mode"] == "buffered",
+        set_bias=chosen["bias"] == "set",
+        reset_latch=chosen["latch"] == "reset",
     )
 
 
@@ -43,7 +60,7 @@ def identify(place: Where, patience: float = PATIENCE) -> TransducerInfo:
 
 
 def prepare(place: Where) -> TransducerInfo:
-    """Set the rate where the address asks for another one, and return who answers, as read back afterwards."""
+    """Set what the address asks for, and return who answers, as read back afterwards."""
     found = _configuration(place, PATIENCE)
     if not found.streams:
         raise SetupError(f"{place.address.uri}: the box's RDT output is disabled; enable it on its Communications page")
@@ -56,7 +73,52 @@ def prepare(place: Where) -> TransducerInfo:
                 f"{place.address.uri}: the box was asked for {place.rate} Hz but {shown}; "
                 "set the rate on its Communications page"
             )
-    return _info(place, found)
+    done = _commanded(place, found) if place.set_bias or place.reset_latch else {}
+    if place.buffered:
+        done["streaming"] = "buffered"
+    info = _info(place, found)
+    return replace(info, settings={**info.settings, **done})
+
+
+def start_request(place: Where) -> bytes:
+    """Return what asks for the stream that the address wants."""
+    return wire.START_BUFFERED if place.buffered else wire.START
+
+
+def _commanded(place: Where, found: Configuration) -> dict[str, str]:
+    """Carry out over the command port what the address asks for; return what came of it, for the record."""
+    units = wire.parse_units(_tcp(place, wire.READ_UNITS, 24))
+    if units is None or (units.counts_per_force, units.counts_per_torque) != (
+        found.counts_per_force,
+        found.counts_per_torque,
+    ):
+        raise SetupError(
+            f"{place.address.uri}: the box's command port does not count as its web page says; check the tcp port"
+        )
+    done: dict[str, str] = {}
+    if place.reset_latch:
+        _wrench(place, wire.RESET_LATCH)
+        done["monitor condition latch"] = "reset at opening, as the address asks"
+    if place.set_bias:
+        _wrench(place, wire.SET_BIAS)
+        time.sleep(_SETTLING)
+        counts = np.array(_wrench(place, wire.READ_WRENCH)) * np.array(units.scales)
+        left = np.abs(found.calibration().matrix @ counts)
+        done["software bias"] = (
+            f"set at opening, as the address asks; at most {left[:3].max():.3g} N and {left[3:].max():.3g} N mm left"
+        )
+    return done
+
+
+def _wrench(place: Where, command: bytes) -> tuple[int, ...]:
+    counts = wire.parse_wrench(_tcp(place, command, 16))
+    if counts is None:
+        raise SetupError(f"{place.address.uri}: its command port gives no answer that can be read; check the tcp port")
+    return counts
+
+
+def _tcp(place: Where, command: bytes, size: int) -> bytes:
+    return tcp_answer(place.address.host, place.tcp_port, command, size, PATIENCE)
 
 
 def answers(place: Where) -> bool:
@@ -75,14 +137,14 @@ def _info(place: Where, found: Configuration) -> TransducerInfo:
         serial=found.serial,
         simulated="SIMULATED" in found.product.upper(),
         rate=found.rate,
-        counter_rate=COUNTER_RATE,
+        counter_rate=found.ticks,
         calibration=found.calibration(),
         settings=found.settings,
     )
 
 
 def _is_rate(found: Configuration, asked: int) -> bool:
-    return math.isclose(found.rate, true_rate(asked))
+    return math.isclose(found.rate, true_rate(asked, found.ticks))
 
 
 def _configuration(place: Where, patience: float) -> Configuration:
@@ -90,12 +152,10 @@ def _configuration(place: Where, patience: float) -> Configuration:
     if answer.status != 200:
         raise SetupError(
             f"{place.address.uri}: its web page answers {answer.status} instead of a configuration; "
-            "check that the address is that of a Net F/T box"
+            "check that the address is that of a Net F/T box or an Ethernet Axia"
         )
     try:
         found = parse_configuration(answer.body)
     except SetupError as error:
         raise SetupError(f"{place.address.uri}: {error}") from None
-    if "axia" in found.product.lower():
-        raise SetupError(f"{place.address.uri} is an Ethernet Axia, whose wire this version cannot read yet")
     return found

@@ -1,7 +1,10 @@
-"""Datagrams of the networked force/torque box. Layout: maker's manual 9620-05-NET FT, chapter 10 and section 15.2."""
+"""Datagrams and commands of the networked force/torque box, and of the Ethernet Axia where it differs.
+
+Layouts: maker's manuals 9620-05-NET FT (chapters 10 and 11, section 15.2) and 9610-05-Ethernet Axia (chapter 10).
+"""
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +15,14 @@ _HEADER = 0x1234
 
 STOP = _REQUEST.pack(_HEADER, 0x0000, 0)
 START = _REQUEST.pack(_HEADER, 0x0002, 0)  # one record a datagram, until stopped
+START_BUFFERED = _REQUEST.pack(_HEADER, 0x0003, 0)  # as many records a datagram as the box is set to
+
+READ_WRENCH = bytes(20)  # commands of the TCP port
+SET_BIAS = bytes(19) + b"\x01"  # what is felt now reads as zero from then on
+RESET_LATCH = bytes(19) + b"\x02"  # of the monitor condition
+READ_UNITS = b"\x01" + bytes(19)
+_WRENCH = struct.Struct(">HH6h")
+_UNITS = struct.Struct(">HBBII6H")
 
 RECORD = np.dtype(
     [
@@ -23,10 +34,9 @@ RECORD = np.dtype(
 )
 COUNTER_RATE = 7000.0  # ticks a second, good to 0.5 % [Hz]
 
-SATURATED = 1 << 17  # the six values of this record are invalid
 _SUMMARY = 1 << 31
 
-_MEANING = {
+_NET_FT = {
     30: "processor or memory fault",
     29: "digital board fault",
     28: "analogue board fault",
@@ -59,6 +69,44 @@ _MEANING = {
 }
 
 
+_AXIA = {
+    30: "force or torque out of range",
+    29: "calibration checksum error",
+    28: "simulated error",
+    27: "gauge out of range",
+    16: "monitor condition latched",
+    7: "calibration not accessible",
+    5: "other error",
+    3: "busy",
+    2: "broken gauge",
+    1: "supply outside 12 to 32 V",
+    0: "temperature outside -5 to 70 °C",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """What differs between the boxes that speak this wire."""
+
+    name: str
+    invalid: int  # status bits that make the six values of a record invalid
+    meaning: Mapping[int, str]  # of each status bit
+
+    def words(self, status: int) -> tuple[str, ...]:
+        """Return what the set bits of a status word mean, the gravest first; nothing when the box is healthy.
+
+        >>> NET_FT.words(0x80020000)
+        ('transducer saturated or converter error',)
+        """
+        bits = [bit for bit in range(30, -1, -1) if status >> bit & 1]
+        words = tuple(self.meaning.get(bit, f"unknown bit {bit}") for bit in bits)
+        return words or (("unnamed error",) if status & _SUMMARY else ())
+
+
+NET_FT = Family("Net F/T", 1 << 17, _NET_FT)
+AXIA = Family("Ethernet Axia", 1 << 30 | 1 << 27 | 1 << 2, _AXIA)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Decoded:
     """What a batch of datagrams held: n records and some datagrams that are none."""
@@ -69,17 +117,38 @@ class Decoded:
 
 
 def decode(datagrams: Sequence[bytes]) -> Decoded:
-    """Return the records of `datagrams`, one in each that has the length of a record. Raises nothing."""
-    origin = [i for i, datagram in enumerate(datagrams) if len(datagram) == RECORD.itemsize]
-    records = np.frombuffer(b"".join([datagrams[i] for i in origin]), RECORD)
-    return Decoded(records, np.array(origin, np.intp), len(datagrams) - len(origin))
+    """Return the records of `datagrams`, one or several whole ones in each. Raises nothing."""
+    size = RECORD.itemsize
+    counts = [0 if len(datagram) % size else len(datagram) // size for datagram in datagrams]
+    records = np.frombuffer(b"".join([d for d, count in zip(datagrams, counts, strict=True) if count]), RECORD)
+    return Decoded(records, np.repeat(np.arange(len(counts)), counts), counts.count(0))
 
 
-def status_words(status: int) -> tuple[str, ...]:
-    """Return what the set bits of a status word mean, the gravest first; nothing when the box is healthy.
+def parse_wrench(answer: bytes) -> tuple[int, ...] | None:
+    """Return the six 16-bit counts that answer READ_WRENCH, SET_BIAS or RESET_LATCH; None where it is no answer."""
+    if len(answer) != _WRENCH.size or answer[:2] != _HEADER.to_bytes(2, "big"):
+        return None
+    return _WRENCH.unpack(answer)[2:]
 
-    >>> status_words(0x80020000)
-    ('transducer saturated or converter error',)
+
+@dataclass(frozen=True, slots=True)
+class Units:
+    """How the TCP port counts."""
+
+    force: int  # code of the unit
+    torque: int
+    counts_per_force: int
+    counts_per_torque: int
+    scales: tuple[int, ...]  # full counts in one of the six 16-bit counts
+
+
+def parse_units(answer: bytes) -> Units | None:
+    """Return what answers READ_UNITS, None where it is no answer.
+
+    >>> parse_units(bytes.fromhex("1234 02 03 000F4240 000F4240 05DC 05DC 05DC 000A 000A 000A"))
+    Units(force=2, torque=3, counts_per_force=1000000, counts_per_torque=1000000, scales=(1500, 1500, 1500, 10, 10, 10))
     """
-    words = tuple(_MEANING.get(bit, f"unknown bit {bit}") for bit in range(30, -1, -1) if status >> bit & 1)
-    return words or (("unnamed error",) if status & _SUMMARY else ())
+    if len(answer) != _UNITS.size or answer[:2] != _HEADER.to_bytes(2, "big"):
+        return None
+    _, force, torque, per_force, per_torque, *scales = _UNITS.unpack(answer)
+    return Units(force, torque, per_force, per_torque, tuple(scales))

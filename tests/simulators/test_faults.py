@@ -1,5 +1,6 @@
 """What befalls a box's datagrams."""
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -98,3 +99,15 @@ def test_faults_of_the_box_itself_are_told_by_time():
 def test_a_fault_that_cannot_be_carried_out_is_refused(wrong):
     with pytest.raises(ValueError, match="fault"):
         Fault(**({"kind": "lose", "start": 0.0, "stop": 1.0} | wrong))
+
+
+def test_a_drift_walks_to_its_share_of_each_range_and_stays():
+    faults, times = Faults([Fault("drift", 1.0, 3.0, share=0.1)]), np.array([0.5, 2.0, 3.0, 9.0])
+    felt = faults.felt(np.zeros((4, 6)), times, (36.0, 36.0, 36.0, 500.0, 500.0, 500.0))
+    np.testing.assert_allclose(felt[:, 2], [0.0, 1.8, 3.6, 3.6])
+    np.testing.assert_allclose(felt[:, 5], [0.0, 25.0, 50.0, 50.0])
+
+
+def test_a_wrong_calibration_feels_more_than_there_is_while_it_lasts():
+    faults, times = Faults([Fault("miscalibrate", 1.0, 2.0, share=0.25)]), np.array([0.0, 1.0, 2.0])
+    np.testing.assert_allclose(faults.felt(np.ones((3, 6)), times, (1.0,) * 6)[:, 0], [1.0, 1.25, 1.0])

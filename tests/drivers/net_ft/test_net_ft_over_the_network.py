@@ -173,7 +173,7 @@ PAGE = (
         (404, b"", "", "answers 404"),
         (302, b"", "", "answers 302"),
         (200, b"<html/>", "", "<html> and not <netft>"),
-        (200, PAGE % (b"Ethernet Axia80", b""), "", "Axia"),
+        (200, PAGE % (b"Ethernet Axia80", b"<setadcrate>7</setadcrate>"), "", "converter runs at '7' Hz"),
         (200, PAGE % (b"Net F/T", b"<comrdtrate>7000</comrdtrate>"), "&rate=200", "stays at 7000 Hz"),
         (200, PAGE % (b"Net F/T", b""), "&rate=200", "shows no rate"),
     ],

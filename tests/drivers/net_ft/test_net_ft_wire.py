@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.net_ft.wire import RECORD, START, STOP, decode, status_words
+from drivers.net_ft.wire import NET_FT, RECORD, START, STOP, decode
 
 RECORD_BYTES = bytes.fromhex("00000001 00000023 00000000 000F4240 FFE17B80 004C4B40 0001E848 FFFFFFFF 00000000")
 
@@ -58,12 +58,12 @@ def test_a_record_is_36_bytes():
     ],
 )
 def test_a_status_word_is_told_in_words(status, words):
-    assert status_words(status) == words
+    assert NET_FT.words(status) == words
 
 
 @given(st.integers(0, 2**32 - 1))
 def test_every_status_word_but_0_has_words(status):
-    assert bool(status_words(status)) == (status != 0)
+    assert bool(NET_FT.words(status)) == (status != 0)
 
 
 def test_counts_come_as_numbers_numpy_can_hold_exactly():
