@@ -154,9 +154,8 @@ class DigitalFtBox:
 
     def _packets(self, times: Array) -> list[bytes]:
         """Return a packet for each of `times` (n,) [s]."""
-        gauges = np.rint(
-            self._faults.felt(self._bench.wrench(times), times, self._bench.settings.rated) @ self._gauges.T
-        )
+        felt = self._faults.felt(self._bench.wrench(times), times, self._bench.settings.rated)
+        gauges = np.rint(felt @ self._gauges.T)
         forced = np.array([self._faults.active("saturate", time) for time in times.tolist()], bool)
         gauges[forced] = 32767
         over = np.any(np.abs(gauges) >= 32767, axis=1)

@@ -75,7 +75,7 @@ class Faults:
         return self._at(kind, time) is not None
 
     def felt(self, wrench: Array, times: Array, rated: Sequence[float]) -> Array:
-        """Return what is felt of a wrench (n, 6) at `times` (n,) [s] by a device that drifts or is wrongly calibrated."""
+        """Return what a device that drifts or is wrongly calibrated feels of a wrench (n, 6) at `times` (n,) [s]."""
         local = times % self._repeat if self._repeat > 0.0 else times
         for fault in self._timetable:
             if fault.kind == "drift":

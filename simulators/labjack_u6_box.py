@@ -159,7 +159,7 @@ class LabJackU6Box:
         times = self._begun + np.arange(self._done, due) / rate
         self._done = max(due, self._done)
         room = (ROOM - len(self._buffer)) // len(gauges)
-        if self._missed and room > ROOM // len(gauges) // 2:
+        if self._missed and self._report is None and room > ROOM // len(gauges) // 2:
             # One scan of ones stands for those lost; the guide counts it among them.
             self._report = (len(self._buffer), self._missed)
             self._buffer += [0xFFFF] * len(gauges)

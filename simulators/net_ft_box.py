@@ -58,8 +58,8 @@ class NetFtBox:
     ) -> None:
         """Set up a box that streams at `rate` [Hz] by an oscillator wrong by `rate_error` [-]. Port 0 is a free one.
 
-        `product` says which box it is. `first_tick` is its counter when it starts, as if it had run for long; `first_record` the first number of the
-        first stream. Both serve to see them wrap.
+        `product` says which box it is. `first_tick` is its counter when it starts, as if it had run for long;
+        `first_record` the first number of the first stream. Both serve to see them wrap.
         """
         self._clock = clock
         self._faults = faults or Faults()

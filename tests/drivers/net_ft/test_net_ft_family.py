@@ -85,7 +85,7 @@ def test_buffered_streaming_brings_the_same_readings_many_to_a_datagram(served):
     np.testing.assert_allclose(np.diff(block.time), 0.001, rtol=1e-9)
 
 
-def test_a_bias_is_set_where_the_address_asks_for_it_and_told(served):
+def test_a_bias_is_set_where_the_address_asks_for_it_and_told():
     settings = BenchSettings(offset=(1.0, -2.0, 3.0, 40.0, 50.0, 60.0))
     box = NetFtBox(Bench(3, settings), CLOCK)
     box.start()
@@ -115,7 +115,11 @@ def test_whoever_keeps_taking_the_stream_is_told_of(served):
     box = served(Fault("steal", 0.5, 1000.0))
     transducer = open_transducer(box.uri, CLOCK)
     transducer.start()
-    with pytest.raises(LinkLost, match="another program on the network|end any other program"):
-        while True:
+    sentence = ""
+    while not sentence:
+        try:
             transducer.read(1.0)
+        except LinkLost as error:
+            sentence = str(error)
     transducer.close()
+    assert "another program on the network" in sentence or "end any other program" in sentence
