@@ -201,6 +201,8 @@ class _Run:
             began_ns = self._clock.now_ns()
             if (ending := stop()) is not None:
                 return ending
+            if self._writer.full is not None:
+                return "disk", self._writer.full
             self._listen()
             if isinstance(self._state, Resting) and self._rested_ns is not None and began_ns >= self._rested_ns:
                 self._take(RestOver())

@@ -67,6 +67,7 @@ class StartSession:
     folder: str
     people: People = field(default_factory=People)
     settings: tuple[Setting, ...] = ()  # that shaped it, for its provenance
+    any_folder: bool = False  # also on a network drive or in a synchronised folder; this is recorded
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,7 +35,9 @@ from sessions.plan import SessionPlan
 from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, Setting, provenance
 from sessions.recording.head import simulated_sentence
 from sessions.recording.manifest import is_sealed
+from sessions.recording.place import unsafe
 from sessions.recording.provenance import software_versions
+from sessions.recording.room import RESERVE, check_room, need
 from sessions.resuming import (
     RESUMABLE,
     ContinuedClock,
@@ -50,6 +52,7 @@ from sessions.steps import Command, Event
 
 LIFT_PATIENCE_NS = 30_000_000_000  # for a finger that touches when the client goes [session clock]
 CLIENT_GONE = "the window or terminal that ran the session is gone"
+ANY_FOLDER = "recorded in an unsafe folder"  # name of a setting
 Send = Callable[[Report], None]
 
 
@@ -74,14 +77,18 @@ def begun(request: StartSession, bench: Bench, clock: Clock) -> Prepared:
         raise NotNow("a session with forces needs a transducer, and none is connected; connect one")
     info = bench.connected.transducer.info if plan.forces and bench.connected is not None else None
     _check_people(people, plan, bench)
+    folder = Path(request.folder)
+    check_room(folder, need(plan, None if info is None else info.rate))
     settings = [*request.settings, *_told(people, bench.uri if info is not None else None)]
+    settings += _allowed(folder, any_folder=request.any_folder)
     writer = SessionWriter.create(
-        Path(request.folder),
+        folder,
         plan,
         info,
         provenance(clock, settings),
         subject_simulated=people.kind != "people",
         clock=clock,
+        reserve=RESERVE,
     )
     return Prepared(plan, writer, clock, people, info)
 
@@ -96,6 +103,8 @@ def gone_on(request: ResumeSession, bench: Bench, clock: Clock) -> Prepared:
         raise RecordingError(f"{folder} is sealed: nothing is added to it; begin a new session")
     recording = Recording.open(folder)
     check_resumable(recording)
+    _allowed(folder, any_folder=ANY_FOLDER in recording.provenance.get("settings", {}))
+    check_room(folder, need(recording.plan, None if recording.info is None else recording.info.rate))
     factor = float(recording.provenance["clock"]["factor"])
     if clock.factor != factor:
         raise NotNow(f"{folder} was recorded at pace {factor:g}: start the recorder with this pace")
@@ -106,7 +115,7 @@ def gone_on(request: ResumeSession, bench: Bench, clock: Clock) -> Prepared:
     _check_people(people, recording.plan, bench)
     if simulated_sentence(info, people.kind != "people") != recording.simulated_sentence:
         raise NotNow("what was simulated at the beginning must be simulated again, and nothing else")
-    writer = SessionWriter.open(folder, going_on)
+    writer = SessionWriter.open(folder, going_on, reserve=RESERVE)
     resumed = Resumed(at, resumed_data(gap, info, software_versions()), last)
     return Prepared(
         recording.plan, writer, going_on, people, info, going_on.offset_ns, resumed, tuple(recording.events)
@@ -257,6 +266,16 @@ def _told(people: People, uri: str | None) -> list[Setting]:
     if uri is not None:
         settings.append(Setting("device", uri, "", "set"))
     return settings
+
+
+def _allowed(folder: Path, *, any_folder: bool) -> list[Setting]:
+    """Return what is to be recorded of a folder that is not safe. Raises RecordingError unless any is allowed."""
+    sentence = unsafe(folder)
+    if sentence is None:
+        return []
+    if not any_folder:
+        raise RecordingError(sentence)
+    return [Setting(ANY_FOLDER, sentence.partition(";")[0].replace(str(folder.resolve()), "the folder"), "", "set")]
 
 
 def _opened_again(

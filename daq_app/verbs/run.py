@@ -41,6 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--stroking-hand", choices=["left", "right"], help="recorded; unknown unless stated")
     parser.add_argument("--answering-hand", choices=["left", "right"], help="recorded; unknown unless stated")
     parser.add_argument("--out", type=Path, metavar="DIR", help="the session's folder (one below recordings/)")
+    parser.add_argument(
+        "--any-folder",
+        action="store_true",
+        help="also on a network drive or in a synchronised folder: at your own risk",
+    )
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -66,7 +71,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     with Recorder.start(options.pace, debug=options.debug) as recorder:
         bench = opened(recorder, options.device) if options.device else None
         frame = _frame(options, planned.frame if bench is None else bench.frame or planned.frame)
-        asked = StartSession(replace(planned, frame=frame), str(folder.absolute()), people, settings)
+        asked = StartSession(
+            replace(planned, frame=frame), str(folder.absolute()), people, settings, any_folder=options.any_folder
+        )
         outcome = attended(recorder, asked, console)
     end = outcome.end
     console.result({"session": str(folder), "end": asdict(end), "sealed": outcome.sealed, "seed": seed})

@@ -8,6 +8,7 @@ from sessions.recording.errors import RecordingError
 from sessions.recording.folding import fold_log
 from sessions.recording.manifest import changed_files, is_sealed, list_in_manifest
 from sessions.recording.reader import Recording
+from sessions.recording.room import release_reserve
 from sessions.recording.schema import (
     DESCRIPTION_FILE,
     LIVE_FILE,
@@ -29,6 +30,7 @@ def seal(folder: Path) -> None:
     if is_sealed(folder):
         raise RecordingError(f"{folder} is sealed already: {MANIFEST_FILE} lists its files")
     fold_log(Recording.open(folder))
+    release_reserve(folder)
     recording = Recording.open(folder)
     new = folder / f".{SEALED_FILE}.part"
     try:

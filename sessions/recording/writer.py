@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NoReturn, Self
 
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock
@@ -17,6 +17,7 @@ from sessions.recording.head import info_to_dict, json_text, plan_to_dict, simul
 from sessions.recording.log import LoggedEvent
 from sessions.recording.manifest import is_sealed
 from sessions.recording.reader import Recording
+from sessions.recording.room import Reserve, release_reserve
 from sessions.recording.schema import (
     APPLICATION_ID,
     FORMAT,
@@ -58,7 +59,9 @@ class SessionWriter:
         self._event_count = 0
         self._acknowledged = Acknowledged(time_ns=clock.now_ns())
         self._failure: str | None = None
+        self._reserve: Reserve | None = None
         self.safe: Callable[[Sequence[LoggedEvent]], None] = lambda _: None  # told of events once they are safe
+        self.full: str | None = None  # why only the end should still be written: the reserve is being used
 
     @classmethod
     def create(
@@ -70,10 +73,12 @@ class SessionWriter:
         *,
         subject_simulated: bool = False,
         clock: Clock | None = None,
+        reserve: int = 0,
     ) -> Self:
         """Begin a recording in `folder`, which is made, or is empty: nothing is ever written over.
 
-        `info` is None for a scores-only visit. `clock` times events and commits (the machine's when None).
+        `info` is None for a scores-only visit. `clock` times events and commits (the machine's when None). `reserve`
+        bytes are taken in advance, so that the end can be written on a full disk.
         Raises RecordingError when the folder holds something or cannot be written.
         """
         simulated = simulated_sentence(info, subject_simulated)
@@ -89,8 +94,10 @@ class SessionWriter:
             folder.mkdir(parents=True, exist_ok=True)
             if any(folder.iterdir()):
                 raise RecordingError(f"{folder} is not empty; give a new folder, for nothing is written over")
+            kept_back = Reserve(folder, reserve) if reserve else None
             path.touch(exist_ok=False)
         except OSError as error:
+            release_reserve(folder)
             raise RecordingError(
                 f"{folder} cannot hold a recording ({error.strerror}); give a folder that can be written"
             ) from error
@@ -99,14 +106,17 @@ class SessionWriter:
             _prepare(connection, head)
         except sqlite3.Error as error:
             connection.close()
+            release_reserve(folder)
             raise RecordingError(
                 f"{path} cannot be begun ({error}); free space, or give a folder on a local disk"
             ) from error
         sync_folder(folder)
-        return cls(connection, path, clock or RealClock())
+        writer = cls(connection, path, clock or RealClock())
+        writer._reserve = kept_back
+        return writer
 
     @classmethod
-    def open(cls, folder: Path, clock: Clock) -> Self:
+    def open(cls, folder: Path, clock: Clock, *, reserve: int = 0) -> Self:
         """Go on with the recording in `folder`, that was cut short: numbers of blocks and events continue.
 
         Raises RecordingError when it is sealed, when somebody still writes it, or when it cannot be written.
@@ -115,6 +125,12 @@ class SessionWriter:
             raise RecordingError(f"{folder} is sealed: nothing is added to it; begin a new session")
         fold_log(Recording.open(folder))
         path = folder / LIVE_FILE
+        try:
+            kept_back = Reserve(folder, reserve) if reserve else None
+        except OSError as error:
+            raise RecordingError(
+                f"{folder} has no room to go on in ({error.strerror}); free space on the disk"
+            ) from error
         connection = sqlite3.connect(path, isolation_level=None, timeout=0.5)
         try:
             _make_durable(connection)
@@ -125,8 +141,10 @@ class SessionWriter:
             (writer._event_count,) = connection.execute("SELECT count(*) FROM events").fetchone()
         except sqlite3.Error as error:
             connection.close()
+            release_reserve(folder)
             raise RecordingError(f"{path} cannot be gone on with ({error}); end whatever else uses it") from error
         writer._acknowledged = Acknowledged(writer._readings, writer._event_count, clock.now_ns())
+        writer._reserve = kept_back
         return writer
 
     @property
@@ -183,15 +201,10 @@ class SessionWriter:
         """Make all that was handed over safe, and say how much that is now."""
         self._check()
         now_ns = self._clock.now_ns()
-        rows = self._block_rows
         try:
-            if self._blocks or self._events:
-                self._connection.execute("BEGIN IMMEDIATE")
-                rows = self._insert_blocks()
-                self._insert_events()
-                self._connection.execute("COMMIT")
+            rows = self._written()
         except sqlite3.Error as error:
-            self._fail(error)
+            rows = self._written_from_the_reserve(error)
         self._block_rows = rows
         self._blocks.clear()
         safe, self._events = self._events, []
@@ -209,6 +222,34 @@ class SessionWriter:
             with suppress(sqlite3.Error):
                 self._connection.execute("PRAGMA journal_mode=DELETE")
         self._connection.close()
+        release_reserve(self.folder)
+
+    def _written(self) -> int:
+        """Write what waits in one transaction, and return the number of the last row of readings."""
+        if not self._blocks and not self._events:
+            return self._block_rows
+        self._connection.execute("BEGIN IMMEDIATE")
+        rows = self._insert_blocks()
+        self._insert_events()
+        self._connection.execute("COMMIT")
+        return rows
+
+    def _written_from_the_reserve(self, error: sqlite3.Error) -> int:
+        """Undo a commit that failed, and try it once more in the room that was kept back."""
+        with suppress(sqlite3.Error):
+            self._connection.execute("ROLLBACK")
+        if self._reserve is None or self.full is not None:
+            self._fail(error)
+        self.full = (
+            f"the disk took no more ({error}); all that was measured is safe: free space on the disk, and resume"
+        )
+        self._reserve.release()
+        try:
+            return self._written()
+        except sqlite3.Error as again:
+            with suppress(sqlite3.Error):
+                self._connection.execute("ROLLBACK")
+            self._fail(again)
 
     def _insert_blocks(self) -> int:
         """Insert the waiting readings in rows of at most LARGEST_BLOCK, and return the number of the last row."""
@@ -229,14 +270,12 @@ class SessionWriter:
         for event in self._events:
             self._connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", event_row(event))
 
-    def _fail(self, error: sqlite3.Error) -> None:
-        """Undo the half-written commit, and refuse everything from now on."""
-        with suppress(sqlite3.Error):
-            self._connection.execute("ROLLBACK")
+    def _fail(self, error: sqlite3.Error) -> NoReturn:
+        """Refuse everything from now on."""
         safe = self._acknowledged
         self._failure = (
             f"the disk took no more ({error}): the first {safe.readings} readings and {safe.events} events are safe; "
-            "free space on the disk and begin a new session"
+            "free space on the disk and resume"
         )
         raise RecordingError(f"{self._path}: {self._failure}") from error
 

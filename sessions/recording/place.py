@@ -1,0 +1,159 @@
+"""Is a folder a safe place to record in? Not on a network drive, and not where a program copies files to a cloud.
+
+The write-ahead log of the live file and its locks work on a disk of this computer only (SQLite documentation, "Write-
+Ahead Logging", disadvantage 1); a program that synchronises takes files away, or puts older ones back, while they are
+written.
+"""
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+
+# File systems whose blocks lie on another computer, as Linux (/proc/mounts) and macOS (mount) name them.
+NETWORK = re.compile(
+    r"nfs[34]?|cifs|smb[23]|smbfs|afpfs|webdav|davfs2?|ncpfs|afs|coda|ceph|glusterfs|lustre|gpfs|beegfs|orangefs|pvfs2"
+    r"|fuse\.(sshfs|rclone|davfs2?|glusterfs|ceph|s3fs|gcsfuse|goofys|curlftpfs|smbnetfs|mfs|juicefs)|(osx|mac)fuse_sshfs"
+)
+SHARED = re.compile(r"vboxsf|vmhgfs|fuse\.vmhgfs-fuse|prl_fs|drvfs")  # folders of the machine around a virtual one
+CLOUD = re.compile(r"fuse\.(google-drive-ocamlfuse|onedriver|dropbox|pcloud|insync|mega|keybase|expandrive)")
+# Names of folders under which a synchronising program keeps its files, as those programs call them.
+SYNC_FOLDERS: tuple[tuple[str, str], ...] = (
+    (r"dropbox( \(.*\))?", "Dropbox"),
+    (r"onedrive( - .*)?", "OneDrive"),
+    (r"google ?drive|googledrive-.*", "Google Drive"),
+    (r"icloud ?drive|mobile documents|com~apple~clouddocs", "iCloud"),
+    (r"cloudstorage", "a cloud provider of macOS"),
+    (r"nextcloud\d*", "Nextcloud"),
+    (r"owncloud", "ownCloud"),
+    (r"box sync|box-box", "Box"),
+    (r"pcloud ?(drive|sync)", "pCloud"),
+    (r"seafile", "Seafile"),
+    (r"synologydrive", "Synology Drive"),
+    (r"mega(sync)?( downloads)?", "MEGA"),
+    (r"sciebo|switchdrive|polybox|surfdrive", "ownCloud"),
+)
+# What such a program leaves in the topmost folder it looks after.
+SYNC_MARKS: tuple[tuple[str, str], ...] = (
+    (".dropbox", "Dropbox"),
+    (".dropbox.cache", "Dropbox"),
+    (".stfolder", "Syncthing"),
+    (".sync", "Resilio Sync"),
+    (".owncloudsync.log", "ownCloud"),
+    (".nextcloudsync.log", "Nextcloud"),
+    (".SynologyWorkingDirectory", "Synology Drive"),
+    (".tmp.driveupload", "Google Drive"),
+)
+SYNC_DATABASE = re.compile(r"\._?sync_[0-9a-f]+\.db")  # of ownCloud and Nextcloud
+SYNC_VARIABLES = ("OneDrive", "OneDriveCommercial", "OneDriveConsumer")  # set by Windows to where OneDrive keeps files
+MOVE = "record into a folder on a disk of this computer, and copy it when it is sealed"
+
+
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """A file system and where it is mounted."""
+
+    kind: str
+    at: PurePath
+    source: str
+
+
+def unsafe(folder: Path) -> str | None:
+    """Return a sentence why a session must not be recorded in `folder`, which need not be there yet; None: it may."""
+    place = folder.resolve()
+    return _on_a_network(place) or _synchronised(place, os.environ)
+
+
+def network_mount(place: PurePath, mounts: Iterable[Mount]) -> Mount | None:
+    """Return the mount that holds `place` where that lies on another computer, else None."""
+    around = [mount for mount in mounts if place.is_relative_to(mount.at)]
+    if not around:
+        return None
+    # The innermost holds it; of several at one place the last hides the others.
+    inner = max(enumerate(around), key=lambda item: (len(item[1].at.parts), item[0]))[1]
+    windows_drive = inner.kind == "9p" and re.match(r"([A-Z]:|drvfs)", inner.source) is not None  # seen from WSL
+    far = any(kinds.fullmatch(inner.kind) for kinds in (NETWORK, SHARED, CLOUD))
+    return inner if far or windows_drive else None
+
+
+def sync_folder_above(place: PurePath) -> str | None:
+    """Return the program whose folder `place` lies in, by the names of the folders above and itself; None: none."""
+    for part in place.parts:
+        for pattern, program in SYNC_FOLDERS:
+            if re.fullmatch(pattern, part, re.IGNORECASE):
+                return program
+    return None
+
+
+def linux_mounts(table: str) -> tuple[Mount, ...]:
+    """Return what /proc/self/mounts tells; blanks in names are written as octal numbers there."""
+    found: list[Mount] = []
+    for line in table.splitlines():
+        source, at, kind = (re.sub(r"\\([0-7]{3})", lambda m: chr(int(m[1], 8)), word) for word in line.split()[:3])
+        found.append(Mount(kind, PurePath(at), source))
+    return tuple(found)
+
+
+def mac_mounts(table: str) -> tuple[Mount, ...]:
+    """Return what the command mount tells on macOS: `SOURCE on PLACE (KIND, ...)`."""
+    lines = re.findall(r"^(.*) on (/.*) \(([^,)]+)", table, re.MULTILINE)
+    return tuple(Mount(kind, PurePath(at), source) for source, at, kind in lines)
+
+
+def _on_a_network(place: Path) -> str | None:
+    if sys.platform == "win32":
+        return f"{place} lies on a network drive; {MOVE}" if _windows_network(place) else None
+    mount = network_mount(place, _mounts())
+    return None if mount is None else f"{place} lies on another computer or is shared with one ({mount.kind}); {MOVE}"
+
+
+def _mounts() -> Sequence[Mount]:
+    table = Path("/proc/self/mounts")
+    if table.exists():
+        return linux_mounts(table.read_text(errors="surrogateescape"))
+    try:
+        said = subprocess.run(["/sbin/mount"], capture_output=True, text=True, timeout=5, check=False).stdout
+    except (OSError, subprocess.TimeoutExpired):
+        return ()
+    return mac_mounts(said)
+
+
+def _windows_network(place: Path) -> bool:
+    """Say whether Windows calls the drive a remote one (GetDriveTypeW: 4), or the path names a computer."""
+    if place.drive.startswith("\\\\"):
+        return True
+    import ctypes
+
+    windows = getattr(ctypes, "windll", None)
+    return windows is not None and windows.kernel32.GetDriveTypeW(f"{place.drive}\\") == 4
+
+
+def _synchronised(place: Path, environment: Mapping[str, str]) -> str | None:
+    program = sync_folder_above(place) or _marked(place) or _named(place, environment)
+    return None if program is None else f"{place} is kept in step with a cloud by {program}; {MOVE}"
+
+
+def _marked(place: Path) -> str | None:
+    """Return the program that left its mark in a folder above `place`."""
+    for folder in (place, *place.parents):
+        try:
+            names = {entry.name for entry in folder.iterdir()} if folder != folder.parent else set[str]()
+        except OSError:
+            continue
+        for mark, program in SYNC_MARKS:
+            if mark in names and (mark != ".dropbox" or folder != Path.home()):  # at home it holds Dropbox's settings
+                return program
+        if any(SYNC_DATABASE.fullmatch(name) for name in names):
+            return "ownCloud or Nextcloud"
+    return None
+
+
+def _named(place: Path, environment: Mapping[str, str]) -> str | None:
+    for variable in SYNC_VARIABLES:
+        root = environment.get(variable)
+        if root and place.is_relative_to(Path(root)):
+            return "OneDrive"
+    return None

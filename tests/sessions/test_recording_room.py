@@ -1,0 +1,45 @@
+import math
+import shutil
+from collections import namedtuple
+
+import pytest
+from recordings import PLAN, begun, readings
+
+from sessions.recording import RecordingError
+from sessions.recording.room import MARGIN, Reserve, check_room, need
+
+Usage = namedtuple("Usage", "total used free")
+
+
+def test_the_room_a_session_needs_is_its_rate_times_its_time_twice():
+    # One trial of 90 s and one block's 300 s at 7000 Hz, six columns of which one holds six numbers: 11 x 8 bytes.
+    assert need(PLAN, 7000.0).size == 2 * 390 * 7000 * 88 + MARGIN
+    assert need(PLAN, None).size == MARGIN
+    assert need(PLAN, math.nan).rate == 1000.0
+
+
+def test_the_room_foreseen_for_a_reading_is_what_a_recording_takes(tmp_path):
+    writer = begun(tmp_path / "s")
+    for i in range(50):
+        writer.readings(readings(7000 * i, 7000))
+        writer.commit()
+    writer.close()
+    size = (tmp_path / "s" / "session.sqlite").stat().st_size
+    assert size / (50 * 7000) == pytest.approx(88, rel=0.02)
+
+
+def test_a_disk_with_too_little_room_is_refused_with_the_arithmetic(tmp_path, monkeypatch):
+    wanted = need(PLAN, 7000.0)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(0, 0, wanted.size - 1))
+    with pytest.raises(RecordingError, match=r"6 min at 7000 readings a second of 88 bytes, kept twice, .*: 548 MB"):
+        check_room(tmp_path / "not" / "there" / "yet", wanted)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(0, 0, wanted.size))
+    check_room(tmp_path / "not" / "there" / "yet", wanted)
+
+
+def test_a_reserve_takes_real_room_and_gives_it_back(tmp_path):
+    reserve = Reserve(tmp_path, 3 * 2**20)
+    assert (tmp_path / "session.reserve").stat().st_blocks * 512 >= 3 * 2**20
+    reserve.release()
+    reserve.release()
+    assert list(tmp_path.iterdir()) == []
