@@ -1,0 +1,194 @@
+"""What the window knows of the session in hand, and how each message changes it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from daq_app.recorder import messages as m
+from daq_app.stroke_quality import Quality
+from daq_app.window_messages import Judged, Message
+from sessions import steps
+from sessions.plan import Block, SessionPlan, Trial
+from sessions.recording import LoggedEvent
+from sessions.runner import SessionEnd, Status
+
+Phase = Literal["idle", "mounting", "taring", "ready", "stroking", "scoring", "paused", "closing", "ended"]
+Outcome = Literal["coming", "done", "skipped"]
+
+
+@dataclass(frozen=True, slots=True)
+class TrialState:
+    """How far a trial is."""
+
+    trial: Trial
+    outcome: Outcome = "coming"
+    takes: int = 0
+    score: float | None = None
+    answered: bool = False
+    quality: Quality | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Something found in the readings, for the plots."""
+
+    kind: Literal["onset", "lift", "steady"]
+    start: float  # [s, device time]
+    stop: float
+
+
+@dataclass(frozen=True, slots=True)
+class SessionState:
+    """The course of the session in hand."""
+
+    folder: str
+    plan: SessionPlan
+    simulated: str | None
+    trials: tuple[TrialState, ...]
+    begun: float  # when the window heard of it [s]
+    phase: Phase = "idle"
+    since: float = 0.0  # when this phase began [s]
+    before_pause: Phase = "idle"
+    trial: int | None = None  # number of the trial in hand
+    block: Block | None = None
+    asked: steps.Command | None = None  # what is waited for
+    told: str | None = None  # the last sentence that needs no answer, or that refuses one
+    judged: int | None = None  # number of the trial whose stroke was looked at last
+    marks: tuple[Mark, ...] = ()  # of the take in hand
+    notes: tuple[str, ...] = ()
+    status: Status | None = None
+    saved_ns: int = 0  # instant of the last thing that is safe [ns, session clock]
+    saved: float | None = None  # when the window heard of it [s]
+    end: SessionEnd | None = None
+    resumable: bool = False
+    sealing: Literal["no", "running", "sealed"] = "no"
+
+    def of(self, number: int | None) -> TrialState | None:
+        """Return the trial of that number."""
+        return next((t for t in self.trials if t.trial.number == number), None)
+
+    def with_trial(self, number: int | None, **changes: Any) -> "SessionState":  # noqa: ANN401  as `replace` takes
+        """Return the session with one trial changed."""
+        changed = tuple(replace(t, **changes) if t.trial.number == number else t for t in self.trials)
+        return replace(self, trials=changed)
+
+
+def session_begun(begun: m.SessionBegun, now: float) -> SessionState:
+    """Return a session that has just begun, or goes on, at `now` [s]."""
+    session = SessionState(
+        begun.folder, begun.plan, begun.simulated, tuple(TrialState(t) for t in begun.plan.trials), now, since=now
+    )
+    for event in begun.events:
+        session = _logged(session, event)
+    return session
+
+
+def session_after(session: SessionState, message: Message, now: float) -> SessionState:
+    """Return the session after a message that came at `now` [s]; the same object where it tells nothing of it."""
+    after = _after(session, message, now)
+    return after if after.phase == session.phase else replace(after, since=now)
+
+
+def _after(session: SessionState, message: Message, now: float) -> SessionState:
+    match message:
+        case LoggedEvent():
+            return _logged(session, message)
+        case Status():
+            moved = message.safe.time_ns != session.saved_ns
+            saved = now if moved else session.saved
+            return replace(session, status=message, saved_ns=message.safe.time_ns, saved=saved)
+        case Judged(trial, take, quality):
+            return _judged(session, trial, take, quality)
+        case m.SessionEnded(_, end, resumable):
+            return replace(session, end=end, phase="ended", asked=None, resumable=resumable)
+        case m.Sealing():
+            return replace(session, sealing="running")
+        case m.Sealed():
+            return replace(session, sealing="sealed")
+        case _:
+            return _shown(session, message)
+
+
+def _shown(session: SessionState, message: Message) -> SessionState:
+    """Return the session after a command: what it asks for is what is waited for now."""
+    match message:
+        case steps.AskBegin():
+            return replace(session, phase="idle", asked=message)
+        case steps.AskMount(trial):
+            return replace(session, phase="mounting", trial=trial.number, asked=message, told=None)
+        case steps.MeasureZero():
+            return replace(session, phase="taring", asked=message, told=None)
+        case steps.AskStroke(trial):
+            return replace(session, phase="ready", trial=trial.number, asked=message, told=None)
+        case steps.AskScore(trial):
+            return replace(session, phase="scoring", trial=trial.number, asked=message)
+        case steps.AskFinish():
+            return replace(session, phase="closing", trial=None, asked=message, told=None)
+        case _:
+            return _noticed(session, message)
+
+
+def _noticed(session: SessionState, message: Message) -> SessionState:
+    """Return the session after a command that asks for nothing."""
+    match message:
+        case steps.ShowInstruction(block):
+            return replace(session, block=block)
+        case steps.StartTake(trial, take):
+            return replace(session.with_trial(trial, takes=take, outcome="coming", quality=None), marks=())
+        case steps.Tell(sentence) | steps.Refuse(sentence):
+            return replace(session, told=sentence)
+        case steps.EndSession():
+            return replace(session, phase="ended", asked=None)
+        case _:
+            return session
+
+
+def _logged(session: SessionState, event: LoggedEvent) -> SessionState:
+    """Return the session after something that is written down."""
+    number, data = event.trial, event.data
+    match event.kind:
+        case "contact_onset":
+            phase = "stroking" if session.phase == "ready" else session.phase
+            return replace(session, phase=phase, marks=(*session.marks, Mark("onset", data["time"], data["time"])))
+        case "finger_lifted":
+            return replace(session, marks=(*session.marks, Mark("lift", data["time"], data["time"])))
+        case "pause":
+            return replace(session, phase="paused", before_pause=session.phase)
+        case "resume" if session.phase == "paused":
+            return replace(session, phase=session.before_pause)
+        case "noted":
+            return replace(session, notes=(*session.notes, str(data.get("text", ""))))
+        case _:
+            return _of_trial(session, number, event.kind, data)
+
+
+def _of_trial(session: SessionState, number: int | None, kind: str, data: Mapping[str, Any]) -> SessionState:
+    """Return the session after something that became of a trial."""
+    match kind:
+        case "scored":
+            return session.with_trial(number, score=data["score"], answered=data["score"] is not None)
+        case "take_started":
+            return session.with_trial(number, takes=data["take"], outcome="coming")
+        case "take_kept":
+            return session.with_trial(number, outcome="done")
+        case "take_discarded":
+            return session.with_trial(number, outcome=_discarded(data), score=None, answered=False)
+        case "skip":
+            return session.with_trial(number, outcome="skipped")
+        case _:
+            return session
+
+
+def _discarded(data: Mapping[str, Any]) -> Outcome:
+    return "skipped" if str(data["reason"]).startswith("skipped: ") else "coming"
+
+
+def _judged(session: SessionState, trial: int, take: int, quality: Quality) -> SessionState:
+    """Return the session with what was found of a stroke; nothing where the take is over and done again."""
+    of = session.of(trial)
+    if of is None or of.takes != take:
+        return session
+    session = replace(session.with_trial(trial, quality=quality), judged=trial)
+    if quality.steady is None:
+        return session
+    return replace(session, marks=(*session.marks, Mark("steady", *quality.steady)))

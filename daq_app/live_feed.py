@@ -1,0 +1,137 @@
+"""From the recorder's live messages to what is drawn, and to the readings of the take in hand."""
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.bench_load import Load, load_of
+from daq_app.live_trace import CHANNELS, LiveTrace
+from daq_app.recorder.messages import Live
+from drivers.readings import ReadingBlock
+from drivers.transducer import TransducerInfo
+from sessions.analysis.forces import centre_of_pressure, in_face_frame
+from sessions.plan import Frame
+
+Array = NDArray[np.float64]
+
+FLOOR = 0.3  # ratio, speed and centre of pressure mean nothing below this normal force [N]
+LAG = 0.1  # the speed is the way of the centre of pressure over this time [s] ...
+SMOOTH = 0.05  # ... between two means over this one [s]
+KEPT = 90.0  # readings of a take that are kept to be looked at, at most [s]
+
+
+class LiveFeed:
+    """Everything of the stream that is shown now. One per window."""
+
+    def __init__(self) -> None:
+        """Start with no transducer."""
+        self.trace = LiveTrace(1000.0)
+        self._info: TransducerInfo | None = None
+        self._stream: int | None = None
+        self._take: deque[Live] = deque()
+        self._tail = _Tail.empty()
+
+    def device(self, info: TransducerInfo | None) -> None:
+        """Begin anew with another transducer, or none."""
+        self._info = info
+        self._stream = None
+        self._take.clear()
+        self.trace = LiveTrace(1000.0 if info is None else info.rate)
+
+    def take_begins(self) -> None:
+        """Keep readings from now on for a new take."""
+        self._take.clear()
+
+    def add(self, live: Live, frame: Frame) -> Load:
+        """Take readings; return how far they load the transducer."""
+        info = self._info
+        if info is None or not len(live.time):
+            return Load()
+        if live.stream != self._stream:
+            self._stream = live.stream
+            self._take.clear()
+            self._tail = _Tail.empty()
+            self.trace.clear()
+        self._keep(live)
+        self.trace.add(live.time, self._channels(live, frame))
+        felt = live.wrench + info.calibration.wrench(np.array([live.zero]), np.zeros(6))
+        return load_of(felt, info.calibration.rated)
+
+    def take(self) -> ReadingBlock:
+        """Return the readings of the take in hand, as a wrench: N, N mm."""
+        lives = list(self._take)
+        if not lives:
+            return ReadingBlock.empty()
+        sequence = np.concatenate([live.sequence for live in lives])
+        return ReadingBlock(
+            sequence,
+            sequence,
+            np.concatenate([live.status for live in lives]),
+            np.concatenate([live.time for live in lives]),
+            np.concatenate([live.received_ns for live in lives]),
+            np.concatenate([live.wrench for live in lives]),
+        )
+
+    def _keep(self, live: Live) -> None:
+        self._take.append(live)
+        while len(self._take) > 1 and live.time[-1] - self._take[0].time[-1] > KEPT:
+            self._take.popleft()
+
+    def _channels(self, live: Live, frame: Frame) -> Array:
+        """Return what is drawn (channels, n); nan where a value means nothing."""
+        wrench = in_face_frame(live.wrench, frame)
+        normal = -wrench[:, 2]
+        tangential = np.hypot(wrench[:, 0], wrench[:, 1])
+        pressed = normal >= FLOOR
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.where(pressed, tangential / normal, np.nan)
+        position = np.where(pressed[:, None], centre_of_pressure(wrench, frame.height), np.nan)
+        self._tail, speed = self._tail.onward(live.time, position)
+        drawn = np.empty((len(CHANNELS), len(normal)))
+        drawn[:6] = wrench.T
+        drawn[6], drawn[7], drawn[8], drawn[9] = normal, tangential, ratio, speed
+        drawn[10:] = position.T
+        return np.where(live.status == 0, drawn, np.nan)
+
+
+class _Tail:
+    """The last moments of the centre of pressure: what the speed of the next reading needs."""
+
+    def __init__(self, time: Array, position: Array) -> None:
+        self._time = time  # (k,)
+        self._position = position  # (k, 2)
+
+    @staticmethod
+    def empty() -> "_Tail":
+        return _Tail(np.empty(0), np.empty((0, 2)))
+
+    def onward(self, time: Array, position: Array) -> tuple["_Tail", Array]:
+        """Return the next tail and the speed (n,) [mm/s] at each of n further readings."""
+        times = np.concatenate([self._time, time])
+        places = np.concatenate([self._position, position])
+        origin = times[0]  # so that sums of times stay exact
+        rows = np.column_stack([np.nan_to_num(places), times - origin])
+        total = np.vstack([np.zeros((1, 3)), np.cumsum(rows, axis=0)])
+        bad = np.concatenate([[0], np.cumsum(np.isnan(places[:, 0]))])
+        ends = np.arange(len(self._time), len(times)) + 1
+        recent = np.searchsorted(times, time - SMOOTH)
+        old_end = np.searchsorted(times, time - LAG)
+        old_start = np.searchsorted(times, time - LAG - SMOOTH)
+        now, known_now = _mean(total, bad, recent, ends)
+        then, known_then = _mean(total, bad, old_start, old_end)
+        moved = now - then
+        with np.errstate(divide="ignore", invalid="ignore"):
+            speed = np.hypot(moved[:, 0], moved[:, 1]) / moved[:, 2]
+        keep = times > (time[-1] - LAG - 2 * SMOOTH)
+        return _Tail(times[keep], places[keep]), np.where(known_now & known_then, speed, np.nan)
+
+
+def _mean(
+    total: Array, bad: NDArray[np.int64], starts: NDArray[np.int64], ends: NDArray[np.int64]
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return means (n, 3) of position and time from `starts` to `ends`, and which have no unknown reading in them."""
+    count = ends - starts
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean = (total[ends] - total[starts]) / count[:, None]
+    return mean, (count > 0) & (bad[ends] == bad[starts])

@@ -1,0 +1,148 @@
+"""The last minute of readings, kept for drawing: a ring, and the least and greatest in each column of pixels."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+CHANNELS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz", "N", "T", "mu", "speed", "x", "y")
+LONGEST = 60.0  # kept for drawing [s]
+GAP = 5.0  # a step in time longer than so many usual ones is a gap, where no reading was counted as lost [-]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Columns:
+    """What is drawn of one stretch of time: the least and the greatest value in each of k columns of pixels.
+
+    `time` (2 k,) [s] holds each column's instant twice, `values` (channels, 2 k) its least and greatest in the order
+    in which the curve passes them. nan where no reading lies in a column: a gap stays a gap.
+    """
+
+    time: Array
+    values: Array
+
+
+class LiveTrace:
+    """A ring of readings. The only thing here that changes; nothing is recorded from it."""
+
+    def __init__(self, rate: float, longest: float = LONGEST) -> None:
+        """Keep `longest` seconds of readings at `rate` [Hz]."""
+        self.rate = rate if np.isfinite(rate) and rate > 0 else 1000.0
+        self._capacity = int(self.rate * longest * 1.05) + 16
+        self._time = np.full(2 * self._capacity, np.nan)
+        self._values = np.full((len(CHANNELS), 2 * self._capacity), np.nan, np.float32)
+        self._end = 0  # one behind the newest; the ring is written from left to right and moved when full
+        self._start = 0
+        self._made = _Made(0.0, 0.0)
+
+    def add(self, time: Array, values: Array) -> None:
+        """Take readings: time (n,) [s, device time, rising] and values (channels, n)."""
+        n = len(time)
+        if n > self._capacity:
+            time, values, n = time[-self._capacity :], values[:, -self._capacity :], self._capacity
+        if self._end + n > len(self._time):
+            kept = min(self._end - self._start, self._capacity - n)
+            source = slice(self._end - kept, self._end)
+            self._time[:kept] = self._time[source].copy()
+            self._values[:, :kept] = self._values[:, source].copy()
+            self._start, self._end = 0, kept
+        self._time[self._end : self._end + n] = time
+        self._values[:, self._end : self._end + n] = values
+        self._end += n
+        self._start = max(self._start, self._end - self._capacity)
+
+    @property
+    def newest(self) -> float | None:
+        """Return the time of the newest reading [s]; None before the first."""
+        return float(self._time[self._end - 1]) if self._end > self._start else None
+
+    def clear(self) -> None:
+        """Forget every reading, as at a new connection."""
+        self._start = self._end = 0
+        self._made = _Made(0.0, 0.0)
+
+    def between(self, first: float, last: float) -> tuple[Array, Array]:
+        """Return time (n,) [s] and values (channels, n) of the readings from `first` to `last` [s]."""
+        a, b = self._positions(first, last)
+        return self._time[a:b], self._values[:, a:b].astype(np.float64)
+
+    def columns(self, first: float, last: float, count: int) -> Columns:
+        """Return about `count` columns of the readings from `first` to `last` [s]; few readings one by one.
+
+        Columns lie at whole multiples of their width from time 0, so that a picture that moves on does not shimmer, and
+        only those that are new since the last call are made: a frame costs the same however long the stretch is.
+        """
+        a, b = self._positions(first, last)
+        if b - a <= 2 * count:
+            return _one_by_one(self._time[a:b], self._values[:, a:b], self.rate)
+        width = (last - first) / count
+        if self._made.width != width or self._made.first > first:
+            self._made = _Made(width, first)
+        begin, _ = self._positions(self._made.open_from, last)
+        self._made = self._made.onward(self._time[begin:b], self._values[:, begin:b], first)
+        return self._made.drawn(self.rate)
+
+    def _positions(self, first: float, last: float) -> tuple[int, int]:
+        kept = self._time[self._start : self._end]
+        a, b = np.searchsorted(kept, [first, last], side="left")
+        return self._start + int(a), self._start + int(b)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Made:
+    """Columns made so far; the newest is open, since readings may still fall into it."""
+
+    width: float  # of a column [s]
+    first: float  # stretch they were begun for [s]
+    numbers: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))  # (k,) time / width
+    pairs: NDArray[np.float32] = field(default_factory=lambda: np.empty((len(CHANNELS), 0), np.float32))  # (c, 2 k)
+
+    @property
+    def open_from(self) -> float:
+        """From which time on readings are needed [s]."""
+        return float(self.numbers[-1]) * self.width if len(self.numbers) else self.first
+
+    def onward(self, time: Array, values: NDArray[np.float32], first: float) -> "_Made":
+        """Return the columns with the readings since `open_from`, without those before `first` [s]."""
+        column = np.floor(time / self.width).astype(np.int64)
+        starts = np.flatnonzero(np.diff(column, prepend=-1) > 0)
+        keep = slice(int(np.searchsorted(self.numbers, first // self.width)), max(len(self.numbers) - 1, 0))
+        old = self.pairs[:, 2 * keep.start : 2 * keep.stop] if keep.stop > keep.start else self.pairs[:, :0]
+        numbers = np.concatenate([self.numbers[keep], column[starts]])
+        return _Made(self.width, first, numbers, np.hstack([old, _pairs(values, starts)]))
+
+    def drawn(self, rate: float) -> Columns:
+        """Return what is drawn of them."""
+        behind = np.flatnonzero(np.diff(self.numbers) > 1 + GAP / (rate * self.width))
+        at = np.repeat((self.numbers.astype(np.float64) + 0.5) * self.width, 2)
+        return _with_gaps(at, self.pairs.astype(np.float64), behind, 2)
+
+
+def _pairs(values: NDArray[np.float32], starts: NDArray[np.int64]) -> NDArray[np.float32]:
+    """Return least and greatest of each group that begins at `starts`, in the order in which the curve passes them."""
+    pairs = np.empty((len(values), 2 * len(starts)), np.float32)
+    if not len(starts):
+        return pairs
+    least = np.fmin.reduceat(values, starts, axis=1)
+    greatest = np.fmax.reduceat(values, starts, axis=1)
+    ends = np.append(starts[1:], values.shape[1]) - 1
+    rising = values[:, ends] >= values[:, starts]
+    pairs[:, 0::2] = np.where(rising, least, greatest)
+    pairs[:, 1::2] = np.where(rising, greatest, least)
+    return pairs
+
+
+def _one_by_one(time: Array, values: NDArray[np.float32], rate: float) -> Columns:
+    gaps = np.flatnonzero(np.diff(time) > GAP / rate)
+    return _with_gaps(time.copy(), values.astype(np.float64), gaps, 1)
+
+
+def _with_gaps(time: Array, values: Array, gaps: NDArray[np.int64], each: int) -> Columns:
+    """Return the columns with a nan behind those named in `gaps`; each column is `each` points."""
+    if not len(gaps):
+        return Columns(time, values)
+    behind = (gaps + 1) * each
+    times: Array = np.insert(time, behind, time[behind])
+    return Columns(times, np.insert(values, behind, np.nan, axis=1))

@@ -1,0 +1,157 @@
+"""What the page of a new session asks for, and what is wrong with it: a sentence for each field. No Qt."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from daq_app.recorder.messages import Kind, People, StartSession
+from sessions.plan import Frame, Hand
+from sessions.protocols import plan, protocol
+from sessions.protocols.protocol import LARGEST_SEED
+from sessions.recording import Recording, RecordingError, Setting
+from sessions.recording.manifest import is_sealed
+from sessions.resuming import check_resumable
+from sessions.toml_file import SettingsError
+
+SHOWN = 20  # sessions that were cut short, at most
+
+
+@dataclass(frozen=True, slots=True)
+class SessionForm:
+    """What stands on the page; everything as it was typed."""
+
+    subject: str = ""
+    protocol: str = "sensotact-friction"
+    study: str = ""
+    folder: str = "recordings"
+    seed: str = ""  # empty: a new one
+    stroking_hand: Hand | None = None
+    answering_hand: Hand | None = None
+    forces: bool = True
+    simulated: bool = False  # the subject's judgement too, where the bench is simulated
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """Why no session can begin: a sentence for each field that is wrong, by its name."""
+
+    sentences: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """What the page needs to know of the bench."""
+
+    connected: bool = False
+    simulated: bool = False
+    frame: Frame | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Unfinished:
+    """A session that was cut short and can go on."""
+
+    folder: Path
+    words: str
+
+
+def checked(
+    form: SessionForm, bench: Bench, now: datetime, new_seed: int, settings: tuple[Setting, ...] = ()
+) -> StartSession | Refused:
+    """Return the request that begins the session, or what is wrong with the form.
+
+    `new_seed` is used where the form names none; `settings` are kept with the session beside the page's own.
+    """
+    wrong = _refusals(form, bench)
+    try:
+        chosen = protocol(form.protocol)
+    except (SettingsError, OSError) as error:
+        return Refused({**wrong, "protocol": _told(error)})
+    if wrong:
+        return Refused(wrong)
+    seed = int(form.seed) if form.seed.strip() else new_seed
+    try:
+        planned = plan(
+            chosen,
+            form.subject.strip(),
+            seed,
+            forces=form.forces,
+            frame=bench.frame if form.forces else None,
+            stroking_hand=form.stroking_hand,
+            answering_hand=form.answering_hand,
+        )
+    except SettingsError as error:
+        return Refused({"subject": _told(error)})
+    folder = session_folder(form, planned.protocol, now)
+    people = People(_kind(form, bench), seed)
+    own = [Setting("seed", seed, "", "set" if form.seed.strip() else "default")]
+    if form.study.strip():
+        own.append(Setting("study", form.study.strip(), "", "set"))
+    return StartSession(planned, str(folder), people, (*own, *settings))
+
+
+def session_folder(form: SessionForm, protocol_name: str, now: datetime) -> Path:
+    """Return the folder the session will be in: a new one for every visit."""
+    name = f"{form.subject.strip()}_{protocol_name}_{now.strftime('%Y%m%dT%H%M%S')}"
+    return Path(form.folder.strip() or ".").expanduser() / form.study.strip() / name
+
+
+def unfinished(folder: Path) -> tuple[Unfinished, ...]:
+    """Return the sessions below a folder (or a study in it) that were cut short, the newest first."""
+    found: list[Unfinished] = []
+    places = sorted((*folder.glob("*/session.sqlite"), *folder.glob("*/*/session.sqlite")), key=_age)
+    for place in places:
+        session = place.parent
+        if len(found) == SHOWN:
+            break
+        if is_sealed(session):
+            continue
+        try:
+            recording = Recording.open(session)
+            check_resumable(recording)
+        except (RecordingError, OSError):
+            continue
+        done = sum(record.outcome != "open" for record in recording.trials)
+        words = f"{recording.plan.subject}: {done} of {len(recording.trials)} trials done"
+        found.append(Unfinished(session, words))
+    return tuple(found)
+
+
+def _age(path: Path) -> float:
+    return -path.stat().st_mtime
+
+
+def _refusals(form: SessionForm, bench: Bench) -> dict[str, str]:
+    wrong: dict[str, str] = {}
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", form.subject.strip()):
+        wrong["subject"] = "Give a code of letters, digits, - and _ (at most 32), never a name."
+    if re.search(r"[/\\]|^\.", form.study.strip()):
+        wrong["study"] = "A study's name has no slash in it and does not begin with a dot."
+    seed = form.seed.strip()
+    if seed and not (seed.isascii() and seed.isdigit() and int(seed) <= LARGEST_SEED):
+        wrong["seed"] = f"A seed is a whole number from 0 to {LARGEST_SEED}; leave it empty for a new one."
+    place = Path(form.folder.strip() or ".").expanduser()
+    existing = next((p for p in (place, *place.parents) if p.exists()), place)
+    if not existing.is_dir():
+        wrong["folder"] = f"{existing} is a file: choose a folder."
+    if form.forces and not bench.connected:
+        wrong["forces"] = "No transducer is connected: connect one, or choose scores only."
+    if form.simulated and form.forces and bench.connected and not bench.simulated:
+        wrong["simulated"] = "Only the simulated bench can be stroked by a simulated subject."
+    return wrong
+
+
+def _kind(form: SessionForm, bench: Bench) -> Kind:
+    if form.simulated:
+        return "simulated people"
+    return "simulated hand" if form.forces and bench.simulated else "people"
+
+
+def _told(error: Exception) -> str:
+    text = str(error)
+    if isinstance(error, OSError) and error.strerror:
+        text = f"{error.filename}: {error.strerror.lower()}"
+    text = " ".join(text.split())
+    return f"{text[:1].upper()}{text[1:]}."

@@ -1,0 +1,164 @@
+"""Small painted things that show a state by shape, word and colour together: lamps, load bars, the stroke's arrow."""
+
+from typing import Literal
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from daq_app.qt.tokens import GRID, Tokens
+from daq_app.view_bench import Bar
+
+Grade = Literal["off", "on", "well", "look", "wrong"]
+
+
+class Lamp(QWidget):
+    """A lamp: a ring when off, a disc when well or recording, a triangle to look at, a square when wrong."""
+
+    def __init__(self, tokens: Tokens, name: str) -> None:
+        """Start switched off; `name` is said to screen readers."""
+        super().__init__()
+        self._tokens = tokens
+        self._grade: Grade = "off"
+        self._name = name
+        self.setFixedSize(2 * GRID + 4, 2 * GRID + 4)
+        self.show_grade("off", "off")
+
+    def show_grade(self, grade: Grade, words: str) -> None:
+        """Show a state and its words."""
+        self.setAccessibleName(f"{self._name}: {words}")
+        self.setToolTip(words)
+        if grade != self._grade:
+            self._grade = grade
+            self.update()
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        self._tokens = tokens
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
+        """Paint the shape of the state."""
+        t = self._tokens
+        colour = {"off": t.quiet, "on": t.record, "well": t.quiet, "look": t.look, "wrong": t.wrong}[self._grade]
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        box = QRectF(self.rect()).adjusted(3, 3, -3, -3)
+        painter.setPen(QPen(QColor(colour), 2))
+        if self._grade != "off":
+            painter.setBrush(QColor(colour))
+        match self._grade:
+            case "look":
+                middle = box.center().x()
+                painter.drawPolygon(
+                    QPolygonF([QPointF(middle, box.top()), box.bottomRight(), box.bottomLeft()]),
+                )
+            case "wrong":
+                painter.drawRect(box)
+            case _:
+                painter.drawEllipse(box)
+
+
+class LoadBar(QWidget):
+    """How far one axis is loaded now, and the most it was loaded since somebody acknowledged it."""
+
+    NAME, NOISE = 72, 84  # widths of the words beside the bar, before the font's scale
+
+    def __init__(self, tokens: Tokens, name: str, scale: float) -> None:
+        """Start empty."""
+        super().__init__()
+        self._tokens = tokens
+        self._scale = scale
+        self._bar = Bar(name, 0.0, 0.0, over=False, noise="")
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setFixedHeight(round(3 * GRID * scale))
+
+    def sizeHint(self) -> QSize:  # noqa: N802  Qt's name
+        """Return the usual size."""
+        return QSize(round(200 * self._scale), self.height())
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        self._tokens = tokens
+        self.update()
+
+    def show_bar(self, bar: Bar) -> None:
+        """Show a load."""
+        if bar == self._bar:
+            return
+        self._bar = bar
+        now = "no rated range" if bar.share is None else f"{100 * bar.share:.0f} % of the rated load"
+        peak = "" if bar.peak is None else f", at most {100 * bar.peak:.0f} %"
+        state = ", OVERLOAD" if bar.over else ""
+        noise = f", noise {bar.noise}" if bar.noise else ""
+        self.setAccessibleName(f"load on {bar.name}: {now}{peak}{state}{noise}")
+        self.setToolTip(self.accessibleName())
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
+        """Paint name, bar, peak and noise."""
+        t, bar = self._tokens, self._bar
+        painter = QPainter(self)
+        left, right = round(self.NAME * self._scale), round(self.NOISE * self._scale)
+        if self.width() < left + right + 40:
+            right = 0
+        colour = QColor(t.wrong if bar.over else t.text)
+        painter.setPen(colour)
+        name = QRectF(0, 0, left - 4, self.height())
+        painter.drawText(name, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, bar.name)
+        track = QRectF(left, self.height() / 2 - 5, max(self.width() - left - right - 4, 8), 10)
+        painter.setPen(QPen(QColor(t.line), 1))
+        painter.setBrush(QColor(t.raised))
+        painter.drawRect(track)
+        if bar.share is not None:
+            filled = track.adjusted(1, 1, -1, -1)
+            filled.setWidth(filled.width() * min(bar.share, 1.0))
+            painter.fillRect(filled, QColor(t.wrong if bar.share >= 1 else t.quiet))
+        if bar.peak is not None:
+            at = track.left() + track.width() * min(bar.peak, 1.0)
+            painter.fillRect(QRectF(at - 1.5, track.top() - 3, 3, track.height() + 6), colour)
+        if right:
+            painter.setPen(QColor(t.wrong if bar.over else t.quiet))
+            words = "OVERLOAD" if bar.over else bar.noise or "–"
+            place = QRectF(self.width() - right + 4, 0, right - 4, self.height())
+            painter.drawText(place, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, words)
+
+
+class Arrow(QWidget):
+    """Which way the stroke goes, as somebody facing the subject's finger from behind sees it: up is away."""
+
+    def __init__(self, tokens: Tokens) -> None:
+        """Start with no arrow."""
+        super().__init__()
+        self._tokens = tokens
+        self._direction = 0
+        self.setFixedSize(5 * GRID, 7 * GRID)
+        self.setAccessibleName("no stroke asked for")
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        self._tokens = tokens
+        self.update()
+
+    def show_direction(self, direction: int) -> None:
+        """Show +1 away from the subject (up), -1 towards the subject (down), 0 nothing."""
+        if direction != self._direction:
+            self._direction = direction
+            words = {1: "stroke away from the subject", -1: "stroke towards the subject", 0: "no stroke asked for"}
+            self.setAccessibleName(words[direction])
+            self.setToolTip(words[direction])
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
+        """Paint the arrow."""
+        if not self._direction:
+            return
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.translate(self.width() / 2, self.height() / 2)
+        painter.scale(1, self._direction)
+        painter.setPen(QPen(QColor(self._tokens.text), 4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+        half = self.height() / 2 - 6
+        painter.drawLine(QPointF(0, half), QPointF(0, -half))
+        painter.drawLine(QPointF(0, -half), QPointF(-12, -half + 14))
+        painter.drawLine(QPointF(0, -half), QPointF(12, -half + 14))

@@ -1,0 +1,153 @@
+"""Colours, sizes and type of the window: one set of tokens for light and dark, and the style sheet made of it."""
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QFont, QFontInfo, QGuiApplication, QPalette
+
+GRID = 8  # everything keeps to multiples of it [device-independent pixels]
+TARGET = 40  # least height of what is clicked or touched
+SMALL, TEXT, TITLE, HEADLINE = 13, 15, 20, 32  # type, before the system's font scale
+USUAL_POINTS = 10.0  # size of a system's interface font that asks for no scaling
+
+# Okabe and Ito's palette, told apart with every common colour blindness.
+FX, FY, N, T, MU, MODEL = "#0072B2", "#E69F00", "#56B4E9", "#D55E00", "#CC79A7", "#009E73"
+
+
+@dataclass(frozen=True, slots=True)
+class Tokens:
+    """One theme."""
+
+    dark: bool
+    ground: str  # of the window
+    surface: str  # of panels
+    raised: str  # of what can be pressed
+    line: str
+    text: str
+    quiet: str  # labels, axes
+    act: str  # the primary button, the focus ring
+    on_act: str
+    wrong: str  # data are being lost or are wrong
+    look: str  # look here
+    record: str  # the recording lamp
+
+    @property
+    def fz(self) -> str:
+        """Fz is drawn in the strongest contrast there is."""
+        return self.text
+
+
+LIGHT = Tokens(
+    dark=False,
+    ground="#eceeef",
+    surface="#f8f9f9",
+    raised="#ffffff",
+    line="#c3c8cb",
+    text="#14181a",
+    quiet="#535c61",
+    act="#0b5a8a",
+    on_act="#ffffff",
+    wrong="#b3261e",
+    look="#8a5a00",
+    record="#c5221f",
+)
+DARK = Tokens(
+    dark=True,
+    ground="#16191b",
+    surface="#1e2224",
+    raised="#2a2f32",
+    line="#454c50",
+    text="#eef1f2",
+    quiet="#a4adb2",
+    act="#7cc4f0",
+    on_act="#0b1a24",
+    wrong="#ff8a80",
+    look="#f3c15c",
+    record="#ff5a52",
+)
+
+
+def current_tokens() -> Tokens:
+    """Return the theme the system asks for."""
+    hints = QGuiApplication.styleHints()
+    scheme = hints.colorScheme()
+    if scheme == Qt.ColorScheme.Unknown:
+        window = QGuiApplication.palette().color(QPalette.ColorRole.Window)
+        return DARK if window.lightness() < 128 else LIGHT
+    return DARK if scheme == Qt.ColorScheme.Dark else LIGHT
+
+
+def font_scale() -> float:
+    """Return how much larger than usual the system wants its type [-], from 1 to 2."""
+    points = QFontInfo(QGuiApplication.font()).pointSizeF()
+    return min(max(points / USUAL_POINTS, 1.0), 2.0) if points > 0 else 1.0
+
+
+def font(size: int, scale: float, *, bold: bool = False) -> QFont:
+    """Return the window's type at a size, with figures that all have the same width."""
+    made = QFont(QGuiApplication.font())
+    made.setPixelSize(round(size * scale))
+    made.setFeature(QFont.Tag.fromString("tnum"), 1)
+    if bold:
+        made.setWeight(QFont.Weight.DemiBold)
+    return made
+
+
+def style_sheet(t: Tokens, scale: float) -> str:
+    """Return the style sheet of every widget of the window."""
+
+    def px(size: float) -> str:
+        return f"{round(size * scale)}px"
+
+    return f"""
+* {{ font-size: {px(TEXT)}; color: {t.text}; }}
+QWidget#window, QDialog, QMainWindow, QStackedWidget, QScrollArea, QScrollArea > QWidget > QWidget {{
+  background: {t.ground}; border: none; }}
+QFrame[role="panel"] {{ background: {t.surface}; border: 1px solid {t.line}; border-radius: 6px; }}
+QFrame[role="strip"] {{ background: {t.surface}; border: 1px solid {t.line}; border-radius: 6px; }}
+QLabel {{ background: transparent; }}
+QLabel[role="quiet"] {{ color: {t.quiet}; font-size: {px(SMALL)}; }}
+QLabel[role="value"] {{ font-size: {px(TEXT)}; }}
+QLabel[role="title"] {{ font-size: {px(TITLE)}; font-weight: 600; }}
+QLabel[role="section"] {{ color: {t.quiet}; font-size: {px(SMALL)}; font-weight: 600; }}
+QLabel[role="headline"] {{ font-size: {px(HEADLINE)}; font-weight: 600; }}
+QLabel[role="simulated"] {{ color: {t.look}; font-weight: 700; border: 2px solid {t.look}; border-radius: 4px;
+  padding: 2px 8px; }}
+QLabel[grade="wrong"] {{ color: {t.wrong}; font-weight: 600; }}
+QLabel[grade="look"] {{ color: {t.look}; font-weight: 600; }}
+QFrame[role="banner"][grade="wrong"] {{ background: {t.wrong}; border-radius: 6px; }}
+QFrame[role="banner"][grade="wrong"] QLabel {{ color: {t.surface}; font-weight: 600; }}
+QFrame[role="banner"][grade="look"] {{ background: {t.surface}; border: 2px solid {t.look}; border-radius: 6px; }}
+QPushButton {{ background: {t.raised}; border: 1px solid {t.line}; border-radius: 6px; min-height: {TARGET - 10}px;
+  padding: 4px 14px; }}
+QPushButton:hover {{ border-color: {t.quiet}; }}
+QPushButton:pressed {{ background: {t.line}; }}
+QPushButton:disabled {{ color: {t.quiet}; background: {t.ground}; border-style: dashed; }}
+QPushButton:focus, QLineEdit:focus, QComboBox:focus, QPlainTextEdit:focus, QListWidget:focus, QRadioButton:focus,
+QTreeWidget:focus, QCheckBox:focus {{ border: 2px solid {t.act}; }}
+QPushButton[role="primary"] {{ background: {t.act}; color: {t.on_act}; border: 2px solid {t.act}; font-weight: 600;
+  font-size: {px(TITLE)}; min-height: {TARGET}px; padding: 8px 28px; }}
+QPushButton[role="primary"]:focus {{ border: 3px solid {t.text}; }}
+QPushButton[role="primary"]:disabled {{ background: {t.ground}; color: {t.quiet}; border: 2px dashed {t.line}; }}
+QPushButton:checked {{ border: 2px solid {t.act}; font-weight: 600; }}
+QPushButton[role="flat"] {{ border: 1px solid transparent; background: transparent; padding: 4px 8px; }}
+QPushButton[role="flat"]:checked {{ border: 2px solid {t.act}; background: {t.raised}; }}
+QPushButton[role="flat"]:focus {{ border: 2px solid {t.act}; }}
+QLineEdit, QComboBox, QSpinBox, QPlainTextEdit {{ background: {t.raised}; border: 1px solid {t.line};
+  border-radius: 4px; padding: 4px 8px; min-height: {TARGET - 12}px; selection-background-color: {t.act};
+  selection-color: {t.on_act}; }}
+QLineEdit[wrong="true"] {{ border: 2px solid {t.wrong}; }}
+QComboBox::drop-down {{ width: 28px; border: none; }}
+QComboBox QAbstractItemView {{ background: {t.raised}; selection-background-color: {t.act};
+  selection-color: {t.on_act}; }}
+QRadioButton, QCheckBox {{ spacing: 10px; min-height: {TARGET - 8}px; padding: 2px 6px; border: 2px solid transparent;
+  border-radius: 4px; background: transparent; }}
+QListWidget, QTreeWidget {{ background: {t.surface}; border: 2px solid transparent; }}
+QScrollBar:vertical {{ background: transparent; width: 12px; }}
+QScrollBar::handle:vertical {{ background: {t.line}; border-radius: 4px; min-height: 24px; margin: 2px; }}
+QScrollBar::add-line:vertical, QScrollBar::sub-line:vertical {{ height: 0; }}
+QScrollBar:horizontal {{ background: transparent; height: 12px; }}
+QScrollBar::handle:horizontal {{ background: {t.line}; border-radius: 4px; min-width: 24px; margin: 2px; }}
+QScrollBar::add-line:horizontal, QScrollBar::sub-line:horizontal {{ width: 0; }}
+QToolTip {{ background: {t.raised}; color: {t.text}; border: 1px solid {t.line}; padding: 4px; }}
+"""

@@ -1,0 +1,137 @@
+"""What the window shows of what it knows: words, numbers and what each button would send. No Qt."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from daq_app import view_bench, view_course, view_subject
+from daq_app.course_state import SessionState
+from daq_app.recorder import messages as m
+from daq_app.state import AppState
+from daq_app.view_bench import BenchView
+from daq_app.view_course import CourseView
+from daq_app.view_subject import SubjectView
+from daq_app.window_messages import Dismissed, Message
+
+SILENT = 3.0  # a recorder that was not heard for longer is said to be silent [s]
+UNSAVED = 3.0  # the recording lamp goes out when nothing became safe for longer [s]
+
+
+@dataclass(frozen=True, slots=True)
+class Lamp:
+    """Whether what happens is being written down; fed by the store's acknowledgement alone."""
+
+    grade: Literal["off", "on", "wrong"]
+    words: str
+    saved: str  # how old the last acknowledged thing is; empty where there is no session
+
+
+@dataclass(frozen=True, slots=True)
+class Banner:
+    """One sentence that stays until its cause is gone."""
+
+    grade: Literal["wrong", "look"]
+    sentence: str
+    action: str = ""  # label of its button; empty where there is none
+    sends: Message | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """Everything the experimenter's window shows, save for the pictures."""
+
+    heading: str
+    simulated: str | None
+    lamp: Lamp
+    banner: Banner | None
+    course: CourseView | None  # None: the page of a new session is shown
+    bench: BenchView
+    subject: SubjectView
+
+
+def derive_view(state: AppState) -> View:
+    """Return what is to be shown of a state."""
+    session = state.session
+    simulated = session.simulated if session else None
+    if session is None and state.bench.info is not None and state.bench.info.simulated:
+        simulated = "SIMULATED transducer"
+    return View(
+        heading="new session" if session is None else f"{session.plan.protocol} · subject {session.plan.subject}",
+        simulated=simulated,
+        lamp=_lamp(state),
+        banner=_banner(state),
+        course=None if session is None else view_course.course_view(session, state.bench, state.now),
+        bench=view_bench.bench_view(state.bench, recording=session is not None and session.end is None),
+        subject=view_subject.subject_view(session),
+    )
+
+
+def _lamp(state: AppState) -> Lamp:
+    session = state.session
+    if session is None:
+        return Lamp("off", "not recording", "")
+    if session.end is not None:
+        return Lamp("off", _ended_words(session), "")
+    running = duration(state.now - session.begun)
+    if session.saved is None:
+        return Lamp("off", f"starting {running}", "nothing saved yet")
+    age = state.now - session.saved
+    saved = f"saved {age:.1f} s ago"
+    if age > UNSAVED or state.gone is not None:
+        return Lamp("wrong", f"NOT RECORDING {running}", saved)
+    return Lamp("on", f"recording {running}", saved)
+
+
+def _ended_words(session: SessionState) -> str:
+    words = {"no": "ended", "running": "ended, being sealed", "sealed": "ended and sealed"}
+    return words[session.sealing]
+
+
+def _banner(state: AppState) -> Banner | None:
+    """Return the worst that is to be said; one at a time."""
+    session, bench = state.session, state.bench
+    running = session is not None and session.end is None
+    if state.gone is not None:
+        kept = f" What was saved until then is in {session.folder}." if session else ""
+        return Banner("wrong", f"The recorder has stopped: {state.gone}.{kept} Start the program again to go on.")
+    if session is not None and session.end is not None and session.end.cause not in ("finished", "aborted", "stopped"):
+        again = m.ResumeSession(session.folder) if session.resumable else None
+        sentence = f"The session was cut short: {session.end.reason}. Everything until then is kept."
+        return Banner("wrong", sentence, "Resume session" if again else "", again)
+    if bench.link == "lost":
+        lost = "" if not running else " Readings are being lost; what came before is kept."
+        return Banner("wrong", f"The transducer does not answer: {bench.problem}.{lost}")
+    if running and state.heard is not None and state.now - state.heard > SILENT:
+        return Banner("wrong", f"Nothing was heard from the recorder for {state.now - state.heard:.0f} s.")
+    if over := bench.peak.over:
+        sentence = f"Overload on {', '.join(over)}: take the load off and check the transducer."
+        return Banner("wrong", sentence, "Acknowledge", m.AcknowledgeOverloads())
+    if state.failed is not None:
+        return Banner("look", sentence_case(state.failed.sentence), "Dismiss", Dismissed())
+    if state.drawing is not None:
+        return Banner(
+            "look", f"A picture could not be drawn ({state.drawing}); the recording goes on.", "Dismiss", Dismissed()
+        )
+    if bench.link == "none" and bench.problem is not None:
+        return Banner("look", f"No transducer: {bench.problem}")
+    return None
+
+
+def duration(seconds: float) -> str:
+    """Return a time as hours, minutes and seconds.
+
+    >>> duration(761.4)
+    '00:12:41'
+    """
+    whole = max(int(seconds), 0)
+    return f"{whole // 3600:02d}:{whole // 60 % 60:02d}:{whole % 60:02d}"
+
+
+def sentence_case(sentence: str) -> str:
+    """Return a sentence with a capital and a full stop, as it stands alone.
+
+    >>> sentence_case("there is no driver 'x'")
+    "There is no driver 'x'."
+    """
+    text = sentence.strip()
+    text = text[:1].upper() + text[1:]
+    return text if text.endswith((".", "!", "?")) else f"{text}."

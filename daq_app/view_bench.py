@@ -1,0 +1,174 @@
+"""The bench as the experimenter sees it: which transducer, whether it is well, how far it is loaded."""
+
+from dataclasses import asdict, dataclass
+from math import isfinite
+from typing import Literal
+
+from daq_app.bench_load import AXES
+from daq_app.bench_state import BenchState
+from daq_app.recorder import messages as m
+from daq_app.window_messages import Message
+
+UNITS = ("N", "N", "N", "N mm", "N mm", "N mm")
+COUNTED = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated")
+LAGGING = 100.0  # a reading handed over later than this is worth a look [ms]
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceRow:
+    """A transducer that can be connected."""
+
+    uri: str
+    name: str
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """How far one axis, or all together, is loaded."""
+
+    name: str
+    share: float | None  # now; 1 is the rated load; None where no range is stated
+    peak: float | None  # since somebody acknowledged
+    over: bool
+    noise: str  # standard deviation with its unit
+
+
+@dataclass(frozen=True, slots=True)
+class BenchView:
+    """Everything about the bench."""
+
+    lamp: Literal["off", "well", "look", "wrong"]
+    lamp_words: str
+    name: str
+    serial: str
+    calibration: str
+    rate: str
+    counters: tuple[tuple[str, str], ...]
+    bars: tuple[Bar, ...]
+    tare: str  # its figures
+    drift: str
+    devices: tuple[DeviceRow, ...]
+    searching: bool
+    uri: str
+    connect: Message | None  # what Disconnect or Connect would send; None while neither is possible
+    can_tare: bool
+    can_acknowledge: bool
+
+
+def bench_view(bench: BenchState, *, recording: bool) -> BenchView:
+    """Return what is shown of the bench; while a session is recorded it is neither disconnected nor tared."""
+    info = bench.info
+    lamp, words = _lamp(bench)
+    open_now = bench.link == "open"
+    noted = bench.zero is not None
+    return BenchView(
+        lamp=lamp,
+        lamp_words=words,
+        name="no transducer" if info is None else info.model,
+        serial="–" if info is None else info.serial,
+        calibration="–" if info is None else info.calibration.source,
+        rate=_rate(bench),
+        counters=_counters(bench),
+        bars=_bars(bench),
+        tare=_tare(bench),
+        drift=_drift(bench) if noted else "–",
+        devices=_devices(bench),
+        searching=bench.searching,
+        uri=bench.uri,
+        connect=m.Disconnect() if open_now and not recording else None,
+        can_tare=open_now and not recording and not bench.taring,
+        can_acknowledge=bool(bench.peak.over or bench.saturated),
+    )
+
+
+def _lamp(bench: BenchState) -> tuple[Literal["off", "well", "look", "wrong"], str]:
+    match bench.link:
+        case "none":
+            return "off", "not connected"
+        case "connecting":
+            return "look", "connecting"
+        case "lost":
+            return "wrong", "does not answer"
+        case "open":
+            pass
+    if bench.peak.over:
+        return "wrong", "overloaded"
+    if bench.saturated:
+        return "wrong", "invalid readings"
+    counts = asdict(bench.health)
+    troubles = [name for name in COUNTED if counts[name]]
+    if troubles:
+        return "look", ", ".join(f"{counts[name]} {name}" for name in troubles)
+    if bench.health.lag_ms > LAGGING:
+        return "look", f"{bench.health.lag_ms:.0f} ms late"
+    return "well", "nothing lost"
+
+
+def _rate(bench: BenchState) -> str:
+    if bench.info is None:
+        return "–"
+    asked = f"{bench.info.rate:.0f}" if isfinite(bench.info.rate) else "unknown"
+    measured = f"{bench.rate:.0f}" if isfinite(bench.rate) else "–"
+    return f"{measured} Hz (set {asked})"
+
+
+def _counters(bench: BenchState) -> tuple[tuple[str, str], ...]:
+    counts = asdict(bench.health)
+    rows = [("received", f"{counts['received']}")]
+    rows += [(name, f"{counts[name]}") for name in COUNTED]
+    return (*rows, ("lag", f"{bench.health.lag_ms:.0f} ms"))
+
+
+def _bars(bench: BenchState) -> tuple[Bar, ...]:
+    over = set(bench.peak.over)
+    noise = [""] * 6 if bench.zero is None else [_noise(n, u) for n, u in zip(bench.zero.noise, UNITS, strict=True)]
+    rows = zip(AXES, bench.load.axes, bench.peak.axes, noise, strict=True)
+    bars = [Bar(name, _share(now), _share(peak), name in over, text) for name, now, peak, text in rows]
+    all_together = Bar("combined", _share(bench.load.combined), _share(bench.peak.combined), "combined" in over, "")
+    return (*bars, all_together)
+
+
+def _share(value: float) -> float | None:
+    return value if isfinite(value) else None
+
+
+def _noise(value: float, unit: str) -> str:
+    """Return a standard deviation in the smaller unit, two digits.
+
+    >>> _noise(0.0042, "N"), _noise(0.052, "N mm")
+    ('4.2 mN', '0.052 N mm')
+    """
+    return f"{1000 * value:.2g} mN" if unit == "N" else f"{value:.2g} {unit}"
+
+
+def _tare(bench: BenchState) -> str:
+    if bench.taring:
+        return "being measured: hands off"
+    if bench.zero is None:
+        return "not measured"
+    fx, fy, fz = bench.zero.mean[:3]
+    return f"Fx {_mn(fx)}, Fy {_mn(fy)}, Fz {_mn(fz)} mN"
+
+
+def _drift(bench: BenchState) -> str:
+    if bench.zero is None or bench.first_zero is None:
+        return "–"
+    if bench.zero is bench.first_zero:
+        return "first zero"
+    moved = max(abs(a - b) for a, b in zip(bench.zero.mean[:3], bench.first_zero.mean[:3], strict=True))
+    return f"{1000 * moved:.0f} mN since the first"
+
+
+def _mn(newtons: float) -> str:
+    return f"{1000 * newtons:.0f}".replace("-", "−")
+
+
+def _devices(bench: BenchState) -> tuple[DeviceRow, ...]:
+    rows = [DeviceRow("sim:", "Simulated bench", "always there")]
+    for found in bench.found:
+        if found.info is not None:
+            info = found.info
+            detail = f"serial {info.serial} · {info.calibration.source}"
+            rows.append(DeviceRow(found.uri, info.model, detail))
+    return tuple(rows)

@@ -1,0 +1,210 @@
+"""The course of a session as the experimenter sees it: what to do now, the plan, and the last stroke."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from daq_app.bench_state import BenchState
+from daq_app.course_state import SessionState, TrialState
+from daq_app.recorder import messages as m
+from daq_app.stroke_quality import Quality
+from daq_app.window_messages import Message, NewSession
+from sessions import steps
+from sessions.plan import PROXIMAL_TO_DISTAL, Trial
+
+WAYS = {1: "away from the subject", -1: "towards the subject"}
+TO_BE_REDONE = frozenset({"mounting", "taring", "ready", "stroking", "scoring", "closing"})
+IN_A_TRIAL = frozenset({"mounting", "taring", "ready", "stroking", "scoring"})
+
+
+@dataclass(frozen=True, slots=True)
+class Button:
+    """Something the experimenter can do."""
+
+    label: str
+    key: str
+    enabled: bool = True
+    sends: Message | None = None  # None: it opens something in the window, such as the line for a reason
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRow:
+    """A line of the plan: a block's heading, or a trial."""
+
+    kind: Literal["block", "done", "current", "coming", "skipped"]
+    mark: str  # shape that tells the kind without colour
+    name: str
+    found: str = ""  # what came of it
+
+
+@dataclass(frozen=True, slots=True)
+class StrokeView:
+    """What is said of the last stroke."""
+
+    grade: Literal["none", "good", "doubtful", "refused"]
+    words: str
+    details: str = ""  # at length, for a hover or a screen reader
+    redo: steps.Redo | None = None  # sent by one key where something is wrong
+
+
+@dataclass(frozen=True, slots=True)
+class CourseView:
+    """Everything about the course."""
+
+    headline: str
+    primary: Button | None
+    direction: int  # of the stroke to be made: +1 away from the subject, -1 towards, 0 where none is in hand
+    timer: str  # how long it has been waited for what is asked
+    told: str
+    rows: tuple[PlanRow, ...]
+    stroke: StrokeView
+    redo: Button
+    skip: Button
+    pause: Button
+    note: Button
+    end: Button
+
+
+def course_view(session: SessionState, bench: BenchState, now: float) -> CourseView:
+    """Return what is shown of a session."""
+    headline, primary = _to_do(session, bench)
+    over = session.end is not None
+    stroke = _stroke(session)
+    trial = session.of(session.trial)
+    takes_before = trial is not None and trial.takes > 0
+    redo = session.phase in TO_BE_REDONE and (session.trial != 1 or takes_before)
+    return CourseView(
+        headline=headline,
+        primary=primary,
+        direction=trial.trial.direction if trial is not None and session.phase in IN_A_TRIAL else 0,
+        timer="" if over else _clock(now - session.since),
+        told=session.told or "",
+        rows=_rows(session),
+        stroke=stroke,
+        redo=Button("Redo", "R", redo, stroke.redo if redo else None),
+        skip=Button("Skip", "S", session.phase in IN_A_TRIAL),
+        pause=_pause(session),
+        note=Button("Note", "N", not over),
+        end=Button("New session", "Ctrl+N", sends=NewSession()) if over else Button("End session", "Ctrl+E"),
+    )
+
+
+def _to_do(session: SessionState, bench: BenchState) -> tuple[str, Button | None]:
+    """Return the one sentence, and the one button that does what it says."""
+    trial = session.of(session.trial)
+    code = "" if trial is None else trial.trial.stimulus.code
+    match session.phase:
+        case "idle" if bench.link == "lost":
+            return "Wait: the transducer does not answer.", None
+        case "idle":
+            return "Everything is set up. Press Space to begin.", Button("Begin", "Space", sends=steps.Begin())
+        case "mounting" if trial is not None:
+            then = "to zero" if session.plan.forces else "to go on"
+            sentence = f"Mount sample {code}, its arrow {WAYS[trial.trial.direction]}. Then press Space {then}."
+            label = "Zero" if session.plan.forces else "Mounted"
+            return sentence, Button(label, "Space", sends=steps.StimulusMounted(code))
+        case "taring":
+            return f"Hands off: zero is being measured with sample {code} on.", None
+        case "ready" if trial is not None:
+            return _stroke_sentence(session, trial.trial), _stroke_button(session)
+        case "stroking":
+            return f"Stroke on {code} is being recorded.", None
+        case "scoring":
+            return f"The subject scores sample {code}.", None
+        case "paused":
+            return "Paused. Press Space to go on.", Button("Resume", "Space", sends=steps.Resume())
+        case "closing":
+            finish = Button("End session", "Space", sends=steps.Finish())
+            return "Every trial is done. Press Space to end the session.", finish
+        case _:
+            return _ended(session)
+
+
+def _stroke_sentence(session: SessionState, trial: Trial) -> str:
+    hand = session.plan.stroking_hand
+    finger = f"{hand} index finger" if hand else "index finger"
+    way = "away from the body" if trial.direction == PROXIMAL_TO_DISTAL else "towards the body"
+    sentence = f"Subject strokes {trial.stimulus.code} once, {way}, with the {finger}."
+    return sentence if session.plan.forces else f"{sentence} Then press Space."
+
+
+def _stroke_button(session: SessionState) -> Button | None:
+    return None if session.plan.forces else Button("Stroke done", "Space", sends=steps.StrokeDone())
+
+
+def _ended(session: SessionState) -> tuple[str, Button | None]:
+    end = session.end
+    if end is None:
+        return "The session is being ended.", None
+    if session.resumable:
+        resume = Button("Resume session", "Space", sends=m.ResumeSession(session.folder))
+        return "The session was cut short and can go on at the same trial.", resume
+    done = sum(t.outcome == "done" for t in session.trials)
+    sentence = f"Session ended: {done} of {len(session.trials)} trials done. It is kept in {session.folder}."
+    return sentence, Button("New session", "Space", sends=NewSession())
+
+
+def _pause(session: SessionState) -> Button:
+    if session.phase == "paused":
+        return Button("Resume", "P", sends=steps.Resume())
+    return Button("Pause", "P", session.phase in IN_A_TRIAL, steps.Pause())
+
+
+def _rows(session: SessionState) -> tuple[PlanRow, ...]:
+    rows: list[PlanRow] = []
+    for block in session.plan.blocks:
+        way = "proximal → distal" if block.direction == PROXIMAL_TO_DISTAL else "distal → proximal"
+        rows.append(PlanRow("block", "", block.name, way))
+        numbers = {trial.number for trial in block.trials}
+        rows += [_row(session, trial) for trial in session.trials if trial.trial.number in numbers]
+    return tuple(rows)
+
+
+def _row(session: SessionState, trial: TrialState) -> PlanRow:
+    name = f"{trial.trial.number}  {trial.trial.stimulus.code}"
+    if trial.trial.number == session.trial and session.phase != "ended":
+        again = f"take {trial.takes}" if trial.takes > 1 else ""
+        return PlanRow("current", "▶", name, again)
+    if trial.outcome == "skipped":
+        return PlanRow("skipped", "–", name, "skipped")
+    if trial.outcome == "coming":
+        return PlanRow("coming", " ", name)
+    score = f"score {trial.score:.0f}" if trial.score is not None else "no answer"
+    found = [score if trial.quality is None else f"{_mu(trial.quality)}   {score}"]
+    if trial.quality is not None and trial.quality.words:
+        found.append("!")
+    return PlanRow("done", "✓", name, "  ".join(found))
+
+
+def _mu(quality: Quality) -> str:
+    """Return the coefficient as its interval: no digit more than is known."""
+    if quality.mu is None:
+        return "µ –"
+    if quality.interval is None:
+        return f"µ {quality.mu:.2f}"
+    low, high = quality.interval
+    return f"µ {low:.2f}–{high:.2f}" if f"{low:.2f}" != f"{high:.2f}" else f"µ {quality.mu:.2f}"
+
+
+def _stroke(session: SessionState) -> StrokeView:
+    judged = session.of(session.judged)
+    if judged is None or judged.quality is None:
+        return StrokeView("none", "No stroke yet.")
+    quality, code = judged.quality, judged.trial.stimulus.code
+    parts = [f"Stroke on {code}"]
+    if quality.steady is not None:
+        parts.append(f"steady {quality.steady[1] - quality.steady[0]:.1f} s")
+    if quality.mu is not None:
+        parts.append(_mu(quality))
+    if quality.speed is not None:
+        parts.append(f"{quality.speed:.0f} mm/s")
+    if quality.fell is not None:
+        parts.append(f"N fell {100 * quality.fell:.0f} %")
+    parts.append("good" if quality.grade == "good" else "; ".join(quality.words))
+    still_mounted = judged.trial.number == session.trial or session.phase in ("mounting", "closing")
+    redo = steps.Redo(quality.words[0]) if quality.words and still_mounted else None
+    return StrokeView(quality.grade, " · ".join(parts), " ".join(quality.sentences), redo)
+
+
+def _clock(seconds: float) -> str:
+    whole = max(int(seconds), 0)
+    return f"{whole // 60}:{whole % 60:02d}"

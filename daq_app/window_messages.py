@@ -1,0 +1,64 @@
+"""What the window tells its own state, beside what goes to and comes from the recorder."""
+
+from dataclasses import dataclass
+
+from daq_app.bench_load import Load
+from daq_app.recorder import messages as m
+from daq_app.stroke_quality import Quality
+from drivers.catalog import Found
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """Time has passed."""
+
+    now: float  # [s] of the machine's monotonic clock
+
+
+@dataclass(frozen=True, slots=True)
+class Searching:
+    """Devices are being looked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class DevicesFound:
+    """What answered when devices were looked for."""
+
+    found: tuple[Found, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """How far the readings that have just come load the transducer."""
+
+    load: Load
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """The last stroke was looked at."""
+
+    trial: int
+    take: int
+    quality: Quality
+
+
+@dataclass(frozen=True, slots=True)
+class Dismissed:
+    """The experimenter has read the sentence of a failure."""
+
+
+@dataclass(frozen=True, slots=True)
+class NewSession:
+    """The experimenter leaves a session that has ended, for the page where the next is begun."""
+
+
+@dataclass(frozen=True, slots=True)
+class DrawingFailed:
+    """A picture could not be drawn; the recording is not touched by it."""
+
+    sentence: str
+
+
+Own = Tick | Searching | DevicesFound | Loaded | Judged | Dismissed | NewSession | DrawingFailed
+Message = m.Request | m.Report | Own  # what `fold` takes
