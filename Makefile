@@ -1,12 +1,15 @@
-# Two jobs on a fresh machine: `make demo` and `make test`. Neither sets anything up twice.
+# Two jobs on a fresh machine: `make demo` and `make test`; `make app` opens the window. None sets anything up twice.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
 
-.PHONY: demo test test-long setup
+.PHONY: app demo test test-long setup
 demo: $(READY)
 	$(BIN)/daq-app demo
+
+app: $(READY)
+	$(BIN)/daq-app
 
 test: $(READY)
 	@$(BIN)/python tests/run.py

@@ -61,7 +61,13 @@ class SessionState:
     saved: float | None = None  # when the window heard of it [s]
     end: SessionEnd | None = None
     resumable: bool = False
+    broken: str | None = None  # why nothing is recorded any more, where no end could be written
     sealing: Literal["no", "running", "sealed"] = "no"
+
+    @property
+    def over(self) -> bool:
+        """Say whether nothing is recorded any more."""
+        return self.end is not None or self.broken is not None
 
     def of(self, number: int | None) -> TrialState | None:
         """Return the trial of that number."""
@@ -101,6 +107,8 @@ def _after(session: SessionState, message: Message, now: float) -> SessionState:
             return _judged(session, trial, take, quality)
         case m.SessionEnded(_, end, resumable):
             return replace(session, end=end, phase="ended", asked=None, resumable=resumable)
+        case m.Failed(request, sentence) if request in ("StartSession", "ResumeSession") and not session.over:
+            return replace(session, broken=sentence, phase="ended", asked=None)
         case m.Sealing():
             return replace(session, sealing="running")
         case m.Sealed():

@@ -40,7 +40,7 @@ def _of_the_session(state: AppState, message: Message) -> AppState:
             return replace(state, session=session_begun(message, state.now), failed=None)
         case m.StartSession() | m.ResumeSession():
             return replace(state, failed=None)
-        case NewSession() if state.session is not None and state.session.end is not None:
+        case NewSession() if state.session is not None and state.session.over:
             return replace(state, session=None)
         case m.Failed():
             return replace(state, failed=message)

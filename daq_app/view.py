@@ -60,7 +60,7 @@ def derive_view(state: AppState) -> View:
         lamp=_lamp(state),
         banner=_banner(state),
         course=None if session is None else view_course.course_view(session, state.bench, state.now),
-        bench=view_bench.bench_view(state.bench, recording=session is not None and session.end is None),
+        bench=view_bench.bench_view(state.bench, recording=session is not None and not session.over),
         subject=view_subject.subject_view(session),
     )
 
@@ -69,6 +69,8 @@ def _lamp(state: AppState) -> Lamp:
     session = state.session
     if session is None:
         return Lamp("off", "not recording", "")
+    if session.broken is not None:
+        return Lamp("wrong", "NOT RECORDING", "")
     if session.end is not None:
         return Lamp("off", _ended_words(session), "")
     running = duration(state.now - session.begun)
@@ -89,10 +91,14 @@ def _ended_words(session: SessionState) -> str:
 def _banner(state: AppState) -> Banner | None:
     """Return the worst that is to be said; one at a time."""
     session, bench = state.session, state.bench
-    running = session is not None and session.end is None
+    running = session is not None and not session.over
     if state.gone is not None:
         kept = f" What was saved until then is in {session.folder}." if session else ""
-        return Banner("wrong", f"The recorder has stopped: {state.gone}.{kept} Start the program again to go on.")
+        again = m.ResumeSession(session.folder) if running and session is not None else None
+        return Banner("wrong", f"{sentence_case(state.gone)}{kept}", "Resume session" if again else "", again)
+    if session is not None and session.broken is not None:
+        sentence = f"The recording has stopped: {session.broken}. What was saved until then is in {session.folder}."
+        return Banner("wrong", sentence)
     if session is not None and session.end is not None and session.end.cause not in ("finished", "aborted", "stopped"):
         again = m.ResumeSession(session.folder) if session.resumable else None
         sentence = f"The session was cut short: {session.end.reason}. Everything until then is kept."

@@ -67,7 +67,7 @@ class CourseView:
 def course_view(session: SessionState, bench: BenchState, now: float) -> CourseView:
     """Return what is shown of a session."""
     headline, primary = _to_do(session, bench)
-    over = session.end is not None
+    over = session.over
     stroke = _stroke(session)
     trial = session.of(session.trial)
     takes_before = trial is not None and trial.takes > 0
@@ -132,8 +132,7 @@ def _stroke_button(session: SessionState) -> Button | None:
 
 
 def _ended(session: SessionState) -> tuple[str, Button | None]:
-    end = session.end
-    if end is None:
+    if not session.over:
         return "The session is being ended.", None
     if session.resumable:
         resume = Button("Resume session", "Space", sends=m.ResumeSession(session.folder))

@@ -1,0 +1,62 @@
+"""One answer on the line from 0 to 100 as it is given: every position with its time, and its corrections."""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from sessions.plan import Hand
+from sessions.steps import Scored
+
+Device = Literal["mouse", "touch", "pen", "keyboard"]
+
+MIDDLE = 50.0  # where the first key press puts the mark, whichever key it is
+STEP = 1.0  # an arrow moves the mark by so much ...
+LEAP = 10.0  # ... and Page Up or Page Down by this
+PAUSE = 1.0  # key presses further apart than this are two answers, not one [s]
+DIGITS = 1  # of a score: a mark can be placed no finer
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """An answer so far; empty until the line was touched."""
+
+    positions: tuple[tuple[float, float], ...] = ()  # (session clock [s], 0 to 100)
+    corrections: int = 0  # how often an answer that stood was changed
+    device: Device | None = None  # that gave the last position
+    held: bool = False  # a finger or button is down
+
+    @property
+    def score(self) -> float | None:
+        """Return where the mark stands; None before the first touch."""
+        return round(self.positions[-1][1], DIGITS) if self.positions else None
+
+    def pressed(self, time: float, position: float, device: Device) -> "Answer":
+        """Return the answer after the line was touched, clicked or tapped on [s, 0 to 100]."""
+        again = self.corrections + bool(self.positions)
+        return replace(self._moved(time, position, device), corrections=again, held=True)
+
+    def dragged(self, time: float, position: float, device: Device) -> "Answer":
+        """Return the answer after what is held down has moved; one answer, however far it goes."""
+        return self._moved(time, position, device) if self.held else self
+
+    def released(self) -> "Answer":
+        """Return the answer after the finger or button has left."""
+        return replace(self, held=False)
+
+    def stepped(self, time: float, by: float) -> "Answer":
+        """Return the answer after a key moved the mark by so much; the first key puts it in the middle."""
+        if not self.positions:
+            return self._moved(time, MIDDLE, "keyboard")
+        last, before = self.positions[-1]
+        again = self.corrections + (time - last > PAUSE or self.device != "keyboard")
+        return replace(self._moved(time, before + by, "keyboard"), corrections=again)
+
+    def scored(self, hand: Hand | None) -> Scored:
+        """Return the event of an answer that is given."""
+        first = self.positions[0][0] if self.positions else None
+        return Scored(self.score, self.positions, first, self.corrections, hand, self.device)
+
+    def _moved(self, time: float, position: float, device: Device) -> "Answer":
+        place = min(max(position, 0.0), 100.0)
+        if self.positions and self.positions[-1][1] == place:
+            return replace(self, device=device)
+        return replace(self, positions=(*self.positions, (time, place)), device=device)

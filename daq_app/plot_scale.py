@@ -1,0 +1,56 @@
+"""The scale of a live plot: it stays until the data leave it, and then steps."""
+
+from dataclasses import dataclass
+
+STEPS = (1.0, 2.0, 5.0)
+SHRINK = 0.25  # a scale of which no more than this share is used ...
+PATIENCE = 20.0  # ... for so long is taken back [s]
+
+
+@dataclass(frozen=True, slots=True)
+class PlotScale:
+    """From `low` to `high`; both 0, or a step: 1, 2 or 5 times a power of ten."""
+
+    low: float
+    high: float
+    least: float  # the smallest span that is shown [unit of the data]
+    used: float = 0.0  # when the scale was last needed [s]
+
+    def following(self, least: float, greatest: float, now: float) -> "PlotScale":
+        """Return the scale after data from `least` to `greatest` were shown at `now` [s].
+
+        >>> scale = PlotScale(0.0, 5.0, 5.0)
+        >>> scale.following(0.0, 4.9, 0.0).high, scale.following(0.0, 5.1, 0.0).high
+        (5.0, 10.0)
+        >>> PlotScale(0.0, 20.0, 5.0).following(0.0, 1.0, 30.0).high
+        5.0
+        """
+        if not (least <= greatest):  # nothing is known
+            return self
+        if greatest > self.high or least < self.low:
+            return PlotScale(min(self.low, -_step(-least)), max(self.high, _step(greatest)), self.least, now)
+        wide = self.high - self.low > self.least
+        if not wide or greatest > SHRINK * self.high or least < SHRINK * self.low:
+            return PlotScale(self.low, self.high, self.least, now)
+        if now - self.used < PATIENCE:
+            return self
+        low = 0.0 if self.low == 0.0 else -max(_step(-least), self.least / 2)
+        return PlotScale(low, max(_step(greatest), self.least if low == 0.0 else self.least / 2), self.least, now)
+
+
+def _step(value: float) -> float:
+    """Return the smallest step that is not below a value; 0 for none.
+
+    >>> _step(0.3), _step(5.1), _step(-2.0)
+    (0.5, 10.0, 0.0)
+    """
+    if value <= 0.0:
+        return 0.0
+    power = 10.0
+    while power > value:
+        power /= 10.0
+    while True:
+        for step in STEPS:
+            if step * power >= value * (1 - 1e-9):
+                return float(f"{step * power:.6g}")
+        power *= 10.0

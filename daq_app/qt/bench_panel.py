@@ -1,0 +1,220 @@
+"""The bench: which transducer, whether it is well, how far it is loaded; or, where there is little room, its lamps."""
+
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QComboBox,
+    QFrame,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QScrollArea,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
+
+from daq_app.bench_load import AXES
+from daq_app.qt.indicators import Lamp, LoadBar
+from daq_app.qt.parts import button, label, regrade, say
+from daq_app.qt.tokens import GRID, Tokens
+from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
+from daq_app.view_bench import BenchView
+from daq_app.window_messages import Message
+
+SHOWN_COUNTERS = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated", "lag")
+
+
+class BenchPanel(QFrame):
+    """The right of the experimenter's window."""
+
+    def __init__(
+        self, tokens: Tokens, scale: float, send: Callable[[Message], None], search: Callable[[], None]
+    ) -> None:
+        """Show no transducer; `send` takes what is asked for, `search` looks for devices."""
+        super().__init__()
+        self.setProperty("role", "panel")
+        self.setAccessibleName("bench")
+        self._send = send
+        self._view: BenchView | None = None
+        self._lamp = Lamp(tokens, "transducer")
+        self._lamp_words = label("not connected", wrap=True)
+        self._fields = {name: label("–", wrap=True) for name in ("serial", "calibration", "rate", "tare", "drift")}
+        self._name = label("no transducer", "title", wrap=True)
+        self._counters = {name: label("0") for name in SHOWN_COUNTERS}
+        self._bars = {name: LoadBar(tokens, name, scale) for name in (*AXES, "combined")}
+        self._choice = QComboBox()
+        self._choice.setAccessibleName("transducer to connect: choose one, or type its address")
+        self._choice.setEditable(True)
+        self._choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.search = button("Search", "search for transducers", search)
+        self.connect_button = button("Connect", "connect the chosen transducer", self._connect)
+        self.tare = button("Zero  T", "measure the zero of the bench", lambda: send(Tare()))
+        self.acknowledge = button(
+            "Acknowledge  A", "acknowledge overloads: begin to watch anew", lambda: send(AcknowledgeOverloads())
+        )
+        self._content = self._built()
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(2, 2, 2, 2)
+        layout.addWidget(self._content)
+
+    def show_view(self, view: BenchView) -> None:
+        """Show the bench."""
+        before, self._view = self._view, view
+        if view == before:
+            return
+        self._lamp.show_grade(view.lamp, view.lamp_words)
+        say(self._lamp_words, view.lamp_words)
+        regrade(self._lamp_words, view.lamp if view.lamp in ("wrong", "look") else "")
+        say(self._name, view.name)
+        for name, text in (
+            ("serial", view.serial),
+            ("calibration", view.calibration),
+            ("rate", view.rate),
+            ("tare", view.tare),
+            ("drift", view.drift),
+        ):
+            say(self._fields[name], text)
+        for name, text in view.counters:
+            if name in self._counters:
+                say(self._counters[name], text)
+                regrade(self._counters[name], "look" if name != "lag" and text != "0" else "")
+        for bar in view.bars:
+            self._bars[bar.name].show_bar(bar)
+        if before is None or before.devices != view.devices:
+            self._show_devices(view)
+        self.search.setText("Searching" if view.searching else "Search")
+        self.search.setEnabled(not view.searching)
+        self.connect_button.setText("Disconnect" if view.lamp not in ("off",) else "Connect")
+        self.connect_button.setAccessibleName(self.connect_button.text() + " the transducer")
+        self.connect_button.setEnabled(view.lamp == "off" or view.connect is not None)
+        self._choice.setEnabled(view.lamp == "off")
+        self.tare.setEnabled(view.can_tare)
+        self.acknowledge.setEnabled(view.can_acknowledge)
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        self._lamp.set_tokens(tokens)
+        for bar in self._bars.values():
+            bar.set_tokens(tokens)
+
+    def _connect(self) -> None:
+        view = self._view
+        if view is not None and view.connect is not None:
+            self._send(view.connect)
+        elif uri := self._chosen():
+            self._send(Connect(uri))
+
+    def _chosen(self) -> str:
+        """Return the address chosen or typed."""
+        text = self._choice.currentText().strip()
+        at = self._choice.findText(text)
+        return text if at < 0 else str(self._choice.itemData(at))
+
+    def _show_devices(self, view: BenchView) -> None:
+        typed = self._chosen()
+        self._choice.clear()
+        for device in view.devices:
+            self._choice.addItem(f"{device.name} · {device.detail}", device.uri)
+        at = self._choice.findData(view.uri or typed or "sim:")
+        self._choice.setCurrentIndex(max(at, 0))
+        if (typed_in := self._choice.lineEdit()) is not None:
+            typed_in.setCursorPosition(0)
+
+    def _built(self) -> QWidget:
+        inside = QWidget()
+        layout = QVBoxLayout(inside)
+        layout.setContentsMargins(int(1.5 * GRID), GRID, int(1.5 * GRID), GRID)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._name)
+        lamp = QHBoxLayout()
+        lamp.addWidget(self._lamp, 0, Qt.AlignmentFlag.AlignTop)
+        lamp.addWidget(self._lamp_words, 1)
+        layout.addLayout(lamp)
+        layout.addLayout(_rows([(name, self._fields[name]) for name in ("serial", "calibration", "rate")]))
+        layout.addWidget(label("Load: share of the rated range, most since acknowledged, noise", "section", wrap=True))
+        for bar in self._bars.values():
+            layout.addWidget(bar)
+        layout.addWidget(self.acknowledge)
+        layout.addWidget(label("Zero", "section"))
+        layout.addLayout(_rows([("zero", self._fields["tare"]), ("drift", self._fields["drift"])]))
+        layout.addWidget(self.tare)
+        layout.addWidget(label("Readings since the stream began", "section", wrap=True))
+        layout.addLayout(_counters([(name, self._counters[name]) for name in SHOWN_COUNTERS]))
+        layout.addStretch(1)
+        layout.addWidget(label("Transducer", "section"))
+        layout.addWidget(self._choice)
+        row = QHBoxLayout()
+        row.addWidget(self.connect_button, 1)
+        row.addWidget(self.search, 1)
+        layout.addLayout(row)
+        scroll = QScrollArea()
+        scroll.setWidget(inside)
+        scroll.setWidgetResizable(True)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        inside.setObjectName("inside")
+        scroll.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")
+        return scroll
+
+
+class BenchStrip(QFrame):
+    """The bench folded: a lamp, and a short bar for each axis."""
+
+    def __init__(self, tokens: Tokens, scale: float, unfold: Callable[[], None]) -> None:
+        """Show no transducer; `unfold` shows the bench whole."""
+        super().__init__()
+        self.setProperty("role", "strip")
+        self.setAccessibleName("bench, folded")
+        self._lamp = Lamp(tokens, "transducer")
+        self._bars = {name: LoadBar(tokens, name, scale) for name in (*AXES, "combined")}
+        self.setFixedWidth(round(150 * scale))
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(GRID, GRID, GRID, GRID)
+        layout.addWidget(button("Bench  B", "show the bench", unfold))
+        row = QHBoxLayout()
+        self._words = label("", "quiet", wrap=True)
+        row.addWidget(self._lamp)
+        row.addWidget(self._words, 1)
+        layout.addLayout(row)
+        for bar in self._bars.values():
+            layout.addWidget(bar)
+        layout.addStretch(1)
+
+    def show_view(self, view: BenchView) -> None:
+        """Show the bench."""
+        self._lamp.show_grade(view.lamp, view.lamp_words)
+        say(self._words, view.lamp_words)
+        for bar in view.bars:
+            self._bars[bar.name].show_bar(bar)
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        self._lamp.set_tokens(tokens)
+        for bar in self._bars.values():
+            bar.set_tokens(tokens)
+
+
+def _rows(fields: list[tuple[str, QLabel]]) -> QGridLayout:
+    grid = QGridLayout()
+    grid.setHorizontalSpacing(GRID)
+    grid.setVerticalSpacing(2)
+    for row, (name, value) in enumerate(fields):
+        grid.addWidget(label(name, "quiet"), row, 0, Qt.AlignmentFlag.AlignTop)
+        grid.addWidget(value, row, 1)
+    grid.setColumnStretch(1, 1)
+    return grid
+
+
+def _counters(fields: list[tuple[str, QLabel]]) -> QGridLayout:
+    grid = QGridLayout()
+    grid.setHorizontalSpacing(GRID)
+    grid.setVerticalSpacing(2)
+    for at, (name, value) in enumerate(fields):
+        value.setAlignment(Qt.AlignmentFlag.AlignRight)
+        grid.addWidget(label(name, "quiet"), at // 2, 2 * (at % 2))
+        grid.addWidget(value, at // 2, 2 * (at % 2) + 1)
+    for column in (1, 3):
+        grid.setColumnStretch(column, 1)
+    return grid

@@ -1,0 +1,165 @@
+"""The one crossing between the recorder and the window: what comes is folded, what is done is sent."""
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from queue import Empty, SimpleQueue
+from typing import Protocol
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from daq_app.live_feed import LiveFeed
+from daq_app.recorder import messages as m
+from daq_app.recorder.messages import REQUESTS, Report, Request
+from daq_app.state import AppState, fold
+from daq_app.take_watch import Judge
+from daq_app.view import View, derive_view
+from daq_app.window_messages import DrawingFailed, Loaded, Message, Tick
+from sessions.plan import Frame
+
+FRAME = 16  # between two looks at the recorder [ms]: 60 a second
+TICK = 0.1  # between two looks at the clock, for what tells an age [s]
+
+
+class Client(Protocol):
+    """The recorder as the window sees it."""
+
+    def send(self, request: Request) -> None:
+        """Ask for something."""
+        ...
+
+    def poll(self, timeout: float = 0.0) -> tuple[Report, ...]:
+        """Return what has come since the last call."""
+        ...
+
+    def close(self) -> None:
+        """End it, and what it does."""
+        ...
+
+    def leave(self) -> None:
+        """Let go of it: a session in hand gets an end from which it can be resumed."""
+        ...
+
+
+class Bridge(QObject):
+    """Holds the window's one state. Everything that changes it passes through `send` or `poll`."""
+
+    changed = Signal(object)  # View, whenever it is another one
+    frame = Signal()  # readings may have come: time to draw
+
+    def __init__(
+        self, client: Client, start: Callable[[], Client], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """Speak to a recorder; `start` makes another should it go, `clock` is the machine's monotonic one [s]."""
+        super().__init__()
+        self._start = start
+        self._clock = clock
+        self._client = client
+        self._ticked = -1.0
+        self._from_threads: SimpleQueue[Message] = SimpleQueue()
+        self._judge = Judge(self._from_threads.put)
+        self.state = fold(AppState(), Tick(clock()))
+        self.view: View = derive_view(self.state)
+        self.feed = LiveFeed()
+        self.session_offset = 0.0  # session clock minus this machine's [s]
+        self._timer = QTimer(self)
+        self._timer.setInterval(FRAME)
+        self._timer.timeout.connect(self.poll)
+
+    @property
+    def recording(self) -> bool:
+        """Say whether a session is being recorded."""
+        return self.state.session is not None and not self.state.session.over
+
+    def connecting(self, uri: str) -> None:
+        """Know that the recorder was asked to connect a transducer already."""
+        self._fold(m.Connect(uri))
+
+    def begin(self) -> None:
+        """Look at the recorder from now on."""
+        self._timer.start()
+
+    def end(self) -> None:
+        """Stop looking, and let the recorder end; a session in hand can be resumed."""
+        self._timer.stop()
+        self._judge.close()
+        if self.recording:
+            self._client.leave()
+        else:
+            self._client.close()
+
+    def session_now(self) -> float:
+        """Return the session clock [s]."""
+        return self._clock() + self.session_offset
+
+    def post(self, message: Message) -> None:
+        """Take a message from another thread."""
+        self._from_threads.put(message)
+
+    def send(self, message: Message) -> None:
+        """Do what somebody asked for: fold it, and tell the recorder where it is for it."""
+        self._fold(message)
+        if isinstance(message, REQUESTS):
+            if self.state.gone is not None:
+                self._begin_again()
+            self._client.send(message)  # pyright: ignore[reportArgumentType]  it is one of REQUESTS
+        self._show()
+
+    def poll(self) -> None:
+        """Take what has come, and let it be drawn."""
+        now = self._clock()
+        if now - self._ticked >= TICK:
+            self._ticked = now
+            self._fold(Tick(now))
+        for report in self._client.poll():
+            self._take(report)
+        with suppress(Empty):
+            while True:
+                self._fold(self._from_threads.get_nowait())
+        self._show()
+        self.frame.emit()
+
+    def drawing_failed(self, error: Exception) -> None:
+        """Say that a picture could not be drawn; nothing else is touched by it."""
+        sentence = f"{type(error).__name__}: {error}"
+        if self.state.drawing != sentence:
+            self._fold(DrawingFailed(sentence))
+
+    def _take(self, report: Report) -> None:
+        match report:
+            case m.Live():
+                self._fold(Loaded(self.feed.add(report, self._frame())))
+                self._judge.look(self.feed, self.state)
+                return
+            case m.Device(info):
+                self.feed.device(info)
+            case m.NoDevice():
+                self.feed.device(None)
+            case m.SessionBegun(clock_offset_ns=offset):
+                self.session_offset = offset * 1e-9
+            case _:
+                pass
+        self._fold(report)
+        self._judge.heard(report, self.feed)
+
+    def _fold(self, message: Message) -> None:
+        self.state = fold(self.state, message)
+
+    def _show(self) -> None:
+        view = derive_view(self.state)
+        if view != self.view:
+            self.view = view
+            self.changed.emit(view)
+
+    def _frame(self) -> Frame:
+        """Return how the transducer lies to the face: as the session states it, or the bench knows it."""
+        session = self.state.session
+        if session is not None and not session.over:
+            return session.plan.frame
+        return self.state.bench.frame or Frame()
+
+    def _begin_again(self) -> None:
+        """Start another recorder where the last one is gone."""
+        self._client.close()
+        self._client = self._start()
+        self._fold(m.Gone(True, ""))

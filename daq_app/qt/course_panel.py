@@ -1,0 +1,180 @@
+"""The course of a session: the plan with what is done, in hand and coming, and what else can be done now."""
+
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QFrame,
+    QGridLayout,
+    QHBoxLayout,
+    QLineEdit,
+    QListWidget,
+    QListWidgetItem,
+    QPushButton,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from daq_app.qt.parts import button, label, say
+from daq_app.qt.tokens import GRID, Tokens
+from daq_app.view_course import Button, CourseView, PlanRow
+from daq_app.window_messages import Message
+from sessions import steps
+
+QUESTIONS = {
+    "redo": "Why is it done again?",
+    "skip": "Why is it left out?",
+    "note": "Note, kept with its time:",
+    "end": "Why does the session end now?",
+}
+
+
+class CoursePanel(QFrame):
+    """The left of the experimenter's window while a session is in hand."""
+
+    def __init__(self, scale: float, send: Callable[[Message], None]) -> None:
+        """Show no plan; `send` takes what is done."""
+        super().__init__()
+        self.setProperty("role", "panel")
+        self.setAccessibleName("course of the session")
+        self._send = send
+        self._view: CourseView | None = None
+        self._asking = ""
+        self._plan = QListWidget()
+        self._plan.setAccessibleName("plan: trials done, in hand and coming")
+        self._plan.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.redo = button("Redo  R", "redo the trial, with a reason", lambda: self.ask("redo"))
+        self.skip = button("Skip  S", "skip the trial, with a reason", lambda: self.ask("skip"))
+        self.pause = button("Pause  P", "pause", self._pause)
+        self.note = button("Note  N", "write a note", lambda: self.ask("note"))
+        self.end = button("End session", "end the session, with a reason", self._end)
+        self.line = QLineEdit()
+        self.line.returnPressed.connect(self._given)
+        self._question = label("", wrap=True)
+        self._bottom = QStackedWidget()
+        self._bottom.addWidget(self._actions())
+        self._bottom.addWidget(self._asked(scale))
+        self._timer = label("", "quiet")
+        self._timer.setAccessibleName("time since this was asked")
+        head = QHBoxLayout()
+        head.addWidget(label("Plan", "section"), 1)
+        head.addWidget(self._timer)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(int(1.5 * GRID), GRID, int(1.5 * GRID), GRID)
+        layout.setSpacing(GRID)
+        layout.addLayout(head)
+        layout.addWidget(self._plan, 1)
+        layout.addWidget(self._bottom)
+
+    @property
+    def asking(self) -> bool:
+        """Say whether a reason or note is being typed."""
+        return self._bottom.currentIndex() == 1
+
+    def show_view(self, view: CourseView) -> None:
+        """Show the course."""
+        before, self._view = self._view, view
+        say(self._timer, f"waiting {view.timer}" if view.timer else "")
+        if before is not None and before.rows == view.rows and _buttons(before) == _buttons(view):
+            return
+        if before is None or before.rows != view.rows:
+            self._show_rows(view.rows)
+        for made, shown in zip((self.redo, self.skip, self.pause, self.note, self.end), _buttons(view), strict=True):
+            _show_button(made, shown)
+
+    def ask(self, what: str) -> None:
+        """Ask for the reason of a redo or skip, or for a note; a redo whose reason is known is sent at once."""
+        view = self._view
+        if view is None:
+            return
+        shown = {"redo": view.redo, "skip": view.skip, "note": view.note, "end": view.end}[what]
+        if not shown.enabled:
+            return
+        if shown.sends is not None:
+            self._send(shown.sends)
+            return
+        self._asking = what
+        say(self._question, QUESTIONS[what])
+        self.line.setAccessibleName(QUESTIONS[what])
+        self.line.clear()
+        self._bottom.setCurrentIndex(1)
+        self.line.setFocus()
+
+    def leave(self) -> None:
+        """Ask for nothing any more."""
+        if self.asking:
+            self._bottom.setCurrentIndex(0)
+            self.window().setFocus()
+
+    def _given(self) -> None:
+        text = self.line.text().strip()
+        if not text:
+            say(self._question, f"{QUESTIONS[self._asking]} A word is enough; Esc leaves it.")
+            return
+        made: dict[str, Callable[[str], Message]] = {"redo": steps.Redo, "skip": steps.Skip, "end": steps.Abort}
+        self.leave()
+        if self._asking in made:
+            self._send(made[self._asking](text))
+
+    def _pause(self) -> None:
+        if self._view is not None and self._view.pause.enabled and self._view.pause.sends is not None:
+            self._send(self._view.pause.sends)
+
+    def _end(self) -> None:
+        self.ask("end")
+
+    def _actions(self) -> QWidget:
+        page = QWidget()
+        grid = QGridLayout(page)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setSpacing(GRID)
+        for at, made in enumerate((self.redo, self.skip, self.pause, self.note)):
+            grid.addWidget(made, at // 2, at % 2)
+        grid.addWidget(self.end, 2, 0, 1, 2)
+        return page
+
+    def _asked(self, scale: float) -> QWidget:
+        page = QWidget()
+        layout = QVBoxLayout(page)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addStretch(1)
+        layout.addWidget(self._question)
+        layout.addWidget(self.line)
+        row = QHBoxLayout()
+        row.addWidget(button("Keep  Enter", "keep what was typed", self._given))
+        row.addWidget(button("Leave  Esc", "leave it", self.leave))
+        layout.addLayout(row)
+        page.setMinimumHeight(round(100 * scale))
+        return page
+
+    def _show_rows(self, rows: tuple[PlanRow, ...]) -> None:
+        while self._plan.count() > len(rows):
+            self._plan.takeItem(self._plan.count() - 1)
+        for at, row in enumerate(rows):
+            item = self._plan.item(at)
+            if item is None:  # pyright: ignore[reportUnnecessaryComparison]  Qt returns None beyond the last
+                item = QListWidgetItem()
+                self._plan.addItem(item)
+            text = f"{row.name}   {row.found}" if row.kind == "block" else f"{row.mark}  {row.name}   {row.found}"
+            if item.text() != text:
+                item.setText(text)
+            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{row.kind}: {row.name} {row.found}")
+            made = self._plan.font()
+            made.setBold(row.kind in ("block", "current"))
+            item.setFont(made)
+            if row.kind == "current":
+                self._plan.scrollToItem(item, QListWidget.ScrollHint.EnsureVisible)
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme: the style sheet does it all."""
+
+
+def _buttons(view: CourseView) -> tuple[Button, ...]:
+    return (view.redo, view.skip, view.pause, view.note, view.end)
+
+
+def _show_button(made: QPushButton, shown: Button) -> None:
+    made.setText(f"{shown.label}  {shown.key}")
+    made.setEnabled(shown.enabled)

@@ -1,0 +1,153 @@
+"""The top of the experimenter's window: whose session, the recording lamp, the banner, and what to do now."""
+
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QWidget
+
+from daq_app.qt.indicators import Arrow, Lamp
+from daq_app.qt.parts import button, label, regrade, say
+from daq_app.qt.tokens import GRID, Tokens
+from daq_app.view import Banner, View
+from daq_app.view_course import Button
+from daq_app.window_messages import Message
+
+
+class Header(QWidget):
+    """Whose session it is, whether anything is simulated, and whether it is being recorded."""
+
+    def __init__(self, tokens: Tokens, subject: Callable[[], None], keys: Callable[[], None]) -> None:
+        """Show no session; `subject` and `keys` show the subject's window and the keys."""
+        super().__init__()
+        self._heading = label("daq-app", "title")
+        self._heading.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._simulated = label("SIMULATED", "simulated")
+        self._simulated.setVisible(False)
+        self._lamp = Lamp(tokens, "recording")
+        self._words = label("not recording", "title")
+        self._saved = label("", "quiet")
+        self._saved.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(GRID, 0, GRID, 0)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._heading, 1)
+        layout.addWidget(self._simulated)
+        layout.addSpacing(GRID)
+        layout.addWidget(self._lamp)
+        layout.addWidget(self._words)
+        layout.addWidget(self._saved)
+        layout.addWidget(button("Subject  F6", "show the subject's window", subject))
+        layout.addWidget(button("Keys  F1", "show the keys of this window", keys))
+        self._saved.setFixedWidth(self._saved.fontMetrics().horizontalAdvance("nothing saved yet "))
+
+    def show_view(self, view: View) -> None:
+        """Show the top line."""
+        say(self._heading, view.heading)
+        self._heading.setToolTip(view.heading)
+        self._simulated.setVisible(view.simulated is not None)
+        self._simulated.setToolTip(view.simulated or "")
+        self._simulated.setAccessibleName(view.simulated or "nothing is simulated")
+        self._lamp.show_grade(view.lamp.grade, view.lamp.words)
+        say(self._words, view.lamp.words)
+        regrade(self._words, "wrong" if view.lamp.grade == "wrong" else "")
+        say(self._saved, view.lamp.saved)
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        self._lamp.set_tokens(tokens)
+
+
+class Notice(QFrame):
+    """One line that is always there: empty, a sentence, or a banner that stays until its cause is gone."""
+
+    def __init__(self, scale: float, send: Callable[[Message], None]) -> None:
+        """Show nothing; `send` takes what the banner's button asks for."""
+        super().__init__()
+        self._send = send
+        self._banner: Banner | None = None
+        self._warning: str | None = None
+        self.setProperty("role", "banner")
+        self._words = label("", wrap=True)
+        self._words.setAccessibleName("notice")
+        self._button = button("", "what the notice offers", self._do)
+        self._button.setVisible(False)
+        self.setMinimumHeight(round(52 * scale))
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(2 * GRID, 2, GRID, 2)
+        layout.addWidget(self._words, 1)
+        layout.addWidget(self._button)
+
+    def show_view(self, banner: Banner | None, told: str) -> None:
+        """Show a banner, or else what was told."""
+        if banner is None and self._warning is not None:
+            told = self._warning
+        if banner is not None:
+            self._warning = None
+        self._banner = banner
+        mark = {"wrong": "■ ", "look": "▲ "}.get(banner.grade, "") if banner else ""
+        text = f"{mark}{banner.sentence}" if banner else told[:1].upper() + told[1:]
+        say(self._words, text)
+        self._words.setAccessibleDescription(text)
+        regrade(self, banner.grade if banner else "")
+        self._button.setVisible(banner is not None and banner.sends is not None)
+        if banner is not None:
+            self._button.setText(banner.action)
+            self._button.setAccessibleName(banner.action)
+
+    def warn(self, sentence: str) -> None:
+        """Show a sentence of the window's own."""
+        self._warning = sentence
+        self.show_view(self._banner, sentence)
+
+    def _do(self) -> None:
+        if self._banner is not None and self._banner.sends is not None:
+            self._send(self._banner.sends)
+
+
+class ToDo(QFrame):
+    """What to do now, and the one button that does it."""
+
+    def __init__(self, tokens: Tokens, primary: Callable[[], None]) -> None:
+        """Show nothing to do."""
+        super().__init__()
+        self.setProperty("role", "panel")
+        self.setAccessibleName("what to do now")
+        self._small = False
+        self._arrow = Arrow(tokens)
+        self.sentence = label("", "headline", wrap=True)
+        self.sentence.setMinimumHeight(2 * GRID)
+        self.primary = button("", "do it", primary, "primary")
+        policy = self.primary.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self.primary.setSizePolicy(policy)
+        self.primary.setMinimumWidth(220)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(2 * GRID, GRID, 2 * GRID, GRID)
+        layout.setSpacing(2 * GRID)
+        layout.addWidget(self._arrow)
+        layout.addWidget(self.sentence, 1)
+        layout.addWidget(self.primary)
+
+    def show_what(self, sentence: str, primary: Button | None, direction: int) -> None:
+        """Show a sentence, its button and the stroke's direction."""
+        say(self.sentence, sentence)
+        self._arrow.show_direction(direction)
+        if primary is not None:
+            text = f"{primary.label}   {primary.key}"
+            if self.primary.text() != text:
+                self.primary.setText(text)
+                self.primary.setAccessibleName(f"{primary.label}: {sentence}")
+        self.primary.setVisible(primary is not None)
+
+    def show_small(self, small: bool) -> None:
+        """Use smaller type, where there is little room."""
+        if small != self._small:
+            self._small = small
+            self.sentence.setProperty("role", "title" if small else "headline")
+            self.sentence.style().unpolish(self.sentence)
+            self.sentence.style().polish(self.sentence)
+            self.setMinimumHeight(0)
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        self._arrow.set_tokens(tokens)

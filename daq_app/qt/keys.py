@@ -1,0 +1,88 @@
+"""The keys of the experimenter's window: one list that the window obeys and F1 shows."""
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QGridLayout, QVBoxLayout, QWidget
+
+from daq_app.qt.parts import button, label, panel
+from daq_app.qt.tokens import GRID
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """A key, the act it stands for, and what it does in words."""
+
+    key: str
+    act: str
+    words: str
+
+
+KEYS = (
+    Key("Space", "primary", "do what the sentence says (Enter too)"),
+    Key("R", "redo", "redo the trial; the reason is asked for, or taken from what was found of the stroke"),
+    Key("S", "skip", "skip the trial, with a reason"),
+    Key("P", "pause", "pause, and go on"),
+    Key("N", "note", "write a note, kept with its time"),
+    Key("Ctrl+E", "end", "end the session before its last trial, with a reason"),
+    Key("Ctrl+N", "new", "new session, after one has ended"),
+    Key("T", "tare", "measure the zero of the bench, outside a session"),
+    Key("A", "acknowledge", "acknowledge overloads"),
+    Key("H", "hold", "hold the picture; readings go on"),
+    Key("+", "longer", "show a longer stretch of time"),
+    Key("-", "shorter", "show a shorter stretch of time"),
+    Key("B", "bench", "show or fold the bench"),
+    Key("F6", "subject", "show the subject's window and go to it"),
+    Key("Ctrl+M", "ruler", "hold the subject's line against a ruler"),
+    Key("F1", "keys", "show or hide these keys"),
+    Key("Esc", "leave", "leave what is being typed, or these keys"),
+)
+
+_NAMED = {
+    Qt.Key.Key_Space: "Space",
+    Qt.Key.Key_Return: "Space",
+    Qt.Key.Key_Enter: "Space",
+    Qt.Key.Key_Plus: "+",
+    Qt.Key.Key_Equal: "+",
+    Qt.Key.Key_Minus: "-",
+    Qt.Key.Key_F1: "F1",
+    Qt.Key.Key_F6: "F6",
+    Qt.Key.Key_Escape: "Esc",
+}
+
+
+def act_of(event: QKeyEvent) -> str | None:
+    """Return the act a key stands for; None where it stands for none."""
+    key = Qt.Key(event.key())
+    name = _NAMED.get(key) or (chr(key) if Qt.Key.Key_A <= key <= Qt.Key.Key_Z else "")
+    held = event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier)
+    if held == Qt.KeyboardModifier.ControlModifier:
+        name = f"Ctrl+{name}"
+    elif held != Qt.KeyboardModifier.NoModifier:
+        return None
+    return next((known.act for known in KEYS if known.key == name), None)
+
+
+class KeysPage(QWidget):
+    """Every key, over the window."""
+
+    def __init__(self, parent: QWidget) -> None:
+        """Build the page, hidden."""
+        super().__init__(parent)
+        self.setAccessibleName("keys")
+        frame, inside = panel("keys of this window")
+        inside.addWidget(label("Keys", "title"))
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(3 * GRID)
+        grid.setVerticalSpacing(4)
+        for row, known in enumerate(KEYS):
+            grid.addWidget(label(known.key, "value"), row, 0)
+            grid.addWidget(label(known.words, "value", wrap=True), row, 1)
+        grid.setColumnStretch(1, 1)
+        inside.addLayout(grid)
+        inside.addWidget(button("Close  F1", "close the keys", self.hide))
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(frame)
+        self.hide()

@@ -1,0 +1,188 @@
+"""What the transducer measures now: forces, ratio, speed, all six axes, and the finger on the sample."""
+
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QButtonGroup, QFrame, QGridLayout, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+
+from daq_app.course_state import Mark
+from daq_app.live_feed import LiveFeed
+from daq_app.live_trace import CHANNELS
+from daq_app.plot_scale import PlotScale
+from daq_app.qt.contact_map import ContactMap
+from daq_app.qt.live_plot import Curve, LivePlot
+from daq_app.qt.parts import button, label, say
+from daq_app.qt.tokens import FX, FY, GRID, MU, N, T, Tokens
+
+LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
+TRAIL = 2.0  # of the centre of pressure [s]
+READ_EVERY = 0.25  # numbers beside the plots change no more often than they can be read [s]
+
+PLOTS = (
+    ("N and T [N]", (Curve("N", N), Curve("T", T)), PlotScale(0.0, 5.0, 5.0)),
+    ("µ = T/N [-]", (Curve("mu", MU),), PlotScale(0.0, 1.0, 1.0)),
+    ("speed [mm/s]", (Curve("speed", "text"),), PlotScale(0.0, 50.0, 50.0)),
+)
+AXES = (
+    ("Fx Fy Fz [N]", (Curve("Fx", FX), Curve("Fy", FY), Curve("Fz", "fz")), PlotScale(-5.0, 5.0, 10.0)),
+    (
+        "Tx Ty Tz [N mm]",
+        (Curve("Tx", FX, dashed=True), Curve("Ty", FY, dashed=True), Curve("Tz", "fz", dashed=True)),
+        PlotScale(-50.0, 50.0, 100.0),
+    ),
+)
+READ = (("N", "N", 2, N), ("T", "N", 2, T), ("mu", "", 2, MU), ("speed", "mm/s", 0, ""))
+KEYS_OF_AXES = (("Fx Tx", FX), ("Fy Ty", FY), ("Fz Tz", ""))
+
+
+class LivePanel(QFrame):
+    """The middle of the experimenter's window."""
+
+    def __init__(self, feed: LiveFeed, tokens: Tokens, scale: float) -> None:
+        """Show what `feed` holds; nothing yet."""
+        super().__init__()
+        self.setProperty("role", "panel")
+        self.setAccessibleName("live readings")
+        self._feed = feed
+        self._seconds = 10
+        self._held: float | None = None  # device time the picture is held at; readings go on behind it
+        self._read_at = 0.0
+        self._tokens = tokens
+        self.plots = [LivePlot(*plot, tokens, scale) for plot in (*PLOTS, *AXES)]
+        self.map = ContactMap(tokens, scale)
+        self._values: dict[str, QLabel] = {}
+        self.hold = button("Hold", "hold the picture; readings go on", self._toggle_hold, "flat")
+        self.hold.setCheckable(True)
+        self._lengths = QButtonGroup(self)
+        grid = QGridLayout()
+        grid.setSpacing(4)
+        for row, plot in enumerate(self.plots[:3]):
+            grid.addWidget(plot, row, 0)
+        side = QVBoxLayout()
+        side.setSpacing(4)
+        side.addWidget(self.map, 3)
+        for plot in self.plots[3:]:
+            side.addWidget(plot, 2)
+        self._side = QWidget()
+        self._side.setLayout(side)
+        side.setContentsMargins(0, 0, 0, 0)
+        grid.addWidget(self._side, 0, 1, 3, 1)
+        grid.setColumnStretch(0, 5)
+        grid.setColumnStretch(1, 3)
+        for row, stretch in enumerate((3, 2, 2)):
+            grid.setRowStretch(row, stretch)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(GRID, GRID, GRID, GRID)
+        layout.setSpacing(4)
+        layout.addLayout(self._bar(scale))
+        layout.addLayout(grid, 1)
+        self.show_seconds(self._seconds)
+
+    @property
+    def holding(self) -> bool:
+        """Say whether the picture is held."""
+        return self._held is not None
+
+    @property
+    def seconds(self) -> int:
+        """Return how many seconds are shown."""
+        return self._seconds
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        self._tokens = tokens
+        self.map.set_tokens(tokens)
+        for plot in self.plots:
+            plot.set_tokens(tokens)
+
+    def show_side(self, shown: bool) -> None:
+        """Show or fold the six axes and the sample, where there is little room."""
+        self._side.setVisible(shown)
+
+    def show_seconds(self, seconds: int) -> None:
+        """Show the last so many seconds."""
+        self._seconds = seconds
+        for plot in self.plots:
+            plot.show_seconds(seconds)
+        pressed = self._lengths.button(seconds)
+        if pressed is not None:  # pyright: ignore[reportUnnecessaryComparison]  Qt returns None for no such button
+            pressed.setChecked(True)
+
+    def change_length(self, by: int) -> None:
+        """Show the next longer (+1) or shorter (-1) stretch."""
+        at = LENGTHS.index(self._seconds) + by
+        if 0 <= at < len(LENGTHS):
+            self.show_seconds(LENGTHS[at])
+
+    def toggle_hold(self) -> None:
+        """Hold the picture, or go on."""
+        self.hold.click()
+
+    def draw(self, marks: tuple[Mark, ...], clock: float) -> None:
+        """Draw a frame; `clock` [s] is the machine's."""
+        trace = self._feed.trace
+        newest = trace.newest
+        now = self._held if self._held is not None else newest
+        if now is None or newest is None:
+            for plot in self.plots:
+                plot.show_columns(trace.columns(0.0, 1.0, 1), 0.0, (), clock)
+            return
+        width = max(self.plots[0].width(), 100)
+        columns = trace.columns(now - self._seconds, np.nextafter(now, np.inf), width)
+        seen = tuple(mark for mark in marks if mark.stop >= now - self._seconds and mark.start <= now)
+        for plot in self.plots:
+            if plot.isVisible():
+                plot.show_columns(columns, now, seen, clock)
+        if self.map.isVisible():
+            _, values = trace.between(now - TRAIL, np.nextafter(now, np.inf))
+            self.map.show_trail(values[CHANNELS.index("x") : CHANNELS.index("y") + 1].T)
+        if clock - self._read_at >= READ_EVERY:
+            self._read_at = clock
+            self._read(now)
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802  Qt's name
+        """Take the room there is."""
+        super().showEvent(event)
+        self.show_seconds(self._seconds)
+
+    def _bar(self, scale: float) -> QHBoxLayout:
+        """Return the row above the plots: numbers that are read, and what is shown."""
+        row = QHBoxLayout()
+        row.setSpacing(GRID)
+        for channel, unit, _, colour in READ:
+            name = {"mu": "µ"}.get(channel, channel)
+            made = label("–", "title")
+            made.setFixedWidth(round((92 if unit == "mm/s" else 74) * scale))
+            made.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            made.setAccessibleName(f"{name} now")
+            caption = label(f"{name}", "quiet")
+            if colour:
+                caption.setStyleSheet(f"border-bottom: 3px solid {colour};")
+            row.addWidget(caption)
+            row.addWidget(made)
+            self._values[channel] = made
+        row.addStretch(1)
+        row.addWidget(label("show", "quiet"))
+        for seconds in LENGTHS:
+            made = QPushButton(f"{seconds} s")
+            made.setCheckable(True)
+            made.setProperty("role", "flat")
+            made.setAccessibleName(f"show the last {seconds} seconds")
+            made.clicked.connect(lambda _=False, s=seconds: self.show_seconds(s))
+            self._lengths.addButton(made, seconds)
+            row.addWidget(made)
+        row.addWidget(self.hold)
+        return row
+
+    def _read(self, now: float) -> None:
+        """Show the means over the last tenth of a second."""
+        _, values = self._feed.trace.between(now - 0.1, np.nextafter(now, np.inf))
+        for channel, unit, digits, _ in READ:
+            known = values[CHANNELS.index(channel)]
+            known = known[np.isfinite(known)]
+            text = f"{known.mean():.{digits}f} {unit}".strip() if len(known) else "–"
+            say(self._values[channel], text.replace("-", "−"))
+
+    def _toggle_hold(self) -> None:
+        self._held = self._feed.trace.newest if self.hold.isChecked() else None
+        self.hold.setText("Held" if self.hold.isChecked() else "Hold")

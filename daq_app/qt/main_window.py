@@ -1,0 +1,338 @@
+"""The experimenter's window: places the panels, and sends what buttons and keys mean."""
+
+import secrets
+import threading
+from datetime import datetime
+from pathlib import Path
+
+from PySide6.QtCore import QEvent, QObject, QSize, Qt, QTimer
+from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QHBoxLayout,
+    QMainWindow,
+    QSizePolicy,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from daq_app.new_session import Bench, Refused, checked, unfinished
+from daq_app.qt.bench_panel import BenchPanel, BenchStrip
+from daq_app.qt.bridge import Bridge
+from daq_app.qt.course_panel import CoursePanel
+from daq_app.qt.header import Header, Notice, ToDo
+from daq_app.qt.keys import KeysPage, act_of
+from daq_app.qt.live_panel import LivePanel
+from daq_app.qt.new_session_page import NewSessionPage
+from daq_app.qt.parts import button, label, regrade, say
+from daq_app.qt.score_line import LENGTH
+from daq_app.qt.screens import millimetres
+from daq_app.qt.subject_window import SubjectWindow
+from daq_app.qt.tokens import GRID, Tokens
+from daq_app.recorder.messages import AcknowledgeOverloads, Tare
+from daq_app.view import View
+from daq_app.view_course import Button
+from daq_app.window_messages import DevicesFound, Message, NewSession, Searching
+from drivers.catalog import reachable
+from sessions.recording import Setting
+
+WIDE = 1366  # below it the bench folds to a strip of lamps
+ROOMY = 1100  # below it the six axes and the sample fold away
+TALL = 620  # below it the type of the headline is smaller
+LEAVING = 10.0  # closing twice within so long leaves a session that is being recorded [s]
+
+
+class MainWindow(QMainWindow):
+    """What the experimenter sees. It knows nothing but the last `View`."""
+
+    def __init__(self, bridge: Bridge, tokens: Tokens, scale: float) -> None:
+        """Place the panels, and follow `bridge`."""
+        super().__init__()
+        self.setWindowTitle("daq-app")
+        self.setAccessibleName("experimenter's window")
+        self.bridge = bridge
+        self._scale = scale
+        self._tokens = tokens
+        self._close_asked = -LEAVING
+        self._bench_shown: bool | None = None  # as somebody wished; None: as there is room
+        self.header = Header(tokens, self.show_subject, self._show_keys)
+        self.notice = Notice(scale, bridge.send)
+        self.to_do = ToDo(tokens, self._primary)
+        self.page = NewSessionPage(scale, bridge.send, self._start_session)
+        self.course = CoursePanel(scale, bridge.send)
+        self.live = LivePanel(bridge.feed, tokens, scale)
+        self.bench = BenchPanel(tokens, scale, bridge.send, self._search)
+        self.strip = BenchStrip(tokens, scale, self._fold_bench)
+        self.stroke = label("No stroke yet.", wrap=True)
+        self.stroke.setAccessibleName("the last stroke")
+        self.redo = button("Redo  R", "redo the last stroke", lambda: self.course.ask("redo"))
+        self.subject = SubjectWindow(tokens, scale, bridge.session_now)
+        self.subject.answered.connect(self._answered)
+        self._left = QStackedWidget()
+        self._left.addWidget(self.page)
+        self._left.addWidget(self.course)
+        self.setCentralWidget(self._placed())
+        self.keys = KeysPage(self)
+        self.page.changed.connect(self._form_changed)
+        bridge.changed.connect(self.show_view)
+        bridge.frame.connect(self._draw)
+        self.show_view(bridge.view)
+        self._look_for_unfinished()
+        for made in self.findChildren(QAbstractButton):
+            made.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves Space to the primary button
+        self.page.subject.setFocus()
+
+    def sizeHint(self) -> QSize:  # noqa: N802  Qt's name
+        """Return the size the window opens with."""
+        return QSize(1440, 860)
+
+    def show_view(self, view: View) -> None:
+        """Show what is known now."""
+        course = view.course
+        self.header.show_view(view)
+        self.notice.show_view(view.banner, "" if course is None else course.told)
+        self.bench.show_view(view.bench)
+        self.strip.show_view(view.bench)
+        self._left.setCurrentIndex(0 if course is None else 1)
+        if course is None:
+            self._form_changed()
+        else:
+            self.course.show_view(course)
+            self.to_do.show_what(course.headline, course.primary, course.direction)
+            self.live.map.show_direction(course.direction)
+            say(self.stroke, course.stroke.words)
+            self.stroke.setToolTip(course.stroke.details)
+            regrade(self.stroke, {"refused": "wrong", "doubtful": "look"}.get(course.stroke.grade, ""))
+            self.redo.setEnabled(course.redo.enabled)
+        self._show_subject_view(view)
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        self._tokens = tokens
+        for part in (self.header, self.to_do, self.live, self.bench, self.strip, self.subject):
+            part.set_tokens(tokens)
+
+    def show_subject(self) -> None:
+        """Show the subject's window: on a second screen where there is one, and let keys go to it."""
+        here = self.screen()
+        others = [screen for screen in QGuiApplication.screens() if screen is not here]
+        if others and not self.subject.isVisible():
+            self.subject.setGeometry(others[0].availableGeometry())
+            self.subject.showFullScreen()
+        else:
+            self.subject.show()
+        self.subject.raise_()
+        self.subject.activateWindow()
+
+    def act(self, act: str) -> None:  # noqa: C901  a table of cases
+        """Do what a key stands for."""
+        match act:
+            case "primary":
+                self._primary()
+            case "redo" | "skip" | "note" | "end" if self.course.isVisible():
+                self.course.ask(act)
+            case "pause" if self.course.isVisible():
+                self.course.pause.click()
+            case "new" if self._view_over():
+                self.bridge.send(NewSession())
+            case "tare" if self.bridge.view.bench.can_tare:
+                self.bridge.send(Tare())
+            case "acknowledge" if self.bridge.view.bench.can_acknowledge:
+                self.bridge.send(AcknowledgeOverloads())
+            case "hold":
+                self.live.toggle_hold()
+            case "longer" | "shorter":
+                self.live.change_length(1 if act == "longer" else -1)
+            case "bench":
+                self._fold_bench()
+            case "subject":
+                self.show_subject()
+            case "ruler":
+                self.show_subject()
+                self.subject.check_ruler()
+            case "keys":
+                self._show_keys()
+            case "leave":
+                self.keys.hide()
+                self.course.leave()
+            case _:
+                pass
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
+        """Obey the keys; those of a field that is typed in never come here."""
+        act = act_of(event)
+        if act is None or event.isAutoRepeat():
+            super().keyPressEvent(event)
+        else:
+            self.act(act)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802  Qt's name
+        """Give letters typed on the plan to the window: a list would search for them."""
+        if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent) and act_of(event) is not None:
+            self.keyPressEvent(event)
+            return True
+        return super().eventFilter(watched, event)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Fold what there is no room for."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802  Qt's name
+        """Leave; a session that is being recorded only when asked twice, and then it can be resumed."""
+        running = self.bridge.recording
+        now = self.bridge.state.now
+        if running and now - self._close_asked > LEAVING:
+            self._close_asked = now
+            self.notice.warn(
+                "A session is being recorded: end it with Ctrl+E, or close once more to leave it; it can be resumed."
+            )
+            event.ignore()
+            return
+        self.bridge.end()
+        self.subject.hide()
+        QGuiApplication.quit()
+
+    def _primary(self) -> None:
+        course = self.bridge.view.course
+        if course is None:
+            self._start_session()
+        elif course.primary is not None and course.primary.sends is not None:
+            self.bridge.send(course.primary.sends)
+
+    def _start_session(self) -> None:
+        if self.bridge.view.course is not None:
+            return
+        shown = millimetres(self.subject.screen())
+        origin = "measured" if shown.checked else "default"
+        settings = (
+            Setting("answer line length", LENGTH, "mm", origin),
+            Setting("pixels in a millimetre of the answering screen", round(shown.pixels, 4), "1/mm", origin),
+        )
+        made = checked(self.page.form(), self._bench(), datetime.now(), secrets.randbelow(2**31), settings)
+        if isinstance(made, Refused):
+            self.page.show_refusals(dict(made.sentences))
+            return
+        self.page.show_refusals({})
+        self.bridge.send(made)
+        self.setFocus()
+
+    def _form_changed(self) -> None:
+        """Say what is to be done on the page of a new session."""
+        bench = self._bench()
+        self.page.show_bench(bench)
+        form = self.page.form()
+        sentence = "Give the subject's code, then press Enter to start."
+        if form.forces and not bench.connected:
+            sentence = "Connect a transducer, or choose scores only."
+        elif form.subject.strip():
+            sentence = f"Press Enter to start the session of {form.subject.strip()}."
+        self.to_do.show_what(sentence, Button("Start", "Enter"), 0)
+        self.redo.setEnabled(False)
+        say(self.stroke, "No stroke yet.")
+        regrade(self.stroke, "")
+
+    def _bench(self) -> Bench:
+        bench = self.bridge.state.bench
+        simulated = bench.info is not None and bench.info.simulated and bench.frame is not None
+        return Bench(bench.link == "open", simulated, bench.frame)
+
+    def _show_subject_view(self, view: View) -> None:
+        session = self.bridge.state.session
+        hand = None if session is None else session.plan.answering_hand
+        was_scoring = self.subject.scoring
+        self.subject.show_view(view.subject, hand)
+        people = session is not None and not self._simulated_people()
+        if self.subject.scoring and not was_scoring and people:
+            self.show_subject()
+
+    def _simulated_people(self) -> bool:
+        return self.page.form().simulated
+
+    def _answered(self, event: Message) -> None:
+        self.bridge.send(event)
+        if len(QGuiApplication.screens()) == 1:
+            self.raise_()
+            self.activateWindow()
+
+    def _draw(self) -> None:
+        session = self.bridge.state.session
+        try:
+            self.live.draw(() if session is None else session.marks, self.bridge.state.now)
+        except Exception as error:  # noqa: BLE001  an error while drawing never stops a recording
+            self.bridge.drawing_failed(error)
+
+    def _search(self) -> None:
+        self.bridge.send(Searching())
+        threading.Thread(target=lambda: self.bridge.post(DevicesFound(reachable())), daemon=True).start()
+
+    def _look_for_unfinished(self) -> None:
+        """Look for sessions that were cut short, without holding up the window."""
+        folder = Path(self.page.form().folder or ".")
+        found: list[tuple[object, ...]] = []
+        worker = threading.Thread(target=lambda: found.append(unfinished(folder)), daemon=True)
+        worker.start()
+        self._unfinished_timer = timer = QTimer(self)
+        timer.setInterval(100)
+
+        def look() -> None:
+            if not worker.is_alive():
+                timer.stop()
+                self.page.show_unfinished(found[0] if found else ())  # pyright: ignore[reportArgumentType]
+
+        timer.timeout.connect(look)
+        timer.start()
+
+    def _view_over(self) -> bool:
+        return self.bridge.state.session is not None and self.bridge.state.session.over
+
+    def _show_keys(self) -> None:
+        self.keys.setVisible(not self.keys.isVisible())
+        self._fit()
+        if self.keys.isVisible():
+            self.keys.raise_()
+
+    def _fold_bench(self) -> None:
+        self._bench_shown = not self.bench.isVisible()
+        self._fit()
+
+    def _fit(self) -> None:
+        wide = self.width() >= WIDE * min(self._scale, 1.0)
+        shown = wide if self._bench_shown is None else self._bench_shown
+        self.bench.setVisible(shown)
+        self.strip.setVisible(not shown and self.width() >= 800)
+        self.live.show_side(self.width() >= ROOMY and not (shown and not wide))
+        self.to_do.show_small(self.height() < TALL or self.width() < ROOMY)
+        size = self.keys.sizeHint().boundedTo(self.size() - QSize(4 * GRID, 4 * GRID))
+        self.keys.setGeometry(
+            (self.width() - size.width()) // 2, (self.height() - size.height()) // 2, size.width(), size.height()
+        )
+
+    def _placed(self) -> QWidget:
+        window = QWidget()
+        window.setObjectName("window")
+        middle = QVBoxLayout()
+        middle.setSpacing(GRID)
+        middle.addWidget(self.live, 1)
+        row = QHBoxLayout()
+        row.addWidget(self.stroke, 1)
+        row.addWidget(self.redo)
+        middle.addLayout(row)
+        body = QHBoxLayout()
+        body.setSpacing(GRID)
+        self._left.setFixedWidth(round(300 * min(self._scale, 1.4)))
+        self._left.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
+        self.bench.setFixedWidth(round(290 * min(self._scale, 1.4)))
+        body.addWidget(self._left)
+        body.addLayout(middle, 1)
+        body.addWidget(self.bench)
+        body.addWidget(self.strip)
+        layout = QVBoxLayout(window)
+        layout.setContentsMargins(GRID, GRID, GRID, GRID)
+        layout.setSpacing(GRID)
+        layout.addWidget(self.header)
+        layout.addWidget(self.notice)
+        layout.addWidget(self.to_do)
+        layout.addLayout(body, 1)
+        return window

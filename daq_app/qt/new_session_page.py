@@ -1,0 +1,245 @@
+"""The page on which a session is begun: what is wrong stands beside the field it is wrong in."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QComboBox,
+    QFileDialog,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QRadioButton,
+    QScrollArea,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
+
+from daq_app.new_session import Bench, SessionForm, Unfinished
+from daq_app.qt.parts import button, label, regrade, say
+from daq_app.qt.tokens import GRID
+from daq_app.recorder.messages import ResumeSession
+from daq_app.window_messages import Message
+from sessions.plan import Hand
+from sessions.protocols import protocol_names
+
+HANDS: tuple[tuple[str, Hand | None], ...] = (("not stated", None), ("right", "right"), ("left", "left"))
+
+
+class NewSessionPage(QFrame):
+    """The left of the experimenter's window while no session is in hand."""
+
+    changed = Signal()
+
+    def __init__(self, scale: float, send: Callable[[Message], None], start: Callable[[], None]) -> None:
+        """Show an empty form; `start` begins the session."""
+        super().__init__()
+        self.setProperty("role", "panel")
+        self.setAccessibleName("new session")
+        self._send = send
+        self._wrong: dict[str, QLabel] = {}
+        self._shown: tuple[Unfinished, ...] = ()
+        self.subject = _line("subject code, never a name")
+        self.subject.setPlaceholderText("e.g. P07")
+        self.protocol = QComboBox()
+        self.protocol.setAccessibleName("protocol")
+        self.protocol.addItems([*protocol_names(), "choose a file …"])
+        self.protocol.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.protocol.activated.connect(self._choose_protocol)
+        self.study = _line("study, a folder of its own; may be empty")
+        self.folder = _line("folder in which sessions are kept")
+        self.folder.setText("recordings")
+        self.seed = _line("seed of the stimulus order; empty for a new one")
+        self.seed.setPlaceholderText("a new one")
+        self.stroking, self.answering = _hands("stroking hand"), _hands("answering hand")
+        self.with_forces = QRadioButton("Forces, with the transducer")
+        self.scores_only = QRadioButton("Scores only")
+        self.people_score = QRadioButton("People")
+        self.simulated = QRadioButton("Simulated")
+        for pair, chosen in (((self.with_forces, self.scores_only), 0), ((self.people_score, self.simulated), 0)):
+            group = QButtonGroup(self)
+            for made in pair:
+                group.addButton(made)
+                made.setAccessibleName(made.text())
+            pair[chosen].setChecked(True)
+        self._people_words = label("", "quiet", wrap=True)
+        self._resume = QComboBox()
+        self._resume.setAccessibleName("sessions that were cut short")
+        self._resume.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self._go_on = button("Go on with it", "go on with the session that was cut short", self._resumed)
+        self._unfinished = QWidget()
+        self._build(scale)
+        for line in (self.subject, self.study, self.folder, self.seed):
+            line.textChanged.connect(self.changed)
+            line.returnPressed.connect(start)
+        for made in (self.with_forces, self.scores_only, self.people_score, self.simulated):
+            made.toggled.connect(self.changed)
+        self.show_unfinished(())
+
+    def form(self) -> SessionForm:
+        """Return what stands on the page."""
+        return SessionForm(
+            subject=self.subject.text(),
+            protocol=self.protocol.currentText(),
+            study=self.study.text(),
+            folder=self.folder.text(),
+            seed=self.seed.text(),
+            stroking_hand=HANDS[self.stroking.currentIndex()][1],
+            answering_hand=HANDS[self.answering.currentIndex()][1],
+            forces=self.with_forces.isChecked(),
+            simulated=self.simulated.isChecked(),
+        )
+
+    def show_bench(self, bench: Bench) -> None:
+        """Offer what the bench allows."""
+        words = "The subject strokes the transducer and scores."
+        if self.simulated.isChecked():
+            words = "Nobody is needed: strokes and scores are simulated, and marked so."
+        elif bench.simulated and self.with_forces.isChecked():
+            words = "A simulated hand strokes when asked; you mount, and you or a subject score."
+        elif self.scores_only.isChecked():
+            words = "The subject strokes and scores; no forces are recorded."
+        say(self._people_words, words)
+        may = bench.simulated or self.scores_only.isChecked() or not bench.connected
+        self.simulated.setEnabled(may)
+        if not may and self.simulated.isChecked():
+            self.people_score.setChecked(True)
+
+    def show_refusals(self, sentences: dict[str, str]) -> None:
+        """Say what is wrong beside each field; the first wrong one is where typing goes."""
+        for name, shown in self._wrong.items():
+            say(shown, sentences.get(name, ""))
+            shown.setVisible(name in sentences)
+            regrade(shown, "wrong" if name in sentences else "")
+        fields: dict[str, QWidget] = {
+            "subject": self.subject,
+            "protocol": self.protocol,
+            "study": self.study,
+            "folder": self.folder,
+            "seed": self.seed,
+        }
+        first = next((fields[name] for name in fields if name in sentences), None)
+        if first is not None:
+            first.setFocus()
+
+    def show_unfinished(self, found: tuple[Unfinished, ...]) -> None:
+        """Offer the sessions that were cut short."""
+        if found != self._shown:
+            self._shown = found
+            self._resume.clear()
+            for session in found:
+                self._resume.addItem(session.words, str(session.folder))
+                self._resume.setItemData(self._resume.count() - 1, str(session.folder), Qt.ItemDataRole.ToolTipRole)
+        self._unfinished.setVisible(bool(found))
+
+    def _resumed(self) -> None:
+        folder = self._resume.currentData()
+        if folder:
+            self._send(ResumeSession(str(folder)))
+
+    def _choose_protocol(self, at: int) -> None:
+        if at != self.protocol.count() - 1:
+            self.changed.emit()
+            return
+        name, _ = QFileDialog.getOpenFileName(self, "Protocol", "", "Protocol (*.toml)")
+        self.add_protocol(name)
+
+    def add_protocol(self, path: str) -> None:
+        """Choose the protocol in a file; none where the path is empty."""
+        if path:
+            self.protocol.insertItem(self.protocol.count() - 1, path)
+            self.protocol.setCurrentIndex(self.protocol.count() - 2)
+        else:
+            self.protocol.setCurrentIndex(0)
+        self.changed.emit()
+
+    def _choose_folder(self) -> None:
+        name = QFileDialog.getExistingDirectory(self, "Folder of sessions", self.folder.text() or str(Path.cwd()))
+        if name:
+            self.folder.setText(name)
+
+    def _build(self, scale: float) -> None:
+        inside = QWidget()
+        inside.setObjectName("inside")
+        layout = QVBoxLayout(inside)
+        layout.setContentsMargins(int(1.5 * GRID), GRID, int(1.5 * GRID), GRID)
+        layout.setSpacing(4)
+        layout.addWidget(label("New session", "title"))
+        self._field(layout, "subject", "Subject code", self.subject)
+        self._field(layout, "protocol", "Protocol", self.protocol)
+        hands = QHBoxLayout()
+        for name, box in (("Stroking hand", self.stroking), ("Answering hand", self.answering)):
+            column = QVBoxLayout()
+            column.setSpacing(4)
+            column.addWidget(label(name, "quiet"))
+            column.addWidget(box)
+            hands.addLayout(column)
+        layout.addLayout(hands)
+        layout.addSpacing(GRID)
+        layout.addWidget(label("What is recorded", "section"))
+        layout.addWidget(self.with_forces)
+        layout.addWidget(self.scores_only)
+        self._refusal(layout, "forces")
+        layout.addWidget(label("Who strokes and scores", "section"))
+        row = QHBoxLayout()
+        row.addWidget(self.people_score)
+        row.addWidget(self.simulated)
+        row.addStretch(1)
+        layout.addLayout(row)
+        layout.addWidget(self._people_words)
+        self._refusal(layout, "simulated")
+        layout.addSpacing(GRID)
+        self._field(layout, "study", "Study", self.study)
+        folder = QHBoxLayout()
+        folder.addWidget(self.folder, 1)
+        folder.addWidget(button("…", "choose the folder of sessions", self._choose_folder))
+        self._field(layout, "folder", "Folder", folder)
+        self._field(layout, "seed", "Seed", self.seed)
+        layout.addStretch(1)
+        cut_short = QVBoxLayout(self._unfinished)
+        cut_short.setContentsMargins(0, GRID, 0, 0)
+        cut_short.addWidget(label("Sessions that were cut short", "section"))
+        cut_short.addWidget(self._resume)
+        cut_short.addWidget(self._go_on)
+        layout.addWidget(self._unfinished)
+        scroll = QScrollArea()
+        scroll.setWidget(inside)
+        scroll.setWidgetResizable(True)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        scroll.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")
+        outer = QVBoxLayout(self)
+        outer.setContentsMargins(2, 2, 2, 2)
+        outer.addWidget(scroll)
+        self.setMinimumWidth(round(280 * min(scale, 1.25)))
+
+    def _field(self, layout: QVBoxLayout, name: str, words: str, field: QWidget | QHBoxLayout) -> None:
+        layout.addWidget(label(words, "quiet"))
+        if isinstance(field, QWidget):
+            layout.addWidget(field)
+        else:
+            layout.addLayout(field)
+        self._refusal(layout, name)
+
+    def _refusal(self, layout: QVBoxLayout, name: str) -> None:
+        made = label("", "quiet", wrap=True)
+        made.setVisible(False)
+        self._wrong[name] = made
+        layout.addWidget(made)
+
+
+def _line(name: str) -> QLineEdit:
+    made = QLineEdit()
+    made.setAccessibleName(name)
+    return made
+
+
+def _hands(name: str) -> QComboBox:
+    made = QComboBox()
+    made.setAccessibleName(name)
+    made.addItems([words for words, _ in HANDS])
+    return made

@@ -1,0 +1,179 @@
+"""The line from 0 to 100: plain, as long in millimetres on every screen, without a mark before the first touch."""
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import (
+    QColor,
+    QInputDevice,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QTouchEvent,
+)
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from daq_app.answer import LEAP, STEP, Answer, Device
+from daq_app.qt.tokens import Tokens
+
+LENGTH = 100.0  # of the line [mm]
+REACH = 12.0  # above and below the line that counts as touching it [mm]
+MARK = 10.0  # height of the mark [mm]
+
+KEYS = {
+    Qt.Key.Key_Left: -STEP,
+    Qt.Key.Key_Down: -STEP,
+    Qt.Key.Key_Right: STEP,
+    Qt.Key.Key_Up: STEP,
+    Qt.Key.Key_PageDown: -LEAP,
+    Qt.Key.Key_PageUp: LEAP,
+    Qt.Key.Key_Home: -100.0,
+    Qt.Key.Key_End: 100.0,
+}
+
+
+class ScoreLine(QWidget):
+    """Takes mouse, touch, pen and keyboard alike; every position is kept with its time."""
+
+    changed = Signal()
+
+    def __init__(self, tokens: Tokens, now: Callable[[], float]) -> None:
+        """Show an empty line; `now` tells the session clock [s]."""
+        super().__init__()
+        self._tokens = tokens
+        self._now = now
+        self._pixels_per_mm = 96 / 25.4
+        self._answer = Answer()
+        self._ends = ("", "")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAttribute(Qt.WidgetAttribute.WA_AcceptTouchEvents)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self._resize()
+
+    @property
+    def answer(self) -> Answer:
+        """Return the answer so far."""
+        return self._answer
+
+    @property
+    def pixels_per_mm(self) -> float:
+        """Return device-independent pixels in a millimetre of this screen."""
+        return self._pixels_per_mm
+
+    def set_pixels_per_mm(self, pixels: float) -> None:
+        """Be as long as `LENGTH` says on a screen with so many device-independent pixels a millimetre."""
+        if pixels != self._pixels_per_mm:
+            self._pixels_per_mm = pixels
+            self._resize()
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        self._tokens = tokens
+        self.update()
+
+    def begin(self, ends: tuple[str, str]) -> None:
+        """Begin another answer, with an empty line between these ends."""
+        self._ends = ends
+        self._take(Answer())
+
+    def place_of(self, position: float) -> QPointF:
+        """Return where a position from 0 to 100 lies in the widget."""
+        line = self._line()
+        return QPointF(line.left() + position / 100.0 * line.width(), line.center().y())
+
+    def sizeHint(self) -> QSize:  # noqa: N802  Qt's name
+        """Return the size that holds the line and its reach."""
+        scale = self._pixels_per_mm
+        return QSize(round((LENGTH + MARK) * scale), round(2 * REACH * scale))
+
+    def event(self, event: QEvent) -> bool:
+        """Take touches; Qt makes mouse events only of those that nobody takes."""
+        if isinstance(event, QTouchEvent) and event.points():
+            self._touched(event, event.points()[0].position())
+            event.accept()
+            return True
+        return super().event(event)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
+        """Place the mark."""
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._take(self._answer.pressed(self._now(), self._position(event.position()), _device(event)))
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
+        """Move the mark along."""
+        self._take(self._answer.dragged(self._now(), self._position(event.position()), _device(event)))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: ARG002, N802  Qt's name
+        """Leave the mark where it is."""
+        self._take(self._answer.released())
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
+        """Place and move the mark with the keyboard."""
+        step = KEYS.get(Qt.Key(event.key()))
+        if step is None:
+            super().keyPressEvent(event)
+            return
+        self._take(self._answer.stepped(self._now(), step))
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
+        """Paint the line, its two ends, and the mark where there is one."""
+        t, mm, line = self._tokens, self._pixels_per_mm, self._line()
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if self.hasFocus():
+            painter.setPen(QPen(QColor(t.act), 2))
+            painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)
+        painter.setPen(QPen(QColor(t.text), max(0.5 * mm, 2.0), Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap))
+        middle = line.center().y()
+        painter.drawLine(QPointF(line.left(), middle), QPointF(line.right(), middle))
+        for x in (line.left(), line.right()):
+            painter.drawLine(QPointF(x, middle - 2 * mm), QPointF(x, middle + 2 * mm))
+        score = self._answer.positions[-1][1] if self._answer.positions else None
+        if score is not None:
+            at = self.place_of(score)
+            painter.setPen(QPen(QColor(t.act), max(1.0 * mm, 3.0), Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+            painter.drawLine(at - QPointF(0, MARK / 2 * mm), at + QPointF(0, MARK / 2 * mm))
+
+    def _touched(self, event: QTouchEvent, at: QPointF) -> None:
+        now, place = self._now(), self._position(at)
+        match event.type():
+            case QEvent.Type.TouchBegin:
+                self._take(self._answer.pressed(now, place, "touch"))
+            case QEvent.Type.TouchUpdate:
+                self._take(self._answer.dragged(now, place, "touch"))
+            case _:
+                self._take(self._answer.released())
+
+    def _take(self, answer: Answer) -> None:
+        if answer is self._answer:
+            return
+        self._answer = answer
+        low, high = self._ends
+        self.setAccessibleName(f"line from {low} to {high}")
+        where = "no answer yet" if answer.score is None else f"answer at {answer.score:.0f} of 100"
+        self.setAccessibleDescription(f"{where}; arrow keys move it")
+        self.update()
+        self.changed.emit()
+
+    def _line(self) -> QRectF:
+        width = LENGTH * self._pixels_per_mm
+        return QRectF((self.width() - width) / 2, 0, width, self.height())
+
+    def _position(self, at: QPointF) -> float:
+        line = self._line()
+        return 100.0 * (at.x() - line.left()) / line.width()
+
+    def _resize(self) -> None:
+        self.setFixedSize(self.sizeHint())
+        self.updateGeometry()
+        self.update()
+
+
+def _device(event: QMouseEvent) -> Device:
+    kind = event.pointingDevice().type()
+    if kind == QInputDevice.DeviceType.Stylus:
+        return "pen"
+    return "touch" if kind == QInputDevice.DeviceType.TouchScreen else "mouse"

@@ -1,0 +1,73 @@
+"""Starts the window: checks that there is a screen, opens it at once with the simulated bench, and runs it."""
+
+import sys
+from collections.abc import Callable
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from daq_app.qt.screen_check import missing_library, what_is_missing
+
+if TYPE_CHECKING:  # Qt is loaded only once it is known that it can be
+    from PySide6.QtWidgets import QApplication
+
+    from daq_app.qt.bridge import Client
+    from daq_app.qt.main_window import MainWindow
+
+SIMULATED_BENCH = "sim:?rate=200"
+FAILED = 1  # exit code: could not be done
+
+
+def main() -> int:
+    """Open the window and return the exit code. What is missing is told in one sentence."""
+    if missing := what_is_missing():
+        return _said(missing)
+    try:
+        from PySide6.QtWidgets import QApplication
+    except ImportError as error:
+        return _said(missing_library(error))
+    application = QApplication(sys.argv[:1])
+    window = opened(application)
+    window.show()
+    return application.exec()
+
+
+def opened(application: "QApplication", start: "Callable[[], Client] | None" = None) -> "MainWindow":
+    """Return the experimenter's window with the simulated bench being connected; `start` makes a recorder."""
+    from daq_app.recorder.client import Recorder
+    from daq_app.recorder.messages import Connect
+
+    # The recorder's process starts while the window is being built.
+    recorder = (start or Recorder.start)()
+    recorder.send(Connect(SIMULATED_BENCH))
+    from daq_app.qt.bridge import Bridge
+    from daq_app.qt.main_window import MainWindow
+    from daq_app.qt.tokens import current_tokens, font_scale, style_sheet
+
+    application.setApplicationName("daq-app")
+    application.setQuitOnLastWindowClosed(False)
+    scale, tokens = font_scale(), current_tokens()
+    application.setStyleSheet(style_sheet(tokens, scale))
+    bridge = Bridge(recorder, start or Recorder.start)
+    bridge.connecting(SIMULATED_BENCH)
+    window = MainWindow(bridge, tokens, scale)
+
+    def theme_changed() -> None:
+        chosen = current_tokens()
+        application.setStyleSheet(style_sheet(chosen, scale))
+        window.set_tokens(chosen)
+
+    application.styleHints().colorSchemeChanged.connect(theme_changed)
+
+    def slipped(_kind: type[BaseException], error: BaseException, _trace: TracebackType | None) -> None:
+        """Say what went wrong in the window, which goes on: an error of ours there never stops a recording."""
+        if isinstance(error, Exception):
+            bridge.drawing_failed(error)
+
+    sys.excepthook = slipped
+    bridge.begin()
+    return window
+
+
+def _said(sentence: str) -> int:
+    sys.stderr.write(f"daq-app: {sentence}\n")
+    return FAILED

@@ -1,0 +1,211 @@
+"""The subject's place: what to do, then the line. Nothing on it tells which stimulus is mounted."""
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtGui import QCloseEvent, QKeyEvent, QMoveEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedWidget, QVBoxLayout, QWidget
+
+from daq_app.qt.parts import button, label, say
+from daq_app.qt.ruler_check import RulerCheck
+from daq_app.qt.score_line import ScoreLine
+from daq_app.qt.screens import Millimetres, millimetres
+from daq_app.qt.tokens import GRID, Tokens, font
+from daq_app.view_subject import SubjectView
+from sessions.plan import Hand
+from sessions.steps import Scored
+
+LARGE, LARGER = 24, 36  # type that is read from where a hand rests on a transducer
+TEXT_WIDTH = 900  # of a text that is still easily read
+
+
+class SubjectWindow(QWidget):
+    """A window of its own, for a second screen or a tablet."""
+
+    answered = Signal(object)  # Scored
+    screen_changed = Signal()
+
+    def __init__(self, tokens: Tokens, scale: float, now: Callable[[], float]) -> None:
+        """Show a welcome; `now` tells the session clock [s]."""
+        super().__init__()
+        self.setObjectName("window")
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setWindowTitle("daq-app · subject")
+        self.setAccessibleName("subject's window")
+        self._view: SubjectView | None = None
+        self._stated_hand: Hand | None = None
+        self._title = _large(label(role="title", wrap=True), LARGER, scale, bold=True)
+        self._text = _large(label(wrap=True), LARGE, scale)
+        self._question = _large(label(role="title", wrap=True), LARGER, scale, bold=True)
+        self.line = ScoreLine(tokens, now)
+        self._low, self._high = (_large(label(wrap=True), LARGE, scale) for _ in range(2))
+        self._high.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop)
+        self._low.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
+        self.next = button("Next", "next: give this answer", self._give, "primary")
+        self.next.setMinimumSize(round(180 * scale), round(64 * scale))
+        self.ruler = RulerCheck(tokens, scale)
+        self.ruler.done.connect(self._ruler_done)
+        self._pages = QStackedWidget()
+        self._pages.addWidget(self._message_page())
+        self._pages.addWidget(self._scale_page())
+        self._pages.addWidget(self.ruler)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self._pages)
+        self.line.changed.connect(self._answer_changed)
+        self.setMinimumSize(round(560 * min(scale, 1.25)), 340)
+        self.fit_screen()
+
+    @property
+    def scoring(self) -> bool:
+        """Say whether an answer is waited for."""
+        return self._view is not None and self._view.kind == "scale"
+
+    def show_view(self, view: SubjectView, hand: Hand | None) -> None:
+        """Show what is to be done now; `hand` is the answering one, where somebody stated it."""
+        before, self._view, self._stated_hand = self._view, view, hand
+        if before == view:
+            return
+        self._place_next(view.hand)
+        if view.kind == "scale":
+            if before is None or before.kind != "scale" or before.key != view.key:
+                self.line.begin(view.ends)
+            say(self._question, view.title)
+            say(self._low, view.ends[0])
+            say(self._high, view.ends[1])
+            self._answer_changed()
+        else:
+            say(self._title, view.title)
+            say(self._text, view.text)
+        if self._pages.currentWidget() is not self.ruler:
+            self._turn()
+
+    def check_ruler(self) -> None:
+        """Show the page on which the line is held against a ruler."""
+        self.ruler.begin(self.screen())
+        self._pages.setCurrentWidget(self.ruler)
+        self.raise_()
+        self.activateWindow()
+
+    def fit_screen(self) -> Millimetres:
+        """Make the line as long as it should be on the screen the window is on."""
+        known = millimetres(self.screen())
+        self.line.set_pixels_per_mm(known.pixels)
+        width = round(self.line.width() / 2 - GRID)
+        for end in (self._low, self._high):
+            end.setFixedWidth(width)
+        return known
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        self.line.set_tokens(tokens)
+        self.ruler.set_tokens(tokens)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
+        """Let Enter be Next, and every other key of the line go to the line."""
+        if self.scoring and event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space):
+            self._give()
+        elif event.key() == Qt.Key.Key_F11:
+            self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
+        else:
+            super().keyPressEvent(event)
+
+    def moveEvent(self, event: QMoveEvent) -> None:  # noqa: N802  Qt's name
+        """Follow to a screen of another size."""
+        super().moveEvent(event)
+        self.fit_screen()
+        self.screen_changed.emit()
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
+        """Follow a change of the screen's scaling."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.DevicePixelRatioChange:
+            self.fit_screen()
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802  Qt's name
+        """Only hide: an answer that is being given is not lost."""
+        event.ignore()
+        self.hide()
+
+    def _message_page(self) -> QWidget:
+        page = QWidget()
+        layout = QVBoxLayout(page)
+        layout.setContentsMargins(6 * GRID, 6 * GRID, 6 * GRID, 6 * GRID)
+        layout.addStretch(1)
+        for words in (self._title, self._text):
+            words.setMaximumWidth(TEXT_WIDTH)
+            row = QHBoxLayout()
+            row.addStretch(1)
+            row.addWidget(words, 100)
+            row.addStretch(1)
+            layout.addLayout(row)
+            layout.addSpacing(3 * GRID)
+        layout.addStretch(2)
+        return page
+
+    def _scale_page(self) -> QWidget:
+        page = QWidget()
+        layout = QVBoxLayout(page)
+        layout.setContentsMargins(2 * GRID, 4 * GRID, 2 * GRID, 4 * GRID)
+        self._question.setAlignment(Qt.AlignmentFlag.AlignHCenter)
+        layout.addWidget(self._question)
+        layout.addStretch(2)
+        layout.addWidget(self.line, 0, Qt.AlignmentFlag.AlignHCenter)
+        ends = QHBoxLayout()
+        ends.addStretch(1)
+        ends.addWidget(self._low)
+        ends.addWidget(self._high)
+        ends.addStretch(1)
+        layout.addLayout(ends)
+        layout.addStretch(2)
+        self._next_row = QHBoxLayout()
+        self._next_row.setContentsMargins(4 * GRID, 0, 4 * GRID, 0)
+        held = QWidget()  # keeps the button's place while there is none
+        held.setLayout(self._next_row)
+        held.setFixedHeight(self.next.minimumHeight() + 2 * GRID)
+        layout.addWidget(held)
+        self._place_next("right")
+        return page
+
+    def _place_next(self, hand: Hand) -> None:
+        """Put Next where the answering hand is."""
+        while self._next_row.count():
+            self._next_row.takeAt(0)
+        if hand == "right":
+            self._next_row.addStretch(1)
+            self._next_row.addWidget(self.next)
+        else:
+            self._next_row.addWidget(self.next)
+            self._next_row.addStretch(1)
+
+    def _turn(self) -> None:
+        self._pages.setCurrentIndex(1 if self.scoring else 0)
+        if self.scoring:
+            self.line.setFocus()
+
+    def _ruler_done(self) -> None:
+        self.fit_screen()
+        self.screen_changed.emit()
+        self._turn()
+
+    def _answer_changed(self) -> None:
+        self.next.setVisible(self.line.answer.score is not None)
+
+    def _give(self) -> None:
+        answer = self.line.answer
+        if not self.scoring or answer.score is None:
+            return
+        given: Scored = answer.released().scored(self._stated_hand)
+        self.next.hide()  # nobody gives an answer twice
+        self._view = None
+        say(self._title, "Thank you")
+        say(self._text, "")
+        self._pages.setCurrentIndex(0)
+        self.answered.emit(given)
+
+
+def _large(made: QLabel, size: int, scale: float, *, bold: bool = False) -> QLabel:
+    """Return a label in large type: the style sheet's sizes are those of the experimenter's window."""
+    made.setStyleSheet(f"font-size: {round(size * scale)}px; font-weight: {600 if bold else 400};")
+    made.setFont(font(size, scale, bold=bold))
+    return made
