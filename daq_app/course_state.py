@@ -12,8 +12,9 @@ from sessions.plan import Block, SessionPlan, Trial
 from sessions.recording import LoggedEvent
 from sessions.runner import SessionEnd, Status
 
-Phase = Literal["idle", "mounting", "taring", "ready", "stroking", "scoring", "paused", "closing", "ended"]
+Phase = Literal["idle", "mounting", "taring", "ready", "stroking", "scoring", "paused", "closing", "ended", "resuming"]
 Outcome = Literal["coming", "done", "skipped"]
+MARKS = 40  # that are kept for the plots: more than a minute can hold
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +55,7 @@ class SessionState:
     asked: steps.Command | None = None  # what is waited for
     told: str | None = None  # the last sentence that needs no answer, or that refuses one
     judged: int | None = None  # number of the trial whose stroke was looked at last
-    marks: tuple[Mark, ...] = ()  # of the take in hand
+    marks: tuple[Mark, ...] = ()  # the last ones
     notes: tuple[str, ...] = ()
     status: Status | None = None
     saved_ns: int = 0  # instant of the last thing that is safe [ns, session clock]
@@ -107,6 +108,10 @@ def _after(session: SessionState, message: Message, now: float) -> SessionState:
             return _judged(session, trial, take, quality)
         case m.SessionEnded(_, end, resumable):
             return replace(session, end=end, phase="ended", asked=None, resumable=resumable)
+        case m.ResumeSession():
+            return replace(session, phase="resuming", asked=None)
+        case m.Failed("ResumeSession") if session.over:
+            return replace(session, phase="ended")
         case m.Failed(request, sentence) if request in ("StartSession", "ResumeSession") and not session.over:
             return replace(session, broken=sentence, phase="ended", asked=None)
         case m.Sealing():
@@ -142,7 +147,7 @@ def _noticed(session: SessionState, message: Message) -> SessionState:
         case steps.ShowInstruction(block):
             return replace(session, block=block)
         case steps.StartTake(trial, take):
-            return replace(session.with_trial(trial, takes=take, outcome="coming", quality=None), marks=())
+            return replace(session.with_trial(trial, takes=take, outcome="coming", quality=None))
         case steps.Tell(sentence) | steps.Refuse(sentence):
             return replace(session, told=sentence)
         case steps.EndSession():
@@ -157,9 +162,9 @@ def _logged(session: SessionState, event: LoggedEvent) -> SessionState:
     match event.kind:
         case "contact_onset":
             phase = "stroking" if session.phase == "ready" else session.phase
-            return replace(session, phase=phase, marks=(*session.marks, Mark("onset", data["time"], data["time"])))
+            return _marked(replace(session, phase=phase), Mark("onset", data["time"], data["time"]))
         case "finger_lifted":
-            return replace(session, marks=(*session.marks, Mark("lift", data["time"], data["time"])))
+            return _marked(session, Mark("lift", data["time"], data["time"]))
         case "pause":
             return replace(session, phase="paused", before_pause=session.phase)
         case "resume" if session.phase == "paused":
@@ -199,4 +204,10 @@ def _judged(session: SessionState, trial: int, take: int, quality: Quality) -> S
     session = replace(session.with_trial(trial, quality=quality), judged=trial)
     if quality.steady is None:
         return session
-    return replace(session, marks=(*session.marks, Mark("steady", *quality.steady)))
+    return _marked(session, Mark("steady", *quality.steady))
+
+
+def _marked(session: SessionState, mark: Mark) -> SessionState:
+    """Return the session with another mark; a steady window that is found anew takes the place of the one before."""
+    kept = [m for m in session.marks if m.kind != "steady" or mark.kind != "steady" or m.stop < mark.start]
+    return replace(session, marks=(*kept, mark)[-MARKS:])

@@ -7,6 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from daq_app.recorder.messages import Kind, People, StartSession
+from daq_app.sentences import sentence
 from sessions.plan import Frame, Hand
 from sessions.protocols import plan, protocol
 from sessions.protocols.protocol import LARGEST_SEED
@@ -153,5 +154,4 @@ def _told(error: Exception) -> str:
     text = str(error)
     if isinstance(error, OSError) and error.strerror:
         text = f"{error.filename}: {error.strerror.lower()}"
-    text = " ".join(text.split())
-    return f"{text[:1].upper()}{text[1:]}."
+    return sentence(text)

@@ -17,7 +17,7 @@ from sessions.plan import SessionPlan, Trial
 
 Array = NDArray[np.float64]
 
-FELL = 0.5  # a normal force that falls by this share within the steady window is worth a word [-]
+FELL = 0.5  # a normal force that falls by this share along the steady window is worth a word [-]
 
 # Few words for what an experimenter can do something about; the others are told by their own sentence.
 WORDS = {
@@ -50,7 +50,7 @@ class Quality:
     mu: float | None  # mean of T/N over the steady window [-]
     interval: tuple[float, float] | None
     speed: float | None  # [mm/s]
-    fell: float | None  # by what share N fell within the steady window [-]
+    fell: float | None  # by what share N fell from the first to the last quarter of the steady window [-]
 
 
 def stroke_quality(
@@ -69,8 +69,8 @@ def stroke_quality(
     sentences = [flaw.sentence for flaw in told]
     fell = None if stroke is None else _fell(stroke)
     if fell is not None and fell >= FELL:
-        words.append(f"normal force fell by {100 * fell:.0f} %")
-        sentences.append(f"Within the steady window the normal force fell to {100 * (1 - fell):.0f} % of its greatest.")
+        words.append("normal force fell by half")
+        sentences.append(f"The normal force ended at {100 * (1 - fell):.0f} % of what it was: the finger was leaving.")
     grades = {flaw.grade for flaw in told}
     grade = "refused" if "refused" in grades else "doubtful" if words else "good"
     if stroke is None:
@@ -101,7 +101,7 @@ def _words(flaw: Flaw) -> str:
 
 
 def _fell(stroke: Stroke) -> float | None:
-    """Return by what share of its greatest the normal force fell within the steady window; None without one."""
+    """Return by what share N fell from the first to the last quarter of the steady window; None without one."""
     if stroke.steady is None or stroke.curve is None:
         return None
     inside = (stroke.curve.time >= stroke.steady[0]) & (stroke.curve.time <= stroke.steady[1])
@@ -109,5 +109,5 @@ def _fell(stroke: Stroke) -> float | None:
     normal = normal[np.isfinite(normal)]
     if not len(normal):
         return None
-    top = int(normal.argmax())
-    return float(1.0 - normal[top:].min() / normal[top])
+    quarter = max(len(normal) // 4, 1)
+    return float(1.0 - np.median(normal[-quarter:]) / np.median(normal[:quarter]))

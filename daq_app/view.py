@@ -6,6 +6,7 @@ from typing import Literal
 from daq_app import view_bench, view_course, view_subject
 from daq_app.course_state import SessionState
 from daq_app.recorder import messages as m
+from daq_app.sentences import sentence
 from daq_app.state import AppState
 from daq_app.view_bench import BenchView
 from daq_app.view_course import CourseView
@@ -59,7 +60,9 @@ def derive_view(state: AppState) -> View:
         simulated=simulated,
         lamp=_lamp(state),
         banner=_banner(state),
-        course=None if session is None else view_course.course_view(session, state.bench, state.now),
+        course=None
+        if session is None
+        else view_course.course_view(session, state.bench, state.now, alone=state.gone is not None),
         bench=view_bench.bench_view(state.bench, recording=session is not None and not session.over),
         subject=view_subject.subject_view(session),
     )
@@ -95,24 +98,24 @@ def _banner(state: AppState) -> Banner | None:
     if state.gone is not None:
         kept = f" What was saved until then is in {session.folder}." if session else ""
         again = m.ResumeSession(session.folder) if running and session is not None else None
-        return Banner("wrong", f"{sentence_case(state.gone)}{kept}", "Resume session" if again else "", again)
+        return Banner("wrong", f"{sentence(state.gone)}{kept}", "Resume session" if again else "", again)
     if session is not None and session.broken is not None:
-        sentence = f"The recording has stopped: {session.broken}. What was saved until then is in {session.folder}."
-        return Banner("wrong", sentence)
+        words = f"The recording has stopped: {session.broken}. What was saved until then is in {session.folder}."
+        return Banner("wrong", words)
     if session is not None and session.end is not None and session.end.cause not in ("finished", "aborted", "stopped"):
         again = m.ResumeSession(session.folder) if session.resumable else None
-        sentence = f"The session was cut short: {session.end.reason}. Everything until then is kept."
-        return Banner("wrong", sentence, "Resume session" if again else "", again)
+        words = f"The session was cut short: {session.end.reason}. Everything until then is kept."
+        return Banner("wrong", words, "Resume session" if again else "", again)
     if bench.link == "lost":
         lost = "" if not running else " Readings are being lost; what came before is kept."
         return Banner("wrong", f"The transducer does not answer: {bench.problem}.{lost}")
     if running and state.heard is not None and state.now - state.heard > SILENT:
         return Banner("wrong", f"Nothing was heard from the recorder for {state.now - state.heard:.0f} s.")
     if over := bench.peak.over:
-        sentence = f"Overload on {', '.join(over)}: take the load off and check the transducer."
-        return Banner("wrong", sentence, "Acknowledge", m.AcknowledgeOverloads())
+        words = f"Overload on {', '.join(over)}: take the load off and check the transducer."
+        return Banner("wrong", words, "Acknowledge", m.AcknowledgeOverloads())
     if state.failed is not None:
-        return Banner("look", sentence_case(state.failed.sentence), "Dismiss", Dismissed())
+        return Banner("look", sentence(state.failed.sentence), "Dismiss", Dismissed())
     if state.drawing is not None:
         return Banner(
             "look", f"A picture could not be drawn ({state.drawing}); the recording goes on.", "Dismiss", Dismissed()
@@ -130,14 +133,3 @@ def duration(seconds: float) -> str:
     """
     whole = max(int(seconds), 0)
     return f"{whole // 3600:02d}:{whole // 60 % 60:02d}:{whole % 60:02d}"
-
-
-def sentence_case(sentence: str) -> str:
-    """Return a sentence with a capital and a full stop, as it stands alone.
-
-    >>> sentence_case("there is no driver 'x'")
-    "There is no driver 'x'."
-    """
-    text = sentence.strip()
-    text = text[:1].upper() + text[1:]
-    return text if text.endswith((".", "!", "?")) else f"{text}."

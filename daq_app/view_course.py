@@ -64,9 +64,9 @@ class CourseView:
     end: Button
 
 
-def course_view(session: SessionState, bench: BenchState, now: float) -> CourseView:
-    """Return what is shown of a session."""
-    headline, primary = _to_do(session, bench)
+def course_view(session: SessionState, bench: BenchState, now: float, *, alone: bool = False) -> CourseView:
+    """Return what is shown of a session; `alone` where its recorder is gone."""
+    headline, primary = _alone(session) if alone and not session.over else _to_do(session, bench)
     over = session.over
     stroke = _stroke(session)
     trial = session.of(session.trial)
@@ -90,33 +90,47 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
 
 def _to_do(session: SessionState, bench: BenchState) -> tuple[str, Button | None]:
     """Return the one sentence, and the one button that does what it says."""
-    trial = session.of(session.trial)
-    code = "" if trial is None else trial.trial.stimulus.code
     match session.phase:
         case "idle" if bench.link == "lost":
             return "Wait: the transducer does not answer.", None
         case "idle":
             return "Everything is set up. Press Space to begin.", Button("Begin", "Space", sends=steps.Begin())
-        case "mounting" if trial is not None:
-            then = "to zero" if session.plan.forces else "to go on"
-            sentence = f"Mount sample {code}, its arrow {WAYS[trial.trial.direction]}. Then press Space {then}."
-            label = "Zero" if session.plan.forces else "Mounted"
-            return sentence, Button(label, "Space", sends=steps.StimulusMounted(code))
-        case "taring":
-            return f"Hands off: zero is being measured with sample {code} on.", None
-        case "ready" if trial is not None:
-            return _stroke_sentence(session, trial.trial), _stroke_button(session)
-        case "stroking":
-            return f"Stroke on {code} is being recorded.", None
-        case "scoring":
-            return f"The subject scores sample {code}.", None
         case "paused":
             return "Paused. Press Space to go on.", Button("Resume", "Space", sends=steps.Resume())
+        case "resuming":
+            return "Wait: the session is being taken up again.", None
         case "closing":
             finish = Button("End session", "Space", sends=steps.Finish())
             return "Every trial is done. Press Space to end the session.", finish
-        case _:
+        case "ended":
             return _ended(session)
+        case _:
+            trial = session.of(session.trial)
+            return ("", None) if trial is None else _to_do_in(trial.trial, session)
+
+
+def _to_do_in(trial: Trial, session: SessionState) -> tuple[str, Button | None]:
+    """Return what is to be done within a trial."""
+    code = trial.stimulus.code
+    match session.phase:
+        case "mounting":
+            then = "to zero" if session.plan.forces else "to go on"
+            label = "Zero" if session.plan.forces else "Mounted"
+            words = f"Mount sample {code}, its arrow {WAYS[trial.direction]}. Then press Space {then}."
+            return words, Button(label, "Space", sends=steps.StimulusMounted(code))
+        case "taring":
+            return f"Hands off: zero is being measured with sample {code} on.", None
+        case "ready":
+            return _stroke_sentence(session, trial), _stroke_button(session)
+        case "stroking":
+            return f"Stroke on {code} is being recorded.", None
+        case _:
+            return f"The subject scores sample {code}.", None
+
+
+def _alone(session: SessionState) -> tuple[str, Button | None]:
+    resume = Button("Resume session", "Space", sends=m.ResumeSession(session.folder))
+    return "The recorder has stopped. Press Space to go on at the same trial.", resume
 
 
 def _stroke_sentence(session: SessionState, trial: Trial) -> str:
@@ -197,7 +211,7 @@ def _stroke(session: SessionState) -> StrokeView:
     if quality.speed is not None:
         parts.append(f"{quality.speed:.0f} mm/s")
     if quality.fell is not None:
-        parts.append(f"N fell {100 * quality.fell:.0f} %")
+        parts.append(f"N {'fell' if quality.fell >= 0 else 'rose'} {100 * abs(quality.fell):.0f} %")
     parts.append("good" if quality.grade == "good" else "; ".join(quality.words))
     still_mounted = judged.trial.number == session.trial or session.phase in ("mounting", "closing")
     redo = steps.Redo(quality.words[0]) if quality.words and still_mounted else None

@@ -34,7 +34,7 @@ def subject_view(session: SessionState | None) -> SubjectView:
             return SubjectView("stroke", "Stroke the surface once", instruction, hand=hand)
         case "scoring":
             return _scale(session, hand)
-        case "paused":
+        case "paused" | "resuming":
             return SubjectView("wait", "Pause", "The experimenter will go on in a moment.", hand=hand)
         case "closing" | "ended":
             return SubjectView("wait", "Thank you", "You can rest your hand now.", hand=hand)

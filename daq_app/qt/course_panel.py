@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QFrame,
     QGridLayout,
@@ -49,8 +50,7 @@ class CoursePanel(QFrame):
         self.pause = button("Pause  P", "pause", self._pause)
         self.note = button("Note  N", "write a note", lambda: self.ask("note"))
         self.end = button("End session", "end the session, with a reason", self._end)
-        self.line = QLineEdit()
-        self.line.returnPressed.connect(self._given)
+        self.line = ReasonLine(self._given, self.leave)
         self._question = label("", wrap=True)
         self._bottom = QStackedWidget()
         self._bottom.addWidget(self._actions())
@@ -169,6 +169,25 @@ class CoursePanel(QFrame):
 
     def set_tokens(self, tokens: Tokens) -> None:
         """Follow another theme: the style sheet does it all."""
+
+
+class ReasonLine(QLineEdit):
+    """A line that keeps Enter and Esc to itself: Enter there is not the window's primary button."""
+
+    def __init__(self, given: Callable[[], None], left: Callable[[], None]) -> None:
+        """Call `given` at Enter and `left` at Esc."""
+        super().__init__()
+        self._given = given
+        self._left = left
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
+        """Take the two keys; type the others."""
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self._given()
+        elif event.key() == Qt.Key.Key_Escape:
+            self._left()
+        else:
+            super().keyPressEvent(event)
 
 
 def _buttons(view: CourseView) -> tuple[Button, ...]:

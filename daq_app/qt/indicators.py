@@ -62,7 +62,7 @@ class Lamp(QWidget):
 class LoadBar(QWidget):
     """How far one axis is loaded now, and the most it was loaded since somebody acknowledged it."""
 
-    NAME, NOISE = 72, 84  # widths of the words beside the bar, before the font's scale
+    NAME, NOISE = 78, 92  # widths of the words beside the bar, before the font's scale
 
     def __init__(self, tokens: Tokens, name: str, scale: float) -> None:
         """Start empty."""

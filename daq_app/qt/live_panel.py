@@ -3,7 +3,7 @@
 import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QButtonGroup, QFrame, QGridLayout, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QFrame, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from daq_app.course_state import Mark
 from daq_app.live_feed import LiveFeed
@@ -32,7 +32,6 @@ AXES = (
     ),
 )
 READ = (("N", "N", 2, N), ("T", "N", 2, T), ("mu", "", 2, MU), ("speed", "mm/s", 0, ""))
-KEYS_OF_AXES = (("Fx Tx", FX), ("Fy Ty", FY), ("Fz Tz", ""))
 
 
 class LivePanel(QFrame):
@@ -51,9 +50,9 @@ class LivePanel(QFrame):
         self.plots = [LivePlot(*plot, tokens, scale) for plot in (*PLOTS, *AXES)]
         self.map = ContactMap(tokens, scale)
         self._values: dict[str, QLabel] = {}
-        self.hold = button("Hold", "hold the picture; readings go on", self._toggle_hold, "flat")
+        self.hold = button("Hold  H", "hold the picture; readings go on", self._toggle_hold)
         self.hold.setCheckable(True)
-        self._lengths = QButtonGroup(self)
+        self.length = QComboBox()
         grid = QGridLayout()
         grid.setSpacing(4)
         for row, plot in enumerate(self.plots[:3]):
@@ -104,9 +103,7 @@ class LivePanel(QFrame):
         self._seconds = seconds
         for plot in self.plots:
             plot.show_seconds(seconds)
-        pressed = self._lengths.button(seconds)
-        if pressed is not None:  # pyright: ignore[reportUnnecessaryComparison]  Qt returns None for no such button
-            pressed.setChecked(True)
+        self.length.setCurrentIndex(LENGTHS.index(seconds))
 
     def change_length(self, by: int) -> None:
         """Show the next longer (+1) or shorter (-1) stretch."""
@@ -152,7 +149,7 @@ class LivePanel(QFrame):
         for channel, unit, _, colour in READ:
             name = {"mu": "µ"}.get(channel, channel)
             made = label("–", "title")
-            made.setFixedWidth(round((92 if unit == "mm/s" else 74) * scale))
+            made.setFixedWidth(round((92 if unit == "mm/s" else 76) * scale))
             made.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             made.setAccessibleName(f"{name} now")
             caption = label(f"{name}", "quiet")
@@ -162,15 +159,11 @@ class LivePanel(QFrame):
             row.addWidget(made)
             self._values[channel] = made
         row.addStretch(1)
-        row.addWidget(label("show", "quiet"))
         for seconds in LENGTHS:
-            made = QPushButton(f"{seconds} s")
-            made.setCheckable(True)
-            made.setProperty("role", "flat")
-            made.setAccessibleName(f"show the last {seconds} seconds")
-            made.clicked.connect(lambda _=False, s=seconds: self.show_seconds(s))
-            self._lengths.addButton(made, seconds)
-            row.addWidget(made)
+            self.length.addItem(f"last {seconds} s", seconds)
+        self.length.setAccessibleName("stretch of time that is shown")
+        self.length.activated.connect(self._length_chosen)
+        row.addWidget(self.length)
         row.addWidget(self.hold)
         return row
 
@@ -183,6 +176,9 @@ class LivePanel(QFrame):
             text = f"{known.mean():.{digits}f} {unit}".strip() if len(known) else "–"
             say(self._values[channel], text.replace("-", "−"))
 
+    def _length_chosen(self, at: int) -> None:
+        self.show_seconds(LENGTHS[at])
+
     def _toggle_hold(self) -> None:
         self._held = self._feed.trace.newest if self.hold.isChecked() else None
-        self.hold.setText("Held" if self.hold.isChecked() else "Hold")
+        self.hold.setText("Held  H" if self.hold.isChecked() else "Hold  H")

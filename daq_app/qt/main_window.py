@@ -59,7 +59,7 @@ class MainWindow(QMainWindow):
         self.header = Header(tokens, self.show_subject, self._show_keys)
         self.notice = Notice(scale, bridge.send)
         self.to_do = ToDo(tokens, self._primary)
-        self.page = NewSessionPage(scale, bridge.send, self._start_session)
+        self.page = NewSessionPage(scale, bridge.send)
         self.course = CoursePanel(scale, bridge.send)
         self.live = LivePanel(bridge.feed, tokens, scale)
         self.bench = BenchPanel(tokens, scale, bridge.send, self._search)
@@ -215,6 +215,8 @@ class MainWindow(QMainWindow):
             self.page.show_refusals(dict(made.sentences))
             return
         self.page.show_refusals({})
+        if self._simulated_people():
+            self.subject.hide()
         self.bridge.send(made)
         self.setFocus()
 

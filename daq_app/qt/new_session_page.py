@@ -35,8 +35,8 @@ class NewSessionPage(QFrame):
 
     changed = Signal()
 
-    def __init__(self, scale: float, send: Callable[[Message], None], start: Callable[[], None]) -> None:
-        """Show an empty form; `start` begins the session."""
+    def __init__(self, scale: float, send: Callable[[Message], None]) -> None:
+        """Show an empty form; `send` takes what is asked for. Enter goes to the window, whose primary button begins."""
         super().__init__()
         self.setProperty("role", "panel")
         self.setAccessibleName("new session")
@@ -75,7 +75,6 @@ class NewSessionPage(QFrame):
         self._build(scale)
         for line in (self.subject, self.study, self.folder, self.seed):
             line.textChanged.connect(self.changed)
-            line.returnPressed.connect(start)
         for made in (self.with_forces, self.scores_only, self.people_score, self.simulated):
             made.toggled.connect(self.changed)
         self.show_unfinished(())

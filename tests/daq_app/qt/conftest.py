@@ -1,0 +1,85 @@
+"""The real window on a screen in memory, with the real recorder behind it, whose clock runs fast."""
+
+import os
+import time
+
+import pytest
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+from PySide6.QtCore import QSettings
+from PySide6.QtWidgets import QApplication
+
+from daq_app.qt.start import opened
+from daq_app.recorder.client import Recorder
+from daq_app.recorder.messages import Stop
+from daq_app.window_messages import Dismissed, NewSession
+
+PACE = 20.0
+PATIENCE = 60.0  # far beyond what anything takes [s]
+
+
+class Driver:
+    """Drives a window as a person does, and waits for what must come."""
+
+    def __init__(self, application, window):
+        self.application = application
+        self.window = window
+
+    @property
+    def state(self):
+        return self.window.bridge.state
+
+    @property
+    def session(self):
+        return self.state.session
+
+    @property
+    def view(self):
+        return self.window.bridge.view
+
+    def until(self, condition, what="it"):
+        end = time.monotonic() + PATIENCE
+        while not condition():
+            assert time.monotonic() < end, f"{what} did not come: {self.state.failed}, {self.view.banner}"
+            self.application.processEvents()
+            time.sleep(0.002)
+
+    def phase(self, *phases):
+        self.until(lambda: self.session is not None and self.session.phase in phases, f"{phases}")
+
+
+@pytest.fixture(scope="session")
+def application(tmp_path_factory):
+    QSettings.setDefaultFormat(QSettings.Format.IniFormat)
+    QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, str(tmp_path_factory.mktemp("settings")))
+    return QApplication.instance() or QApplication([])
+
+
+@pytest.fixture(scope="session")
+def one_window(application):
+    """One window for all tests: a session that is over leaves it as it was."""
+    window = opened(application, lambda: Recorder.start(pace=PACE))
+    window.resize(1440, 900)
+    window.show()
+    yield window
+    window.bridge.end()
+    window.subject.hide()
+    window.hide()
+
+
+@pytest.fixture
+def driver(application, one_window, tmp_path):
+    driver = Driver(application, one_window)
+    driver.until(lambda: driver.state.bench.link == "open", "the simulated bench")
+    one_window.page.folder.setText(str(tmp_path / "recordings"))
+    one_window.page.people_score.setChecked(True)
+    one_window.page.subject.clear()
+    one_window.page.subject.setFocus()
+    yield driver
+    if driver.session is not None:
+        if not driver.session.over:
+            one_window.bridge.send(Stop())
+        driver.until(lambda: driver.session.sealing == "sealed", "the end")
+        one_window.bridge.send(NewSession())
+    one_window.bridge.send(Dismissed())

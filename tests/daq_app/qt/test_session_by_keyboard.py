@@ -1,0 +1,138 @@
+"""A whole session in the real window, with the keyboard alone, against the recorded session."""
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from sessions.recording import Recording
+
+pytestmark = pytest.mark.qt
+
+ENTER, SPACE = Qt.Key.Key_Return, Qt.Key.Key_Space
+
+
+def begin(driver, subject="P07"):
+    window = driver.window
+    QTest.keyClicks(window.page.subject, subject)
+    QTest.keyClick(window.page.subject, ENTER)
+    driver.phase("idle")
+    QTest.keyClick(window, SPACE)
+    driver.phase("mounting")
+
+
+def one_trial(driver, *, steps=3):
+    """Mount, let the simulated hand stroke, score with the arrow keys."""
+    window, number = driver.window, driver.session.trial
+    QTest.keyClick(window, SPACE)
+    driver.phase("scoring")
+    for _ in range(steps):
+        QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
+    QTest.keyClick(window.subject.line, ENTER)
+    driver.until(lambda: driver.session.phase == "closing" or driver.session.trial != number, "the next trial")
+
+
+def test_a_whole_session_with_a_tare_and_a_redo_by_keyboard_alone(driver):
+    window = driver.window
+    window.setFocus()
+    QTest.keyClick(window, Qt.Key.Key_T)
+    driver.until(lambda: driver.state.bench.zero is not None, "the zero")
+    window.page.subject.setFocus()
+    begin(driver)
+    one_trial(driver, steps=1)
+    one_trial(driver, steps=4)
+    # The second trial is taken up again, with a reason that is typed.
+    if driver.view.course.redo.sends is None:
+        QTest.keyClick(window, Qt.Key.Key_R)
+        QTest.keyClicks(window.course.line, "the finger slipped")
+        QTest.keyClick(window.course.line, ENTER)
+    else:
+        QTest.keyClick(window, Qt.Key.Key_R)
+    driver.until(lambda: driver.session.trial == 2 and driver.session.phase == "mounting", "the second trial again")
+    while driver.session.phase != "closing":
+        one_trial(driver)
+    QTest.keyClick(window, SPACE)
+    driver.until(lambda: driver.session.sealing == "sealed", "the sealed session")
+    recording = Recording.open(Path(driver.session.folder))
+    assert recording.end["complete"]
+    assert [record.score for record in recording.trials] == [50.0, *[52.0] * 9]
+    assert recording.trials[1].take.number == 2
+    assert [take.number for take in recording.trials[1].other_takes] == [1]
+    scored = [event.data for event in recording.events if event.kind == "scored"]
+    assert [position for _, position in scored[0]["positions"]] == [50.0]
+    assert [position for _, position in scored[1]["positions"]] == [50.0, 51.0, 52.0, 53.0]
+    assert all(data["input_device"] == "keyboard" for data in scored)
+    assert driver.state.failed is None
+    assert driver.state.drawing is None
+    qualities = [trial.quality for trial in driver.session.trials]
+    assert all(quality is not None and quality.mu is not None for quality in qualities)
+    QTest.keyClick(window, SPACE)
+    assert driver.session is None
+
+
+def test_a_recorder_that_is_killed_is_one_banner_and_the_session_goes_on_at_the_same_trial(driver):
+    begin(driver, "P08")
+    one_trial(driver)
+    folder = driver.session.folder
+    os.kill(driver.window.bridge._client.pid, signal.SIGKILL)
+    driver.until(lambda: driver.view.banner is not None, "the banner")
+    assert driver.view.banner.grade == "wrong"
+    assert driver.view.lamp.grade == "wrong"
+    assert driver.view.banner.action == "Resume session"
+    QTest.keyClick(driver.window, SPACE)
+    assert driver.session.phase == "resuming"
+    driver.phase("mounting")
+    assert driver.session.folder == folder
+    assert driver.session.trial == 2
+    assert driver.view.course.rows[1].kind == "done"
+    one_trial(driver)
+    driver.window.act("end")
+    QTest.keyClicks(driver.window.course.line, "enough")
+    QTest.keyClick(driver.window.course.line, ENTER)
+    driver.until(lambda: driver.session.sealing == "sealed", "the sealed session")
+    recording = Recording.open(Path(folder))
+    assert [record.outcome for record in recording.trials[:3]] == ["scored", "scored", "open"]
+    assert [event.kind for event in recording.events].count("resumed") == 1
+
+
+def test_a_session_that_nobody_sits_at_runs_by_itself_and_says_it_is_simulated(driver):
+    driver.window.page.simulated.setChecked(True)
+    QTest.keyClicks(driver.window.page.subject, "S01")
+    QTest.keyClick(driver.window.page.subject, ENTER)
+    driver.until(lambda: driver.session is not None and driver.session.sealing == "sealed", "the sealed session")
+    assert driver.session.end.complete
+    assert "SIMULATED" in driver.view.simulated
+    assert not driver.window.subject.isVisible()
+
+
+def test_an_error_while_drawing_is_said_and_the_session_goes_on(driver, monkeypatch):
+    begin(driver, "P09")
+
+    def fails(*_):
+        raise ValueError("no such picture")
+
+    monkeypatch.setattr(driver.window.live, "draw", fails)
+    driver.until(lambda: driver.view.banner is not None, "the banner")
+    assert "the recording goes on" in driver.view.banner.sentence
+    one_trial(driver)
+    assert driver.view.lamp.grade == "on"
+
+
+def test_a_wrong_form_begins_nothing_and_typing_goes_to_the_wrong_field(driver):
+    window = driver.window
+    QTest.keyClicks(window.page.subject, "Ada Lovelace")
+    QTest.keyClick(window.page.subject, ENTER)
+    assert driver.session is None
+    assert "never a name" in window.page._wrong["subject"].text()
+    assert window.page._wrong["subject"].isVisible()
+    assert window.focusWidget() is window.page.subject
+
+
+def test_closing_while_a_session_is_recorded_asks_once_and_leaves_a_session_that_can_be_resumed(driver):
+    begin(driver, "P10")
+    driver.window.close()
+    assert driver.window.isVisible()
+    assert "close once more" in driver.window.notice._words.text()

@@ -1,0 +1,333 @@
+"""What the window knows and shows, message by message, without Qt and without a recorder."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from daq_app.bench_load import Load
+from daq_app.recorder import messages as m
+from daq_app.state import AppState, fold
+from daq_app.stroke_quality import Quality
+from daq_app.view import derive_view
+from daq_app.window_messages import Dismissed, DrawingFailed, Judged, Loaded, NewSession, Tick
+from drivers.calibration import Calibration
+from drivers.transducer import Health, TransducerInfo
+from sessions import steps
+from sessions.plan import Frame
+from sessions.protocols import plan, protocol
+from sessions.recording import Acknowledged, LoggedEvent
+from sessions.runner import SessionEnd, Status
+
+CALIBRATION = Calibration(
+    "FT1", "counts", np.diag([1e-6] * 3 + [1e-3] * 3), np.array([36.0] * 3 + [500.0] * 3), "typed"
+)
+INFO = TransducerInfo("net-ft://192.168.1.1", "net-ft", "Net F/T", "FT1", False, 7000.0, 7000.0, CALIBRATION)
+PLAN = plan(protocol("sensotact-friction"), "P07", 7)
+FIRST, SECOND = PLAN.trials[:2]
+GOOD = Quality("good", (), (), (2.0, 3.5), 0.44, (0.438, 0.444), 21.0, 0.08)
+BAD = replace(GOOD, grade="refused", words=("no steady window",), steady=None, mu=None)
+
+
+def after(*messages, state=None):
+    state = AppState() if state is None else state
+    for message in messages:
+        state = fold(state, message)
+    return state
+
+
+def logged(kind, trial=None, **data):
+    return LoggedEvent(1, 0, kind, trial, 0, data)
+
+
+def status(safe_ns, state="mounting"):
+    return Status(state, 1, 10, 100, 0, 2.0, Acknowledged(100, 3, safe_ns))
+
+
+BEGUN = (m.Device(INFO, None), m.SessionBegun("recordings/P07", PLAN, None, 0, 1.0), steps.AskBegin())
+MOUNT = (*BEGUN, steps.ShowInstruction(PLAN.blocks[0]), steps.AskMount(FIRST))
+TARE = (*MOUNT, steps.StartTake(1, 1), steps.MeasureZero())
+READY = (*TARE, steps.AskStroke(FIRST))
+TOUCH = (*READY, logged("contact_onset", 1, time=1.5, noticed=1.51))
+SCORE = (*TOUCH, logged("finger_lifted", 1, time=3.6, noticed=3.7), steps.AskScore(FIRST, ("low end", "high end")))
+PAUSED = (*MOUNT, logged("pause", 1))
+CLOSING = (*BEGUN, steps.AskFinish())
+END = SessionEnd("every trial is done", "finished", True, 100, Health())
+LOST = SessionEnd("the cable was pulled", "device", False, 100, Health(lost=3))
+TOO_MUCH = Load((0.0, 0.0, 1.2, 0.0, 0.0, 0.0), 1.2)
+CODE = FIRST.stimulus.code
+
+
+@pytest.mark.parametrize(
+    ("messages", "words", "label", "sends"),
+    [
+        (BEGUN, "begin", "Begin", steps.Begin()),
+        (MOUNT, f"Mount sample {CODE}", "Zero", steps.StimulusMounted(CODE)),
+        (TARE, "Hands off", None, None),
+        (READY, f"Subject strokes {CODE} once", None, None),
+        (TOUCH, "being recorded", None, None),
+        (SCORE, "scores sample", None, None),
+        (PAUSED, "Paused", "Resume", steps.Resume()),
+        (CLOSING, "Every trial is done", "End session", steps.Finish()),
+        ((*CLOSING, m.SessionEnded("recordings/P07", END, False)), "Session ended", "New session", NewSession()),
+        (
+            (*MOUNT, m.SessionEnded("recordings/P07", LOST, True)),
+            "cut short",
+            "Resume session",
+            m.ResumeSession("recordings/P07"),
+        ),
+    ],
+)
+def test_one_sentence_says_what_to_do_now_and_one_button_does_it(messages, words, label, sends):
+    course = derive_view(after(*messages)).course
+    assert words in course.headline
+    assert (course.primary.label if course.primary else None) == label
+    assert (course.primary.sends if course.primary else None) == sends
+
+
+def test_the_way_of_the_stroke_is_shown_while_a_trial_is_in_hand_and_only_then():
+    assert derive_view(after(*MOUNT)).course.direction == FIRST.direction
+    assert "away from the subject" in derive_view(after(*MOUNT)).course.headline
+    assert derive_view(after(*CLOSING)).course.direction == 0
+
+
+def test_the_plan_shows_what_is_done_in_hand_and_coming():
+    messages = (
+        *SCORE,
+        Judged(1, 1, GOOD),
+        logged("scored", 1, score=38.2),
+        logged("take_kept", 1, take=1),
+        steps.AskMount(SECOND),
+    )
+    rows = derive_view(after(*messages)).course.rows
+    assert [row.kind for row in rows[:4]] == ["block", "done", "current", "coming"]
+    assert "µ 0.44" in rows[1].found
+    assert "score 38" in rows[1].found
+    assert len(rows) == 2 + 10
+
+
+def test_a_skipped_and_an_unanswered_trial_are_told_apart():
+    skipped = (*READY, logged("skip", 1, reason="torn"), logged("take_discarded", 1, take=1, reason="skipped: torn"))
+    rows = derive_view(after(*skipped, steps.AskMount(SECOND))).course.rows
+    assert (rows[1].kind, rows[1].found) == ("skipped", "skipped")
+    unanswered = (*SCORE, logged("scored", 1, score=None), logged("take_kept", 1, take=1), steps.AskMount(SECOND))
+    rows = derive_view(after(*unanswered)).course.rows
+    assert (rows[1].kind, rows[1].found) == ("done", "no answer")
+
+
+def test_a_redone_trial_loses_its_score_and_says_which_take_it_is():
+    again = (
+        *SCORE,
+        logged("redo", 1, reason="slipped"),
+        logged("take_discarded", 1, take=1, reason="slipped"),
+        steps.StartTake(1, 2),
+        steps.MeasureZero(),
+    )
+    state = after(*again)
+    assert state.session.trials[0].score is None
+    row = derive_view(state).course.rows[1]
+    assert (row.kind, row.found) == ("current", "take 2")
+
+
+def test_a_flawed_stroke_is_redone_by_one_key_whose_reason_is_what_was_found():
+    course = derive_view(after(*SCORE, Judged(1, 1, BAD))).course
+    assert course.stroke.grade == "refused"
+    assert "no steady window" in course.stroke.words
+    assert course.redo.sends == steps.Redo("no steady window")
+
+
+def test_a_good_stroke_is_redone_only_with_a_reason_that_is_asked_for():
+    course = derive_view(after(*SCORE, Judged(1, 1, GOOD))).course
+    assert course.stroke.words == f"Stroke on {CODE} · steady 1.5 s · µ 0.44 · 21 mm/s · N fell 8 % · good"
+    assert course.redo.enabled
+    assert course.redo.sends is None
+
+
+def test_what_was_found_of_a_take_that_was_done_again_meanwhile_is_not_shown():
+    state = after(*SCORE, steps.StartTake(1, 2), Judged(1, 1, BAD))
+    assert derive_view(state).course.stroke.grade == "none"
+
+
+def test_onset_steady_window_and_lift_are_marked_in_device_time():
+    state = after(*SCORE, Judged(1, 1, GOOD))
+    assert [(mark.kind, mark.start, mark.stop) for mark in state.session.marks] == [
+        ("onset", 1.5, 1.5),
+        ("lift", 3.6, 3.6),
+        ("steady", 2.0, 3.5),
+    ]
+
+
+def test_nothing_can_be_redone_before_the_first_trial_was_begun():
+    assert not derive_view(after(*MOUNT)).course.redo.enabled
+    assert derive_view(after(*READY)).course.redo.enabled
+
+
+# ---- the lamp
+
+
+def test_the_recording_lamp_is_fed_by_what_the_disk_acknowledged_and_by_nothing_else():
+    state = after(Tick(100.0), *MOUNT)
+    assert derive_view(state).lamp.grade == "off"
+    state = after(status(1_000), state=state)
+    assert derive_view(state).lamp.grade == "on"
+    for second in range(1, 6):  # the state goes on being told, but nothing more becomes safe
+        state = after(Tick(100.0 + second), status(1_000), state=state)
+    lamp = derive_view(state).lamp
+    assert lamp.grade == "wrong"
+    assert lamp.words == "NOT RECORDING 00:00:05"
+    assert lamp.saved == "saved 5.0 s ago"
+    assert derive_view(after(status(2_000), state=state)).lamp.grade == "on"
+
+
+def test_a_session_that_has_ended_shows_no_recording():
+    state = after(*MOUNT, status(1_000), m.SessionEnded("recordings/P07", END, False), m.Sealing(""), m.Sealed(""))
+    assert derive_view(state).lamp == replace(derive_view(state).lamp, grade="off", words="ended and sealed")
+
+
+# ---- what is wrong
+
+
+@pytest.mark.parametrize(
+    ("messages", "grade", "words", "sends"),
+    [
+        ((m.LinkDown("no readings for 1 s"),), "wrong", "no readings for 1 s", None),
+        ((*MOUNT, m.LinkDown("no readings for 1 s")), "wrong", "Readings are being lost", None),
+        (
+            (m.Failed("Connect", "nothing answers at 192.168.1.1"),),
+            "look",
+            "Nothing answers at 192.168.1.1.",
+            Dismissed(),
+        ),
+        (
+            (m.Device(INFO, None), Loaded(Load((0.0, 0.0, 1.2, 0.0, 0.0, 0.0), 0.9))),
+            "wrong",
+            "Fz",
+            m.AcknowledgeOverloads(),
+        ),
+        ((*MOUNT, DrawingFailed("ValueError: x")), "look", "the recording goes on", Dismissed()),
+        (
+            (*MOUNT, m.Gone(False, "the recorder has ended unexpectedly (signal 9)")),
+            "wrong",
+            "signal 9",
+            m.ResumeSession("recordings/P07"),
+        ),
+        ((*MOUNT, m.Failed("StartSession", "the disk is full", "RecordingError")), "wrong", "the disk is full", None),
+        (
+            (*MOUNT, m.SessionEnded("recordings/P07", LOST, True)),
+            "wrong",
+            "the cable was pulled",
+            m.ResumeSession("recordings/P07"),
+        ),
+    ],
+)
+def test_what_is_wrong_is_one_banner_with_what_can_be_done(messages, grade, words, sends):
+    banner = derive_view(after(*messages)).banner
+    assert banner.grade == grade
+    assert words in banner.sentence
+    assert banner.sends == sends
+
+
+def test_a_calm_bench_shows_no_banner():
+    assert derive_view(after(*SCORE)).banner is None
+    assert derive_view(AppState()).banner is None
+
+
+def test_a_banner_of_a_lost_link_goes_when_the_same_transducer_is_back_and_stays_for_another():
+    lost = after(*MOUNT, m.LinkDown("silent"))
+    assert derive_view(after(m.LinkBack(INFO, True), state=lost)).banner is None
+    other = replace(INFO, serial="FT2")
+    assert "FT2" in derive_view(after(m.LinkBack(other, False), state=lost)).banner.sentence
+
+
+def test_an_error_while_saving_ends_the_course_and_puts_the_lamp_to_wrong():
+    view = derive_view(after(*MOUNT, m.Failed("StartSession", "the disk is full", "RecordingError")))
+    assert view.lamp.grade == "wrong"
+    assert view.course.primary.sends == NewSession()
+
+
+def test_a_recorder_that_is_silent_in_a_session_is_said_to_be_silent():
+    state = after(Tick(100.0), *MOUNT, status(1_000), Tick(105.0))
+    assert "Nothing was heard from the recorder for 5 s" in derive_view(state).banner.sentence
+
+
+# ---- the bench
+
+
+def test_the_health_lamp_names_what_was_lost():
+    report = m.HealthReport(Health(received=7000, lost=3), 6998.0, (0.0,) * 6, (0.0,) * 6, (False,) * 6, 0)
+    bench = derive_view(after(m.Device(INFO, None), report)).bench
+    assert (bench.lamp, bench.lamp_words) == ("look", "3 lost")
+    assert bench.rate == "6998 Hz (set 7000)"
+    assert dict(bench.counters)["lost"] == "3"
+
+
+def test_an_overload_stays_until_somebody_acknowledges_it():
+    state = after(
+        m.Device(INFO, None), Loaded(Load((0.0, 0.0, 0.4, 0.0, 0.0, 0.9), 1.3)), Loaded(Load((0.1,) * 6, 0.2))
+    )
+    bench = derive_view(state).bench
+    [combined] = [bar for bar in bench.bars if bar.name == "combined"]
+    assert (combined.share, combined.peak, combined.over) == (0.2, 1.3, True)
+    assert bench.can_acknowledge
+    bench = derive_view(after(m.AcknowledgeOverloads(), state=state)).bench
+    assert not bench.can_acknowledge
+    assert bench.bars[-1].peak == 0.0
+
+
+def test_a_tare_shows_its_figures_in_newtons_and_how_far_the_zero_has_moved_since_the_first():
+    first = m.Tared((8e3, -7e3, -1e3, 0.0, 0.0, 0.0), (4e3,) * 3 + (50.0,) * 3, (0.0,) * 6, 200, 1.0)
+    bench = derive_view(after(m.Device(INFO, None), first)).bench
+    assert bench.tare == "Fx 8, Fy −7, Fz −1 mN"
+    assert bench.drift == "first zero"
+    assert bench.bars[0].noise == "4 mN"
+    assert bench.bars[3].noise == "0.05 N mm"
+    second = logged("zeroed", 1, mean=[14e3, -7e3, -1e3, 0.0, 0.0, 0.0], spread=[4e3] * 6, readings=100, duration=0.5)
+    assert derive_view(after(m.Device(INFO, None), first, second)).bench.drift == "6 mN since the first"
+
+
+def test_a_session_keeps_the_transducer_connected_and_its_zero_untouched_by_hand():
+    bench = derive_view(after(*MOUNT)).bench
+    assert bench.connect is None
+    assert not bench.can_tare
+    bench = derive_view(after(m.Device(INFO, None))).bench
+    assert bench.connect == m.Disconnect()
+    assert bench.can_tare
+
+
+def test_a_simulated_bench_is_said_to_be_simulated_before_a_session_begins():
+    assert derive_view(after(m.Device(replace(INFO, simulated=True), Frame()))).simulated is not None
+    assert derive_view(after(m.Device(INFO, None))).simulated is None
+
+
+# ---- the subject
+
+
+@pytest.mark.parametrize("messages", [BEGUN, MOUNT, TARE, READY, TOUCH, SCORE, PAUSED, CLOSING])
+def test_nothing_the_subject_sees_gives_the_stimulus_away(messages):
+    shown = repr(derive_view(after(*messages)).subject)
+    for trial in PLAN.trials:
+        assert trial.stimulus.code not in shown
+    indices = {str(trial.stimulus.index) for trial in PLAN.trials} - {"0"}
+    assert not any(word.strip("(),'") in indices for word in shown.replace("=", " ").split())
+
+
+def test_the_subject_gets_the_line_with_its_ends_when_it_is_time_to_score():
+    subject = derive_view(after(*SCORE)).subject
+    assert subject.kind == "scale"
+    assert subject.ends == ("low end", "high end")
+    assert "stickiness" in subject.title
+    assert derive_view(after(*READY)).subject.text == PLAN.blocks[0].instruction
+
+
+def test_a_session_that_goes_on_shows_what_was_done_before():
+    before = (
+        logged("take_started", 1, take=1),
+        logged("scored", 1, score=40.0),
+        logged("take_kept", 1, take=1),
+        logged("take_started", 2, take=1),
+        logged("take_discarded", 2, take=1, reason="cut short"),
+    )
+    begun = m.SessionBegun("recordings/P07", PLAN, None, 0, 1.0, before)
+    rows = derive_view(after(m.Device(INFO, None), begun, steps.AskMount(SECOND))).course.rows
+    assert [row.kind for row in rows[:4]] == ["block", "done", "current", "coming"]
+    assert rows[1].found == "score 40"
