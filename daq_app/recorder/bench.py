@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from daq_app.life import remember_zero
 from daq_app.recorder.display import Display, six
 from daq_app.recorder.messages import Device, LinkBack, LinkDown, NoDevice, Report, Tared
 from daq_app.wiring import Connected, connected
@@ -162,6 +163,7 @@ class Bench:
             tare, self._tare = self._tare, None
             told = tare.result(self._connected.transducer.info)
             self._display.zeroed(told.mean)
+            remember_zero(self._connected.transducer.info, told.mean, told.spread)
             self._send(told)
 
     def _open(self, uri: str, clock: Clock) -> None:

@@ -8,7 +8,9 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.life import remember_overload
 from daq_app.recorder.messages import HealthReport, Live, Report, Six
+from drivers.loads import ALARM, level, loads
 from drivers.readings import ReadingBlock
 from drivers.transducer import Health, TransducerInfo
 
@@ -31,7 +33,8 @@ class Display:
         self._stream = 0
         self._waiting: list[ReadingBlock] = []
         self._zero: Six = UNLOADED
-        self._load = self._peak = np.zeros(6)
+        self._load = self._peak = np.zeros(7)
+        self._overload_told = False
         self._saturated_before = self._saturated_now = 0
         self._arrived: deque[tuple[float, int]] = deque()  # real time [s] and readings, over the last second
         self._live_due = self._health_due = 0.0
@@ -42,7 +45,7 @@ class Display:
         self._info = info
         self._zero = UNLOADED
         self.acknowledge()
-        self._load = np.zeros(6)
+        self._load = np.zeros(7)
         self._health_due = 0.0
 
     def stream_began(self) -> None:
@@ -59,7 +62,8 @@ class Display:
 
     def acknowledge(self) -> None:
         """Forget the greatest loads."""
-        self._peak = np.zeros(6)
+        self._peak = np.zeros(7)
+        self._overload_told = False
         self._saturated_before = self._saturated_now
         self._health_due = 0.0
 
@@ -86,8 +90,11 @@ class Display:
             return
         calibration = info.calibration
         felt = calibration.wrench(block.raw, np.zeros(6))
-        load = np.abs(felt).max(axis=0) / calibration.rated
+        load = loads(felt, calibration.rated).max(axis=0)
         self._load, self._peak = np.fmax(self._load, load), np.fmax(self._peak, load)
+        if level(self._peak) == "alarm" and not self._overload_told:
+            self._overload_told = True
+            remember_overload(info, tuple(self._peak.tolist()))
         self._send(
             Live(
                 self._stream,
@@ -108,18 +115,22 @@ class Display:
         count = sum(readings for _, readings in self._arrived) - (self._arrived[0][1] if self._arrived else 0)
         self._saturated_now = health.saturated
         rated = np.full(6, np.nan) if self._info is None else self._info.calibration.rated
-        unknown = np.isnan(rated)
+        unknown = np.isnan(np.append(rated, rated.sum()))
+        load, peak = np.where(unknown, np.nan, self._load), np.where(unknown, np.nan, self._peak)
         self._send(
             HealthReport(
                 health,
                 count / span / self._factor if span > 0.2 * RATE_OVER else 0.0,
-                six(np.where(unknown, np.nan, self._load)),
-                six(np.where(unknown, np.nan, self._peak)),
-                tuple(bool(peak > 1.0) for peak in self._peak),
+                six(load[:6]),
+                six(peak[:6]),
+                tuple(bool(one > ALARM) for one in self._peak[:6]),
                 self._saturated_now - self._saturated_before,
+                float(load[6]),
+                float(peak[6]),
+                level(self._peak),
             )
         )
-        self._load = np.zeros(6)
+        self._load = np.zeros(7)
 
 
 def six(values: Array) -> Six:

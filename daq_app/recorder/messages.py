@@ -5,12 +5,14 @@ recorder sends every command of `sessions.steps` (what they are asked for), each
 `Status` ten times a second [session clock].
 """
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.loads import Level
 from drivers.transducer import Health, TransducerInfo
 from sessions import steps
 from sessions.plan import Frame, SessionPlan
@@ -119,6 +121,9 @@ class HealthReport:
     peak: Six  # the same since somebody acknowledged overloads
     overloaded: tuple[bool, ...]  # (6,): the peak exceeded 1; latched until acknowledged
     saturated: int  # readings the device called invalid since somebody acknowledged
+    combined: float = math.nan  # load of the axes together (`drivers.loads`) since the last report [-]
+    combined_peak: float = math.nan  # the same since somebody acknowledged
+    level: Level = "fine"  # of the peaks: latched until acknowledged
 
 
 @dataclass(frozen=True, slots=True, eq=False)

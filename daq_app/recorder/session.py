@@ -8,6 +8,7 @@ from pathlib import Path
 
 import msgspec
 
+from daq_app.life import remember_zero
 from daq_app.recorder.bench import Bench, NotNow
 from daq_app.recorder.display import Display
 from daq_app.recorder.messages import (
@@ -181,6 +182,7 @@ class _Course:
         self._inbox = inbox
         self._send = send
         self._clock = prepared.clock
+        self._info = prepared.info
         self._helper = _helper(prepared, bench)
         self._touching = False
         self._alone_ns: int | None = None  # when it was noticed that the client has gone
@@ -234,6 +236,8 @@ class _Course:
                 self._touching = False
             elif event.kind == "zeroed":
                 self._display.zeroed(tuple(event.data["mean"]))
+                if self._info is not None:
+                    remember_zero(self._info, event.data["mean"], event.data["spread"])
 
 
 def _helper(prepared: Prepared, bench: Bench) -> Operator | None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from daq_app.cli import WrongValue
 from daq_app.console import Console, number, table
+from daq_app.life import Life, life_of
 from daq_app.wiring import connected
 from drivers.catalog import Found, reachable
 from drivers.clock import Clock, RealClock
@@ -49,6 +50,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     for device in found:
         if device.problem:
             console.say(f"{device.uri}: {device.problem}")
+        if device.info is not None and (life := life_of(device.info.serial)) is not None:
+            console.say(f"{device.info.serial}: {_told(life)}")
     return 0
 
 
@@ -64,7 +67,20 @@ def _described(device: Found) -> dict[str, Any]:
         "simulated": info.simulated,
         "rate": info.rate if np.isfinite(info.rate) else None,
         "calibration": info.calibration.source,
+        "life": None if (life := life_of(info.serial)) is None else asdict(life),
     }
+
+
+def _told(life: Life) -> str:
+    """Return a transducer's history in one sentence."""
+    overloads = f"{life.overloads} overloads, the last on {life.last_overload}" if life.overloads else "no overload"
+    if not life.zeros:
+        return f"{overloads} since it is known here"
+    drift, noise = max(map(abs, life.drift[:3])), max(life.noise[:3])
+    return (
+        f"zero moved by at most {number(drift, 2)} N since {life.since} ({life.zeros} zeros), "
+        f"noise at rest {number(noise, 2)} N, {overloads}"
+    )
 
 
 def _probe(uri: str, console: Console) -> int:

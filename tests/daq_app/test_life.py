@@ -1,0 +1,62 @@
+"""What is kept of a transducer over the years."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from daq_app import life
+from daq_app.life import life_of, remember_overload, remember_zero
+from drivers.calibration import Calibration
+from drivers.transducer import TransducerInfo
+
+INFO = TransducerInfo(
+    "net-ft://192.168.1.1",
+    "net-ft",
+    "Net F/T",
+    "FT1234",
+    simulated=False,
+    rate=200.0,
+    counter_rate=7000.0,
+    calibration=Calibration("FT1234", "counts", np.diag([1e-6] * 3 + [1e-3] * 3), np.full(6, 36.0), "by hand"),
+)
+
+
+@pytest.fixture(autouse=True)
+def kept(tmp_path, monkeypatch):
+    monkeypatch.setattr(life.platformdirs, "user_data_dir", lambda *_, **__: str(tmp_path))
+    return tmp_path
+
+
+def test_of_a_stranger_nothing_is_known():
+    assert life_of("FT9999") is None
+
+
+def test_drift_noise_and_overloads_are_those_that_were_kept():
+    remember_zero(INFO, (1e6, 0, 0, 0, 0, 0), (4e3,) * 6)
+    remember_zero(INFO, (1.25e6, -1e5, 0, 0, 0, 50), (4e3,) * 6)
+    remember_overload(INFO, (1.2, 0, 0, 0, 0, 0, 1.2))
+    known = life_of("FT1234")
+    assert known is not None
+    assert (known.zeros, known.overloads) == (2, 1)
+    np.testing.assert_allclose(known.drift, [0.25, -0.1, 0.0, 0.0, 0.0, 0.05])
+    np.testing.assert_allclose(known.noise, [0.004] * 3 + [4.0] * 3)
+    assert known.since == known.last_overload != ""
+
+
+def test_a_torn_line_costs_itself_alone(kept):
+    remember_overload(INFO, (1.2, 0, 0, 0, 0, 0, 1.2))
+    (file,) = (kept / "transducers").iterdir()
+    with file.open("ab") as torn:
+        torn.write(b'{"time": "2026-11-21", "kind": "zero", "wrench": [1, \xff\n')
+    remember_overload(INFO, (1.3, 0, 0, 0, 0, 0, 1.3))
+    known = life_of("FT1234")
+    assert known is not None
+    assert known.overloads == 2
+
+
+def test_a_simulated_transducer_has_no_life_and_a_serial_number_is_no_path(kept):
+    remember_overload(replace(INFO, simulated=True), (1.2,) * 7)
+    assert not list(kept.iterdir())
+    remember_overload(replace(INFO, serial="../../x y"), (1.2,) * 7)
+    assert [file.name for file in (kept / "transducers").iterdir()] == ["______x_y.jsonl"]
