@@ -10,9 +10,8 @@ from scipy.linalg import LinAlgError
 from solver.contact import Touchable
 from solver.dissection import Reduced, Tree, places
 from solver.elements import line
-from solver.materials import Hooke
 from solver.mesh import Array, Indices, Mesh
-from solver.stiffness import Elastic
+from solver.stiffness import Elastic, Isotropic
 
 Motion = Literal["x", "y", "turn"]
 
@@ -30,7 +29,7 @@ class Body:
     @staticmethod
     def of(
         mesh: Mesh,
-        materials: Sequence[Hooke],
+        materials: Sequence[Isotropic],
         loads: Array | None = None,
         prescribed: Array | None = None,
         free: Sequence[Motion] = (),

@@ -17,6 +17,17 @@ STAYS = 0.4
 LARGE_STRAIN = 0.1  # a strain from which finite strain ought to be considered [-]
 
 
+def _laws(scene: Scene) -> str:
+    """Say which law every tissue follows."""
+    usual = "Hooke" if scene.solve.kinematics == "small" else "compressible neo-Hookean"
+    said: list[str] = []
+    for name in ("epidermis", "dermis", "fat"):
+        tissue = scene.materials.of(name)
+        law = f"Demiray, stiffening {tissue.stiffening:g}" if tissue.stiffening is not None else usual
+        said.append(f"{name} {law}" + (f", relaxing in {len(tissue.prony)} terms" if tissue.prony else ""))
+    return "; ".join(said)
+
+
 def model(scene: Scene, finger: FingerModel, contact: Contact, displacement: Array) -> dict[str, Any]:
     """Return what was modelled and what was left out, as plain data.
 
@@ -31,7 +42,7 @@ def model(scene: Scene, finger: FingerModel, contact: Contact, displacement: Arr
     width = finger.contact_width(contact, finger.skin_displacement(contact)[:, 0])
     return {
         "kinematics": "small strain, plane strain",
-        "material": "Hooke, per layer",
+        "material": _laws(scene),
         "element": "Q2/P-1: nine nodes, three pressure modes condensed in the element",
         "contact": "unilateral, Coulomb with |t| <= min(mu p, tau_max), open, stick, slip or cap at every skin node",
         "course": _course(scene),
@@ -56,7 +67,7 @@ def finite_model(scene: Scene, *, force: Array, width: float, sticking: float, s
     """
     return {
         "kinematics": "finite strain, plane strain",
-        "material": "compressible neo-Hookean, per layer",
+        "material": _laws(scene),
         "element": "Q2/P-1: nine nodes, three modes of ln J condensed in the element",
         "contact": "unilateral on the deformed skin, Coulomb with |t| <= min(mu p, tau_max) on true tractions",
         "course": _course(scene),

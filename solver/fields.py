@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.elements import Q2P1
-from solver.materials import Hooke
 from solver.mesh import Array, Indices, Mesh
 from solver.outline import Outline
 from solver.prediction import Prediction
+from solver.receptor import Endings
 from solver.stiffness import Elastic, Probes, local_coordinates
+from solver.tissues import finite_laws, settled_moduli
 
 # Eight triangles of each element, in its nine nodes
 _SPLIT = np.array([[8, 0, 4], [8, 4, 1], [8, 1, 5], [8, 5, 2], [8, 2, 6], [8, 6, 3], [8, 3, 7], [8, 7, 0]])
@@ -30,11 +31,8 @@ class Fields:
 def fields_of(prediction: Prediction) -> Fields:
     """Return the picture of `prediction`."""
     mesh, scene = prediction.mesh, prediction.scene
-    tissues = (scene.materials.epidermis, scene.materials.dermis, scene.materials.fat)
-    elastic = Elastic.of(mesh, [Hooke(t.E, t.nu) for t in tissues])
     count = len(mesh.elements)
-    probes = Probes.at(mesh, elastic, np.repeat(np.arange(count), 9), np.tile(Q2P1.positions, (count, 1)))
-    sed = probes.energy(mesh, elastic, prediction.displacement[:, :, None])[:, 0]
+    sed = _energies(prediction)
     # one node for each pair of node and layer
     pairs = mesh.elements + len(mesh.nodes) * mesh.region[:, None]
     kept, place = np.unique(pairs, return_inverse=True)
@@ -53,6 +51,22 @@ def fields_of(prediction: Prediction) -> Fields:
         outlines=drawn | {"bone": outline.bone(arcs) - [0.0, prediction.indentation]},
         patch=_moved(prediction, lowered, _patch(outline, prediction)),
     )
+
+
+def _energies(prediction: Prediction) -> Array:
+    """Return the SED at the nodes of every element, one element after the other (9 e,) [MPa]."""
+    mesh, scene = prediction.mesh, prediction.scene
+    elastic = Elastic.of(mesh, settled_moduli(scene.materials))
+    count = len(mesh.elements)
+    probes = Probes.at(mesh, elastic, np.repeat(np.arange(count), 9), np.tile(Q2P1.positions, (count, 1)))
+    if scene.solve.kinematics == "small":
+        return probes.energy(mesh, elastic, prediction.displacement[:, :, None])[:, 0]
+    # Imported here: a picture at small strain need not wait for the compiled loops to be loaded.
+    from solver.finite_body import FiniteBody, FiniteProbes
+
+    body = FiniteBody.of(mesh, finite_laws(scene.materials))
+    places = Endings(probes, np.ones(9 * count), np.arange(9 * count), 9 * count)
+    return FiniteProbes.of(body, places).energy(body, prediction.displacement)
 
 
 def _patch(outline: Outline, prediction: Prediction) -> Array:

@@ -8,12 +8,12 @@ import numpy as np
 from solver.body import Body, elimination
 from solver.contact import Contact
 from solver.elements import Q2P1
-from solver.materials import Hooke
 from solver.mesh import Array, Mesh
 from solver.mesher import FingerMesh, Sizing, finger_mesh
 from solver.receptor import ROW, Endings, endings, middle
 from solver.scene import Scene
 from solver.stiffness import Probes
+from solver.tissues import settled_moduli
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,9 +36,8 @@ class FingerModel:
         """
         geometry = finger_mesh(scene.finger, scene.receptor, sizing)
         tree = elimination(geometry.mesh)
-        tissues = (scene.materials.epidermis, scene.materials.dermis, scene.materials.fat)
         begun = perf_counter()
-        body = Body.of(geometry.mesh, [Hooke(t.E, t.nu) for t in tissues], tree=tree)
+        body = Body.of(geometry.mesh, settled_moduli(scene.materials), tree=tree)
         took = perf_counter() - begun
         at_touch = endings(geometry, body.elastic, scene.receptor, np.zeros(1))
         return FingerModel(

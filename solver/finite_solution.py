@@ -17,16 +17,15 @@ from solver.failures import Cancelled, NotConverged, SolveFailure, beyond_fricti
 from solver.finite_body import FiniteBody, FiniteProbes
 from solver.finite_forced import Given
 from solver.grid import MeshError
-from solver.hyperelastic import NeoHooke
 from solver.kernels import CAP, OPEN, SLIP, STICK
 from solver.march import march
-from solver.materials import Hooke
 from solver.mesher import FingerMesh, Sizing, finger_mesh
 from solver.newton import Newton, Pull, Shape
 from solver.prediction import History, Prediction, Row, Skin
 from solver.receptor import ROW, endings, middle
 from solver.scene import Scene, SceneError
 from solver.stiffness import Elastic
+from solver.tissues import finite_laws, settled_moduli
 
 MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
 SAFETY = 1.0  # of the error estimate; see docs/solver.md for what was measured
@@ -55,11 +54,10 @@ class FiniteFinger:
     @staticmethod
     def of(scene: Scene, sizing: Sizing) -> "FiniteFinger":
         """Mesh the finger of `scene`. Raises SceneError where its outline cannot be meshed."""
-        tissues = (scene.materials.epidermis, scene.materials.dermis, scene.materials.fat)
         try:
             made = finger_mesh(scene.finger, scene.receptor, sizing)
-            elastic = Elastic.of(made.mesh, [Hooke(t.E, t.nu) for t in tissues])
-            body = FiniteBody.of(made.mesh, [NeoHooke(t.E, t.nu) for t in tissues])
+            elastic = Elastic.of(made.mesh, settled_moduli(scene.materials))
+            body = FiniteBody.of(made.mesh, finite_laws(scene.materials))
         except (MeshError, LinAlgError) as bad:
             raise SceneError("finger", scene.finger, f"no mesh fits it ({bad})") from bad
         return FiniteFinger(

@@ -52,4 +52,86 @@ class Hooke:
         return 2.0 * self.shear * strain + self.lame * trace * np.eye(2)
 
 
-MATERIALS = (Hooke,)
+@dataclass(frozen=True, slots=True)
+class Moduli:
+    """The two moduli by which elements are integrated."""
+
+    shear: float  # [MPa]
+    lame: float  # Lamé's first constant [MPa]
+
+
+@dataclass(frozen=True, slots=True)
+class Prony:
+    """Linear viscoelasticity at small strain: Hooke at once, whose shear modulus relaxes in terms (g, tau).
+
+    G(t) = G (1 - sum g + sum g exp(-t/tau)), the bulk modulus staying as it is: a generalised Maxwell solid, as in Simo
+    and Hughes (1998), Computational Inelasticity, sec. 10.2.
+    """
+
+    E: float  # Young's modulus at once [MPa]
+    nu: float  # Poisson's ratio at once [-]
+    terms: tuple[tuple[float, float], ...] = ()  # g [-] and tau [s] of each
+
+    @property
+    def at_once(self) -> Hooke:
+        """The elastic solid that it is in a moment."""
+        return Hooke(self.E, self.nu)
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus at once [MPa]."""
+        return self.at_once.shear
+
+    @property
+    def lame(self) -> float:
+        """Lamé's first constant at once [MPa]."""
+        return self.at_once.lame
+
+    @property
+    def bulk(self) -> float:
+        """Bulk modulus K = lambda + 2 G / 3 [MPa]."""
+        return self.lame + 2.0 / 3.0 * self.shear
+
+    @property
+    def stays(self) -> float:
+        """Part of the shear modulus that never relaxes [-]."""
+        return 1.0 - sum(g for g, _ in self.terms)
+
+    @property
+    def relaxed(self) -> Moduli:
+        """The moduli in the end.
+
+        >>> round(Prony(0.08, 0.48, ((0.3, 1.0),)).relaxed.shear / Prony(0.08, 0.48).shear, 6)
+        0.7
+        """
+        return self._with(self.stays)
+
+    def within(self, step: float) -> Moduli:
+        """Return the moduli that a strain has which grows evenly over `step` [s]: what of it is left at the end.
+
+        After one relaxation time that is 0.7 + 0.3 (1 - 1/e):
+
+        >>> round(Prony(0.08, 0.48, ((0.3, 1.0),)).within(1.0).shear / Prony(0.08, 0.48).shear, 6)
+        0.889636
+        """
+        return self._with(self.stays + sum(g * kept(step / tau) for g, tau in self.terms))
+
+    def _with(self, part: float) -> Moduli:
+        shear = part * self.shear
+        return Moduli(shear, self.bulk - 2.0 / 3.0 * shear)
+
+    def energy(self, gradient: Array) -> Array:
+        """Return the energy density (...) [MPa] stored at once, as `Hooke.energy`."""
+        return self.at_once.energy(gradient)
+
+    def stress(self, gradient: Array) -> Array:
+        """Return the stress (..., 2, 2) [MPa] at once, as `Hooke.stress`."""
+        return self.at_once.stress(gradient)
+
+
+def kept(times: float) -> float:
+    """Return what is left of a strain that grew evenly over so many relaxation times: (1 - exp(-x)) / x."""
+    return float(-np.expm1(-times) / times) if times > 0.0 else 1.0
+
+
+MATERIALS = (Hooke, Prony)

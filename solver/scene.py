@@ -9,6 +9,9 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 Slide = Literal["+x", "-x", "none"]
+Law = Literal["hooke", "neo-hookean", "demiray"]
+TISSUES = ("epidermis", "dermis", "fat", "bone")  # in the order of the mesh's regions
+LAWS_OF = {"small": ("hooke",), "finite": ("neo-hookean", "demiray")}  # that each kinematics has
 
 
 class SceneError(ValueError):
@@ -94,11 +97,40 @@ class Finger:
 
 
 @dataclass(frozen=True, slots=True)
-class Material:
-    """An isotropic elastic tissue."""
+class Relaxation:
+    """One term of a Prony series: this part of the shear modulus relaxes with this time."""
 
-    E: float  # Young's modulus [MPa]
-    nu: float  # Poisson's ratio [-]
+    g: float  # by the modulus at once [-]
+    tau: float  # [s]
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """An isotropic tissue."""
+
+    E: float  # Young's modulus, of the undeformed tissue, at once [MPa]
+    nu: float  # Poisson's ratio, likewise [-]
+    law: Law | None = None  # None: Hooke at small strain, neo-Hookean at finite strain
+    stiffening: float | None = None  # b of Demiray's law [-]
+    prony: tuple[Relaxation, ...] = ()  # of the shear modulus; the bulk modulus does not relax
+
+    def check(self, key: str) -> None:
+        """Raise SceneError where a value is not allowed; `key` is how the scene calls the tissue."""
+        _within(f"{key}.E", self.E, 1e-6, 1e12, "MPa")
+        if not 0.0 <= self.nu <= 0.4999999:
+            allowed = "it must lie between 0 and 0.4999999, since a material with nu = 0.5 has no strain energy of "
+            raise SceneError(f"{key}.nu", self.nu, allowed + "volume change to compute")
+        if self.law not in (None, "hooke", "neo-hookean", "demiray"):
+            raise SceneError(f"{key}.law", self.law, 'it must be "hooke", "neo-hookean" or "demiray"')
+        if (self.stiffening is not None) != (self.law == "demiray"):
+            raise SceneError(f"{key}.stiffening", self.stiffening, 'it belongs to law = "demiray", which needs it')
+        if self.stiffening is not None:
+            _within(f"{key}.stiffening", self.stiffening, 0.0, 20.0)
+        for number, term in enumerate(self.prony):
+            _within(f"{key}.prony[{number}].g", term.g, 0.0, 0.99)
+            _within(f"{key}.prony[{number}].tau", term.tau, 1e-6, 1e6, "s")
+        if not sum(term.g for term in self.prony) <= 0.99:
+            raise SceneError(f"{key}.prony", [term.g for term in self.prony], "all g together must stay below 0.99")
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,12 +144,27 @@ class Materials:
 
     def __post_init__(self) -> None:
         """Check each tissue: here, where it has a name."""
-        for name in ("epidermis", "dermis", "fat", "bone"):
-            tissue: Material = getattr(self, name)
-            _within(f"materials.{name}.E", tissue.E, 1e-6, 1e12, "MPa")
-            if not 0.0 <= tissue.nu <= 0.4999999:
-                allowed = "it must lie between 0 and 0.4999999, since a material with nu = 0.5 has no strain energy of "
-                raise SceneError(f"materials.{name}.nu", tissue.nu, allowed + "volume change to compute")
+        for name in TISSUES:
+            self.of(name).check(f"materials.{name}")
+
+    def of(self, name: str) -> Material:
+        """Return the tissue called `name`, one of TISSUES."""
+        return {"epidermis": self.epidermis, "dermis": self.dermis, "fat": self.fat, "bone": self.bone}[name]
+
+    @property
+    def by_region(self) -> tuple[Material, ...]:
+        """The tissues in the order in which the mesh numbers its regions."""
+        return tuple(self.of(name) for name in TISSUES)
+
+    @property
+    def longest_relaxation(self) -> float:
+        """The longest relaxation time of any tissue [s], 0 where none relaxes."""
+        return max((term.tau for tissue in self.by_region for term in tissue.prony), default=0.0)
+
+    @property
+    def relax(self) -> bool:
+        """Whether any of the tissues relaxes."""
+        return self.longest_relaxation > 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,6 +298,7 @@ class Scene:
     def __post_init__(self) -> None:
         """Check what several tables decide together."""
         _within("width", self.width, 0.1, 1000.0, "mm")
+        self._check_laws()
         skin = self.finger.epidermis + self.finger.dermis
         half = self.receptor.ending[0] / 2.0
         if not half < self.receptor.depth < self.finger.tip_radius - half:
@@ -265,6 +313,18 @@ class Scene:
         if drag is not None and push is not None and drag > self.friction.mu * push * (1.0 + 1e-12):
             allowed = f"friction carries at most mu times the normal force, {self.friction.mu * push:.4g}"
             raise SceneError("loading.tangential_force", drag, allowed)
+
+    def _check_laws(self) -> None:
+        kinematics = self.solve.kinematics
+        for name in TISSUES:
+            tissue = self.materials.of(name)
+            if tissue.law is not None and tissue.law not in LAWS_OF[kinematics]:
+                has = " or ".join(f'"{law}"' for law in LAWS_OF[kinematics])
+                allowed = f'with solve.kinematics = "{kinematics}" it must be {has}'
+                raise SceneError(f"materials.{name}.law", tissue.law, allowed)
+            if tissue.prony and kinematics == "finite":
+                allowed = 'tissues relax at small strain only: leave it out, or ask for solve.kinematics = "small"'
+                raise SceneError(f"materials.{name}.prony", len(tissue.prony), allowed)
 
     @property
     def normal_force(self) -> float | None:

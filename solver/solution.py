@@ -21,8 +21,10 @@ from solver.mesher import FINEST, Sizing
 from solver.prediction import History, Prediction, Row, Skin
 from solver.pressing import depth_of, sliding_under
 from solver.receptor import ROW
+from solver.relaxing import RelaxingBody, RelaxingWay, march_relaxing
 from solver.scene import Scene, SceneError
 from solver.stepping import March, march
+from solver.tissues import relaxing_laws
 from solver.wedging import WIDE, deepest, followed
 
 FINENESS = (6, 8, 12, 16, 24, 32, 48)  # the meshes that can be asked for
@@ -237,9 +239,10 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Pred
     if contact is None:
         return None
     way: March | None = None
+    over_time: Array | None = None
     direct = contact
     if scene.solve.course == "history":
-        way = march(finger.body.touchable, law, scene.loading_per_mm, progress)
+        way, over_time = _marched(scene, finger, progress)
         contact = way.instants[-1].contact
     skin = finger.skin_displacement(contact)
     displacement = finger.body.displacement(skin)[:, :, 0]
@@ -260,9 +263,11 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Pred
         )
     if way is not None:
         checks |= course_audits(finger, way)
+        if over_time is not None:  # what the balance of work leaves over is what the tissues took by relaxing
+            checks["course_viscous_work"] = checks.pop("course_work_balance")
         checks["course_against_direct"] = abs(finger.sed_ending(finger.displacement(direct)) / sed - 1.0)
     left = model(scene.driven(depth), finger, contact, displacement)
-    history = None if way is None else _history(scene, finger, way)
+    history = None if way is None else _history(scene, finger, way, over_time)
     row = Row(ROW, finger.sed_row(displacement))
     solved = perf_counter()
     numbers = np.array([sed, contact.normal.sum(), contact.tangential.sum()])
@@ -366,25 +371,41 @@ def _skin(finger: FingerModel, contact: Contact, skin: Array) -> Skin:
     )
 
 
-def _history(scene: Scene, finger: FingerModel, way: March) -> History:
-    """Return the course as arrays; all its states are unfolded together, and only where the ending is."""
-    mesh = finger.geometry.mesh
-    contacts = [instant.contact for instant in way.instants]
+def _marched(scene: Scene, finger: FingerModel, progress: Progress | None) -> tuple[March, Array | None]:
+    """Return the whole way, and where tissues relax the SED of ending and point at each instant (m, 2) [MPa]."""
+    law, loading = _law(scene), scene.loading_per_mm
+    if not scene.materials.relax:
+        return march(finger.body.touchable, law, loading, progress), None
+    body = RelaxingBody(finger.geometry.mesh, relaxing_laws(scene.materials))
+    way = RelaxingWay(body, law, loading, finger.ending, finger.point)
+    march_relaxing(way, loading, scene.materials.longest_relaxation, progress)
+    return way.march(), np.array(way.sed)
+
+
+def _over_time(finger: FingerModel, contacts: Sequence[Contact]) -> Array:
+    """Return the SED of ending and point (m, 2) [MPa] of elastic states, unfolded together where the ending is."""
+    mesh, elastic = finger.geometry.mesh, finger.body.elastic
     forces = np.stack([np.concatenate([c.normal, c.tangential]) for c in contacts], axis=1)
-    skin = finger.body.skin_displacement(forces)
     nodes = np.union1d(finger.ending.nodes(mesh), finger.point.nodes(mesh))
-    displacement = finger.body.displacement(skin, only=nodes)
+    displacement = finger.body.displacement(finger.body.skin_displacement(forces), only=nodes)
+    return np.stack([patch.average(mesh, elastic, displacement)[0] for patch in (finger.ending, finger.point)], axis=1)
+
+
+def _history(scene: Scene, finger: FingerModel, way: March, over_time: Array | None) -> History:
+    """Return the course as arrays."""
+    contacts = [instant.contact for instant in way.instants]
+    sed = _over_time(finger, contacts) if over_time is None else over_time
     touching = np.array([c.touching.sum() for c in contacts])
     slipping = np.array([(c.state >= SLIP).sum() for c in contacts])
     return History(
         time=np.array([i.time for i in way.instants]),
         bone_x=np.array([i.travel for i in way.instants]),
         bone_y=np.array([-i.depth for i in way.instants]),
-        sed_ending=finger.ending.average(mesh, finger.body.elastic, displacement)[0],
-        sed_point=finger.point.average(mesh, finger.body.elastic, displacement)[0],
-        normal_force=forces[: len(forces) // 2].sum(axis=0),
+        sed_ending=sed[:, 0],
+        sed_point=sed[:, 1],
+        normal_force=np.array([c.normal.sum() for c in contacts]),
         tangential_force=np.array([_drag(scene, c.tangential.sum()) for c in contacts]),
-        contact_width=np.array([finger.contact_width(c, skin[:, n]) for n, c in enumerate(contacts)]),
+        contact_width=np.array([finger.contact_width(c, np.concatenate([c.gap, c.shift])) for c in contacts]),
         slipping=slipping / np.maximum(touching, 1),
     )
 

@@ -59,13 +59,18 @@ def march(body: Touchable, law: FrictionLaw, loading: Loading, progress: Progres
     Forces of `loading` are per mm. A given drag must be less than what friction carries. Raises NotConverged where a
     step cannot be made or sliding does not settle, Cancelled where `progress` says so.
     """
-    way = _Way(body, law, loading)
+    way = Way(body, law, loading)
+    course(way, loading, progress)
+    return way.march()
+
+
+def course(way: "Way", loading: Loading, progress: Progress | None = None) -> None:
+    """Press, and slide or drag, along `way`. Raises as `march`."""
     press = loading.depth if loading.normal_force is None else loading.normal_force
     for number in range(1, PRESSING_STEPS + 1):
         part = number / PRESSING_STEPS
         way.go(Aim(PRESSING_TIME * part, press * part, 0.0))
         _report(progress, part / 2.0)
-    settled = None
     if loading.tangential_force is not None:
         pull = -loading.direction * loading.tangential_force
         for number in range(1, DRAGGING_STEPS + 1):
@@ -74,8 +79,7 @@ def march(body: Touchable, law: FrictionLaw, loading: Loading, progress: Progres
             _report(progress, (1.0 + part) / 2.0)
     else:
         for direction in loading.directions:
-            settled = _slide(way, direction, loading.speed, progress)
-    return March(tuple(way.instants), settled, sum(instant.contact.iterations for instant in way.instants))
+            way.settled = slide(way, direction, loading.speed, progress)
 
 
 def _report(progress: Progress | None, part: float) -> None:
@@ -83,15 +87,16 @@ def _report(progress: Progress | None, part: float) -> None:
         raise Cancelled
 
 
-class _Way:
+class Way:
     """The states so far, and how the next one is found."""
 
     def __init__(self, body: Touchable, law: FrictionLaw, loading: Loading) -> None:
-        self._by_force = loading.normal_force is not None
-        self._by_drag = loading.tangential_force is not None
+        """Start at rest, untouched; `loading` says what is driven and what is found."""
+        self.by_force = loading.normal_force is not None
+        self.by_drag = loading.tangential_force is not None
         start = untouched(body)
-        if self._by_force:
-            body = forced(body, 0.0, 0.0 if self._by_drag else None)
+        if self.by_force:
+            body = forced(body, 0.0, 0.0 if self.by_drag else None)
             # under a force something touches from the first
             state = start.state.copy()
             state[np.argmin(start.gap)] = SLIP if law.frictionless else STICK
@@ -99,12 +104,17 @@ class _Way:
         self.course = Course(body, law)
         self.instants = [Instant(0.0, 0.0, 0.0, start)]
         self.aim = Aim(0.0, 0.0, 0.0)
+        self.settled: float | None = None  # travel of the last slide after which nothing changed [mm]
+
+    def march(self) -> March:
+        """Return the way so far."""
+        return March(tuple(self.instants), self.settled, sum(i.contact.iterations for i in self.instants))
 
     def go(self, aim: Aim, halvings: int = HALVINGS) -> None:
         """Append the state at `aim`, in smaller steps where one of that size fails."""
         before = self.instants[-1].contact
         try:
-            contact = self._step(before, aim)
+            contact = self.found(before, aim)
         except ContactLost as lost:
             if halvings == 0:
                 start = self.instants[-1]
@@ -115,20 +125,21 @@ class _Way:
             self.go(self.aim.towards(aim, 0.5), halvings - 1)
             self.go(aim, halvings - 1)
             return
-        depth = -float(contact.motion[0]) if self._by_force else aim.press
-        travel = float(contact.motion[1]) if self._by_drag else aim.along
+        depth = -float(contact.motion[0]) if self.by_force else aim.press
+        travel = float(contact.motion[1]) if self.by_drag else aim.along
         self.instants.append(Instant(aim.time, depth, travel, contact))
         self.aim = aim
 
-    def _step(self, before: Contact, aim: Aim) -> Contact:
-        if not self._by_force:
+    def found(self, before: Contact, aim: Aim) -> Contact:
+        """Return the state at `aim`, coming from `before`. Raises ContactLost."""
+        if not self.by_force:
             return self.course.step(before, aim.press, aim.along)
-        if self._by_drag:
+        if self.by_drag:
             return self.course.step(before, 0.0, 0.0, np.array([aim.press, aim.along]))
         return self.course.step(before, 0.0, aim.along, np.array([aim.press]))
 
 
-def _slide(way: _Way, direction: int, speed: float, progress: Progress | None) -> float:
+def slide(way: Way, direction: int, speed: float, progress: Progress | None) -> float:
     """Append the sliding states and return the travel after which they did not change."""
     begun, depth = way.aim, way.instants[-1].depth
     step, distance = 0.01 * depth, 0.0

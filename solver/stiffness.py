@@ -2,15 +2,29 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.elements import Q2P1
-from solver.materials import Hooke
 from solver.mesh import Array, Indices, Mesh
 
 _VALUES, _GRADIENTS = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
+
+
+class Isotropic(Protocol):
+    """What elements ask of a material at small strain."""
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus [MPa]."""
+        ...
+
+    @property
+    def lame(self) -> float:
+        """Lamé's first constant [MPa]."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,8 +38,8 @@ class Elastic:
     lame: Array  # (e,) [MPa]
 
     @staticmethod
-    def of(mesh: Mesh, materials: Sequence[Hooke]) -> "Elastic":
-        """Integrate the stiffness of every element with 3 x 3 Gauss points.
+    def of(mesh: Mesh, materials: Sequence[Isotropic]) -> "Elastic":
+        """Integrate the stiffness of every element with 3 x 3 Gauss points; `materials` by region.
 
         K = integral of 2 G eps:eps + lambda theta^2, where theta is the best fit of the volume strain by 1, x, y. That
         is the mixed form with pressure lambda theta, its three pressure modes eliminated (exact for Hooke).

@@ -11,9 +11,9 @@ from math import sqrt
 from solver.body import Body
 from solver.contact import Contact, ContactLost, Course, Touchable
 from solver.friction import FrictionLaw
-from solver.materials import Hooke
 from solver.mesher import Sizing, finger_mesh
 from solver.scene import Scene
+from solver.tissues import settled_moduli
 
 WIDE = 16.0  # margin at which nearly all the palmar skin may touch
 FINENESS = 10.0  # of the meshes on which the limit of depth is looked for: it hardly depends on the mesh
@@ -69,5 +69,4 @@ def deepest(scene: Scene, law: FrictionLaw) -> float | None:
 
 def _body(scene: Scene, depth: float, fineness: float) -> Touchable:
     mesh = finger_mesh(scene.finger, scene.receptor, Sizing(fineness, depth, margin=WIDE)).mesh
-    tissues = (scene.materials.epidermis, scene.materials.dermis, scene.materials.fat)
-    return Body.of(mesh, [Hooke(t.E, t.nu) for t in tissues]).touchable
+    return Body.of(mesh, settled_moduli(scene.materials)).touchable

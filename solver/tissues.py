@@ -1,0 +1,26 @@
+"""The tissues of a scene as the laws that elements are made of, in the order of the mesh's regions."""
+
+from solver.hyperelastic import Demiray, Law, NeoHooke
+from solver.materials import Moduli, Prony
+from solver.scene import Material, Materials
+
+
+def settled_moduli(materials: Materials) -> list[Moduli]:
+    """Return the small-strain moduli of a settled response: those that a tissue has once it has relaxed."""
+    return [law.relaxed for law in relaxing_laws(materials)]
+
+
+def relaxing_laws(materials: Materials) -> list[Prony]:
+    """Return the small-strain laws; a tissue that does not relax has no terms."""
+    return [Prony(t.E, t.nu, tuple((term.g, term.tau) for term in t.prony)) for t in materials.by_region]
+
+
+def finite_laws(materials: Materials) -> list[Law]:
+    """Return the laws at finite strain."""
+    return [_finite(tissue) for tissue in materials.by_region]
+
+
+def _finite(tissue: Material) -> Law:
+    if tissue.stiffening is not None:
+        return Demiray(tissue.E, tissue.nu, tissue.stiffening)
+    return NeoHooke(tissue.E, tissue.nu)

@@ -1,0 +1,129 @@
+"""Tissues that relax: closed forms of homogeneous states, the limits at once and in the end, and the whole finger."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.materials import Prony
+from solver.reference import SLIPPERINESS, scene
+from solver.relaxing import RelaxingBody
+from solver.scene import Material, Materials, Relaxation, Solve
+from solver.shapes import block
+from solver.solution import solve
+from solver.stiffness import Probes
+
+TIMES = [0.5, 1.0, 1.5, 2.0, 3.0, 6.0]
+# E(t)/E0 = 1 - g + g exp(-t/tau), g = 0.3, strain ramped to 1 within 1 s and held: stress/E0 (elementary integral)
+TABLE = {
+    0.1: [0.379798, 0.729999, 0.700202, 0.700001, 0.700000, 0.700000],
+    1.0: [0.468041, 0.889636, 0.815020, 0.769763, 0.725664, 0.701278],
+    10.0: [0.496312, 0.985488, 0.971564, 0.958320, 0.933738, 0.873157],
+}
+
+
+def held_all_round(law):
+    """A block whose whole boundary is held, its probes, and its boundary nodes' positions."""
+    mesh = block(np.linspace(0, 2, 4), np.linspace(0, 1, 3), held=False)
+    low, high = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)
+    boundary = np.flatnonzero(np.any((mesh.nodes < low + 1e-9) | (mesh.nodes > high - 1e-9), axis=1))
+    mesh = replace(mesh, held=boundary, skin=mesh.skin[:0])
+    body = RelaxingBody(mesh, [law])
+    count = len(mesh.elements)
+    return body, Probes.at(mesh, body.elastic, np.arange(count), np.full((count, 2), 0.3)), mesh.nodes[boundary]
+
+
+def course(law, gradient):
+    """Yield time, body and probes while the displacement `gradient` ramps within 1 s and is held."""
+    body, probes, places = held_all_round(law)
+    before = 0.0
+    for time in sorted({0.25, 0.75, *TIMES}):
+        body.ready(time - before, min(time, 1.0) * places @ gradient.T)
+        body.advance(np.zeros(0), np.zeros(0))
+        before = time
+        forces = body.forces()
+        inside = np.ones(len(forces), bool)
+        inside[body.mesh.held] = False
+        assert np.abs(forces[inside]).max() < 1e-14
+        yield time, body, probes
+
+
+@pytest.mark.parametrize("tau", sorted(TABLE))
+def test_a_sheared_block_relaxes_as_the_standard_linear_solid_does_whatever_the_steps(tau):
+    law = Prony(0.08, 0.48, ((0.3, tau),))
+    shear = np.array([[0.0, 0.01], [0.0, 0.0]])
+    found = {t: body.stress(probes) for t, body, probes in course(law, shear)}
+    of_table = [found[t][:, 0, 1] / (law.shear * 0.01) for t in TIMES]
+    np.testing.assert_allclose(of_table, np.array(TABLE[tau])[:, None] * np.ones(len(of_table[0])), atol=6e-7)
+
+
+def test_a_block_pressed_between_walls_keeps_its_bulk_stress_and_relaxes_by_its_shear_alone():
+    law = Prony(0.08, 0.48, ((0.3, 1.0),))
+    pressed = np.array([[0.0, 0.0], [0.0, -0.01]])
+    found = {t: body.stress(probes) for t, body, probes in course(law, pressed)}
+    for time, part in zip(TIMES, TABLE[1.0], strict=True):
+        expected = -0.01 * (law.bulk * min(time, 1.0) + 4.0 / 3.0 * law.shear * part)
+        np.testing.assert_allclose(found[time][:, 1, 1], expected, rtol=1e-6)
+
+
+def test_the_energy_is_that_of_the_springs_alone():
+    tau, g = 1.0, 0.3
+    law = Prony(0.08, 0.48, ((g, tau),))
+    shear = np.array([[0.0, 0.01], [0.0, 0.0]])
+    found = {t: body.energy(probes) for t, body, probes in course(law, shear)}
+    whole = law.shear * 0.01**2 / 2.0
+    for time in (1.0, 1.5, 2.0, 3.0, 6.0):
+        left = tau * (1.0 - np.exp(-1.0 / tau)) * np.exp(-(time - 1.0) / tau)  # of the strain in the damped spring
+        np.testing.assert_allclose(found[time], whole * (1.0 - g + g * left**2), rtol=1e-9)
+
+
+def of_layers(*terms):
+    usual = Materials()
+    tissues = {name: replace(usual.of(name), prony=terms) for name in ("epidermis", "dermis", "fat")}
+    return replace(usual, **tissues)
+
+
+def published(materials, course="history", **loading):
+    given = scene(SLIPPERINESS[4])
+    return replace(
+        given, materials=materials, loading=replace(given.loading, **loading), solve=Solve("small", course, 0.5)
+    )
+
+
+def test_terms_that_relax_nothing_leave_the_elastic_course_as_it_was():
+    elastic, same = solve(published(Materials())), solve(published(of_layers(Relaxation(0.0, 0.01))))
+    count = int((elastic.history.time <= 1.0).sum())
+    np.testing.assert_allclose(same.history.sed_ending[:count], elastic.history.sed_ending[:count], rtol=1e-9)
+    assert same.sed_ending == pytest.approx(elastic.sed_ending, rel=1e-9)
+
+
+def test_terms_that_take_for_ever_leave_the_pressing_as_it_was():
+    elastic = solve(published(Materials(), slide="none")).history
+    slow = solve(published(of_layers(Relaxation(0.3, 1e6)), slide="none")).history
+    np.testing.assert_allclose(slow.sed_ending[:26], elastic.sed_ending[:26], rtol=2e-6)
+
+
+def test_in_the_end_the_finger_has_its_relaxed_moduli_and_sliding_overshoots_on_the_way():
+    tissues = of_layers(Relaxation(0.3, 0.07), Relaxation(0.2, 1.4))
+    found = solve(published(tissues))
+    relaxed = Materials(*(_softer(tissues.of(name), 0.5) for name in ("epidermis", "dermis", "fat")))
+    elastic = solve(published(relaxed, course="steady"))
+    assert found.sed_ending == pytest.approx(elastic.sed_ending, rel=1e-5)
+    assert found.normal_force == pytest.approx(elastic.normal_force, rel=1e-5)
+    assert found.audits["course_against_direct"] < 1e-5
+    assert found.history.normal_force.max() > 1.2 * found.normal_force
+    assert found.history.sed_ending[-1] == pytest.approx(found.sed_ending, rel=1e-5)
+
+
+def _softer(tissue, part):
+    """The elastic tissue with `part` of the shear modulus and the same bulk modulus."""
+    shear, bulk = part * tissue.E / (2 * (1 + tissue.nu)), tissue.E / (3 * (1 - 2 * tissue.nu))
+    return Material(9 * bulk * shear / (3 * bulk + shear), (3 * bulk - 2 * shear) / (2 * (3 * bulk + shear)))
+
+
+def test_a_given_force_presses_a_relaxing_finger_deeper_with_time():
+    found = solve(published(of_layers(Relaxation(0.5, 0.5)), indentation=None, normal_force=0.05, slide="none"))
+    depth, time = -found.history.bone_y, found.history.time
+    np.testing.assert_allclose(found.history.normal_force[time >= 1.0], 0.05, rtol=1e-9)
+    assert (np.diff(depth[time >= 1.0]) > -1e-12).all()
+    assert depth[-1] > 1.1 * depth[np.argmin(np.abs(time - 1.0))]

@@ -1,0 +1,65 @@
+"""Laws named in a scene reach the elements, and those that a kinematics does not have are refused."""
+
+from dataclasses import replace
+
+import pytest
+
+from solver.fields import fields_of
+from solver.reference import SLIPPERINESS, scene
+from solver.scene import Friction, Loading, Material, Materials, Relaxation, Scene, SceneError, Solve
+from solver.solution import solve
+
+NAMES = ("epidermis", "dermis", "fat")
+
+
+def with_skin(law, stiffening=None, kinematics="finite"):
+    usual = Materials()
+    skin = {name: replace(usual.of(name), law=law, stiffening=stiffening) for name in ("epidermis", "dermis")}
+    return replace(scene(SLIPPERINESS[4]), materials=replace(usual, **skin), solve=Solve(kinematics, "steady", 0.5))
+
+
+def test_without_stiffening_demirays_law_is_the_neo_hookean_one_and_with_it_the_finger_resists_more():
+    usual, none, some = (solve(with_skin(*law)) for law in [("neo-hookean",), ("demiray", 1e-9), ("demiray", 5.0)])
+    assert none.sed_ending == pytest.approx(usual.sed_ending, rel=1e-6)
+    assert none.normal_force == pytest.approx(usual.normal_force, rel=1e-6)
+    assert some.normal_force > 1.02 * usual.normal_force
+    assert "Demiray" in some.model["material"]
+
+
+def test_the_default_laws_are_hooke_at_small_strain_and_neo_hooke_at_finite_strain():
+    for kinematics, law in (("small", "hooke"), ("finite", "neo-hookean")):
+        named = solve(with_skin(law, kinematics=kinematics))
+        assert named.sed_ending == solve(with_skin(None, kinematics=kinematics)).sed_ending
+
+
+def test_the_picture_at_finite_strain_shows_the_energy_of_its_law():
+    found = solve(with_skin("demiray", 5.0))
+    drawn = fields_of(found)
+    middle = (drawn.patch[:-1].min(axis=0) + drawn.patch[:-1].max(axis=0)) / 2.0
+    near = ((drawn.nodes - middle) ** 2).sum(axis=1).argmin()
+    assert drawn.sed[near] == pytest.approx(found.sed_ending, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("tissue", "kinematics", "key"),
+    [
+        (Material(0.1, 0.48, "rubber"), "finite", "materials.dermis.law"),
+        (Material(0.1, 0.48, "hooke"), "finite", "materials.dermis.law"),
+        (Material(0.1, 0.48, "neo-hookean"), "small", "materials.dermis.law"),
+        (Material(0.1, 0.48, "demiray"), "finite", "materials.dermis.stiffening"),
+        (Material(0.1, 0.48, "neo-hookean", 1.0), "finite", "materials.dermis.stiffening"),
+        (Material(0.1, 0.48, "demiray", -1.0), "finite", "materials.dermis.stiffening"),
+        (Material(0.1, 0.48, prony=(Relaxation(0.3, 1.0),)), "finite", "materials.dermis.prony"),
+        (Material(0.1, 0.48, prony=(Relaxation(0.3, 0.0),)), "small", "materials.dermis.prony[0].tau"),
+        (Material(0.1, 0.48, prony=(Relaxation(0.6, 0.1), Relaxation(0.6, 1.0))), "small", "materials.dermis.prony"),
+    ],
+)
+def test_laws_that_do_not_fit_are_refused_with_their_key(tissue, kinematics, key):
+    with pytest.raises(SceneError) as refused:
+        Scene(
+            materials=replace(Materials(), dermis=tissue),
+            friction=Friction(0.3),
+            loading=Loading(1.0),
+            solve=Solve(kinematics),
+        )
+    assert refused.value.key == key
