@@ -99,6 +99,7 @@ def data_sets(recording: Recording) -> tuple[DataSet, ...]:
 
 def _head(recording: Recording) -> Iterator[DataSet]:
     info = recording.info
+    yield DataSet("head/simulated", texts([recording.simulated_sentence or "no"]), "", "as the attribute SIMULATED")
     yield DataSet("head/plan", texts([_plain_json(plan_to_dict(recording.plan))]), "", "JSON")
     yield DataSet("head/transducer", texts([_plain_json(info_to_dict(info) if info else None)]), "", "JSON")
     yield DataSet("head/provenance", texts([_plain_json(dict(recording.provenance))]), "", "JSON")

@@ -1,8 +1,6 @@
 """What the format page tells is what is written."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import get_args
 
@@ -56,24 +54,6 @@ def test_every_kind_of_event_is_told(recorded):
     met = {kind for (kind,) in rows(recorded, "SELECT kind FROM events")}
     possible = {re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__).lower() for kind in get_args(Event)}
     assert met | possible | set(LOSSES) <= NAMED
-
-
-def test_the_printed_reader_reads_a_session_with_nothing_installed(recorded, tmp_path):
-    (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.S)
-    script = tmp_path / "reader.py"
-    script.write_text(code, encoding="utf-8")
-    run = subprocess.run(
-        [sys.executable, "-I", script, recorded], capture_output=True, text=True, check=True, encoding="utf-8"
-    )
-    lines = run.stdout.splitlines()
-    assert lines[0].startswith("SIMULATED: the transducer and the subject")
-    assert lines[1] == "subject S01 protocol sensotact-friction"
-    scores = [line for line in lines if line.startswith("trial ")]
-    assert len(scores) == 10
-    readings = [line for line in lines if re.match(r"[\d.]+ ", line)]
-    assert len(readings) == rows(recorded, "SELECT sum(readings) FROM blocks")[0][0]
-    # A bias of 0.1 N with 4 mN of noise was planted, pressing being negative.
-    assert float(readings[0].split()[3]) == pytest.approx(-0.1, abs=0.03)
 
 
 def test_every_key_of_a_protocol_is_told():

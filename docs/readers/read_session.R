@@ -1,0 +1,37 @@
+# Reads a session that 'daq-app export SESSION --format csv' wrote, with R alone.
+#
+#   session <- read_session("P07-csv")
+#   Rscript read_session.R P07-csv
+#
+# session$readings, $events, $trials, $answers, $strokes, $friction, $flaws and, where stored, $predictions are data frames;
+# units stand at the end of a column's name, README.md of the export tells each of them. The file session.h5 of a session can
+# be read too where Bioconductor's rhdf5 is installed: rhdf5::h5read("session.h5", "readings/raw").
+
+read_session <- function(folder) {
+  files <- list.files(folder, pattern = "[.]csv$", full.names = TRUE)
+  session <- lapply(files, read_table)
+  names(session) <- sub("[.]csv$", "", basename(files))
+  first <- readLines(files[1], n = 1, encoding = "UTF-8")
+  session$simulated <- if (startsWith(first, "#")) sub("^# ", "", first) else NULL
+  session
+}
+
+# Lines that begin with # are no rows; a # within a text is one.
+read_table <- function(file) {
+  lines <- readLines(file, encoding = "UTF-8")
+  read.csv(text = lines[!startsWith(lines, "#")], na.strings = "", comment.char = "", encoding = "UTF-8")
+}
+
+if (!interactive() && length(commandArgs(trailingOnly = TRUE)) == 1) {
+  session <- read_session(commandArgs(trailingOnly = TRUE))
+  if (!is.null(session$simulated)) cat(session$simulated, "\n", sep = "")
+  cat(nrow(session$readings), "readings", nrow(session$events), "events\n")
+  for (i in seq_len(min(3, nrow(session$readings)))) {
+    row <- session$readings[i, ]
+    wrench <- unlist(row[c("Fx_N", "Fy_N", "Fz_N", "Tx_Nmm", "Ty_Nmm", "Tz_Nmm")])
+    cat(sprintf("reading %d at %.6f s: %s\n", row$sequence, row$time_s, paste(sprintf("%.9g", wrench), collapse = " ")))
+  }
+  for (i in seq_len(nrow(session$trials))) {
+    cat(sprintf("trial %d score %g\n", session$trials$trial[i], session$trials$score[i]))
+  }
+}
