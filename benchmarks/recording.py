@@ -8,6 +8,8 @@ import resource
 import statistics
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,7 @@ from drivers.transducer import TransducerInfo
 from sessions.plan import Frame, SessionPlan
 from sessions.recording import Recording, SessionWriter, provenance
 from sessions.recording.archive import problems, seal
+from sessions.recording.schema import COLUMNS
 
 RATE = 7000
 BLOCK = 140  # readings handed over at once: 20 ms
@@ -51,6 +54,19 @@ def main() -> None:
         measure(Path(room) / "session", options.seconds)
 
 
+@contextmanager
+def timed(what: str) -> Iterator[None]:
+    """Print how long something took, by the clock and by the processor: others may be using the machine."""
+    began, worked = time.perf_counter(), time.process_time()
+    yield
+    print(f"{what}: {time.perf_counter() - began:.2f} s ({time.process_time() - worked:.2f} s of processor time)")
+
+
+def memory() -> float:
+    """Return the largest memory so far [MB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+
+
 def measure(folder: Path, seconds: int) -> None:
     """Write, open, read and seal one recording."""
     clock = ToldClock()
@@ -58,6 +74,7 @@ def measure(folder: Path, seconds: int) -> None:
     writer = SessionWriter.create(folder, plan, INFO, provenance(clock), clock=clock)
     raw = np.round(np.random.default_rng(0).normal(0, 4000, (BLOCK, 6)))
     calls: list[float] = []
+    worked = time.process_time()
     for first in range(0, seconds * RATE, BLOCK):
         i = np.arange(first, first + BLOCK)
         block = ReadingBlock(i, i, i * 0, i / RATE, np.full(BLOCK, clock.ns), raw)
@@ -65,6 +82,10 @@ def measure(folder: Path, seconds: int) -> None:
         began = time.perf_counter()
         writer.readings(block)
         calls.append(time.perf_counter() - began)
+        if first == 10 * RATE:
+            early = memory()
+    worked = time.process_time() - worked
+    late = memory()
     began = time.perf_counter()
     event_times: list[float] = []
     for _ in range(50):
@@ -73,25 +94,29 @@ def measure(folder: Path, seconds: int) -> None:
         event_times.append(time.perf_counter() - began)
     writer.event("ended", data={"reason": "the benchmark is over"})
     writer.close()
-    print(f"writing: {100 * sum(calls) / seconds:.2f} % of real time, longest call {1e3 * max(calls):.0f} ms")
+    print(
+        f"writing: {100 * sum(calls) / seconds:.2f} % of real time by the clock, {100 * worked / seconds:.2f} % by the"
+        f" processor, the making of the readings included; longest call {1e3 * max(calls):.0f} ms"
+    )
+    print(f"memory of the writer: {early:.0f} MB after 10 s, {late:.0f} MB after {seconds} s")
     print(
         f"an event made safe: median {1e3 * statistics.median(event_times):.1f} ms,"
         f" most {1e3 * max(event_times):.0f} ms"
     )
     print(f"file: {(folder / 'session.sqlite').stat().st_size / 1e6:.0f} MB")
-    began = time.perf_counter()
-    recording = Recording.open(folder)
-    print(f"opening: {time.perf_counter() - began:.2f} s")
-    began = time.perf_counter()
-    count = len(recording.readings())
-    print(f"reading {count} readings whole: {time.perf_counter() - began:.1f} s")
-    began = time.perf_counter()
-    seal(folder)
-    print(f"sealing: {time.perf_counter() - began:.1f} s")
-    began = time.perf_counter()
-    found = problems(folder)
-    print(f"checking: {time.perf_counter() - began:.1f} s, {len(found)} problems")
-    print(f"largest memory: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3:.0f} MB")
+    with timed("opening"):
+        recording = Recording.open(folder)
+    before = memory()
+    with timed("reading it whole"):
+        block = recording.readings()
+    held = sum(getattr(block, name).nbytes for name in COLUMNS) / 1e6
+    print(f"{len(block)} readings, {held:.0f} MB; memory grew by {memory() - before:.0f} MB")
+    del block
+    with timed("sealing"):
+        seal(folder)
+    with timed("checking"):
+        found = problems(folder)
+    print(f"{len(found)} problems; largest memory: {memory():.0f} MB")
 
 
 if __name__ == "__main__":

@@ -55,6 +55,7 @@ TABLES = (
 
 # Columns of a ReadingBlock in the order of the blobs, with the type of one number.
 COLUMNS = {"sequence": "<i8", "counter": "<i8", "status": "<i8", "time": "<f8", "received_ns": "<i8", "raw": "<f8"}
+BYTES_A_READING = 11 * 8  # five columns of one number, and the six of `raw`
 
 
 def text_crc(text: str) -> int:
