@@ -11,9 +11,10 @@ from typing import Any
 from daq_app.console import Console
 from daq_app.derived import ANALYSIS, PREDICTION, predicted_again
 from sessions.analysis import analyse
-from sessions.recording import Recording
+from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems
 from sessions.recording.derived import load_derived
+from sessions.toml_file import SettingsError
 from sessions.verification import MADE_BY, differences, told
 
 EXAMPLE = "daq-app verify recordings/P07"
@@ -32,12 +33,16 @@ def run(options: argparse.Namespace, console: Console) -> int:
     checked = ["files"]
     analysis = None
     for name in (ANALYSIS, PREDICTION):
-        stored = load_derived(folder, name)
-        if stored is None:
-            continue
         console.progress(0.5, f"making {name} again")
-        analysis = analysis or analyse(recording)
-        fresh = analysis.to_dict() if name == ANALYSIS else predicted_again(recording, analysis, stored)
+        try:
+            stored = load_derived(folder, name)
+            if stored is None:
+                continue
+            analysis = analysis or analyse(recording)
+            fresh = analysis.to_dict() if name == ANALYSIS else predicted_again(recording, analysis, stored)
+        except (RecordingError, SettingsError) as damaged:
+            found.append(" ".join(str(damaged).split()))
+            continue
         changed = told(list(differences(stored, json.loads(json.dumps(fresh)), name)))
         if changed:
             found += [*changed, f"{name} was made by {_versions(stored)}"]

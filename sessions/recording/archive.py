@@ -1,7 +1,9 @@
 """Seals an ended session: an HDF5 copy for any reader, a description, a manifest; compared before it counts."""
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, cast
 
 from sessions.recording.description import description
 from sessions.recording.errors import RecordingError
@@ -54,13 +56,40 @@ def seal(folder: Path) -> None:
 def problems(folder: Path) -> tuple[str, ...]:
     """Return a sentence for each thing wrong with a session's files; none for a whole, sealed session.
 
-    Checks the SHA-256 of each file, the CRC-32 of each block and event, and each number of the HDF5 copy against the
-    live file. Raises RecordingError where the recording cannot be read at all.
+    Checks the SHA-256 of each file, the CRC-32 of each block and event, and each number of the HDF5 copy and of the
+    description against the live file. Raises RecordingError where the recording cannot be read at all.
     """
     recording = Recording.open(folder)
     if not is_sealed(folder):
         return (*recording.losses, f"the session was never sealed: there is no {MANIFEST_FILE}")
-    return (*changed_files(folder), *recording.losses, *differences(recording))
+    return (
+        *changed_files(folder, recording.simulated_sentence),
+        *recording.losses,
+        *differences(recording),
+        *_otherwise_described(recording),
+    )
+
+
+def _otherwise_described(recording: Recording) -> Iterator[str]:
+    """Yield a sentence for each part of `session.json` that the live file tells otherwise."""
+    path = recording.folder / DESCRIPTION_FILE
+    if not path.is_file():
+        return  # the manifest tells
+    try:
+        told = json.loads(path.read_bytes())
+    except (OSError, ValueError) as error:
+        yield f"{DESCRIPTION_FILE} cannot be read ({error})"
+        return
+    expected: dict[str, Any] = json.loads(json.dumps(description(recording)))
+    if not isinstance(told, dict):
+        yield f"{DESCRIPTION_FILE} holds no names"
+        return
+    held = cast("dict[str, Any]", told)
+    yield from (
+        f"{name} of {DESCRIPTION_FILE} is not what the live file tells"
+        for name in {**expected, **held}
+        if name not in held or name not in expected or held[name] != expected[name]
+    )
 
 
 def _clear_unfinished(folder: Path) -> None:

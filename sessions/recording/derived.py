@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from sessions.recording.errors import RecordingError
 from sessions.recording.manifest import is_sealed, list_in_manifest
@@ -39,9 +39,12 @@ def load_derived(folder: Path, name: str) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        return json.loads(path.read_bytes())
+        found = json.loads(path.read_bytes())
     except ValueError as error:
         raise RecordingError(f"{path} is damaged ({error}); make it anew from the recording") from error
+    if not isinstance(found, dict):
+        raise RecordingError(f"{path} is damaged (it holds no names); make it anew from the recording")
+    return cast("dict[str, Any]", found)
 
 
 def _store(folder: Path, name: str, content: bytes, simulated: str | None) -> Path:

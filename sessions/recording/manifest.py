@@ -22,24 +22,34 @@ def list_in_manifest(folder: Path, names: Iterable[str], simulated: str | None) 
     for name in names:
         path = folder / name
         files[name] = {"sha256": _sha256(path), "bytes": path.stat().st_size}
-    document = {
-        **({"SIMULATED": simulated} if simulated else {}),
-        "format": {"name": FORMAT, "version": FORMAT_VERSION},
-        "files": dict(sorted(files.items())),
-    }
+    document = {**_head(simulated), "files": dict(sorted(files.items()))}
     write_whole(folder / MANIFEST_FILE, json.dumps(document, indent=1).encode() + b"\n")
 
 
-def changed_files(folder: Path) -> tuple[str, ...]:
-    """Return a sentence for each listed file that is gone or not what it was when it was listed."""
+def changed_files(folder: Path, simulated: str | None) -> tuple[str, ...]:
+    """Return a sentence for each listed file that is gone or not what it was, and one for a damaged manifest."""
     found: list[str] = []
-    for name, told in _files(folder).items():
+    try:
+        files = _files(folder)
+    except RecordingError as damaged:
+        return (str(damaged),)
+    for name, told in files.items():
         path = folder / name
         if not path.is_file():
             found.append(f"{name} is listed in {MANIFEST_FILE} and missing")
-        elif _sha256(path) != told["sha256"]:
-            found.append(f"{name} is not what it was when it was listed: its SHA-256 differs from {MANIFEST_FILE}")
+        elif _sha256(path) != told["sha256"] or path.stat().st_size != told["bytes"]:
+            found.append(
+                f"{name} is not what it was when it was listed: its SHA-256 or size differs from {MANIFEST_FILE}"
+            )
+    document = json.loads((folder / MANIFEST_FILE).read_bytes())
+    if {name: value for name, value in document.items() if name != "files"} != _head(simulated):
+        found.append(f"the head of {MANIFEST_FILE} is not what was written")
     return tuple(found)
+
+
+def _head(simulated: str | None) -> dict[str, Any]:
+    """Return what stands before the files."""
+    return {**({"SIMULATED": simulated} if simulated else {}), "format": {"name": FORMAT, "version": FORMAT_VERSION}}
 
 
 def _files(folder: Path) -> dict[str, Any]:

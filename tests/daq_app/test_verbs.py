@@ -1,12 +1,19 @@
 """The verbs as scripts use them: JSON on stdout, exit codes, and what a session folder holds."""
 
+import hashlib
 import json
 import shutil
+import sqlite3
 import stat
+import zlib
+from contextlib import closing
+from dataclasses import fields
 
 import pytest
 
 from daq_app.cli import run
+from sessions.analysis import AnalysisSettings, forces
+from sessions.recording.schema import COLUMNS
 
 SCENE = """
 title = "slipperiness 100"
@@ -92,6 +99,95 @@ def test_verify_names_a_derived_number_that_comes_out_otherwise(session, capsys)
     capsys.readouterr()
     assert run(["verify", str(session), "--json"]) == 3
     assert any("strokes[4].mu_dynamic" in problem for problem in printed(capsys)["problems"])
+
+
+def test_verify_names_every_number_that_a_changed_constant_of_the_analysis_changes(session, capsys, monkeypatch):
+    run(["analyse", str(session)])
+    names = [field.name for field in fields(AnalysisSettings)]
+    defaults = list(AnalysisSettings.__init__.__defaults__)
+    place = names.index("smoothing") - len(names)
+    assert defaults[place] == 0.1
+    defaults[place] = 0.2
+    monkeypatch.setattr(AnalysisSettings.__init__, "__defaults__", tuple(defaults))
+    capsys.readouterr()
+    assert run(["verify", str(session), "--json"]) == 3
+    problems = printed(capsys)["problems"]
+    assert "analysis.json.settings.smoothing was stored as 0.1 and comes out as 0.2" in problems
+    assert any("mu_max was stored as" in problem for problem in problems)
+    assert any("analysis.json was made by daq-app" in problem for problem in problems)
+
+
+def test_verify_names_what_a_changed_constant_inside_the_analysis_changes(session, capsys, monkeypatch):
+    run(["analyse", str(session)])
+    monkeypatch.setattr(forces, "_TWO_PASSES", 1.0)
+    forces._sections.cache_clear()
+    capsys.readouterr()
+    try:
+        assert run(["verify", str(session), "--json"]) == 3
+    finally:
+        forces._sections.cache_clear()
+    assert any("friction[0].mu was stored as" in problem for problem in printed(capsys)["problems"])
+
+
+@pytest.mark.parametrize("name", ["MANIFEST.json", "analysis.json", "session.h5", "session.json", "session.sqlite"])
+def test_verify_names_the_file_in_which_one_byte_is_changed(session, capsys, name):
+    if name == "analysis.json":
+        run(["analyse", str(session)])
+    path = session / name
+    content = path.read_bytes()
+    for part in (0.0, 0.3, 0.83):
+        changed = bytearray(content)
+        changed[int(part * len(content))] ^= 4
+        path.chmod(stat.S_IRUSR | stat.S_IWUSR)
+        path.write_bytes(changed)
+        capsys.readouterr()
+        code = run(["verify", str(session), "--json"])
+        told = capsys.readouterr()
+        assert code == 3 or (code == 1 and name == "session.sqlite")
+        assert name in (told.out if code == 3 else told.err)
+
+
+@pytest.mark.parametrize("column", ["raw", "time", "received_ns", "status"])
+def test_verify_names_a_changed_reading_whose_check_sums_were_made_to_fit(session, capsys, column):
+    live = session / "session.sqlite"
+    live.chmod(stat.S_IRUSR | stat.S_IWUSR)
+    with closing(sqlite3.connect(live)) as file:
+        names = list(COLUMNS)
+        blobs = list(file.execute(f"SELECT {', '.join(names)} FROM blocks WHERE number = 3").fetchone())
+        changed = bytearray(blobs[names.index(column)])
+        changed[2] ^= 1
+        blobs[names.index(column)] = bytes(changed)
+        crc = zlib.crc32(b"".join(blobs))
+        file.execute(f"UPDATE blocks SET {column} = ?, crc32 = ? WHERE number = 3", (bytes(changed), crc))
+        file.commit()
+    manifest = json.loads((session / "MANIFEST.json").read_text())
+    manifest["files"]["session.sqlite"]["sha256"] = hashlib.sha256(live.read_bytes()).hexdigest()
+    (session / "MANIFEST.json").write_text(json.dumps(manifest))
+    assert run(["verify", str(session), "--json"]) == 3
+    problems = printed(capsys)["problems"]
+    assert any(problem.startswith(f"{column} of the readings") and "session.h5" in problem for problem in problems)
+    assert "sha256 of session.json is not what the live file tells" in problems
+
+
+@pytest.mark.parametrize("content", ["{", "[]", '{"options": {"course": 7}}', '{"options": []}', "nothing"])
+def test_verify_names_a_document_beside_the_recording_that_cannot_be_read(session, capsys, content):
+    (session / "prediction.json").write_text(content)
+    assert run(["verify", str(session), "--json"]) == 3
+    assert any("prediction.json" in problem for problem in printed(capsys)["problems"])
+
+
+def test_a_session_goes_out_and_comes_back_by_the_command_line(session, tmp_path, capsys):
+    run(["predict", str(session)])
+    capsys.readouterr()
+    out = tmp_path / "out"
+    assert run(["export", str(session), "--format", "csv", "--out", str(out), "--json"]) == 0
+    assert str(out / "predictions.csv") in printed(capsys)["files"]
+    assert run(["import", str(out), "--out", str(tmp_path / "again"), "--json"]) == 0
+    assert printed(capsys)["differences"] == []
+    assert run(["verify", str(tmp_path / "again")]) == 0
+    assert run(["import", str(out), "--units", "N,Nmm", "--out", str(tmp_path / "third")]) == 2
+    assert run(["export", str(session), "--format", "csv", "--out", str(out)]) == 1
+    assert run(["export", str(session), "--format", "xls"]) == 2
 
 
 def test_verify_of_what_is_no_recording_is_exit_code_1(tmp_path, capsys):

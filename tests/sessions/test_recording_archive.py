@@ -253,14 +253,14 @@ def test_a_missing_file_is_named(sealed):
 def test_a_reading_changed_in_the_copy_is_named_even_when_the_manifest_was_changed_to_match(sealed):
     with h5py.File(writable(sealed / "session.h5"), "r+") as copy:
         copy["readings/raw"][250, 3] = 0.0
-    list_in_manifest(sealed, ("session.h5",), "SIMULATED")
+    list_in_manifest(sealed, ("session.h5",), Recording.open(sealed).simulated_sentence)
     assert problems(sealed) == ("raw of the readings 200 to 299 in session.h5 differs from the live file",)
 
 
 def test_a_score_changed_in_the_copy_is_named_even_when_the_manifest_was_changed_to_match(sealed):
     with h5py.File(writable(sealed / "session.h5"), "r+") as copy:
         copy["trials/score"][0] = 99.0
-    list_in_manifest(sealed, ("session.h5",), "SIMULATED")
+    list_in_manifest(sealed, ("session.h5",), Recording.open(sealed).simulated_sentence)
     assert problems(sealed) == ("trials/score of session.h5 differs from the live file",)
 
 
@@ -277,7 +277,7 @@ def test_a_copy_whose_bytes_rotted_is_named_by_its_own_check_sum(sealed):
     place = content.index(np.float64(6 * 321).tobytes())  # a torque of reading 321
     content[place + 6] ^= 1
     path.write_bytes(content)
-    list_in_manifest(sealed, ("session.h5",), "SIMULATED")
+    list_in_manifest(sealed, ("session.h5",), Recording.open(sealed).simulated_sentence)
     assert any(problem.startswith("session.h5 cannot be read") for problem in problems(sealed))
 
 
@@ -285,10 +285,10 @@ def test_a_session_that_was_never_sealed_is_named(tmp_path):
     assert problems(ended(tmp_path / "s")) == ("the session was never sealed: there is no MANIFEST.json",)
 
 
-def test_a_manifest_that_cannot_be_read_is_refused_with_a_sentence(sealed):
+def test_a_manifest_that_cannot_be_read_is_named(sealed):
     (sealed / "MANIFEST.json").write_text('{"files": [1]}')
-    with pytest.raises(RecordingError, match=r"MANIFEST\.json cannot be read"):
-        problems(sealed)
+    (found,) = problems(sealed)
+    assert "MANIFEST.json cannot be read" in found
 
 
 # ---- sealing what a crash left
