@@ -62,8 +62,9 @@ def problems(folder: Path) -> tuple[str, ...]:
     recording = Recording.open(folder)
     if not is_sealed(folder):
         return (*recording.losses, f"the session was never sealed: there is no {MANIFEST_FILE}")
+    form: dict[str, Any] = recording.head["format"]
     return (
-        *changed_files(folder, recording.simulated_sentence),
+        *changed_files(folder, recording.simulated_sentence, form),
         *recording.losses,
         *differences(recording),
         *_otherwise_described(recording),
@@ -81,15 +82,30 @@ def _otherwise_described(recording: Recording) -> Iterator[str]:
         yield f"{DESCRIPTION_FILE} cannot be read ({error})"
         return
     expected: dict[str, Any] = json.loads(json.dumps(description(recording)))
-    if not isinstance(told, dict):
-        yield f"{DESCRIPTION_FILE} holds no names"
-        return
-    held = cast("dict[str, Any]", told)
     yield from (
-        f"{name} of {DESCRIPTION_FILE} is not what the live file tells"
-        for name in {**expected, **held}
-        if name not in held or name not in expected or held[name] != expected[name]
+        f"{where} of {DESCRIPTION_FILE} is not what the live file tells" for where in _unlike(told, expected, "")
     )
+
+
+def _unlike(told: object, expected: object, where: str) -> Iterator[str]:
+    """Yield the places where `told` is not what is expected; names that an older version did not tell are left out."""
+    if isinstance(told, dict) and isinstance(expected, dict):
+        held, fresh = cast("dict[str, Any]", told), cast("dict[str, Any]", expected)
+        for name, value in held.items():
+            place = f"{where}.{name}" if where else name
+            if name in fresh:
+                yield from _unlike(value, fresh[name], place)
+            else:
+                yield place
+    elif isinstance(told, list) and isinstance(expected, list):
+        entries, others = cast("list[Any]", told), cast("list[Any]", expected)
+        if len(entries) != len(others):
+            yield where
+        else:
+            for i, (value, other) in enumerate(zip(entries, others, strict=True)):
+                yield from _unlike(value, other, f"{where}[{i}]")
+    elif told != expected:
+        yield where or "all"
 
 
 def _clear_unfinished(folder: Path) -> None:

@@ -3,10 +3,8 @@
 from typing import Any
 
 from sessions.recording.digests import digest_of
-from sessions.recording.head import info_to_dict, plan_to_dict
 from sessions.recording.log import TrialRecord
 from sessions.recording.reader import Recording
-from sessions.recording.schema import FORMAT, FORMAT_VERSION
 
 
 def description(recording: Recording) -> dict[str, Any]:
@@ -14,9 +12,9 @@ def description(recording: Recording) -> dict[str, Any]:
     digest = digest_of(recording.blocks(), recording.events)
     return {
         **({"SIMULATED": recording.simulated_sentence} if recording.simulated_sentence else {}),
-        "format": {"name": FORMAT, "version": FORMAT_VERSION},
-        "plan": plan_to_dict(recording.plan),
-        "transducer": info_to_dict(recording.info) if recording.info else None,
+        "format": recording.head["format"],
+        "plan": recording.head["plan"],
+        "transducer": recording.head["transducer"],
         "provenance": dict(recording.provenance),
         "trials": [_trial(record) for record in recording.trials],
         "readings": digest.readings,

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +18,23 @@ def is_sealed(folder: Path) -> bool:
 
 def list_in_manifest(folder: Path, names: Iterable[str], simulated: str | None) -> None:
     """Take the files called `names` into the manifest as they are now; the others stay as listed."""
-    files: dict[str, Any] = _files(folder) if is_sealed(folder) else {}
+    sealed = is_sealed(folder)
+    files: dict[str, Any] = _files(folder) if sealed else {}
+    head = (
+        _head_of(folder) if sealed else {**_simulated(simulated), "format": {"name": FORMAT, "version": FORMAT_VERSION}}
+    )
     for name in names:
         path = folder / name
         files[name] = {"sha256": _sha256(path), "bytes": path.stat().st_size}
-    document = {**_head(simulated), "files": dict(sorted(files.items()))}
+    document = {**head, "files": dict(sorted(files.items()))}
     write_whole(folder / MANIFEST_FILE, json.dumps(document, indent=1).encode() + b"\n")
 
 
-def changed_files(folder: Path, simulated: str | None) -> tuple[str, ...]:
-    """Return a sentence for each listed file that is gone or not what it was, and one for a damaged manifest."""
+def changed_files(folder: Path, simulated: str | None, form: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return a sentence for each listed file that is gone or not what it was, and one for a damaged manifest.
+
+    `simulated` and `form` are what the live file says at its head.
+    """
     found: list[str] = []
     try:
         files = _files(folder)
@@ -41,15 +48,19 @@ def changed_files(folder: Path, simulated: str | None) -> tuple[str, ...]:
             found.append(
                 f"{name} is not what it was when it was listed: its SHA-256 or size differs from {MANIFEST_FILE}"
             )
-    document = json.loads((folder / MANIFEST_FILE).read_bytes())
-    if {name: value for name, value in document.items() if name != "files"} != _head(simulated):
-        found.append(f"the head of {MANIFEST_FILE} is not what was written")
+    if _head_of(folder) != {**_simulated(simulated), "format": form}:
+        found.append(f"the head of {MANIFEST_FILE} is not what the live file tells")
     return tuple(found)
 
 
-def _head(simulated: str | None) -> dict[str, Any]:
-    """Return what stands before the files."""
-    return {**({"SIMULATED": simulated} if simulated else {}), "format": {"name": FORMAT, "version": FORMAT_VERSION}}
+def _simulated(sentence: str | None) -> dict[str, Any]:
+    return {"SIMULATED": sentence} if sentence else {}
+
+
+def _head_of(folder: Path) -> dict[str, Any]:
+    """Return what stands before the files in a manifest that can be read."""
+    document = json.loads((folder / MANIFEST_FILE).read_bytes())
+    return {name: value for name, value in document.items() if name != "files"}
 
 
 def _files(folder: Path) -> dict[str, Any]:

@@ -56,6 +56,7 @@ class Recording:
     provenance: Mapping[str, Any]
     events: tuple[LoggedEvent, ...]
     trials: tuple[TrialRecord, ...]  # every planned trial, in the plan's order
+    head: Mapping[str, Any]  # plan and transducer as the file holds them, whatever later versions add to theirs
     _log_losses: tuple[str, ...]
 
     @staticmethod
@@ -84,7 +85,7 @@ class Recording:
             raise RecordingError(f"{path}: its head is damaged ({error}); restore the folder from a copy") from error
         simulated = None if head["simulated"] == "no" else head["simulated"]
         trials = trial_records(plan, events)
-        return Recording(folder, plan, info, simulated, head["provenance"], events, trials, tuple(losses))
+        return Recording(folder, plan, info, simulated, head["provenance"], events, trials, head, tuple(losses))
 
     @property
     def simulated(self) -> bool:

@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.recording.head import calibration_hash, info_to_dict, plan_to_dict
+from sessions.recording.head import calibration_hash
 from sessions.recording.log import OUTCOMES
 from sessions.recording.reader import Recording
 from sessions.recording.schema import COLUMNS, FORMAT, FORMAT_VERSION, SEALED_FILE
@@ -55,7 +55,7 @@ def write_copy(
         if recording.simulated_sentence:
             file.attrs["SIMULATED"] = _attribute(recording.simulated_sentence)
         file.attrs["format"] = _attribute(FORMAT)
-        file.attrs["format_version"] = FORMAT_VERSION
+        file.attrs["format_version"] = recording.head["format"]["version"]
         file.attrs["description"] = _attribute("every table, data set, unit and byte: docs/session-format.md")
         readings = _empty_readings(file)
         for block in recording.blocks():
@@ -83,7 +83,10 @@ def differences(recording: Recording) -> Iterator[str]:
     try:
         with h5py.File(recording.folder / SEALED_FILE, "r") as file:
             yield from _different_readings(recording, file)
+            older = int(file.attrs.get("format_version", 0)) < FORMAT_VERSION
             for made in data_sets(recording):
+                if older and made.name not in file:
+                    continue  # a later version holds more
                 if not _same(np.asarray(file[made.name]), made.values):
                     yield f"{made.name} of {SEALED_FILE} differs from the live file"
             if file.attrs.get("SIMULATED") != _attribute(recording.simulated_sentence):
@@ -98,10 +101,9 @@ def data_sets(recording: Recording) -> tuple[DataSet, ...]:
 
 
 def _head(recording: Recording) -> Iterator[DataSet]:
-    info = recording.info
-    yield DataSet("head/simulated", texts([recording.simulated_sentence or "no"]), "", "as the attribute SIMULATED")
-    yield DataSet("head/plan", texts([_plain_json(plan_to_dict(recording.plan))]), "", "JSON")
-    yield DataSet("head/transducer", texts([_plain_json(info_to_dict(info) if info else None)]), "", "JSON")
+    yield DataSet("head/simulated", texts([recording.simulated_sentence or "no"]), "", "a sentence where something was simulated; or no")
+    yield DataSet("head/plan", texts([_plain_json(recording.head["plan"])]), "", "JSON")
+    yield DataSet("head/transducer", texts([_plain_json(recording.head["transducer"])]), "", "JSON")
     yield DataSet("head/provenance", texts([_plain_json(dict(recording.provenance))]), "", "JSON")
     yield DataSet("head/losses", texts(recording.losses), "", "what storage lost, a sentence each")
     yield DataSet("head/flaws", texts(recording.flaws), "", "what went wrong while recording, a sentence each")
