@@ -101,7 +101,7 @@ def data_sets(recording: Recording) -> tuple[DataSet, ...]:
 
 
 def _head(recording: Recording) -> Iterator[DataSet]:
-    yield DataSet("head/simulated", texts([recording.simulated_sentence or "no"]), "", "a sentence where something was simulated; or no")
+    yield DataSet("head/simulated", texts([recording.simulated_sentence or "no"]), "", "what was simulated, or no")
     yield DataSet("head/plan", texts([_plain_json(recording.head["plan"])]), "", "JSON")
     yield DataSet("head/transducer", texts([_plain_json(recording.head["transducer"])]), "", "JSON")
     yield DataSet("head/provenance", texts([_plain_json(dict(recording.provenance))]), "", "JSON")
