@@ -28,7 +28,7 @@ def march(
     newton: Newton,
     course: Iterable[Pull],
     start: Shape | None = None,
-    tolerance: float = 1e-8,
+    tolerance: float = 1e-7,
     stop: Callable[[], bool] = lambda: False,
 ) -> Iterator[Shape]:
     """Yield the equilibrium at each pull of `course`, from undeformed or `start`; a step that fails is cut in two.

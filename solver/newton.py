@@ -24,7 +24,7 @@ SHORTEST = 1.0 / 16.0  # part of a Newton step below which a body that turns ins
 ROUNDS = 12  # of changes of contact states within one linear system: dense, of the skin alone, and so cheap
 NEAR = 0.1  # step below which the tangent of the state before is tried again [mm]
 FAST = 0.02  # fall of the steps' size, below which a new tangent is kept
-SLOW = 0.3  # the same, above which a kept one is given up
+SLOW = 0.5  # the same, above which a kept one is given up
 EQUILIBRIUM, BY_DEPTH, BY_FRICTION, BY_TRAVEL = 0, 1, 2, 3  # columns of Newton.steps
 
 
@@ -157,7 +157,7 @@ class Newton:
         changed = kernels.restate(state, sense, reaction, above, x - anchor, self.length, pull.mu, pull.tau, pull.sense)
         return Shape(u, pressure, state, sense, reaction, pull, shape.iterations + 1), largest, changed
 
-    def settle(self, start: Shape, pull: Pull, tolerance: float = 1e-8, limit: int = 25) -> Shape:
+    def settle(self, start: Shape, pull: Pull, tolerance: float = 1e-9, limit: int = 25) -> Shape:
         """Return the equilibrium under `pull`, from `start`, its displacements good to `tolerance` [mm].
 
         Tangents are kept, factors and all, where steps are small or fall fast. What is still missing is judged from how

@@ -1,0 +1,86 @@
+"""How time and memory of one linear system grow with the unknowns, to 100,000, at both kinematics.
+
+Run it alone, single-threaded: OPENBLAS_NUM_THREADS=1 python -m benchmarks.growth
+Times are those of one assembly, elimination and solve (`finite`), of one assembly and elimination down to the skin's
+compliance (`small`); memory is the peak above what the process held before its first solve on that mesh, mesh, plan
+and tables included. The exponent is that of the line through the logarithms.
+"""
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: threads cost more than they bring at these sizes
+
+import subprocess
+import sys
+from resource import RUSAGE_SELF, getrusage
+from statistics import median
+from time import perf_counter
+
+import numpy as np
+
+from solver.finger import FingerModel
+from solver.finite_solution import FiniteFinger
+from solver.mesher import Sizing
+from solver.newton import Pull
+from solver.reference import SLIPPERINESS, scene
+from solver.sliding import settled
+
+FINENESS = (5, 8, 12, 16, 24, 32, 48, 64, 86)
+SCENE = scene(SLIPPERINESS[4])
+PULL = Pull(1.5, 0.24, 0.00877, 1)  # slipperiness 100
+
+
+def peak() -> float:
+    """Return the most memory this process has held [MB]."""
+    return getrusage(RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def finite(fineness: float, repeats: int = 9) -> tuple[int, float, float]:
+    """Return the unknowns, the time of one linear system [ms] and the memory of a solve [MB] at finite strain."""
+    settled(FiniteFinger.of(SCENE, Sizing(5.0, 2.0, margin=3.0)).newton, PULL, tolerance=1e-5)  # compiles
+    before = peak()
+    newton = FiniteFinger.of(SCENE, Sizing(fineness, 2.0, margin=3.0)).newton
+    shape = settled(newton, PULL, tolerance=1e-5)
+    held = peak() - before
+    spans: list[float] = []
+    for _ in range(repeats):
+        begin = perf_counter()
+        newton.linearise(shape, PULL, newton.skin_x)
+        newton.moved(shape, PULL, newton.steps[:, 0], newton.skin_x)
+        spans.append(1e3 * (perf_counter() - begin))
+    return newton.body.dofs, median(spans), held
+
+
+def small(fineness: float, repeats: int = 5) -> tuple[int, float, float]:
+    """Return the unknowns, the time of assembly and elimination [ms] and the memory [MB] at small strain."""
+    FingerModel.of(SCENE, Sizing(5.0, 2.0))
+    before = peak()
+    models = [FingerModel.of(SCENE, Sizing(fineness, 2.0))]
+    held = peak() - before
+    spans = [models[0].solve_s] + [FingerModel.of(SCENE, Sizing(fineness, 2.0)).solve_s for _ in range(repeats - 1)]
+    return models[0].body.dofs, 1e3 * median(spans), held
+
+
+def main() -> None:
+    """Print the tables; each mesh is measured in a process of its own, so that memory is its alone."""
+    if len(sys.argv) > 1:
+        kind, fineness = sys.argv[1], float(sys.argv[2])
+        print(*(finite if kind == "finite" else small)(fineness))
+        return
+    for kind in ("small", "finite"):
+        print(f"{kind} strain\n  dofs       ms       MB")
+        rows: list[tuple[float, float]] = []
+        for fineness in FINENESS:
+            call = [sys.executable, "-m", "benchmarks.growth", kind, str(fineness)]
+            out = subprocess.run(call, capture_output=True, text=True, check=True).stdout
+            dofs, ms, held = map(float, out.split())
+            rows.append((dofs, ms))
+            print(f"{dofs:6.0f} {ms:8.2f} {held:8.1f}", flush=True)
+        size, span = np.log(np.array(rows)).T
+        print(
+            f"exponent {np.polyfit(size, span, 1)[0]:.2f}; of the upper half {np.polyfit(size[4:], span[4:], 1)[0]:.2f}"
+        )
+
+
+if __name__ == "__main__":
+    main()
