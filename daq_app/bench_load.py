@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.loads import ALARM, ALARM_COMBINED, WARNING, loads
+
 Array = NDArray[np.float64]
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
-FULL = 1.0  # share of the rated range at which a load is an overload
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +17,7 @@ class Load:
     """Shares of the rated range, the greatest of some readings; 1 is the rated load. nan where no range is stated."""
 
     axes: tuple[float, ...] = (0.0,) * 6
-    combined: float = 0.0  # see `load_of`
+    combined: float = 0.0  # see `drivers.loads`
 
     def latched(self, other: "Load") -> "Load":
         """Return the greater of each share.
@@ -29,21 +30,23 @@ class Load:
 
     @property
     def over(self) -> tuple[str, ...]:
-        """Return the names of what is at or beyond its rated load."""
+        """Return the names of what is beyond its rated load."""
+        over = tuple(name for name, share in zip(AXES, self.axes, strict=True) if share > ALARM)
+        return (*over, "combined") if self.combined > ALARM_COMBINED else over
+
+    @property
+    def near(self) -> tuple[str, ...]:
+        """Return the names of what is near its rated load, or beyond it."""
         named = zip((*AXES, "combined"), (*self.axes, self.combined), strict=True)
-        return tuple(name for name, share in named if share >= FULL)
+        return tuple(name for name, share in named if share > WARNING)
 
 
 def load_of(wrench: Array, rated: Array) -> Load:
     """Return the greatest load within readings (n, 6) [N, N mm] of a transducer with rated ranges (6,) [N, N mm].
 
-    `wrench` is as felt: what strains the transducer includes its zero. The combined load is the greater of the sums
-    Fxy + Tz and Fz + Txy of rated shares, as the maker of the Axia sensors states its own overload (status bit 30).
+    `wrench` is as felt: what strains the transducer includes its zero.
     """
     if not len(wrench):
         return Load()
-    share = np.abs(wrench) / rated
-    fxy = np.hypot(share[:, 0], share[:, 1])
-    txy = np.hypot(share[:, 3], share[:, 4])
-    combined = np.fmax(fxy + share[:, 5], share[:, 2] + txy)
-    return Load(tuple(share.max(axis=0).tolist()), float(combined.max()))
+    greatest = loads(wrench, rated).max(axis=0)
+    return Load(tuple(greatest[:6].tolist()), float(greatest[6]))

@@ -56,7 +56,7 @@ def bench_after(bench: BenchState, message: Message) -> BenchState:
         case m.Tare() | m.Tared() | LoggedEvent(kind="zeroed"):
             return _tared(bench, message)
         case m.HealthReport():
-            peak = bench.peak.latched(Load(tuple(message.peak), bench.peak.combined))
+            peak = bench.peak.latched(Load(tuple(message.peak), message.combined_peak))
             return replace(bench, health=message.health, rate=message.rate, saturated=message.saturated, peak=peak)
         case Loaded(load):
             return replace(bench, load=load, peak=bench.peak.latched(load))

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from daq_app.recorder import messages as m
+from daq_app.recorder.messages import Kind
 from daq_app.stroke_quality import Quality
 from daq_app.window_messages import Judged, Message
 from sessions import steps
@@ -44,6 +45,7 @@ class SessionState:
 
     folder: str
     plan: SessionPlan
+    people: Kind
     simulated: str | None
     trials: tuple[TrialState, ...]
     begun: float  # when the window heard of it [s]
@@ -83,7 +85,13 @@ class SessionState:
 def session_begun(begun: m.SessionBegun, now: float) -> SessionState:
     """Return a session that has just begun, or goes on, at `now` [s]."""
     session = SessionState(
-        begun.folder, begun.plan, begun.simulated, tuple(TrialState(t) for t in begun.plan.trials), now, since=now
+        begun.folder,
+        begun.plan,
+        begun.people,
+        begun.simulated,
+        tuple(TrialState(t) for t in begun.plan.trials),
+        now,
+        since=now,
     )
     for event in begun.events:
         session = _logged(session, event)

@@ -96,6 +96,8 @@ def _lamp(bench: BenchState) -> tuple[Literal["off", "well", "look", "wrong"], s
         return "wrong", "overloaded"
     if bench.saturated:
         return "wrong", "invalid readings"
+    if near := bench.peak.near:
+        return "look", f"near the rated load: {', '.join(near)}"
     counts = asdict(bench.health)
     troubles = [name for name in COUNTED if counts[name]]
     if troubles:

@@ -215,7 +215,7 @@ class MainWindow(QMainWindow):
             self.page.show_refusals(dict(made.sentences))
             return
         self.page.show_refusals({})
-        if self._simulated_people():
+        if made.people.kind == "simulated people":
             self.subject.hide()
         self.bridge.send(made)
         self.setFocus()
@@ -245,12 +245,9 @@ class MainWindow(QMainWindow):
         hand = None if session is None else session.plan.answering_hand
         was_scoring = self.subject.scoring
         self.subject.show_view(view.subject, hand)
-        people = session is not None and not self._simulated_people()
+        people = session is not None and session.people != "simulated people"
         if self.subject.scoring and not was_scoring and people:
             self.show_subject()
-
-    def _simulated_people(self) -> bool:
-        return self.page.form().simulated
 
     def _answered(self, event: Message) -> None:
         self.bridge.send(event)

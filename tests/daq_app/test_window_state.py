@@ -44,7 +44,7 @@ def status(safe_ns, state="mounting"):
     return Status(state, 1, 10, 100, 0, 2.0, Acknowledged(100, 3, safe_ns))
 
 
-BEGUN = (m.Device(INFO, None), m.SessionBegun("recordings/P07", PLAN, None, 0, 1.0), steps.AskBegin())
+BEGUN = (m.Device(INFO, None), m.SessionBegun("recordings/P07", PLAN, "people", None, 0, 1.0), steps.AskBegin())
 MOUNT = (*BEGUN, steps.ShowInstruction(PLAN.blocks[0]), steps.AskMount(FIRST))
 TARE = (*MOUNT, steps.StartTake(1, 1), steps.MeasureZero())
 READY = (*TARE, steps.AskStroke(FIRST))
@@ -327,7 +327,7 @@ def test_a_session_that_goes_on_shows_what_was_done_before():
         logged("take_started", 2, take=1),
         logged("take_discarded", 2, take=1, reason="cut short"),
     )
-    begun = m.SessionBegun("recordings/P07", PLAN, None, 0, 1.0, before)
+    begun = m.SessionBegun("recordings/P07", PLAN, "people", None, 0, 1.0, before)
     rows = derive_view(after(m.Device(INFO, None), begun, steps.AskMount(SECOND))).course.rows
     assert [row.kind for row in rows[:4]] == ["block", "done", "current", "coming"]
     assert rows[1].found == "score 40"
