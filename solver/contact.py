@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgetrf, dgetrs
 
 from solver.friction import FrictionLaw
+from solver.lapack import dgetrf, dgetrs
 
 Array = NDArray[np.float64]
 States = NDArray[np.int8]

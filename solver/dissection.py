@@ -10,9 +10,9 @@ an elastic body whose skin is kept is positive definite.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError
-from scipy.linalg.lapack import dposv, dpotrs
+from numpy.linalg import LinAlgError
 
+from solver.lapack import dposv, dpotrs
 from solver.mesh import Array, Indices
 
 LEAF = 16  # elements in a part that is not halved any more: fewer means more Python, more means more arithmetic

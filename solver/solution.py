@@ -6,7 +6,7 @@ from math import sqrt
 from time import perf_counter
 
 import numpy as np
-from scipy.linalg import LinAlgError
+from numpy.linalg import LinAlgError
 
 from solver.audits import audits, course_audits
 from solver.contact import NAMES, SLIP, Contact, ContactLost, Course
