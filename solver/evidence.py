@@ -28,6 +28,14 @@ def _laws(scene: Scene) -> str:
     return "; ".join(said)
 
 
+def _held(scene: Scene) -> str:
+    """Say what moves with the bone, and how the bone itself is modelled."""
+    finger = scene.finger
+    said = "driven as a whole" if finger.bone == "rigid" else "meshed, driven at its core of a third of its radius"
+    said += "; the cut is free" if finger.cut == "free" else "; the cut is driven with it"
+    return said + (f"; a nail plate of {finger.nail_length:g} mm is fixed to it" if finger.nail_length else "; no nail")
+
+
 def model(scene: Scene, finger: FingerModel, contact: Contact, displacement: Array) -> dict[str, Any]:
     """Return what was modelled and what was left out, as plain data.
 
@@ -46,7 +54,7 @@ def model(scene: Scene, finger: FingerModel, contact: Contact, displacement: Arr
         "element": "Q2/P-1: nine nodes, three pressure modes condensed in the element",
         "contact": "unilateral, Coulomb with |t| <= min(mu p, tau_max), open, stick, slip or cap at every skin node",
         "course": _course(scene),
-        "bone": "driven as a whole",
+        "bone": _held(scene),
         "width": "forces are per mm of width",
         "left_out": {
             "finite strain": _finite_strain(finger, displacement),
@@ -71,7 +79,7 @@ def finite_model(scene: Scene, *, force: Array, width: float, sticking: float, s
         "element": "Q2/P-1: nine nodes, three modes of ln J condensed in the element",
         "contact": "unilateral on the deformed skin, Coulomb with |t| <= min(mu p, tau_max) on true tractions",
         "course": _course(scene),
-        "bone": "driven as a whole",
+        "bone": _held(scene),
         "width": "forces are per mm of width",
         "left_out": {
             "bone compliance": _bone(scene, force),

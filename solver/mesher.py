@@ -11,7 +11,8 @@ from solver.mesh import Array, Indices, Mesh
 from solver.outline import Outline
 from solver.scene import Finger, Receptor
 
-EPIDERMIS, DERMIS, FAT = 0, 1, 2  # numbers of the regions
+EPIDERMIS, DERMIS, FAT, BONE = 0, 1, 2, 3  # numbers of the regions
+CORE = 1.0 / 3.0  # radius of a meshed bone's core, which is driven, by the bone's [-]
 GROWTH = 0.2  # of the elements' size with the distance from where the skin may touch [-]
 TALL = 1.4  # size of elements across the skin by that along it [-]
 COARSEST = 10.0  # elements far from the contact by those in the bulk of the pulp [-]
@@ -36,13 +37,14 @@ class FingerMesh:
     outline: Outline
     arcs: Array  # (a + 1,) arc positions of the lines between elements [mm]
     depths: Array  # (b + 1,) depths of the lines between the elements of the skin, outermost last; bone not included
-    fat: int  # elements from bone to dermis
+    fat: int  # elements below the dermis: of the fat, and of the bone where it is meshed
     whole: Indices  # (2 a + 1,) nodes of all the skin, those that may touch and those that may not
 
 
 def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMesh:
-    """Return the mesh of `finger`, its bone left out and its bone's surface held.
+    """Return the mesh of `finger`, its bone left out and its bone's surface held, or the core of a meshed bone.
 
+    Where the cut is driven with the bone, and where a nail plate is fixed to it, the nodes there are held too.
     Lines between elements frame the reference ending: averages over whole elements converge faster than over parts.
     Raises MeshError where the outline cannot be meshed.
     """
@@ -62,12 +64,27 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     points = np.concatenate([inner, outline.tissue(every_arc[:, None], depths[None, :])], axis=1)
     skin = np.where(_middles(lines) > finger.epidermis, DERMIS, EPIDERMIS)
     layers = np.concatenate([np.full(len(fat) - 1, FAT), skin])
+    below = len(fat) - 1
+    if finger.bone == "meshed":
+        parts = np.linspace(CORE, 1.0, 2 * max(2, ceil((1.0 - CORE) * finger.bone_radius / (TALL * bulk))) + 1)[:-1]
+        points = np.concatenate([outline.bone(every_arc[:, None], parts), points], axis=1)
+        layers = np.concatenate([np.full(len(parts) // 2, BONE), layers])
+        below += len(parts) // 2
     touching = _lower_than(outline, sizing.indentation * (1.0 + 0.25 * sizing.margin))
     low = max(int(np.searchsorted(arcs, touching[0])) - 1, 0)
     high = min(int(np.searchsorted(arcs, touching[1])), len(arcs) - 1)
-    held: Indices = np.arange(len(every_arc)) * points.shape[1]
-    mesh = grid_mesh(points, layers, slice(2 * low, 2 * high + 1), held)
-    return FingerMesh(mesh, outline, arcs, lines, len(fat) - 1, held + points.shape[1] - 1)
+    long, wide = points.shape[0], points.shape[1]
+    number: Indices = np.arange(long * wide, dtype=np.int64).reshape(long, wide)
+    held = [number[:, 0]]
+    if finger.cut == "driven":
+        held += [number[0], number[-1]]
+        low, high = max(low, 1), min(high, len(arcs) - 2)
+    if finger.nail_length > 0.0:
+        nail = np.flatnonzero((every_arc >= outline.dorsal - 1e-9) & (every_arc <= outline.nail_end + 1e-9))
+        held.append(number[nail, -1])
+        high = min(high, int(nail[0]) // 2 - 1)
+    mesh = grid_mesh(points, layers, slice(2 * low, 2 * high + 1), np.unique(np.concatenate(held)))
+    return FingerMesh(mesh, outline, arcs, lines, below, number[:, -1].copy())
 
 
 def _lower_than(outline: Outline, height: float) -> tuple[float, float]:
@@ -134,13 +151,17 @@ def _stations(
 ) -> Array:
     """Return the arc positions of the lines across the mesh: fine in the overlap, coarser with the distance from it.
 
-    Lines always lie where straight edge and arc meet, since an element cannot follow a jump in curvature.
+    Lines always lie where straight edge and arc meet, since an element cannot follow a jump in curvature, and where a
+    nail plate ends.
     """
     low, high = overlap
     away = np.concatenate([[0.0], np.geomspace(1e-9, 1.0, 1000)])
     arc = np.concatenate([(low + (outline.palmar_cut - low) * away)[::-1], high + (outline.dorsal_cut - high) * away])
     distance = np.maximum(low - arc, 0.0) + np.maximum(arc - high, 0.0)
     size = np.minimum(fine + GROWTH * distance, COARSEST * bulk)
-    ends = _distinct(outline.palmar_cut, outline.palmar, *frame.tolist(), outline.dorsal, outline.dorsal_cut)
+    ends = [outline.palmar_cut, outline.palmar, *frame.tolist(), outline.dorsal, outline.dorsal_cut]
+    if outline.finger.nail_length > 0.0:
+        ends.append(outline.nail_end)
+    ends = _distinct(*ends)
     lines = _spaced(arc, size, ends, (2,) * (len(ends) - 1), shift=shift)
     return np.concatenate([lines[0], *(more[1:] for more in lines[1:])])

@@ -40,6 +40,11 @@ class Outline:
         dorsal = finger.tip_radius * (pi / 2 - touch)
         return cls(finger, palmar - finger.shaft_length, palmar, dorsal, dorsal + finger.shaft_length, touch)
 
+    @property
+    def nail_end(self) -> float:
+        """Arc position of the proximal end of the nail plate, which begins where the tip's arc ends [mm]."""
+        return self.dorsal + self.finger.nail_length
+
     def _course(self, arc: Array) -> tuple[Array, Array]:
         """Return the angle on the tip's arc [rad], and the distance back along a straight edge [mm], 0 on the arc."""
         angle = self.touch + np.clip(arc, self.palmar, self.dorsal) / self.finger.tip_radius
@@ -57,10 +62,14 @@ class Outline:
         radius = self.finger.tip_radius - depth
         return self.world(radius * np.cos(angle) - back, radius * np.sin(angle))
 
-    def bone(self, arc: Array) -> Array:
-        """Return the points (..., 2) of the bone's outline that the mesh pairs with `arc` on the skin."""
+    def bone(self, arc: Array, part: Array | float = 1.0) -> Array:
+        """Return the points (..., 2) of the bone's outline that the mesh pairs with `arc` on the skin.
+
+        With `part`, those inside the bone at this part of its radius.
+        """
         angle, back = self._course(arc)
-        (x, y), r, length = self.finger.bone_centre, self.finger.bone_radius, self.finger.shaft_length
+        (x, y), length = self.finger.bone_centre, self.finger.shaft_length
+        r = self.finger.bone_radius * part
         return self.world(x + r * np.cos(angle) - back * (x + length) / length, y + r * np.sin(angle))
 
     def world(self, x: Array, y: Array) -> Array:

@@ -42,6 +42,9 @@ class Finger:
     bone_radius: float = 1.5  # [mm]
     bone_centre: tuple[float, float] = (-1.0, 0.75)  # centre of the bone's arc, finger frame [mm]
     contact_angle: float = 45.0  # between finger axis and surface, tip down [degrees]
+    bone: Literal["rigid", "meshed"] = "rigid"  # "meshed": of its own material, driven at its core
+    cut: Literal["free", "driven"] = "free"  # "driven": the cut through the soft tissues moves with the bone
+    nail_length: float = 0.0  # of a nail plate fixed to the bone, on the dorsal skin back from the tip's arc [mm]
 
     def __post_init__(self) -> None:
         """Check ranges, and that some fat is left between dermis and bone everywhere."""
@@ -54,6 +57,12 @@ class Finger:
             raise SceneError("finger.bone_centre", self.bone_centre, "it must be two finite lengths in mm")
         _within("finger.bone_centre[0]", self.bone_centre[0], -0.8 * self.shaft_length, self.tip_radius, "mm")
         _within("finger.contact_angle", self.contact_angle, 10.0, 90.0, "degrees")
+        if self.bone not in ("rigid", "meshed"):
+            raise SceneError("finger.bone", self.bone, 'it must be "rigid" or "meshed"')
+        if self.cut not in ("free", "driven"):
+            raise SceneError("finger.cut", self.cut, 'it must be "free" or "driven"')
+        if self.nail_length != 0.0:
+            _within("finger.nail_length", self.nail_length, 0.1 * self.tip_radius, 0.95 * self.shaft_length, "mm")
         least = 0.02 * self.tip_radius
         if not self.fat_thickness() >= least:
             raise SceneError(
