@@ -1,0 +1,52 @@
+"""A client of the recorder with people in front of it, for tests."""
+
+import time
+
+from sessions.plan import Frame
+from sessions.protocols import plan, protocol
+from sessions.steps import AskBegin, AskFinish, AskMount, AskScore, Begin, Finish, Scored, StimulusMounted
+
+PACE = 20.0
+DEADLINE = 60.0  # of a machine that hangs, not of a slow one [s]
+PLAN = plan(protocol("sensotact-friction"), "S01", 3, frame=Frame("-z", "set", 20.0, "set"))
+
+
+class Desk:
+    """A client with people in front of it, who do what is asked; `instead` maps a command's type to what they do."""
+
+    def __init__(self, recorder, instead=None):
+        self.recorder = recorder
+        self.instead = instead or {}
+        self.seen = []
+        self.waiting = []
+
+    def until(self, wanted, number=1):
+        """Go on until so many more reports of a kind came, and return the last."""
+        deadline = time.monotonic() + DEADLINE
+        while time.monotonic() < deadline:
+            self.waiting += self.recorder.poll(0.0 if self.waiting else 0.05)
+            while self.waiting:
+                report = self.waiting.pop(0)
+                self.seen.append(report)
+                self.answer(report)
+                number -= isinstance(report, wanted)
+                if number == 0:
+                    return report
+        raise AssertionError(f"no {wanted} came; the last were {[type(r).__name__ for r in self.seen[-8:]]}")
+
+    def answer(self, report):
+        if type(report) in self.instead:
+            self.instead[type(report)](report)
+            return
+        match report:
+            case AskBegin():
+                self.recorder.send(Begin())
+            case AskMount(trial):
+                self.recorder.send(StimulusMounted(trial.stimulus.code))
+            case AskScore(trial):
+                self.recorder.send(Scored(float(trial.stimulus.index)))
+            case AskFinish():
+                self.recorder.send(Finish())
+
+    def of(self, kind):
+        return [report for report in self.seen if isinstance(report, kind)]

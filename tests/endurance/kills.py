@@ -1,0 +1,237 @@
+"""A session that is killed again and again: client, recorder or both, at a random moment of a chosen state."""
+
+import json
+import os
+import random
+import shutil
+import signal
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+from desk import PLAN, Desk
+
+from daq_app.recorder.client import Recorder
+from daq_app.recorder.messages import (
+    Connect,
+    Device,
+    Gone,
+    Live,
+    People,
+    ResumeSession,
+    Sealed,
+    Sealing,
+    SessionBegun,
+    StartSession,
+)
+from sessions.recording import LoggedEvent, Recording, RecordingError
+from sessions.recording.schema import event_row
+from sessions.resuming import check_resumable, resumption
+from sessions.runner import Status
+from sessions.steps import AskBegin, AskFinish, AskMount, AskScore, AskStroke, Pause, Resume
+
+PACE = 4.0
+SHORT = replace(PLAN, blocks=(replace(PLAN.blocks[0], trials=PLAN.blocks[0].trials[:2]),))
+STATES = ("beginning", "idle", "mounting", "taring", "ready", "stroking", "scoring", "paused", "closing", "sealing")
+VICTIMS = ("recorder", "client", "both")
+
+
+def told_of(message):
+    """Return what the client tells of a report."""
+    match message:
+        case SessionBegun():
+            return {"state": "begun"}
+        case Live(stream=stream) if len(message.sequence):
+            return {"stream": stream, "shown": int(message.sequence[-1])}
+        case LoggedEvent():
+            return {"event": [*event_row(message)]}
+        case Status():
+            return {"state": message.state, "readings": message.safe.readings}
+        case Sealing():
+            return {"state": "sealing"}
+        case Sealed() | Gone():
+            return {"state": "done"}
+        case _:
+            return {}
+
+
+def client(folder, pipe, *, pausing):
+    """Be the client: begin or resume the session, answer a little later, and report down `pipe` all that is told."""
+
+    def report(**told):
+        os.write(pipe, (json.dumps(told) + "\n").encode())
+
+    chance = random.Random()
+    recorder = Recorder.start(PACE)
+    report(pid=recorder.pid)
+    desk = Desk(recorder)
+    if (folder / "session.sqlite").exists():
+        recorder.send(ResumeSession(str(folder)))
+    else:
+        recorder.send(Connect("sim:?seed=7"))
+        desk.until(Device)
+        recorder.send(StartSession(SHORT, str(folder), People("simulated hand", 7)))
+    report(state="beginning")
+    told = {}
+    while told.get("state") != "done":
+        for message in recorder.poll(0.02):
+            told = told_of(message)
+            report(**told)
+            if isinstance(message, AskBegin | AskMount | AskScore | AskFinish | AskStroke):
+                time.sleep(chance.uniform(0.0, 0.15))
+                if pausing and isinstance(message, AskStroke):
+                    pausing = False
+                    recorder.send(Pause())
+                    time.sleep(0.4)
+                    recorder.send(Resume())
+                desk.answer(message)
+
+
+class Killing:
+    """One kill: what was acknowledged before it, and what is in the file after it."""
+
+    def __init__(self, folder, state, victim, chance):
+        self.folder, self.state, self.victim = folder, state, victim
+        self.events, self.safe, self.shown, self.recorder = [], 0, {}, None
+        self.reached = False
+        self.states = set()
+        self.lost = 0.0  # told seconds of readings that were shown and are not in the file
+        self._chance = chance
+        if state == "idle":
+            shutil.rmtree(folder, ignore_errors=True)  # no session comes back to it
+        self._before = self._count()
+        reading, writing = os.pipe()
+        sys.stdout.flush()
+        process = os.fork()
+        if process == 0:
+            try:
+                os.close(reading)
+                client(folder, writing, pausing=state == "paused")
+            finally:
+                os._exit(0)
+        os.close(writing)
+        self._process = process
+        self._buffer = b""
+        with os.fdopen(reading, "rb", buffering=0) as pipe:
+            os.set_blocking(reading, False)
+            self._watch(pipe)
+
+    def _watch(self, pipe):
+        """Follow what the client is told; kill a random while after the state is reached."""
+        self._until_due(pipe)
+        if self.victim in ("recorder", "both") and self.recorder is not None:
+            self._kill(self.recorder)
+        if self.victim in ("client", "both"):
+            os.kill(self._process, signal.SIGKILL)
+        # What was on its way when it was killed counts as told.
+        end = time.monotonic() + (0.3 if self.victim == "recorder" else 0.05)
+        while time.monotonic() < end and self._took(pipe):
+            pass
+        if self.victim == "recorder":
+            os.kill(self._process, signal.SIGKILL)
+        os.waitpid(self._process, 0)
+
+    def _until_due(self, pipe):
+        """Wait for the state, and a random while longer; or until the session is done without it."""
+        deadline = time.monotonic() + 120
+        while not self.reached and "done" not in self.states:
+            assert time.monotonic() < deadline
+            if not self._took(pipe):
+                return
+            self.reached = self.state in self.states
+            time.sleep(0.001)
+        due = time.monotonic() + self._chance.uniform(0.0, 0.35)
+        while time.monotonic() < due and self._took(pipe):
+            time.sleep(0.001)
+
+    def _kill(self, pid):
+        try:
+            os.kill(pid, signal.SIGKILL)
+        except ProcessLookupError:
+            self.reached = False
+
+    def _took(self, pipe):
+        """Note what has come down the pipe; False at its end."""
+        data = pipe.read(1 << 20)
+        if data == b"":
+            return False
+        *lines, self._buffer = (self._buffer + (data or b"")).split(b"\n")
+        for line in lines:
+            self._note(json.loads(line))
+        return True
+
+    def _note(self, told):
+        self.recorder = told.get("pid", self.recorder)
+        self.safe = max(self.safe, told.get("readings", 0))
+        self.states.add(told.get("state"))
+        if "event" in told:
+            self.events.append(tuple(told["event"]))
+        if "shown" in told:
+            self.shown[told["stream"]] = told["shown"]
+
+    def _count(self):
+        try:
+            return len(Recording.open(self.folder).readings())
+        except RecordingError:
+            return 0
+
+    def check(self):
+        """Check that what was acknowledged is there, that no more than a second is missing, and where it goes on."""
+        if self.victim == "client":
+            self._wait_for_the_recorder()
+        try:
+            recording = Recording.open(self.folder)
+        except RecordingError:
+            assert self.events == []
+            assert self.safe == 0
+            shutil.rmtree(self.folder, ignore_errors=True)
+            return
+        rows = [event_row(event) for event in recording.events]
+        if self.events:
+            first = self.events[0][0] - 1
+            assert rows[first : first + len(self.events)] == self.events
+        block = recording.readings()
+        assert len(block) >= self.safe
+        assert np.all(np.diff(block.sequence) == 1)
+        if self.shown and len(block) > self._before:
+            seam = [event.data["sequence_offset"] for event in recording.events if event.kind == "readings_joined"]
+            shown = self.shown[max(self.shown)]
+            self.lost = max(shown + (seam[-1] if seam and self._before else 0) - int(block.sequence[-1]), 0) / 200.0
+        if self.victim == "client" and recording.end is not None:
+            assert recording.end["cause"] in ("client", "finished")
+            assert len(block) == recording.end["readings"]
+        self._cut_tail()
+        if (self.folder / "MANIFEST.json").exists() or (recording.end and recording.end.get("complete")):
+            shutil.rmtree(self.folder)  # the next kill begins a new session
+            return
+        check_resumable(recording)
+        kept = [event.trial for event in recording.events if event.kind == "take_kept"]
+        asked = [c.trial.number for c in resumption(recording.plan, recording.events).commands if hasattr(c, "trial")]
+        assert asked in ([len(set(kept)) + 1], [])
+
+    def _cut_tail(self):
+        """Cut a copy's log short at random: a beginning of the session must be left."""
+        log = self.folder / "session.sqlite-wal"
+        if not log.exists():
+            return
+        room = self.folder.with_name("cut")
+        shutil.copytree(self.folder, room)
+        content = log.read_bytes()
+        (room / log.name).write_bytes(content[: max(len(content) - self._chance.randrange(1, 200_000), 0)])
+        try:
+            left = Recording.open(room).readings().sequence
+            assert np.all(np.diff(left) == 1)
+        except RecordingError as error:
+            assert "no such table" in str(error) or (room / "session.sqlite").stat().st_size < 8192  # noqa: PT017
+        finally:
+            shutil.rmtree(room)
+
+    def _wait_for_the_recorder(self):
+        deadline = time.monotonic() + 60
+        while self.recorder is not None and time.monotonic() < deadline:
+            try:
+                os.kill(self.recorder, 0)
+            except ProcessLookupError:
+                return
+            time.sleep(0.02)
