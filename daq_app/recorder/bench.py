@@ -9,7 +9,7 @@ import numpy as np
 
 from daq_app.life import remember_zero
 from daq_app.recorder.display import Display, six
-from daq_app.recorder.messages import Device, LinkBack, LinkDown, NoDevice, Report, Tared
+from daq_app.recorder.messages import Device, Failed, LinkBack, LinkDown, NoDevice, Report, Tared
 from daq_app.wiring import Connected, connected
 from drivers.clock import Clock
 from drivers.readings import ReadingBlock
@@ -125,6 +125,12 @@ class Bench:
         if not 0.1 <= duration <= 60.0:
             raise NotNow(f"a zero is measured over 0.1 to 60 s, not {duration:g} s")
         self._tare = _Tare(duration)
+
+    def end_tare(self) -> None:
+        """Give up a tare under way."""
+        if self._tare is not None:
+            self._tare = None
+            self._send(Failed("Tare", "the zero was not measured: stopped by the user", "NotNow"))
 
     def stream(self) -> None:
         """Begin to show what is measured, unless it is shown already."""

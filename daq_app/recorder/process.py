@@ -88,6 +88,7 @@ class Recorder:
                 self._session(lambda: gone_on(request, self._bench, self._clock))
             case Stop() | Shutdown():
                 self._inbox.stop_wanted.clear()
+                self._bench.end_tare()
             case _:
                 raise NotNow("no session is running")
 

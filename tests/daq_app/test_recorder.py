@@ -214,6 +214,18 @@ def test_a_recorder_that_is_killed_has_lost_nothing_it_told_of_and_its_session_g
     assert all(record.outcome == "scored" for record in Recording.open(folder).trials)
 
 
+def test_a_stop_with_nothing_in_hand_changes_nothing_and_during_a_tare_ends_that():
+    with Recorder.start() as recorder:
+        desk = Desk(recorder)
+        recorder.send(Stop())
+        recorder.send(Connect("sim:?seed=7"))
+        desk.until(Device)
+        recorder.send(Tare(60.0))
+        recorder.send(Stop())
+        assert desk.until(Failed).sentence == "the zero was not measured: stopped by the user"
+        desk.until(Live)
+
+
 def test_a_stop_breaks_off_a_connection_that_does_not_come_about():
     with socket.create_server(("127.0.0.1", 0)) as silent, Recorder.start() as recorder:
         desk = Desk(recorder)

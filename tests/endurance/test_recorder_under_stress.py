@@ -1,0 +1,110 @@
+"""A recorder that is stopped in every state, and one that is put to sleep: `make test-long`."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections import defaultdict
+
+import numpy as np
+import pytest
+from desk import PLAN, Desk
+
+from daq_app.recorder.client import Recorder
+from daq_app.recorder.messages import (
+    Connect,
+    Device,
+    Live,
+    People,
+    SessionBegun,
+    SessionEnded,
+    StartSession,
+    Stop,
+)
+from sessions.recording import Recording
+from sessions.runner import Status
+from sessions.steps import AskMount, AskStroke, Pause
+
+pytestmark = pytest.mark.slow
+
+STATES = ("begun", "idle", "mounting", "taring", "ready", "stroking", "scoring", "paused")
+ROUNDS = 12
+LIMIT = 0.2  # [s]
+ASLEEP = 3.0  # [s]
+
+
+def reach(desk, state):
+    """Go on with a session until it is in this state."""
+    if state == "begun":
+        desk.until(SessionBegun)
+        return
+    if state == "paused":
+        desk.until(AskStroke)
+        desk.recorder.send(Pause())
+    while desk.until(Status).state != state:
+        pass
+
+
+def test_a_stop_is_answered_within_a_fifth_of_a_second_in_every_state(tmp_path):
+    chance = random.Random(3)
+    took = defaultdict(list)
+    with Recorder.start() as recorder:
+        desk = Desk(recorder)
+        recorder.send(Connect("sim:?seed=7"))
+        desk.until(Device)
+        for number in range(ROUNDS * len(STATES)):
+            state = STATES[number % len(STATES)]
+            folder = tmp_path / str(number)
+            desk.instead = {} if state != "idle" else {AskMount: lambda _: None}
+            recorder.send(StartSession(PLAN, str(folder), People("simulated hand", 7)))
+            reach(desk, state)
+            time.sleep(chance.uniform(0.0, 0.1))
+            began = time.monotonic()
+            recorder.send(Stop())
+            end = desk.until(SessionEnded).end
+            took[state].append(time.monotonic() - began)
+            assert end.cause == "stopped"
+            assert Recording.open(folder).end["cause"] == "stopped"
+    for state, times in took.items():
+        print(f"\nstop while {state}: median {np.median(times) * 1e3:.0f} ms, most {max(times) * 1e3:.0f} ms", end="")
+    print(f"\nload of this computer: {os.getloadavg()[0]:.1f}")
+    assert all(np.median(times) < LIMIT for times in took.values())
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="puts a process to sleep, which needs POSIX")
+def test_a_recorder_that_slept_loses_no_reading_that_the_system_kept_for_it(tmp_path):
+    box = subprocess.Popen(
+        [sys.executable, "-m", "daq_app", "simulate", "net-ft", "--json"], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        said = ""
+        while "net-ft://" not in said:
+            said += box.stdout.readline()
+        uri = next(word for word in said.replace('"', " ").split() if word.startswith("net-ft://"))
+        with Recorder.start() as recorder:
+            desk = Desk(recorder, {AskMount: lambda _: None})
+            recorder.send(Connect(uri))
+            desk.until(Device)
+            recorder.send(StartSession(PLAN, str(tmp_path / "s")))
+            desk.until(Live, 30)
+            os.kill(recorder.pid, signal.SIGSTOP)
+            time.sleep(ASLEEP)
+            recorder.poll()
+            assert recorder.silence > ASLEEP - 0.5
+            os.kill(recorder.pid, signal.SIGCONT)
+            desk.until(Live, 30)
+            recorder.send(Stop())
+            end = desk.until(SessionEnded).end
+        recording = Recording.open(tmp_path / "s")
+        block = recording.readings()
+        assert end.health.received == len(block) == end.readings
+        missing = int(block.sequence[-1]) + 1 - int(block.sequence[0]) - len(block)
+        assert missing == end.health.lost
+        counted = sum(event.data.get("lost", 0) for event in recording.events if event.kind == "losses")
+        assert counted == missing
+        print(f"\nasleep for {ASLEEP:g} s: {len(block)} readings, {missing} lost, and as many counted")
+    finally:
+        box.terminate()
+        box.communicate()
