@@ -24,6 +24,7 @@ VERBS = {
     "solve": "run the solver on a scene file",
     "report": "write a session's report as one page",
     "export": "write a session as CSV, BIDS, HDF5 or NWB",
+    "selftest": "pull its own plug on this computer and disk, and write a certificate",
     "simulate": "serve the other end of a wire, to try a driver without hardware",
     "verify": "check every checksum of a session and recompute every derived number",
 }

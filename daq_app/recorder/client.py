@@ -128,6 +128,10 @@ class Recorder:
         self._reader.join(patience)
         self.leave()
 
+    def kill(self) -> None:
+        """End the recorder as a crash would, to see that nothing acknowledged is lost."""
+        self._process.kill()
+
     def leave(self) -> None:
         """Let go of the recorder: it ends by its rule for a client that is gone."""
         self._to_send.append(None)

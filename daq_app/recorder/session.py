@@ -34,6 +34,7 @@ from drivers.clock import Clock
 from drivers.transducer import TransducerInfo
 from sessions.plan import SessionPlan
 from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, Setting, provenance
+from sessions.recording.certificate import certificate_for
 from sessions.recording.head import simulated_sentence
 from sessions.recording.manifest import is_sealed
 from sessions.recording.place import unsafe
@@ -86,7 +87,7 @@ def begun(request: StartSession, bench: Bench, clock: Clock) -> Prepared:
         folder,
         plan,
         info,
-        provenance(clock, settings),
+        {**provenance(clock, settings), "selftest": certificate_for(folder)},
         subject_simulated=people.kind != "people",
         clock=clock,
         reserve=RESERVE,

@@ -67,13 +67,24 @@ def unsafe(folder: Path) -> str | None:
     return _on_a_network(place) or _synchronised(place, os.environ)
 
 
+def file_system(folder: Path) -> str | None:
+    """Return the kind of file system `folder` lies on, such as ext4; None where the system does not tell."""
+    mount = None if sys.platform == "win32" else innermost(folder.resolve(), _mounts())
+    return None if mount is None else mount.kind
+
+
+def innermost(place: PurePath, mounts: Iterable[Mount]) -> Mount | None:
+    """Return the mount that holds `place`."""
+    around = [mount for mount in mounts if place.is_relative_to(mount.at)]
+    # Of several at one place the last hides the others.
+    return max(enumerate(around), key=lambda item: (len(item[1].at.parts), item[0]))[1] if around else None
+
+
 def network_mount(place: PurePath, mounts: Iterable[Mount]) -> Mount | None:
     """Return the mount that holds `place` where that lies on another computer, else None."""
-    around = [mount for mount in mounts if place.is_relative_to(mount.at)]
-    if not around:
+    inner = innermost(place, mounts)
+    if inner is None:
         return None
-    # The innermost holds it; of several at one place the last hides the others.
-    inner = max(enumerate(around), key=lambda item: (len(item[1].at.parts), item[0]))[1]
     windows_drive = inner.kind == "9p" and re.match(r"([A-Z]:|drvfs)", inner.source) is not None  # seen from WSL
     far = any(kinds.fullmatch(inner.kind) for kinds in (NETWORK, SHARED, CLOUD))
     return inner if far or windows_drive else None

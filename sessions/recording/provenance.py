@@ -31,12 +31,7 @@ def provenance(clock: Clock, settings: Iterable[Setting] = ()) -> dict[str, Any]
     return {
         "created_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "software": software_versions(),
-        "machine": {
-            "system": platform.system(),
-            "release": platform.release(),
-            "processor": platform.machine(),
-            "cores": os.cpu_count(),
-        },
+        "machine": machine(),
         "clock": {
             "kind": "told: faster than the machine's clock" if told else "the machine's monotonic clock",
             "factor": clock.factor,
@@ -46,6 +41,16 @@ def provenance(clock: Clock, settings: Iterable[Setting] = ()) -> dict[str, Any]
             setting.name: {"value": setting.value, "unit": setting.unit, "origin": setting.origin}
             for setting in settings
         },
+    }
+
+
+def machine() -> dict[str, Any]:
+    """Return the kind of machine this is, never its name or user."""
+    return {
+        "system": platform.system(),
+        "release": platform.release(),
+        "processor": platform.machine(),
+        "cores": os.cpu_count(),
     }
 
 

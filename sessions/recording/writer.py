@@ -243,13 +243,17 @@ class SessionWriter:
         self.full = (
             f"the disk took no more ({error}); all that was measured is safe: free space on the disk, and resume"
         )
-        self._reserve.release()
+        self._give_back()
         try:
             return self._written()
         except sqlite3.Error as again:
             with suppress(sqlite3.Error):
                 self._connection.execute("ROLLBACK")
             self._fail(again)
+
+    def _give_back(self) -> None:
+        """Give the reserve back to the disk."""
+        release_reserve(self.folder)
 
     def _insert_blocks(self) -> int:
         """Insert the waiting readings in rows of at most LARGEST_BLOCK, and return the number of the last row."""

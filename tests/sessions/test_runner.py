@@ -398,3 +398,21 @@ def test_progress_tells_what_the_recording_has_acknowledged(tmp_path):
     assert all(status.safe.readings <= status.readings for status in told)
     # A commit a second: never more than one second and one look are not yet safe.
     assert max(status.readings - status.safe.readings for status in told) <= 1.1 * RATE
+
+
+def test_a_clock_that_jumps_ahead_while_the_computer_slept_costs_nothing_and_the_session_goes_on(tmp_path):
+    session = Session(tmp_path / "s")
+
+    def asleep(_):
+        if session.clock.ns < 100e9:
+            session.clock.ns += 100_000_000_000
+
+    session.hands.instead[AskScore] = asleep
+    recording = session.run()
+    assert session.end.complete
+    sequence = recording.readings().sequence
+    assert sequence.tolist() == list(range(session.transducer.sent))
+    assert len(sequence) > 100 * RATE
+    assert recording.losses == recording.flaws == ()
+    times = [event.time_ns for event in recording.events]
+    assert times == sorted(times)

@@ -1,0 +1,51 @@
+import json
+from types import SimpleNamespace
+
+import pytest
+from recordings import ended
+
+from daq_app import selftest
+from daq_app.cli import run
+from sessions.recording import LoggedEvent, Recording
+from sessions.recording.certificate import certificate_for, write_certificate
+
+
+def test_the_selftest_kills_cuts_fills_stops_and_later_sessions_carry_its_certificate(tmp_path, capsys, monkeypatch):
+    for name, value in {"KILLS": 2, "STOPS": 1, "CUTS": 4, "RUNNING": (0.1, 0.4)}.items():
+        monkeypatch.setattr(selftest, name, value)
+    assert run(["selftest", "--out", str(tmp_path), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["passed"]
+    assert "was killed 2 times, the end of its log was cut off 4 times" in told["sentence"]
+    assert told["quota"]["readings"] > 4 * 2**20 / 88 * 0.9  # as many as the room holds, by 88 bytes each
+    assert [path.name for path in tmp_path.iterdir()] == ["daq-app-selftest.json"]
+    folder = tmp_path / "P08"
+    words = ["run", "sensotact-friction", "--scores-only", "--subject", "P08", "--simulate-subject", "1"]
+    assert run([*words, "--pace", "20", "--out", str(folder)]) == 0
+    carried = Recording.open(folder).provenance["selftest"]
+    assert carried["same_program"]
+    assert carried["sentence"] == told["sentence"]
+
+
+@pytest.mark.parametrize("what", ["readings", "event", "trial"])
+def test_the_selftest_fails_where_anything_acknowledged_is_missing(tmp_path, what):
+    recording = Recording.open(ended(tmp_path / "s"))
+    events = list(recording.events)
+    watched = SimpleNamespace(events=events, safe=300)
+    selftest._check_kept(recording, watched, 1)
+    if what == "readings":
+        watched.safe = 301
+    if what == "event":
+        watched.events = [*events, LoggedEvent(len(events) + 1, 0, "scored", 1, 300, {"score": 1.0})]
+    with pytest.raises(selftest.SelfTestFailed):
+        selftest._check_kept(recording, watched, 2 if what == "trial" else 1)
+
+
+def test_a_certificate_of_other_versions_says_so_and_a_damaged_one_counts_for_nothing(tmp_path):
+    folder = tmp_path / "lab" / "P07"
+    assert certificate_for(folder) is None
+    certificate = {"format": {"name": "daq-app selftest", "version": 1}, "software": {"daq-app": "0.0.1"}}
+    path = write_certificate(tmp_path, certificate)
+    assert certificate_for(folder) == {**certificate, "same_program": False}
+    path.write_text("{")
+    assert certificate_for(folder) is None
