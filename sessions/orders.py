@@ -1,12 +1,16 @@
 """Orders and labels of stimuli: reproducible from a seed, in any language, for as long as there is SHA-256."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from itertools import combinations
 
 LETTERS = "BCDFGHJKLMNPQRSTVWXZ"  # no vowels: no label spells a word
+DRAWS = 10_000  # of an order that is to meet constraints
+
+Item = int | str
 
 
-def shuffled(items: Sequence[int], seed: int, name: str) -> tuple[int, ...]:
+def shuffled(items: Sequence[Item], seed: int, name: str) -> tuple[Item, ...]:
     """Return the items in an order that chance, seeded with `seed` and `name`, put them in.
 
     The rule: sort by the SHA-256 digest of the UTF-8 text "seed/name/item", each a decimal number or the name itself.
@@ -16,6 +20,53 @@ def shuffled(items: Sequence[int], seed: int, name: str) -> tuple[int, ...]:
     (80, 100, 20, 50, 0)
     """
     return tuple(sorted(items, key=lambda item: _digest(f"{seed}/{name}/{item}")))
+
+
+def drawn(
+    items: Sequence[Item], seed: int, name: str, meets: Callable[[Sequence[Item]], bool]
+) -> tuple[Item, ...] | None:
+    """Return the first order that `meets` a constraint; None where none of many draws does.
+
+    The rule: the order `shuffled` gives for `name`, or else for "name~1", "name~2", and so on. Every order that meets
+    the constraint is equally likely over seeds.
+    """
+    for draw in range(DRAWS):
+        order = shuffled(items, seed, f"{name}~{draw}" if draw else name)
+        if meets(order):
+            return order
+    return None
+
+
+def williams(count: int) -> tuple[tuple[int, ...], ...]:
+    """Return the rows of a Williams design: orders of 0 to `count` - 1 in which each follows each other equally often.
+
+    Each stands in each position equally often too. Rows are `count` for an even count (each follows each other once),
+    twice that for an odd one (twice): the second square is the first one backwards. E. J. Williams, Australian Journal
+    of Scientific Research A 2 (1949) 149; first row 0, 1, n-1, 2, n-2, ...
+
+    >>> williams(4)
+    ((0, 1, 3, 2), (1, 2, 0, 3), (2, 3, 1, 0), (3, 0, 2, 1))
+    """
+    zigzag = [0, *((step + 1) // 2 if step % 2 else count - step // 2 for step in range(1, count))]
+    square = tuple(tuple((item + shift) % count for item in zigzag) for shift in range(count))
+    return square if count % 2 == 0 or count == 1 else (*square, *(row[::-1] for row in square))
+
+
+def pairs(items: Sequence[Item], seed: int, name: str) -> tuple[tuple[Item, Item], ...]:
+    """Return every two of the items once, in an order by chance, each item first as often as second (or nearly).
+
+    The rule: items stand round a circle in the order `shuffled` gives for "name/first"; of two, the one from which the
+    other is reached sooner clockwise is first (of two that face one another, the earlier one). Pairs come in the order
+    `shuffled` gives for `name` and the texts "first,second".
+    """
+    circle = shuffled(items, seed, f"{name}/first")
+    count = len(circle)
+    found = {
+        f"{a},{b}": (a, b)
+        for i, j in combinations(range(count), 2)
+        for a, b in [(circle[i], circle[j]) if 2 * (j - i) <= count else (circle[j], circle[i])]
+    }
+    return tuple(found[str(key)] for key in shuffled(tuple(found), seed, name))
 
 
 def opaque_codes(count: int, seed: int) -> tuple[str, ...]:

@@ -121,6 +121,7 @@ class SessionPlan:
     finger: Finger = Finger()
     rests: Rests = Rests()
     shown: Shown = Shown()
+    masking: str = ""  # of sounds; empty: none
     study: str | None = None  # name of the study the subject is enrolled in
     order_row: int | None = None  # of the study's design, from 1
     order_seed: int | None = None  # that orders were made from, where it is not `seed`
@@ -130,6 +131,10 @@ class SessionPlan:
     def blinded(self) -> bool:
         """Say whether the plan hides which stimulus bears which code."""
         return any(trial.stimulus.index is None for trial in self.trials)
+
+    def strokes_allowed(self, trial: Trial) -> int:
+        """Return how many strokes a trial may have; 1 where no block holds it."""
+        return next((block.strokes_allowed for block in self.blocks if trial in block.trials), 1)
 
     @property
     def trials(self) -> tuple[Trial, ...]:

@@ -114,10 +114,11 @@ def predict(
 ) -> SessionPrediction:
     """Return what the model predicts for every trial of `plan`, or for every stroke where it plans none.
 
-    A trial without friction, without depth or without a settled state keeps its row, with the reason. Raises SceneError
+    The finger is the one asked for, or else the published one with what the plan knows of the subject's own. A trial
+    without friction, without depth or without a settled state keeps its row, with the reason. Raises SceneError
     where the options make no scene, Cancelled where `progress` (told the part done) returns False.
     """
-    asked = options or PredictionOptions()
+    asked = with_own_finger(options or PredictionOptions(), plan)
     rows = [_prepared(case, asked) for case in _cases(analysis, plan)]
     scenes = [row.scene for row in rows if row.scene is not None]
     opposite = [_opposite(scene) for scene in scenes]
@@ -165,10 +166,24 @@ def _cases(analysis: Analysis, plan: SessionPlan) -> Iterator[_Case]:
     for number, stroke in enumerate(analysis.strokes):
         first.setdefault(stroke.trial, number)
     for block in plan.blocks:
-        for trial in block.trials:
+        for trial in block.trials if block.phase == "main" else ():
             number = first.get(trial.number)
             stroke = None if number is None else analysis.strokes[number]
             yield _Case(trial, block, given.get(trial.number), number, stroke)
+
+
+def with_own_finger(options: PredictionOptions, plan: SessionPlan) -> PredictionOptions:
+    """Return the options with the subject's own finger, as far as the plan knows it and no other was asked for."""
+    if options.scene is not None:
+        return options
+    published = _template(options)
+    own = replace(
+        published.finger,
+        tip_radius=plan.finger.tip_radius or published.finger.tip_radius,
+        contact_angle=plan.contact_angle,
+    )
+    scene = replace(published, finger=own, width=plan.finger.width or published.width)
+    return options if scene == published else replace(options, scene=scene)
 
 
 def _template(options: PredictionOptions) -> Scene:

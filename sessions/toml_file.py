@@ -164,6 +164,8 @@ def _shown(value: object) -> str:
     >>> _shown("a"), _shown(True), _shown([1, 2.5])
     ('"a"', 'true', '[1, 2.5]')
     """
+    if value is None:
+        return "nothing"
     text = {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
     if isinstance(value, str):
         text = f'"{value}"'
@@ -181,8 +183,8 @@ def _line_of(text: str, key: str) -> int | None:
             if line.lstrip().startswith("[["):
                 counted[here] = counted.get(here, -1) + 1
                 here += f"[{counted[here]}]"
-            if key == here:
-                best = number
+            if key == here or key.startswith((f"{here}.", f"{here}[")):
+                best = number  # where nothing better comes: a key that is missing is missed in its table
         elif assigned := re.match(r"\s*([\w.\-]+)\s*=", line):
             full = f"{here}.{assigned.group(1)}" if here else assigned.group(1)
             if key == full or key.startswith((f"{full}.", f"{full}[")):

@@ -52,13 +52,20 @@ class Analysis:
 
 
 def analyse(recording: "Recording", settings: AnalysisSettings | None = None) -> Analysis:
-    """Return the strokes of a recording: within each trial's valid take, or anywhere where it has no trials."""
+    """Return the strokes of a recording: within each trial's valid take, or anywhere where it has no trials.
+
+    Trials of practice and pre-evaluation are left out: they are no part of the experiment.
+    """
     chosen = settings or AnalysisSettings()
     told = [Flaw(FlawName.RECORDING, sentence, "doubtful") for sentence in (*recording.losses, *recording.flaws)]
     if recording.info is None:
         return Analysis(recording.simulated, (), (), tuple(told), "no forces were recorded", chosen)
     parts: list[tuple[Trial | None, ReadingBlock]] = (
-        [(record.trial, recording.readings(record.trial.number)) for record in recording.trials if record.take]
+        [
+            (record.trial, recording.readings(record.trial.number))
+            for record in recording.trials
+            if record.take and record.trial.phase == "main"
+        ]
         if recording.plan.blocks
         else [(None, recording.readings())]
     )
@@ -151,8 +158,10 @@ def _strokes(
         strokes.append(stroke)
     if not strokes:
         flaws.append(Flaw(FlawName.NO_STROKE, "No contact is a stroke.", "refused"))
-    if trial is not None and len(strokes) > 1:
-        sentence = f"{len(strokes)} strokes in a trial that asks for one: the model gets the first."
+    allowed = 1 if trial is None else plan.strokes_allowed(trial)
+    if trial is not None and len(strokes) > allowed:
+        asked = "one" if allowed == 1 else f"up to {allowed}"
+        sentence = f"{len(strokes)} strokes in a trial that asks for {asked}: the model gets the first."
         flaws.append(Flaw(FlawName.SECOND_STROKE, sentence, "doubtful"))
     return tuple(strokes), flaws
 

@@ -37,6 +37,7 @@ class ScoreTable:
     subject: str
     simulated: bool
     scores: tuple[Score, ...]  # answered trials only
+    left_out: str = ""  # a sentence about answers that are no scores on the line, and cannot be compared with them
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +82,20 @@ def score_table(recording: "Recording") -> ScoreTable:
         for record in recording.trials
         if record.score is not None and record.trial.phase == "main"
     )
-    return ScoreTable(str(recording.folder.resolve()), subject, recording.simulated, scores)
+    return ScoreTable(str(recording.folder.resolve()), subject, recording.simulated, scores, _left_out(recording))
+
+
+def _left_out(recording: "Recording") -> str:
+    """Say which answers of a session are no scores on the line."""
+    numbers = sum(record.number is not None for record in recording.trials)
+    choices = sum(record.choice is not None for record in recording.trials)
+    if not numbers and not choices:
+        return ""
+    what = f"{numbers} numbers on a scale of the subject's own" if numbers else f"{choices} choices of one of two"
+    return (
+        f"The answers of {recording.plan.subject} in {recording.folder.name} are {what}: they are kept, and no mean or "
+        "correlation of scores between 0 and 100 is taken of them."
+    )
 
 
 def joined(tables: Iterable[ScoreTable]) -> tuple[ScoreTable, ...]:

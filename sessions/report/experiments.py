@@ -12,7 +12,7 @@ def experiments(
 ) -> tuple[Experiment, ...]:
     """Return one experiment a block; `seds` holds the predicted SED [MPa] by block and index, where there is one."""
     means = mean_scores(tables)
-    return tuple(_experiment(block, means, tables, seds) for block in plan.blocks if block.trials)
+    return tuple(_experiment(block, means, tables, seds) for block in plan.blocks if block.phase == "main")
 
 
 def _experiment(

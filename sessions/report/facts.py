@@ -35,14 +35,25 @@ def people(recording: Recording, tables: Sequence[ScoreTable]) -> tuple[Fact, ..
         facts.append(Fact("protocol", plan.protocol))
         facts.append(Fact("stimulus order", plan.order_rule, f"seed {plan.seed}"))
     facts += [Fact(block.name, _block(block)) for block in plan.blocks]
+    own = {"tip radius": plan.finger.tip_radius, "width": plan.finger.width}
+    facts += [
+        Fact(f"the subject's finger: {name}", f"{value:g} mm", "measured") for name, value in own.items() if value
+    ]
+    if plan.contact_angle_origin == "measured":
+        facts.append(Fact("contact angle", f"{plan.contact_angle:g}°", "measured"))
+    if plan.masking:
+        facts.append(Fact("masking of sounds", plan.masking))
     return tuple(facts)
 
 
 def _block(block: Block) -> str:
     way = "proximal to distal" if block.direction == PROXIMAL_TO_DISTAL else "distal to proximal"
     indices = ", ".join(str(i) for i in sorted({trial.stimulus.known_index for trial in block.trials}))
-    ends = f"0 “{block.scale_ends[0]}”, 100 “{block.scale_ends[1]}”"
-    return f"{block.instruction} Stimuli {indices}, stroked {way}; scale: {ends}."
+    low, high = block.scale_ends
+    ticks = f", {block.ticks} marks" if block.ticks else ""
+    asked = f"scale: 0 “{low}”, 100 “{high}”{ticks}" if low else f"asked: “{block.question}”"
+    depth = f"; depth {block.indentation:g} mm, measured" if block.indentation_origin == "measured" else ""
+    return f"{block.instruction} Stimuli {indices}, stroked {way}; {asked}{depth}."
 
 
 def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
@@ -70,6 +81,7 @@ def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
 def excluded(recording: Recording, strokes: Sequence[StrokeFinding], tables: Sequence[ScoreTable]) -> tuple[str, ...]:
     """Return what does not enter the results, and why, a sentence each."""
     sentences = [f"Lost: {loss}." for loss in recording.losses]
+    sentences += [table.left_out for table in tables if table.left_out]
     for record in recording.trials:
         sentences += _trial(record)
     for number, words in (("mu_dynamic", "dynamic friction"), ("speed", "speed")):

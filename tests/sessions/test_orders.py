@@ -1,11 +1,12 @@
 import hashlib
 from collections import Counter
+from itertools import pairwise, permutations
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sessions.orders import opaque_codes, shuffled
+from sessions.orders import drawn, opaque_codes, pairs, shuffled, williams
 
 STIMULI = (0, 20, 50, 80, 100)
 
@@ -49,3 +50,70 @@ def test_a_label_once_given_stays_when_more_are_asked_for():
 def test_more_labels_than_there_are_is_refused():
     with pytest.raises(ValueError, match="at most 2000"):
         opaque_codes(2001, 1)
+
+
+# ---- Williams designs: the properties by which the literature defines them
+
+
+@pytest.mark.parametrize("count", range(2, 12))
+def test_in_a_williams_design_every_stimulus_follows_every_other_equally_often(count):
+    rows = williams(count)
+    follows = Counter(pair for row in rows for pair in pairwise(row))
+    assert set(follows) == set(permutations(range(count), 2))
+    assert set(follows.values()) == {1 if count % 2 == 0 else 2}
+
+
+@pytest.mark.parametrize("count", range(2, 12))
+def test_in_a_williams_design_every_stimulus_stands_in_every_position_equally_often(count):
+    rows = williams(count)
+    stands = Counter((item, position) for row in rows for position, item in enumerate(row))
+    assert len(stands) == count * count
+    assert len(set(stands.values())) == 1
+
+
+def test_five_stimuli_take_two_squares_which_are_ten_rows():
+    assert len(williams(5)) == 10
+    assert williams(5)[0] == (0, 1, 4, 2, 3)  # the first row the literature prints, counted from 0
+    assert len(set(williams(5))) == 10
+    assert len(williams(6)) == 6
+
+
+# ---- constraints
+
+
+def apart(order):
+    return all(abs(STIMULI.index(a) - STIMULI.index(b)) > 1 for a, b in pairwise(order))
+
+
+@given(seed=st.integers(0, 2**31 - 1))
+def test_an_order_that_is_to_meet_a_constraint_meets_it_and_one_that_does_at_once_is_the_shuffled_one(seed):
+    order = drawn(STIMULI, seed, "b", apart)
+    assert apart(order)
+    plain = shuffled(STIMULI, seed, "b")
+    assert order == plain or not apart(plain)
+
+
+def test_all_fourteen_orders_of_five_without_neighbours_come_about_equally_often():
+    # 14 is the fifth number of Hertzsprung's problem (OEIS A002464).
+    counted = Counter(drawn(STIMULI, seed, "b", apart) for seed in range(1400))
+    assert len(counted) == 14
+    assert all(abs(count - 100) < 50 for count in counted.values())  # five standard deviations of a binomial count
+
+
+def test_a_constraint_that_no_order_meets_gives_none():
+    assert drawn((0, 1, 2), 1, "b", lambda order: abs(order[0] - order[1]) > 1 and abs(order[1] - order[2]) > 1) is None
+
+
+# ---- pairs
+
+
+@given(seed=st.integers(0, 2**31 - 1), count=st.integers(2, 9))
+def test_every_two_are_compared_once_and_each_is_first_as_often_as_second(seed, count):
+    made = pairs(range(count), seed, "b")
+    assert sorted(tuple(sorted(pair)) for pair in made) == [(a, b) for a in range(count) for b in range(a + 1, count)]
+    first = Counter(a for a, _ in made)
+    assert all(abs(2 * first[item] - (count - 1)) <= (count % 2 == 0) for item in range(count))
+
+
+def test_the_order_of_pairs_changes_with_the_seed():
+    assert len({pairs(STIMULI, seed, "b") for seed in range(50)}) > 45

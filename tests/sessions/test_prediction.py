@@ -8,7 +8,8 @@ import pytest
 
 from sessions.analysis import Analysis, AnalysisSettings, FrictionParameters, Stroke
 from sessions.plan import Block, Frame, SessionPlan, Stimulus, Trial
-from sessions.prediction import PredictionOptions, predict
+from sessions.plan import Finger as OwnFinger
+from sessions.prediction import PredictionOptions, predict, with_own_finger
 from solver.reference import INDENTATION, SLIPPERINESS, STICKINESS
 from solver.scene import Finger, Friction, Loading, Scene, SceneError
 from solver.solution import solve
@@ -195,3 +196,13 @@ def test_a_picture_can_be_drawn_of_every_row(predicted):
     fields, skin = predicted.trials[0].picture()
     assert len(fields.sed) == len(fields.nodes)
     assert len(skin.pressure) == len(skin.state)
+
+
+def test_the_subjects_own_finger_and_angle_are_predicted_unless_another_finger_is_asked_for():
+    assert with_own_finger(PredictionOptions(), PLAN).scene is None
+    own = replace(PLAN, finger=OwnFinger(tip_radius=6.5, width=17.0), contact_angle=40.0)
+    scene = with_own_finger(PredictionOptions(), own).scene
+    assert scene.finger == replace(Finger(), tip_radius=6.5, contact_angle=40.0)
+    assert scene.width == 17.0
+    other = Scene(friction=Friction(0.0), loading=Loading(1.0), width=12.0)
+    assert with_own_finger(PredictionOptions(scene=other), own).scene == other

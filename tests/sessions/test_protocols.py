@@ -1,7 +1,10 @@
+from collections import Counter
+from itertools import pairwise
+
 import pytest
 
-from sessions.plan import Frame
-from sessions.protocols import plan, protocol, protocol_names
+from sessions.plan import Blinded, Finger, Frame
+from sessions.protocols import Body, StudyPlace, plan, protocol, protocol_names
 from sessions.protocols.protocol import FOLDER
 from sessions.toml_file import SettingsError
 
@@ -89,10 +92,18 @@ def test_an_unknown_protocol_is_refused_with_the_names_of_those_there_are():
             'direction = "down"',
             r'blocks\[1\].direction = "down" .*"proximal to dist',
         ),
-        ('order = "shuffled"', 'order = "random"', r'line 6: order = "random" .*"shuffled"'),
-        ("contact_angle = 45.0", "contact_angle = 5", r"line 8: contact_angle = 5.0 .*between 10 and 90 degrees"),
+        ('rule = "shuffled"', 'rule = "random"', r'line 12: order.rule = "random" .*"shuffled" or "williams"'),
+        ("contact_angle = 45.0", "contact_angle = 5", r"line 7: contact_angle = 5.0 .*between 10 and 90 degrees"),
         ('name = "slipperiness"', 'name = "stickiness"', r"blocks\[1\].name .*same name"),
-        ("label_seed = 1", "label_sed = 1", r"label_sed is not known; allowed here: name, title, order, label_seed"),
+        ("label_seed = 1", "label_sed = 1", r"label_sed is not known; allowed here: name, title, label_seed"),
+        ("strokes_allowed = 1", "strokes_allowed = 0", r"blocks\[0\].strokes_allowed = 0 .*between 1 and 20"),
+        ("practice = [0, 100]", "practice = [7]", r"blocks\[0\].practice = \[7\] .*one of indices"),
+        ("ticks = 0", "ticks = 200", r"scale.ticks = 200 .*between 0 and 99"),
+        ('answer = "line"', 'answer = "colour"', r'scale.answer = "colour" .*"line" or "number" or "choice"'),
+        ("not_first = []", "not_first = [0, 20, 50, 55, 75, 80, 100]", r"no order of these meets"),
+        ('subject = ["instruction"]', 'subject = ["score"]', r'shown.subject\[0\] = "score" .*"trial count"'),
+        ('phases = ["main"]', 'phases = ["warm-up"]', r'phases\[0\] = "warm-up" .*"pre-evaluation" or "practice"'),
+        ("# duration = 60 ", "duration = 0.5", r"rests.duration = 0.5 .*between 1 and 3600 s"),
     ],
 )
 def test_a_wrong_protocol_file_is_refused_with_line_key_value_and_what_is_allowed(tmp_path, was, written, named):
@@ -105,5 +116,152 @@ def test_a_wrong_protocol_file_is_refused_with_line_key_value_and_what_is_allowe
     message = str(caught.value)
     assert message.startswith(f"{wrong}, line ")
     assert "\n" not in message
+    if "no order of these" in message:
+        return  # the constraint is in one place and the stimuli it shuts out in another
     line = int(message.removeprefix(f"{wrong}, line ").split(":")[0])
     assert written in wrong.read_text().splitlines()[line - 1]
+
+
+@pytest.mark.parametrize(
+    ("name", "was", "written", "named"),
+    [
+        (
+            "magnitude-estimation",
+            'question = "How sticky was it?"',
+            "",
+            r"blocks\[0\].question = \"\" .*asked",
+        ),
+        (
+            PAPER,
+            'scale_ends = ["not sticky at all", "as sticky as can be"]',
+            "",
+            r"blocks\[0\].scale_ends = nothing .*both",
+        ),
+        ("paired-comparison", 'answer = "choice"', 'answer = "choice"\nticks = 3', r"scale.ticks = 3 .*only a line"),
+        (
+            "paired-comparison",
+            "[scale]",
+            '[order]\nrule = "williams"\n[scale]',
+            r'order.rule = "williams" .*"shuffled"',
+        ),
+        (PAPER, "[pre_evaluation]", "[pre_evaluations]", r"pre_evaluations is not known"),
+    ],
+)
+def test_what_does_not_go_together_is_refused_with_its_line(tmp_path, name, was, written, named):
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text((FOLDER / f"{name}.toml").read_text().replace(was, written))
+    with pytest.raises(SettingsError, match=named) as caught:
+        protocol(wrong)
+    assert ", line " in str(caught.value)
+
+
+def edited(tmp_path, *changes, name=PAPER):
+    text = (FOLDER / f"{name}.toml").read_text()
+    for was, written in changes:
+        assert was in text
+        text = text.replace(was, written)
+    path = tmp_path / "ours.toml"
+    path.write_text(text)
+    return protocol(path)
+
+
+def indices(block):
+    return [trial.stimulus.index for trial in block.trials]
+
+
+def test_pre_evaluation_and_practice_are_blocks_of_their_own_before_what_they_are_for():
+    made = plan(protocol(PAPER), "S01", 1, phases=("main", "practice", "pre-evaluation"))
+    assert [block.phase for block in made.blocks] == ["pre-evaluation"] * 2 + ["practice", "main"] * 2
+    assert [len(block.trials) for block in made.blocks] == [5, 5, 2, 5, 2, 5]
+    assert indices(made.blocks[2]) == [0, 100]
+    assert all(trial.phase == block.phase for block in made.blocks for trial in block.trials)
+    assert [trial.number for trial in made.trials] == list(range(1, 25))
+    # The experiment itself is in the order it has without them.
+    assert indices(made.blocks[3]) == indices(plan(protocol(PAPER), "S01", 1).blocks[0])
+
+
+def test_phases_a_protocol_does_not_have_are_refused():
+    with pytest.raises(SettingsError, match=r"needs a table \[pre_evaluation\]"):
+        plan(protocol("magnitude-estimation"), "S01", 1, phases=("pre-evaluation",))
+
+
+def test_magnitude_estimation_asks_for_numbers_in_rounds_that_begin_with_different_surfaces():
+    for seed in range(30):
+        sticky = plan(protocol("magnitude-estimation"), "S01", seed).blocks[0]
+        rounds = [indices(sticky)[at : at + 5] for at in (0, 5, 10)]
+        assert all(sorted(one) == [0, 20, 50, 80, 100] for one in rounds)
+        assert len({one[0] for one in rounds}) == 3
+        assert {trial.answer for trial in sticky.trials} == {"number"}
+        assert [trial.repetition for trial in sticky.trials if trial.stimulus.index == 50] == [1, 2, 3]
+
+
+def test_paired_comparison_presents_two_by_two_and_asks_after_the_second():
+    made = plan(protocol("paired-comparison"), "S01", 1)
+    for block in made.blocks:
+        assert len(block.trials) == 20
+        for first, second in zip(block.trials[::2], block.trials[1::2], strict=True):
+            assert (first.answer, second.answer) == ("none", "choice")
+            assert second.compared_with == first.number == second.number - 1
+        compared = {frozenset((a, b)) for a, b in zip(indices(block)[::2], indices(block)[1::2], strict=True)}
+        assert len(compared) == 10
+
+
+def test_the_same_surfaces_bear_the_same_labels_in_all_built_in_protocols():
+    assert len({tuple(protocol(name).labels.items()) for name in protocol_names()}) == 1
+
+
+def test_the_rows_of_a_williams_design_are_balanced_over_ten_subjects(tmp_path):
+    williams = edited(tmp_path, ('rule = "shuffled"', 'rule = "williams"'))
+    places = [StudyPlace("s", row, 5, williams.labels) for row in range(1, 11)]
+    plans = [plan(williams, "S01", 1, place=place) for place in places]
+    follows = Counter(pair for made in plans for pair in pairwise(indices(made.blocks[1])))
+    assert set(follows.values()) == {2}
+    assert len(follows) == 20
+    assert [made.order_row for made in plans] == list(range(1, 11))
+    assert plans[2].order_rule == "williams, row 3 of 10"
+    # Another study deals the letters of the design otherwise.
+    other = plan(williams, "S01", 1, place=StudyPlace("t", 1, 6, williams.labels))
+    assert indices(other.blocks[0]) != indices(plans[0].blocks[0])
+
+
+def test_constraints_of_the_file_hold_in_every_plan(tmp_path):
+    apart = edited(
+        tmp_path, ("neighbours_apart = false", "neighbours_apart = true"), ("not_first = []", "not_first = [100]")
+    )
+    for seed in range(40):
+        for block in plan(apart, "S01", seed).blocks:
+            ranks = [sorted(indices(block)).index(index) for index in indices(block)]
+            assert all(abs(a - b) > 1 for a, b in pairwise(ranks))
+            assert indices(block)[0] != 100
+
+
+def test_a_subjects_own_finger_angle_and_depths_are_in_the_plan_as_measured():
+    body = Body(Finger(tip_radius=6.5, width=17.0), 40.0, {"slipperiness": 1.2})
+    made = plan(protocol(PAPER), "S01", 1, body=body)
+    assert made.finger == Finger(6.5, 17.0)
+    assert (made.contact_angle, made.contact_angle_origin) == (40.0, "measured")
+    assert [(block.indentation, block.indentation_origin) for block in made.blocks] == [(2.0, "set"), (1.2, "measured")]
+
+
+@pytest.mark.parametrize(
+    ("body", "named"),
+    [
+        (Body(Finger(tip_radius=50.0)), "tip_radius = 50.0 is not allowed: it must lie between 3 and 15 mm"),
+        (Body(contact_angle=120.0), "contact_angle = 120.0 .*90 degrees"),
+        (Body(indentations={"sweetness": 1.0}), "no such block; sensotact-friction has stickiness, slipperiness"),
+        (Body(indentations={"stickiness": 0.0}), "depth of stickiness = 0.0"),
+    ],
+)
+def test_a_subjects_own_value_out_of_range_is_refused(body, named):
+    with pytest.raises(SettingsError, match=named):
+        plan(protocol(PAPER), "S01", 1, body=body)
+
+
+def test_a_blinded_plan_names_codes_alone():
+    paper = protocol(PAPER)
+    made = plan(paper, "S01", 1, place=StudyPlace("s", 1, 5, paper.labels, key_sha256="ab"))
+    assert made.blinded
+    assert {trial.stimulus.index for trial in made.trials} == {None}
+    assert [t.stimulus.code for t in made.trials] == [t.stimulus.code for t in plan(paper, "S01", 1).trials]
+    with pytest.raises(Blinded, match="unblind"):
+        _ = made.trials[0].stimulus.known_index

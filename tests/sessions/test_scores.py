@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from recordings import begun
 
 from sessions.analysis.scores import (
     Score,
@@ -13,8 +14,11 @@ from sessions.analysis.scores import (
     relation,
     reversed_subjects,
     score_matrix,
+    score_table,
     subject_scores,
 )
+from sessions.plan import Block, Frame, SessionPlan, Stimulus, Trial
+from sessions.recording import Recording
 
 
 def table(subject, values, *, session=None, descriptor="stickiness", indices=(0, 20, 50, 80, 100)):
@@ -136,3 +140,33 @@ def test_the_order_of_the_sessions_does_not_matter(answers):
     means = mean_scores(table(subject, [v]) for subject, v in answers)
     assert means[0].mean == pytest.approx(50)
     assert {s.subject for s in subject_scores(table(p, [v]) for p, v in answers)} == {"P01", "P02", "P03"}
+
+
+@pytest.mark.parametrize(
+    ("answers", "said"),
+    [
+        (["number", "number"], "1 numbers on a scale of the subject's own"),
+        (["none", "choice"], "1 choices of one of two"),
+    ],
+)
+def test_answers_that_are_no_scores_on_the_line_are_named_and_never_averaged_with_them(tmp_path, answers, said):
+    trials = tuple(
+        Trial(n, "b", Stimulus("d", n, f"K{n}"), 1, 1, answer=answer, compared_with=1 if answer == "choice" else None)
+        for n, answer in enumerate(answers, 1)
+    )
+    plan = SessionPlan("made", "S01", 0, "none", (Block("b", "Stroke.", 1, 2.0, ("", ""), trials),), False, Frame())
+    writer = begun(tmp_path / "s", info=None, plan=plan)
+    for n, answer in enumerate(answers, 1):
+        writer.event("take_started", n, {"take": 1})
+        if n == 2:
+            given = ("number_given", {"number": 7.5}) if answer == "number" else ("chosen", {"choice": "first"})
+            writer.event(given[0], n, given[1])
+        writer.event("take_kept", n, {"take": 1})
+    writer.event("ended", data={"reason": "done"})
+    writer.close()
+    recording = Recording.open(tmp_path / "s")
+    assert [record.outcome for record in recording.trials] in (["not answered", "numbered"], ["presented", "chosen"])
+    table = score_table(recording)
+    assert table.scores == ()
+    assert said in table.left_out
+    assert mean_scores([table]) == ()
