@@ -1,0 +1,72 @@
+"""What is asked of a subject, what it may know of the others, and how time is taken."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from statistics import median
+from time import perf_counter
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Kind = TypeVar("Kind")
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """Something that was not measured, and why: one sentence."""
+
+    told: str
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """How much may be measured. `until` is an instant of `perf_counter` after which nothing new is begun."""
+
+    quick: bool
+    until: float
+
+    @property
+    def left(self) -> float:
+        """Seconds left; below 0 when time is over."""
+        return self.until - perf_counter()
+
+    def pick(self, full: Iterable[Kind], quick: Iterable[Kind]) -> list[Kind]:
+        """Return what a full or a quick run measures."""
+        return list(quick if self.quick else full)
+
+
+@dataclass(slots=True)
+class Found:
+    """All rows so far, of every subject."""
+
+    rows: list[DataclassInstance] = field(default_factory=list["DataclassInstance"])
+
+    def of(self, kind: type[Kind]) -> list[Kind]:
+        """Return the rows of one kind, in their order."""
+        return [row for row in self.rows if isinstance(row, kind)]
+
+
+def timed(work: Callable[[], object], repeats: int = 5, most_s: float = 1.0) -> float:
+    """Return the median time of `work()` [s] over up to `repeats` runs; slow work is run less often, at least once."""
+    spans: list[float] = []
+    begun = perf_counter()
+    for _ in range(repeats):
+        start = perf_counter()
+        work()
+        spans.append(perf_counter() - start)
+        if perf_counter() - begun > most_s:
+            break
+    return median(spans)
+
+
+def within(asked: Asked, work: Iterable[Kind], what: str) -> Iterator[Kind | LeftOut]:
+    """Yield the items of `work` until time is over; then say that the rest of `what` was left out."""
+    items = list(work)
+    for number, item in enumerate(items):
+        if asked.left <= 0.0:
+            yield LeftOut(f"Time was over after {number} of {len(items)} {what}.")
+            return
+        yield item

@@ -1,0 +1,166 @@
+"""Every way of solving a scene that the project keeps, behind one face, so that all are measured alike."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from time import perf_counter
+from typing import Any, Literal, Protocol
+
+import numpy as np
+
+from solver.carrying import carried
+from solver.elements import Q2P1
+from solver.existence import steady
+from solver.finger import FingerModel
+from solver.finite_solution import MARGIN, FiniteFinger
+from solver.mesh import Array
+from solver.mesher import Sizing
+from solver.newton import Pull, Shape
+from solver.scene import Scene
+from solver.sliding import settled as slid
+from solver.solution import numbers_on, settled
+
+Kinematics = Literal["small", "finite"]
+State = Any  # of contact at small strain, of the whole body at finite strain; only handed back
+
+
+class Meshed(Protocol):
+    """One finger on one mesh."""
+
+    dofs: int
+    setup_s: float  # mesh and tables
+    prepared_s: float  # assembly and factorisation that all surfaces share; 0 where each surface has its own
+
+    def solve(self, scene: Scene, before: State | None = None) -> State:
+        """Return the settled state of `scene`, from the undeformed finger or from a state of a similar surface.
+
+        Raises SolveFailure or ContactLost where there is none.
+        """
+        ...
+
+    def numbers(self, state: State) -> Array:
+        """Return SED of the ending [MPa], normal force and drag [N/mm] (3,)."""
+        ...
+
+    def floor(self) -> float:
+        """Return the time of one assembly, factorisation and solve of this system [s]."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """One way of solving."""
+
+    name: str
+    kinematics: Kinematics
+    element: str
+    order: int  # of the displacements
+    linear_solver: str
+    start: str  # from what a surface is begun
+    meshed: Callable[[Scene, float, bool], Meshed]  # scene, fineness, whether moved by half an element
+
+
+class SmallMeshed:
+    """Small strain: all but the skin eliminated once, contact on what remains."""
+
+    def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
+        """Mesh and reduce the finger of `scene`."""
+        begun = perf_counter()
+        self.finger = FingerModel.of(scene, Sizing(fineness, scene.loading.indentation, shift, margin=4.0))
+        self.prepared_s = self.finger.solve_s
+        self.setup_s = perf_counter() - begun - self.prepared_s
+        self.dofs = self.finger.body.dofs
+
+    def solve(self, scene: Scene, before: State | None = None) -> State:
+        """Return the state of contact; every surface begins at the same guess, so `before` is not used."""
+        del before
+        return settled(scene, self.finger)
+
+    def numbers(self, state: State) -> Array:
+        """Return SED, normal force and drag."""
+        return np.abs(numbers_on(self.finger, state))
+
+    def floor(self) -> float:
+        """Return what assembling, eliminating and unfolding once took."""
+        skin = np.ones((2 * len(self.finger.body.touchable.gap), 1))
+        begun = perf_counter()
+        self.finger.body.displacement(skin)
+        return self.prepared_s + perf_counter() - begun
+
+
+class FiniteMeshed:
+    """Finite strain: Newton on the whole body, contact and displacements together."""
+
+    prepared_s = 0.0
+
+    def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
+        """Mesh the finger of `scene`."""
+        begun = perf_counter()
+        self.finger = _finite(scene, fineness, shift)
+        self.setup_s = perf_counter() - begun
+        self.dofs = self.finger.newton.body.dofs
+
+    def solve(self, scene: Scene, before: State | None = None) -> State:
+        """Return the settled shape, from `before` where it is given."""
+        newton, outline = self.finger.newton, self.finger.geometry.whole
+        return steady(newton, pull_of(scene), outline, start=before)
+
+    def numbers(self, state: State) -> Array:
+        """Return SED, normal force and drag."""
+        return np.array([self.finger.sed_ending(state), state.force[1], abs(state.force[0])])
+
+    def floor(self) -> float:
+        """Return what one assembly, factorisation and solve takes."""
+        newton = self.finger.newton
+        shape = Shape.undeformed(newton.body)
+        begun = perf_counter()
+        newton.linearise(shape, Pull(0.1, 0.0), newton.skin_x)
+        return perf_counter() - begun
+
+
+class CarriedMeshed(FiniteMeshed):
+    """Finite strain, each mesh starting from the state of a coarser one."""
+
+    LADDER = (5.0, 12.0)  # finenesses of the coarser meshes
+
+    def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
+        """Mesh the finger of `scene`, and coarser."""
+        super().__init__(scene, fineness, shift)
+        begun = perf_counter()
+        self.coarser = [_finite(scene, n, False) for n in self.LADDER if n < 0.7 * fineness]
+        self.setup_s += perf_counter() - begun
+
+    def solve(self, scene: Scene, before: State | None = None) -> State:
+        """Return the settled shape, carried up from the coarsest mesh unless there is a state `before`."""
+        if before is not None:
+            return super().solve(scene, before)
+        levels = [*self.coarser, self.finger]
+        shape = slid(levels[0].newton, pull_of(scene), tolerance=1e-3)
+        for coarse, fine in pairwise(levels):
+            start = carried(shape, coarse.geometry, fine.geometry, fine.newton.body)
+            if fine is not self.finger:
+                shape = slid(fine.newton, pull_of(scene), start, 1e-3)
+            else:
+                return super().solve(scene, start)
+        return super().solve(scene)
+
+
+def _finite(scene: Scene, fineness: float, shift: bool) -> FiniteFinger:
+    return FiniteFinger.of(scene, Sizing(fineness, scene.loading.indentation, shift, margin=MARGIN))
+
+
+def pull_of(scene: Scene) -> Pull:
+    """Return what the surface does in a scene of settled sliding."""
+    friction, loading = scene.friction, scene.loading
+    return Pull(loading.indentation, float(friction.mu), friction.cap, -(loading.direction or 1))
+
+
+_BAND = "band factorisation in compiled loops"
+SMALL = Method(
+    "small strain", "small", Q2P1.name, Q2P1.order, "nested dissection, dense contact", "one guess", SmallMeshed
+)
+FINITE = Method("finite strain", "finite", Q2P1.name, Q2P1.order, _BAND, "undeformed", FiniteMeshed)
+CARRIED = Method("finite strain, carried up", "finite", Q2P1.name, Q2P1.order, _BAND, "coarser meshes", CarriedMeshed)
+
+METHODS = (SMALL, FINITE, CARRIED)
+MAIN = {"small": SMALL, "finite": FINITE}  # the one an answer comes from

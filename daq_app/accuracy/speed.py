@@ -1,0 +1,96 @@
+"""Time against true error, for every way of solving and every mesh, on the reference cases."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from statistics import median
+
+import numpy as np
+
+from daq_app.accuracy.asked import Asked, Found, LeftOut, timed, within
+from daq_app.accuracy.methods import CARRIED, METHODS, Method
+from daq_app.accuracy.truth import JUDGED, Truth, cases, known
+from solver.contact import ContactLost
+from solver.failures import SolveFailure
+from solver.scene import Scene
+
+MESHES = {"small": (3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0), "finite": (4.0, 5.0, 6.0, 8.0, 12.0, 16.0, 20.0)}
+QUICK = {"small": (4.0, 6.0, 12.0, 24.0), "finite": (4.0, 5.0, 8.0, 12.0)}
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """One way of solving on one mesh. Times are medians; errors relative, by case, of SED, normal force and drag."""
+
+    method: str
+    kinematics: str
+    element: str
+    order: int
+    linear_solver: str
+    start: str
+    fineness: float
+    dofs: int
+    setup_s: float  # mesh and tables
+    prepared_s: float  # assembly and factorisation shared by all surfaces
+    floor_s: float  # one assembly, factorisation and solve of the same system
+    first_s: float  # one surface from undeformed, `prepared_s` included: median over the cases
+    next_s: float  # each further surface
+    all_s: float  # all cases one after another, `prepared_s` included
+    surfaces: int  # how many those are
+    errors: dict[str, tuple[float, ...]]
+    failed: dict[str, str]  # cases without an answer on this mesh, and why
+
+    @property
+    def judged_error(self) -> float | None:
+        """The largest error of the SED on the cases that speeds are asked at; None where one is missing."""
+        if any(name in self.failed for name in JUDGED):
+            return None
+        return max((self.errors[name][0] for name in JUDGED if name in self.errors), default=None)
+
+
+def measure(asked: Asked, found: Found) -> Iterator[Speed | LeftOut]:
+    """Yield a row for every way and mesh, coarse meshes of all ways before fine ones."""
+    pairs = [
+        (fineness, method)
+        for method in METHODS
+        for fineness in (QUICK if asked.quick else MESHES)[method.kinematics]
+        if method is not CARRIED or fineness > 1.5 * 5.0
+    ]
+    for item in within(asked, sorted(pairs, key=lambda pair: pair[0]), "meshes and ways of solving"):
+        if isinstance(item, LeftOut):
+            yield item
+        else:
+            fineness, method = item
+            yield _row(method, fineness, known(found, method.kinematics))
+
+
+def _row(method: Method, fineness: float, truths: dict[str, Truth]) -> Speed:
+    chosen = [scene for scene in cases(method.kinematics) if scene.title in truths]
+    deepest = max(chosen, key=lambda scene: scene.loading.indentation)
+    builds = [method.meshed(deepest, fineness, False) for _ in range(3)]
+    mesh = builds[-1]
+    prepared = median(b.prepared_s for b in builds)
+    first: list[float] = []
+    states: list[tuple[Scene, object]] = []
+    errors: dict[str, tuple[float, ...]] = {}
+    failed: dict[str, str] = {}
+    for scene in chosen:
+        try:
+            state = mesh.solve(scene)
+        except (SolveFailure, ContactLost) as failure:
+            failed[scene.title] = str(failure)
+            continue
+        true = np.array(truths[scene.title].numbers)
+        off = np.abs(mesh.numbers(state) - true) / np.where(true > 0.0, true, 1.0)
+        errors[scene.title] = tuple(off.tolist())
+        states.append((scene, state))
+        first.append(timed(lambda s=scene: mesh.numbers(mesh.solve(s)), 5, 0.25))
+    onward: list[float] = []
+    for (one, before), (scene, _) in zip(states, states[1:], strict=False):
+        if one.loading.indentation == scene.loading.indentation and one.loading.slide == scene.loading.slide:
+            onward.append(timed(lambda s=scene, b=before: mesh.numbers(mesh.solve(s, b)), 5, 0.25))
+    next_s = median(onward) if onward else float("nan")
+    return Speed(
+        method.name, method.kinematics, method.element, method.order, method.linear_solver, method.start,
+        fineness, mesh.dofs, median(b.setup_s for b in builds), prepared, median(mesh.floor() for _ in range(7)),
+        prepared + median(first), next_s, prepared + sum(first), len(states), errors, failed,
+    )  # fmt: skip

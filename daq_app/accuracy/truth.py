@@ -1,0 +1,112 @@
+"""The reference cases and their truth: overkill solves on meshes whose nodes lie elsewhere, made in the same run.
+
+The ten published surfaces, at small and at finite strain. The truth of a number is the mean of three solves far finer
+than any that is judged; how far they lie from it is its doubt. Nothing is shipped and nothing comes from elsewhere, so
+the truth is never older than the solver. Where a surface has no settled sliding the solver's refusal stands instead.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from daq_app.accuracy.asked import Asked, Found, LeftOut
+from daq_app.accuracy.methods import CARRIED, SMALL, Kinematics, Meshed, Method
+from solver.contact import ContactLost
+from solver.failures import SolveFailure
+from solver.reference import scenes
+from solver.scene import Scene, Solve
+from solver.solution import answers
+
+NUMBERS = ("SED of the ending", "normal force", "drag")
+# fineness of the three meshes, and whether moved along the skin by half an element
+OVERKILL: dict[Kinematics, tuple[tuple[float, bool], ...]] = {
+    "small": ((64.0, False), (64.0, True), (56.0, False)),
+    "finite": ((28.0, False), (28.0, True), (25.0, False)),
+}
+QUICK: dict[Kinematics, tuple[tuple[float, bool], ...]] = {
+    "small": ((40.0, False), (40.0, True), (36.0, False)),
+    "finite": ((16.0, False), (16.0, True), (14.0, False)),
+}
+# "slip 0-100 and stick 0": what speeds are asked at
+JUDGED = ("slipperiness 0", "slipperiness 20", "slipperiness 55", "slipperiness 75", "slipperiness 100", "stickiness 0")
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """What one case truly is, or why it has no answer."""
+
+    kinematics: Kinematics
+    case: str
+    numbers: tuple[float, ...]  # SED [MPa], normal force, drag [N/mm]; empty where refused
+    doubt: tuple[float, ...]  # of each, relative: how far the three solves lie from their mean, at most
+    dofs: tuple[int, ...]  # of the three meshes
+    took_s: float
+    refused: str  # the solver's sentence, "" where there is an answer
+
+
+def cases(kinematics: Kinematics) -> list[Scene]:
+    """Return the ten published scenes in one of the two kinematics."""
+    return [replace(scene, solve=Solve(kinematics)) for scene in scenes()]
+
+
+def measure(asked: Asked, found: Found) -> Iterator[Truth | LeftOut]:
+    """Yield the truth of every case; a quick run takes coarser overkill and only the cases speeds are asked at."""
+    del found
+    overkill = QUICK if asked.quick else OVERKILL
+    for kinematics, method in (("small", SMALL), ("finite", CARRIED)):
+        chosen = [s for s in cases(kinematics) if s.title in JUDGED or not asked.quick]
+        yield from _truths(asked, method, chosen, overkill[kinematics])
+
+
+def _truths(
+    asked: Asked, method: Method, chosen: list[Scene], overkill: tuple[tuple[float, bool], ...]
+) -> Iterator[Truth | LeftOut]:
+    refused, todo = _sorted_out(method.kinematics, chosen)
+    yield from refused
+    deepest = max(chosen, key=lambda scene: scene.loading.indentation)
+    begun = perf_counter()
+    meshes = [method.meshed(deepest, fineness, shift) for fineness, shift in overkill]
+    shared = (perf_counter() - begun) / max(len(todo), 1)
+    for number, scene in enumerate(todo):
+        if asked.left <= 0.0:
+            yield LeftOut(f"Time was over before the truth of {len(todo) - number} cases at {method.name} was known.")
+            return
+        yield _truth(method.kinematics, scene, meshes, shared)
+
+
+def _truth(kinematics: Kinematics, scene: Scene, meshes: list[Meshed], shared: float) -> Truth:
+    begun = perf_counter()
+    try:
+        solves = np.array([mesh.numbers(mesh.solve(scene)) for mesh in meshes])
+    except (SolveFailure, ContactLost) as failure:
+        return Truth(kinematics, scene.title, (), (), (), perf_counter() - begun, f"On an overkill mesh: {failure}")
+    mean = solves.mean(axis=0)
+    doubt = np.abs(solves / np.where(mean > 0.0, mean, 1.0) - 1.0).max(axis=0)
+    took = perf_counter() - begun + shared
+    return Truth(
+        kinematics, scene.title, tuple(mean.tolist()), tuple(doubt.tolist()), tuple(m.dofs for m in meshes), took, ""
+    )
+
+
+def _sorted_out(kinematics: Kinematics, chosen: list[Scene]) -> tuple[list[Truth], list[Scene]]:
+    """Return the cases that the solver refuses, each with its sentence, and the others."""
+    refused: list[Truth] = []
+    todo: list[Scene] = []
+    for scene in chosen:
+        if scene.title in JUDGED:  # known to have an answer; were it refused, the overkill meshes would tell
+            todo.append(scene)
+            continue
+        begun = perf_counter()
+        (answer,) = answers([replace(scene, solve=Solve(kinematics, tolerance=0.02))])
+        if isinstance(answer, SolveFailure):
+            refused.append(Truth(kinematics, scene.title, (), (), (), perf_counter() - begun, str(answer)))
+        else:
+            todo.append(scene)
+    return refused, todo
+
+
+def known(found: Found, kinematics: Kinematics) -> dict[str, Truth]:
+    """Return the cases whose truth is known, by name."""
+    return {t.case: t for t in found.of(Truth) if t.kinematics == kinematics and t.numbers}
