@@ -36,6 +36,7 @@ FROM_FINENESS = 0.07
 UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]
 DOUBTED = 1e-8  # and from which it is told
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
+PIERCED = 1e-7  # part of the indentation by which skin may lie too low without it being told [-]
 ROUGH = 1e-10  # and from which round-off is taken out of the displacements
 
 _Answer = Prediction | SolveFailure
@@ -296,7 +297,7 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Pred
         mesh=finger.geometry.mesh,
         displacement=displacement,
         history=history,
-        warnings=(*warnings(left["left_out"]), *_doubts(unbalanced)),
+        warnings=(*warnings(left["left_out"]), *_doubts(unbalanced, checks["penetration"])),
     )
 
 
@@ -304,10 +305,15 @@ def _unbalanced(checks: dict[str, float]) -> float:
     return max(checks[name] for name in ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance"))
 
 
-def _doubts(unbalanced: float) -> tuple[str, ...]:
-    if unbalanced <= DOUBTED:
-        return ()
-    return (f"Forces balance to {unbalanced:.1g} only: materials near the incompressible limit magnify round-off.",)
+def _doubts(unbalanced: float, penetration: float) -> tuple[str, ...]:
+    told: list[str] = []
+    if unbalanced > DOUBTED:
+        told.append(
+            f"Forces balance to {unbalanced:.1g} only: materials near the incompressible limit magnify round-off."
+        )
+    if penetration > PIERCED:
+        told.append(f"The skin lies {penetration:.1g} of the indentation too low: stiff layers magnify round-off.")
+    return tuple(told)
 
 
 def _drag(scene: Scene, tangential: float) -> float:

@@ -29,7 +29,7 @@ def followed(body: Touchable, law: FrictionLaw, depth: float, direction: int) ->
     """
     reached, step = 0.0, law.mu
     state = Course(body, replace(law, mu=0.0)).sliding(depth, direction)
-    while reached < law.mu and step > CLOSE * max(reached, 0.01):
+    while reached < law.mu and step > CLOSE * max(reached, min(0.01, law.mu)):
         aim = min(reached + step, law.mu)
         try:
             found = Course(body, replace(law, mu=aim), PATIENCE).sliding(depth, direction, state.state)

@@ -163,4 +163,4 @@ FINITE = Method("finite strain", "finite", Q2P1.name, Q2P1.order, _BAND, "undefo
 CARRIED = Method("finite strain, carried up", "finite", Q2P1.name, Q2P1.order, _BAND, "coarser meshes", CarriedMeshed)
 
 METHODS = (SMALL, FINITE, CARRIED)
-MAIN = {"small": SMALL, "finite": FINITE}  # the one an answer comes from
+MAIN: dict[Kinematics, Method] = {"small": SMALL, "finite": FINITE}  # the one an answer comes from

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from statistics import median
 
 import numpy as np
@@ -85,7 +86,7 @@ def _row(method: Method, fineness: float, truths: dict[str, Truth]) -> Speed:
         states.append((scene, state))
         first.append(timed(lambda s=scene: mesh.numbers(mesh.solve(s)), 5, 0.25))
     onward: list[float] = []
-    for (one, before), (scene, _) in zip(states, states[1:], strict=False):
+    for (one, before), (scene, _) in pairwise(states):
         if one.loading.indentation == scene.loading.indentation and one.loading.slide == scene.loading.slide:
             onward.append(timed(lambda s=scene, b=before: mesh.numbers(mesh.solve(s, b)), 5, 0.25))
     next_s = median(onward) if onward else float("nan")

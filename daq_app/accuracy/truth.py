@@ -55,9 +55,9 @@ def measure(asked: Asked, found: Found) -> Iterator[Truth | LeftOut]:
     """Yield the truth of every case; a quick run takes coarser overkill and only the cases speeds are asked at."""
     del found
     overkill = QUICK if asked.quick else OVERKILL
-    for kinematics, method in (("small", SMALL), ("finite", CARRIED)):
-        chosen = [s for s in cases(kinematics) if s.title in JUDGED or not asked.quick]
-        yield from _truths(asked, method, chosen, overkill[kinematics])
+    for method in (SMALL, CARRIED):
+        chosen = [s for s in cases(method.kinematics) if s.title in JUDGED or not asked.quick]
+        yield from _truths(asked, method, chosen, overkill[method.kinematics])
 
 
 def _truths(

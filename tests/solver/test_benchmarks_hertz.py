@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from daq_app.accuracy.published.bodies import chain, disc, graded, mirrored, mound, skin_motion, stress, touching_within
 from solver.body import Body, edge_load
 from solver.contact import CAP, OPEN, SLIP, STICK, Course, forced
 from solver.friction import FrictionLaw
 from solver.materials import Hooke
-from tests.solver.bodies import chain, disc, graded, mirrored, mound, skin_motion, stress, touching_within
 
 ELEMENT = 1 / 30  # of the half-width
 RADIUS = 1000.0  # in half-widths: theirs is the limit of light loads

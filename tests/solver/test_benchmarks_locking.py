@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from daq_app.accuracy.published.bodies import membrane, ring
 from solver.body import Body, edge_load
 from solver.materials import Hooke
-from tests.solver.bodies import membrane, ring
 
 PRINTED = {0.3: 4.582500e-3, 0.48: 5.017200e-3, 0.49: 5.039925e-3, 0.499: 5.060249e-3, 0.4999: 5.062275e-3}
 

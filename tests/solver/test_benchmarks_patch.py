@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from daq_app.accuracy.published.bodies import distorted, local_corners
 from solver.body import Body, edge_load
 from solver.contact import CAP, SLIP, STICK, Course, untouched
 from solver.friction import FrictionLaw
@@ -13,7 +14,6 @@ from solver.materials import Hooke
 from solver.mesh import Mesh
 from solver.shapes import block
 from solver.stiffness import Probes
-from tests.solver.bodies import distorted, local_corners
 
 GRADIENT = np.array([[0.01, 0.03], [-0.02, -0.01]])  # keeps volume, as an incompressible body asks
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from daq_app.accuracy.published.bodies import distorted, graded, membrane, mirrored, mound, ring
 from solver.body import Body, edge_load
 from solver.contact import Course
 from solver.elements import Q2P1
@@ -12,7 +13,6 @@ from solver.materials import Hooke
 from solver.mesher import Sizing
 from solver.reference import STICKINESS, scene
 from solver.stiffness import Probes
-from tests.solver.bodies import distorted, graded, membrane, mirrored, mound, ring
 
 POINTS = np.array([[0.31, -0.57], [-0.77, 0.11], [0.43, 0.83]])
 

@@ -1,26 +1,29 @@
 """Bodies of the published problems: patches of quadrilaterals joined to one mesh, and the stress inside."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from solver.contact import OPEN, SLIP
+from solver.body import Body
+from solver.contact import OPEN, SLIP, Contact, States
 from solver.elements import Q2P1
 from solver.grid import grid_mesh, quality
-from solver.mesh import Mesh
+from solver.mesh import Array, Indices, Mesh
 from solver.stiffness import Probes, local_coordinates
 
-NONE = np.zeros(0, np.int64)
+NONE: Indices = np.zeros(0, np.int64)
 
 
-def with_middles(lines):
+def with_middles(lines: Array) -> Array:
     """Return lines between elements with one more in the middle of each gap."""
     out = np.empty(2 * len(lines) - 1)
     out[::2], out[1::2] = lines, (lines[1:] + lines[:-1]) / 2
     return out
 
 
-def graded(finest, growth, zone, end):
+def graded(finest: float, growth: float, zone: float, end: float) -> Array:
     """Return lines from 0 to `end`, `finest` apart up to `zone` and then further and further apart."""
     steps = [0.0]
     while steps[-1] < end:
@@ -28,17 +31,18 @@ def graded(finest, growth, zone, end):
     return np.array(steps) * end / steps[-1]
 
 
-def mirrored(lines):
+def mirrored(lines: Array) -> Array:
+    """Return the lines from 0 up, and as many below 0."""
     return np.concatenate([-lines[:0:-1], lines])
 
 
-def joined(grids):
+def joined(grids: Sequence[Array]) -> Mesh:
     """Return the mesh of several grids of points (2 a + 1, 2 b + 1, 2), nodes at one place made one.
 
     Nothing is held, nothing may touch.
     """
     turned = [g if _clockwise(g) else g[::-1] for g in grids]
-    meshes = [grid_mesh(g, np.zeros((g.shape[1] - 1) // 2, np.int64), slice(0, 1), NONE) for g in turned]
+    meshes = [grid_mesh(g, _one_region(g), slice(0, 1), NONE) for g in turned]
     nodes = np.concatenate([m.nodes for m in meshes])
     starts = np.cumsum([0, *(len(m.nodes) for m in meshes[:-1])])
     elements = np.concatenate([m.elements + s for m, s in zip(meshes, starts, strict=True)])
@@ -47,25 +51,26 @@ def joined(grids):
     return Mesh(nodes[first], elements, np.zeros(len(elements), np.int64), NONE, NONE)
 
 
-def chain(on, along):
+def chain(on: NDArray[np.bool_], along: Array) -> Indices:
     """Return the nodes where `on` is true, in the order of `along`."""
     found = np.flatnonzero(on)
     return found[np.argsort(along[found])]
 
 
-def ring(inner, outer, radial, around):
+def ring(inner: float, outer: float, radial: int, around: int) -> tuple[Mesh, Indices]:
     """Return a thick cylinder that nothing holds, and the nodes of its hole in order; its skin is one outer edge."""
     r = with_middles(np.geomspace(inner, outer, radial + 1))
     turn = np.linspace(-np.pi, np.pi, 2 * around + 1)
     mesh = joined([np.stack([r * np.cos(turn)[:, None], r * np.sin(turn)[:, None]], axis=-1)])
-    radius = np.hypot(*mesh.nodes.T)
-    angle = np.round(np.arctan2(mesh.nodes[:, 1], mesh.nodes[:, 0]), 9) % round(2 * np.pi, 9)
+    x, y = mesh.nodes.T
+    radius = np.hypot(x, y)
+    angle = np.asarray(np.round(np.arctan2(y, x), 9) % round(2 * np.pi, 9), np.float64)
     hole = chain(np.isclose(radius, inner), angle)
     outside = chain(np.isclose(radius, outer), angle)
     return replace(mesh, skin=outside[:3]), np.append(hole, hole[0])
 
 
-def membrane(across, up):
+def membrane(across: int, up: int) -> Mesh:
     """Return Cook's membrane (0,0) (48,44) (48,60) (0,44), its left edge held, its right edge as the skin."""
     x, part = with_middles(np.linspace(0, 48, across + 1)), with_middles(np.linspace(0, 1, up + 1))
     low, high = 44 * x / 48, 44 + 16 * x / 48
@@ -78,7 +83,7 @@ def membrane(across, up):
     return replace(mesh, held=left, skin=right)
 
 
-def mound(x_lines, y_lines, radius, zone):
+def mound(x_lines: Array, y_lines: Array, radius: float, zone: float) -> Mesh:
     """Return a block whose underside is the parabola x^2 / (2 radius) that the theory of Hertz has; its top is held.
 
     It may touch where |x| is below `zone`.
@@ -93,14 +98,14 @@ def mound(x_lines, y_lines, radius, zone):
     return grid_mesh(points, np.zeros(len(y_lines) - 1, np.int64), skin, np.arange(len(x)) * len(y))
 
 
-def disc(radius, finest, zone):
+def disc(radius: float, finest: float, zone: float) -> Mesh:
     """Return a whole cylinder standing on the surface, fine below and above; its skin is the lower quarter."""
     fine = mirrored(graded(finest, 0.3, zone, radius * np.pi / 4)) / radius  # angles from the foot
     beside = np.linspace(-np.pi / 4, np.pi / 4, 13)
     out = 1 - graded(finest, 0.3, 0.0, 0.45 * radius)[::-1] / radius  # radii by the outer one
     half = 0.4 * radius
 
-    def quarter(angles, turn):
+    def quarter(angles: Array, turn: float) -> Array:
         angle = with_middles(angles)
         square = half * np.stack([np.tan(angle), -np.ones_like(angle)], axis=-1)
         circle = radius * np.stack([np.sin(angle), -np.cos(angle)], axis=-1)
@@ -119,12 +124,16 @@ def disc(radius, finest, zone):
     return replace(mesh, nodes=nodes, skin=chain(low, nodes[:, 0]))
 
 
-def _clockwise(grid):
+def _one_region(grid: Array) -> Indices:
+    return np.zeros((len(grid[0]) - 1) // 2, np.int64)
+
+
+def _clockwise(grid: Array) -> bool:
     first, second = grid[1, 0] - grid[0, 0], grid[0, 1] - grid[0, 0]
-    return first[0] * second[1] - first[1] * second[0] < 0
+    return bool(first[0] * second[1] - first[1] * second[0] < 0)
 
 
-def distorted(mesh, by, seed, still=None):
+def distorted(mesh: Mesh, by: float, seed: int, still: Indices | None = None) -> Mesh:
     """Move the inner corners of elements at random by up to `by` of their shortest edge; mid-nodes follow.
 
     Nodes in `still` stay, as does the boundary.
@@ -159,7 +168,7 @@ def distorted(mesh, by, seed, still=None):
     return out
 
 
-def placed(mesh, points):
+def placed(mesh: Mesh, points: Array) -> tuple[Indices, Array]:
     """Return the element that holds each point (p, 2), and the point's local coordinates there."""
     centres = mesh.nodes[mesh.elements[:, 8]]
     near = np.argsort(np.sum((points[:, None] - centres) ** 2, axis=2), axis=1)[:, :24]
@@ -172,7 +181,7 @@ def placed(mesh, points):
     return near[rows, best], local.reshape(*near.shape, 2)[rows, best]
 
 
-def stress(body, displacement, points):
+def stress(body: Body, displacement: Array, points: Array) -> Array:
     """Return the in-plane stress (p, 2, 2) [MPa] at `points` (p, 2) for displacements (nodes, 2)."""
     mesh, elastic = body.mesh, body.elastic
     element, local = placed(mesh, points)
@@ -185,7 +194,7 @@ def stress(body, displacement, points):
     return 2 * shear * strain + lame[:, None, None] * np.eye(2)
 
 
-def skin_motion(body, found):
+def skin_motion(body: Body, found: Contact) -> Array:
     """Return the displacement (2 k,) of the skin, normal first, of a body that nothing holds, in a state of contact."""
     t = body.touchable
     up = t.normal_by_normal @ found.normal + t.normal_by_tangential @ found.tangential + t.normal_free
@@ -193,11 +202,11 @@ def skin_motion(body, found):
     return np.concatenate([up, along]) + t.motions @ found.motion
 
 
-def touching_within(body, half_width):
+def touching_within(body: Body, half_width: float) -> States:
     """Return first states: points whose |x| is below `half_width` slip, the others are open."""
     return np.where(np.abs(body.mesh.nodes[body.mesh.skin, 0]) < half_width, SLIP, OPEN).astype(np.int8)
 
 
-def local_corners(mesh):
+def local_corners(mesh: Mesh) -> tuple[Indices, Array]:
     """Return an element number and local corner for each corner of each element."""
     return np.repeat(np.arange(len(mesh.elements)), 4), np.tile(Q2P1.corners, (len(mesh.elements), 1))

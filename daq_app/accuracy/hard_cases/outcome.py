@@ -1,0 +1,78 @@
+"""How a hard case ended, and what is wrong with it, if anything."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.failures import SolveFailure
+from solver.prediction import Prediction
+from solver.scene import Scene
+from solver.solution import answers
+
+BALANCE = ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance")  # those of them that an answer has
+LIMITS = ("penetration", "tension", "cone_violation")
+UNBALANCED, EXCEEDED = 1e-4, 1e-7  # largest part of the forces left over; largest part by which a law is exceeded
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a case ended."""
+
+    answered: bool
+    numbers: tuple[float, ...]  # all that was found; each must be finite
+    flaw: str  # "" where the answer is sound, else what is not
+    told: str  # for people: the answer with its error, or the reason why there is none
+
+
+def of_scene(asked: Scene) -> Outcome:
+    """Solve a scene of the finger through the solver's front door."""
+    (found,) = answers([asked])
+    return _refused(found) if isinstance(found, SolveFailure) else _answered(found)
+
+
+def _refused(failure: SolveFailure) -> Outcome:
+    told = str(failure)
+    flaw = "" if told.endswith(".") and "nan" not in told.split() else "its reason is no sentence"
+    return Outcome(False, (), flaw, told)
+
+
+def _answered(found: Prediction) -> Outcome:
+    checks = found.audits
+    flaws = [name for name in BALANCE if name in checks and not checks[name] < UNBALANCED]
+    flaws += [name for name in LIMITS if not checks[name] < EXCEEDED]
+    if found.scene.solve.kinematics == "finite" and not checks["smallest_det_F"] > 0.0:
+        flaws.append("smallest_det_F")
+    if not found.sed_ending > 0.0:
+        flaws.append("sed_ending")
+    if not 0.0 < found.error_estimate < math.inf:
+        flaws.append("error_estimate")
+    numbers = (found.sed_ending, found.sed_point, found.normal_force, found.tangential_force, found.error_estimate)
+    balance = max(checks[name] for name in BALANCE if name in checks)
+    told = (
+        f"SED {found.sed_ending:.4g} ± {percent(found.error_estimate)}, N {found.normal_force:.4g}, "
+        f"T {found.tangential_force + 0.0:.4g}; {found.newton_iterations} systems; balance {power(balance)}"
+    )
+    return Outcome(True, numbers, ", ".join(flaws), told)
+
+
+def agree(told: str, numbers: Sequence[float], within: float) -> Outcome:
+    """Return an outcome whose numbers must all be one."""
+    spread = float(np.ptp(numbers)) / abs(numbers[0])
+    flaw = "" if spread <= within else f"{len(numbers)} ways differ by {spread:.1g}"
+    return Outcome(True, tuple(numbers), flaw, f"{told}: {len(numbers)} ways agree to {power(spread)}")
+
+
+def percent(part: float) -> str:
+    """Return a part in percent, to two digits."""
+    return f"{100 * part:.2g} %"
+
+
+def power(value: float) -> str:
+    """Return the power of ten at or above a round-off, whose digits differ from machine to machine.
+
+    >>> power(3e-12), power(0.0)
+    ('1e-11', '1e-16')
+    """
+    return f"1e{math.ceil(math.log10(max(value, 1e-16)))}"
