@@ -1,0 +1,110 @@
+"""Where the time of one solve goes: mesh, assembly, factorisation, contact, estimate.
+
+A solve through the front door is run once to load what must be loaded, timed, and run again under a profiler whose
+shares are then of the time without it. What a function outside the solver takes is its caller's.
+"""
+
+import cProfile
+import pstats
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import cast
+
+from daq_app.accuracy.asked import Asked, Found, LeftOut, timed
+from daq_app.accuracy.methods import MAIN, Kinematics
+from daq_app.accuracy.truth import cases
+from solver.scene import Solve
+from solver.solution import solve
+
+# What a file of the solver does, and what a compiled loop does whose file does more than one thing.
+FILES = {
+    "mesher": "mesh and tables", "grid": "mesh and tables", "outline": "mesh and tables", "mesh": "mesh and tables",
+    "finite_body": "mesh and tables", "elements": "assembly", "stiffness": "assembly",
+    "dissection": "factorisation", "elimination": "factorisation", "fronts": "factorisation", "body": "factorisation",
+    "contact": "contact", "friction": "contact", "skin": "contact", "receptor": "receptor", "newton": "iteration",
+    "sliding": "iteration", "existence": "proof of existence", "crossing": "proof of existence",
+    "limit": "proof of existence", "audits": "audits and evidence", "evidence": "audits and evidence",
+    "kernels_numpy": "audits and evidence",
+}  # fmt: skip
+LOOPS = {
+    "assemble": "assembly", "advance": "assembly", "factorise": "factorisation", "substitute": "factorisation",
+    "impose": "contact", "reactions": "contact", "tributary": "contact", "restate": "contact", "energies": "receptor",
+}  # fmt: skip
+OTHER = "the rest"
+Function = tuple[str, int, str]  # file, line, name
+Spent = tuple[
+    int, int, float, float, dict["Function", tuple[int, int, float, float]]
+]  # calls, own and total time, callers
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """The parts of one solve, mesh and estimate included."""
+
+    kinematics: Kinematics
+    tolerance: float
+    dofs: int
+    took_s: float  # from scene to answer: median
+    setup_s: float  # as the answer itself tells
+    wall_s: float
+    estimate_s: float
+    parts: dict[str, float]  # shares of `took_s`
+
+
+def measure(asked: Asked, found: Found) -> Iterator[Cost | LeftOut]:
+    """Yield a row a kinematics and tolerance."""
+    del found
+    for kinematics in MAIN:
+        for tolerance in asked.pick((0.01, 0.003), (0.01,)):
+            scene = replace(cases(kinematics)[-1], solve=Solve(kinematics, tolerance=tolerance))
+            answer = solve(scene)
+            span = timed(lambda s=scene: solve(s), 5, 1.5)
+            profile = cProfile.Profile(builtins=False)
+            profile.enable()
+            solve(scene)
+            profile.disable()
+            yield Cost(
+                kinematics, tolerance, answer.dofs, span, answer.setup_s, answer.wall_s, answer.estimate_s,
+                shares(pstats.Stats(profile)),
+            )  # fmt: skip
+
+
+def shares(profile: pstats.Stats) -> dict[str, float]:
+    """Return the share of every part in a profile, the largest first."""
+    raw = cast("dict[Function, Spent]", vars(profile)["stats"])
+    part_of: dict[Function, dict[str, float]] = {}
+
+    def parts(function: Function, above: frozenset[Function]) -> dict[str, float]:
+        """Return which parts a function works for, as shares that sum to 1."""
+        own = _part(function)
+        if own is not None:
+            return {own: 1.0}
+        if function in part_of:
+            return part_of[function]
+        callers = {c: spent[3] for c, spent in raw[function][4].items() if c not in above}
+        total = sum(callers.values())
+        out: dict[str, float] = {}
+        for caller, spent in callers.items():
+            for name, share in parts(caller, above | {function}).items():
+                out[name] = out.get(name, 0.0) + share * (spent / total if total > 0.0 else 1.0 / len(callers))
+        part_of[function] = out or {OTHER: 1.0}
+        return part_of[function]
+
+    spent: dict[str, float] = {}
+    for function, row in raw.items():
+        for name, share in parts(function, frozenset()).items():
+            spent[name] = spent.get(name, 0.0) + share * row[2]
+    total = sum(spent.values())
+    return {name: value / total for name, value in sorted(spent.items(), key=lambda item: -item[1])}
+
+
+def _part(function: Function) -> str | None:
+    """Return the part a function belongs to; None where it is its caller's."""
+    path, _, name = function
+    file = Path(path)
+    if "solver" not in file.parts:
+        return None
+    if name in LOOPS and file.stem.startswith(("kernels", "elements", "fronts", "skin")):
+        return LOOPS[name]
+    return FILES.get(file.stem)

@@ -1,0 +1,99 @@
+"""Run the subjects one after another, within the time there is, and keep what was found however it ends."""
+
+import datetime
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from math import isfinite
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from daq_app.accuracy.asked import Asked, Found, LeftOut
+from daq_app.accuracy.subjects import SUBJECTS, Subject
+from solver.contact import ContactLost
+from solver.failures import SolveFailure
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+FULL_S, QUICK_S = 165.0, 17.0  # what the subjects may take; drawing the page comes on top
+ALWAYS = ("machine", "targets")  # cost nothing, and are told of what there is even when stopped
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """All that one run found."""
+
+    begun: str  # date and time, UTC
+    quick: bool
+    stopped: bool  # by the user, before everything was measured
+    took_s: dict[str, float]  # by subject
+    rows: "dict[str, tuple[DataclassInstance, ...]]"  # by subject
+    left_out: tuple[str, ...]
+
+    def of(self, kind: type[Any]) -> list[Any]:
+        """Return all rows of one kind."""
+        return [row for rows in self.rows.values() for row in rows if isinstance(row, kind)]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for a JSON file; a number that is none is null."""
+        rows = {
+            name: [{"kind": type(row).__name__, **asdict(row)} for row in found] for name, found in self.rows.items()
+        }
+        return _plain(
+            {
+                "begun": self.begun, "quick": self.quick, "stopped": self.stopped, "took_s": self.took_s,
+                "left_out": list(self.left_out), **rows,
+            }
+        )  # fmt: skip
+
+
+def measured(
+    quick: bool, progress: Progress, subjects: Sequence[Subject] = SUBJECTS, seconds: float | None = None
+) -> Measured:
+    """Return what the subjects find. Ctrl-C ends the measuring and keeps what was found until then."""
+    begun = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+    start = perf_counter()
+    end = start + (seconds or (QUICK_S if quick else FULL_S))
+    found = Found()
+    rows: dict[str, tuple[DataclassInstance, ...]] = {}
+    took: dict[str, float] = {}
+    left_out: list[str] = []
+    stopped = False
+    for number, subject in enumerate(subjects):
+        if stopped and subject.name not in ALWAYS:
+            left_out.append(f"Stopped before: {subject.told}.")
+            continue
+        part = _share(subject, quick) / max(sum(_share(s, quick) for s in subjects[number:]), 1e-9)
+        now = perf_counter()
+        asked = Asked(quick, now + max(end - now, 0.0) * part)
+        mine: list[DataclassInstance] = []
+        try:
+            for row in subject.measure(asked, found):
+                progress(min((perf_counter() - start) / (end - start), 0.99), subject.told)
+                if isinstance(row, LeftOut):
+                    left_out.append(row.told)
+                else:
+                    mine.append(row)
+                    found.rows.append(row)
+        except KeyboardInterrupt:
+            stopped = True
+            left_out.append(f"Stopped during: {subject.told}.")
+        except (SolveFailure, ContactLost, ArithmeticError, ValueError) as failure:
+            left_out.append(f"{subject.told.capitalize()} broke off: {failure}")
+        rows[subject.name], took[subject.name] = tuple(mine), perf_counter() - now
+    return Measured(begun, quick, stopped, took, rows, tuple(left_out))
+
+
+def _share(subject: Subject, quick: bool) -> float:
+    return subject.quick_share if quick else subject.share
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401  whatever JSON may hold
+    if isinstance(value, dict):
+        return {str(name): _plain(item) for name, item in value.items()}  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]  # pyright: ignore[reportUnknownVariableType]
+    if isinstance(value, float) and not isfinite(value):
+        return None
+    return value

@@ -1,0 +1,112 @@
+"""What only a process of its own shows: the cold start of `daq-app solve`, and the memory of one solve."""
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+from daq_app.accuracy.asked import Asked, Found, LeftOut
+from daq_app.accuracy.methods import Kinematics
+
+SCENE = """[friction]
+mu = 0.24
+tau_max = 0.00877
+[loading]
+indentation = 1.5
+slide = "-x"
+[solve]
+kinematics = "{kinematics}"
+"""
+TOLERANCE = 0.0015  # of the solve whose memory is measured
+LONGEST = 60.0  # seconds after which a process is given up
+# Run alone: the peak before it is the idle process, loops loaded, and what it rises by is the solve's.
+MEMORY = """
+import json, resource, sys
+from dataclasses import replace
+from solver.reference import SLIPPERINESS, scene
+from solver.scene import Solve
+from solver.solution import solve
+asked = scene(SLIPPERINESS[4])
+solve(replace(asked, solve=Solve("{kinematics}", tolerance=0.05)))
+unit = 1.0 if sys.platform == "darwin" else 1024.0
+before = unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+found = solve(replace(asked, solve=Solve("{kinematics}", tolerance={tolerance})))
+after = unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+print(json.dumps([before / 1e6, (after - before) / 1e6, found.dofs, found.error_estimate]))
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Cold:
+    """A process from start to end."""
+
+    what: str
+    runs: int
+    took_s: float  # median
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """What one solve needs above the idle process."""
+
+    kinematics: Kinematics
+    tolerance: float
+    dofs: int
+    error_estimate: float
+    idle_mb: float
+    solve_mb: float  # largest, above idle
+
+
+def measure(asked: Asked, found: Found) -> Iterator[Cold | Memory | LeftOut]:
+    """Yield cold starts and the memory of a solve in each kinematics."""
+    del found
+    with tempfile.TemporaryDirectory() as folder:
+        for what, command in _commands(Path(folder)):
+            if asked.left <= 0.0:
+                yield LeftOut(f"Time was over before the cold start of {what}.")
+                return
+            runs = 2 if asked.quick else 5
+            try:
+                yield Cold(what, runs, median(_run(command) for _ in range(runs)))
+            except (subprocess.SubprocessError, OSError) as bad:
+                yield LeftOut(f"The cold start of {what} could not be measured: {bad}.")
+    kinds: list[Kinematics] = ["small", "finite"]
+    for kinematics in kinds:
+        if asked.quick or asked.left <= 0.0:
+            yield LeftOut(f"Memory of a solve at {kinematics} strain is left to a full run.")
+            continue
+        yield _memory(kinematics)
+
+
+def _commands(folder: Path) -> list[tuple[str, list[str]]]:
+    python = sys.executable
+    out: list[tuple[str, list[str]]] = [
+        ("Python alone", [python, "-c", "pass"]),
+        ("Python and its arrays", [python, "-c", "import numpy, scipy.linalg"]),
+    ]
+    for kinematics in ("small", "finite"):
+        scene = folder / f"{kinematics}.toml"
+        scene.write_text(SCENE.format(kinematics=kinematics), encoding="utf-8")
+        out.append((f"daq-app solve, {kinematics} strain", [python, "-m", "daq_app", "solve", str(scene), "--json"]))
+    return out
+
+
+def _run(command: list[str]) -> float:
+    begun = perf_counter()
+    subprocess.run(command, check=True, capture_output=True, timeout=LONGEST)
+    return perf_counter() - begun
+
+
+def _memory(kinematics: Kinematics) -> Memory | LeftOut:
+    code = MEMORY.format(kinematics=kinematics, tolerance=TOLERANCE)
+    try:
+        done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=LONGEST)
+    except (subprocess.SubprocessError, OSError) as bad:
+        return LeftOut(f"Memory of a solve at {kinematics} strain could not be measured here: {bad}.")
+    idle, solving, dofs, estimate = json.loads(done.stdout)
+    return Memory(kinematics, TOLERANCE, dofs, estimate, idle, solving)

@@ -1,0 +1,130 @@
+"""What was asked of the solver's speed, row by row: reach and aim, what was measured, met or missed.
+
+Speeds are at a true error: the time is that of the cheapest way and mesh whose error on slipperiness 0 to 100 and
+stickiness 0 stays below it, without the cost of the estimate, mesh and tables apart. The floor is one assembly,
+factorisation and solve of the same system, timed in the same run.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from statistics import median
+
+from daq_app.accuracy.asked import Asked, Found
+from daq_app.accuracy.estimates import Guaranteed
+from daq_app.accuracy.growth import Growth, exponent
+from daq_app.accuracy.histories import Marched
+from daq_app.accuracy.processes import Cold, Memory
+from daq_app.accuracy.speed import Speed
+from daq_app.accuracy.warm import Warm
+
+AGREED = 1e-10  # a course and the direct state, relative
+PEAK = 0.02  # error of the warm stepper, by the peak
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """One row. Times in ms; `reach` and `aim` are None where a row only reports."""
+
+    work: str
+    at_error: str
+    unit: str
+    reach: float | None
+    aim: float | None
+    measured: float | None  # None: nothing measured met the error, or it was not measured
+    floors: float | None  # measured by the floor
+    how: str  # which way, mesh and error
+
+    @property
+    def verdict(self) -> str:
+        """Say plainly whether it was met."""
+        if self.measured is None:
+            return "not measured" if self.how == "" else "missed"
+        if self.reach is None:
+            return "reported"
+        if self.aim is not None and self.measured <= self.aim:
+            return "aim met"
+        return "reach met" if self.measured <= self.reach else "missed"
+
+
+def measure(asked: Asked, found: Found) -> Iterator[Target]:
+    """Yield every row from what the other subjects found."""
+    del asked
+    yield _at_error(found, "small strain, all ten surfaces, from scratch", "small", 0.01, 5.0, 2.0, lambda s: s.all_s)
+    yield _at_error(found, "finite strain, one surface from undeformed", "finite", 0.01, 12.0, 8.0, lambda s: s.first_s)
+    yield _at_error(found, "finite strain, each further surface", "finite", 0.01, 4.0, 2.0, lambda s: s.next_s)
+    yield _at_error(found, "finite strain, each further surface", "finite", 0.003, 12.0, 6.0, lambda s: s.next_s)
+    yield _at_error(found, "finite strain, one surface", "finite", 0.0015, 150.0, 80.0, lambda s: s.first_s)
+    yield _at_error(found, "finite strain, one surface", "finite", 0.0006, 400.0, 100.0, lambda s: s.first_s)
+    yield _warm(found, "warm stepper, finite strain, p99 of a reading", "finite", 1.5, 1.0)
+    yield _warm(found, "warm stepper, small strain, p99 of a reading", "small", 0.3, 0.1)
+    yield _marched(found)
+    yield _cold(found)
+    for row in found.of(Guaranteed):
+        yield _guaranteed(row)
+    for row in found.of(Memory):
+        yield Target(
+            f"memory of a solve, {row.kinematics} strain, above idle", _percent(row.tolerance), "MB", 100.0, None,
+            row.solve_mb, None, f"{row.dofs} unknowns, estimate {_percent(row.error_estimate)}",
+        )  # fmt: skip
+    for kinematics in ("small", "finite"):
+        rows = [row for row in found.of(Growth) if row.kinematics == kinematics]
+        power = exponent(rows)
+        how = "" if power is None else f"up to {max(r.dofs for r in rows):,} unknowns"
+        yield Target(
+            f"growth of the floor with unknowns, {kinematics} strain", "", "power", 1.5, None, power, None, how
+        )
+
+
+def _at_error(
+    found: Found, work: str, kinematics: str, error: float, reach: float, aim: float, time: Callable[[Speed], float]
+) -> Target:
+    rows = [row for row in found.of(Speed) if row.kinematics == kinematics]
+    good = [r for r in rows if r.judged_error is not None and r.judged_error <= error and time(r) == time(r)]
+    if not good:
+        least = min((r.judged_error for r in rows if r.judged_error is not None), default=None)
+        how = "" if least is None else f"no mesh that was tried is below: the best is at {_percent(least)}"
+        return Target(work, _percent(error), "ms", reach, aim, None, None, how)
+    best = min(good, key=time)
+    how = f"{best.method}, {best.dofs} unknowns, error {_percent(best.judged_error or 0.0)}"
+    return Target(work, _percent(error), "ms", reach, aim, 1e3 * time(best), time(best) / best.floor_s, how)
+
+
+def _warm(found: Found, work: str, kinematics: str, reach: float, aim: float) -> Target:
+    rows = [row for row in found.of(Warm) if row.kinematics == kinematics]
+    at = f"{_percent(PEAK)} of peak"
+    if not rows:
+        return Target(work, at, "ms", reach, aim, None, None, "")
+    worst = max(row.worst_error for row in rows)
+    how = f"error {_percent(worst)} of peak, median {1e3 * median(r.median_s for r in rows):.3g} ms"
+    slowest = 1e3 * max(row.p99_s for row in rows)
+    return Target(work, at, "ms", reach, aim, slowest if worst <= PEAK else None, None, how)
+
+
+def _marched(found: Found) -> Target:
+    work, rows = "a course of 200 substeps, by the direct solve", found.of(Marched)
+    if not rows:
+        return Target(work, "1e-10", "times", 60.0, 30.0, None, None, "")
+    off = max(abs(row.difference) for row in rows)
+    how = f"largest difference {off:.0e}, both kinematics"
+    times = max(row.marched_s / row.direct_s for row in rows)
+    return Target(work, "1e-10", "times", 60.0, 30.0, times if off <= AGREED else None, None, how)
+
+
+def _cold(found: Found) -> Target:
+    work = "`daq-app solve` as a cold process, compiled code cached"
+    rows = [row for row in found.of(Cold) if row.what.startswith("daq-app")]
+    if not rows:
+        return Target(work, "", "ms", 1000.0, 400.0, None, None, "")
+    how = ", ".join(f"{row.what.removeprefix('daq-app solve, ')} {1e3 * row.took_s:.0f} ms" for row in rows)
+    return Target(work, "", "ms", 1000.0, 400.0, 1e3 * max(row.took_s for row in rows), None, how)
+
+
+def _guaranteed(row: Guaranteed) -> Target:
+    error = "" if row.worst_error is None else f", true error {_percent(row.worst_error)}"
+    how = f"{row.dofs} unknowns, estimate {_percent(row.worst_estimate)}{error}"
+    work = f"guaranteed tolerance, {row.kinematics} strain, {row.surfaces} surfaces, mesh and estimate included"
+    return Target(work, _percent(row.tolerance), "ms", None, None, 1e3 * row.took_s, None, how)
+
+
+def _percent(part: float) -> str:
+    return f"{100 * part:.2g} %"

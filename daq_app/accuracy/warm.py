@@ -1,0 +1,99 @@
+"""The warm stepper that a live view calls: time a reading, and how far the response is off while forces come in.
+
+The truth is a course driven by depth on a finer mesh, pressing and then sliding; its forces, without noise and without
+a bound on traction, are what the stepper is given. A busy machine stops a process for milliseconds now and then: so
+each reading counts with its median over several passes, and the percentile of one pass stands beside.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from daq_app.accuracy.asked import Asked, Found, LeftOut, within
+from daq_app.accuracy.methods import FiniteMeshed, Kinematics, SmallMeshed
+from daq_app.accuracy.truth import cases
+from solver.contact import Course, untouched
+from solver.friction import FrictionLaw
+from solver.march import march, press_and_slide
+from solver.scene import Friction, Scene
+from solver.stepper import Stepper, stepper
+
+PASSES = 5
+PRESS, SLIDES, DISTANCE = 200, 60, 6.0  # readings of the press and of the slide, and how far it goes [mm]
+FINER: dict[Kinematics, float] = {"small": 16.0, "finite": 12.0}  # fineness of the truth's mesh
+SURFACES = ("slipperiness 100", "slipperiness 55", "slipperiness 0", "stickiness 0")
+Reading = tuple[float, float, float]  # normal and tangential force [N/mm], SED [MPa]
+
+
+@dataclass(frozen=True, slots=True)
+class Warm:
+    """One surface followed reading by reading."""
+
+    kinematics: Kinematics
+    case: str
+    readings: int
+    median_s: float
+    p99_s: float  # of each reading's median over the passes
+    once_p99_s: float  # of the last pass alone
+    worst_error: float  # of the SED, by its peak
+    setup_s: float
+
+
+def measure(asked: Asked, found: Found) -> Iterator[Warm | LeftOut]:
+    """Yield a row a surface and kinematics."""
+    del found
+    names = SURFACES[:1] + SURFACES[3:] if asked.quick else SURFACES
+    scenes = [s for kind in ("small", "finite") for s in cases(kind) if s.title in names]
+    for scene in within(asked, scenes, "surfaces followed reading by reading"):
+        yield scene if isinstance(scene, LeftOut) else _row(replace(scene, friction=Friction(scene.friction.mu)))
+
+
+def _row(scene: Scene) -> Warm:
+    kinematics = scene.solve.kinematics
+    readings = list(_small(scene) if kinematics == "small" else _finite(scene))
+    begun = perf_counter()
+    follows = stepper(scene)
+    setup = perf_counter() - begun
+    spans, found = timed_passes(follows, readings)
+    truth = np.array([sed for _, _, sed in readings])
+    each = np.median(spans, axis=0)
+    return Warm(
+        kinematics, scene.title, len(readings), float(np.median(each)), float(np.percentile(each, 99)),
+        float(np.percentile(spans[-1], 99)), float(np.abs(found - truth).max() / truth.max()), setup,
+    )  # fmt: skip
+
+
+def timed_passes(follows: Stepper, readings: list[Reading]) -> tuple[np.ndarray, np.ndarray]:
+    """Return what each reading took in each pass (passes, n) [s], and the SED found in the last (n,)."""
+    spans = np.zeros((PASSES, len(readings)))
+    found = np.zeros(len(readings))
+    for number in range(PASSES):
+        follows.forget()
+        for n, (normal, tangential, _) in enumerate(readings):
+            begun = perf_counter()
+            found[n] = follows.step(normal, tangential)
+            spans[number, n] = perf_counter() - begun
+    return spans, found
+
+
+def _small(scene: Scene) -> Iterator[Reading]:
+    finger = SmallMeshed(scene, FINER["small"], False).finger
+    course = Course(finger.body.touchable, FrictionLaw(scene.friction.mu, np.inf))
+    state = untouched(finger.body.touchable)
+    depth, direction = scene.loading.indentation, scene.loading.direction
+    press = [(depth * (n + 1) / PRESS, 0.0) for n in range(PRESS)]
+    slide = [(depth, direction * DISTANCE * (n + 1) / SLIDES) for n in range(SLIDES)]
+    for down, along in press + slide:
+        state = course.step(state, down, along)
+        sed = finger.sed_ending(finger.displacement(state))
+        yield float(state.normal.sum()), float(state.tangential.sum()), sed
+
+
+def _finite(scene: Scene) -> Iterator[Reading]:
+    finger = FiniteMeshed(scene, FINER["finite"], False).finger
+    depth, mu, direction = scene.loading.indentation, scene.friction.mu, scene.loading.direction
+    course = press_and_slide(depth, mu, np.inf, direction, press=PRESS, slides=SLIDES, distance=DISTANCE)
+    for shape in march(finger.newton, course, tolerance=1e-6):
+        yield float(shape.force[1]), float(shape.force[0]), finger.sed_ending(shape)
