@@ -44,7 +44,7 @@ def measure(asked: Asked, found: Found) -> Iterator[Marched | LeftOut]:
 
 def _small(scene: Scene) -> Marched:
     mesh = SmallMeshed(scene, FINENESS["small"], False)
-    touch, depth, way = mesh.finger.body.touchable, scene.loading.indentation, scene.loading.direction
+    touch, depth, way = mesh.finger.body.touchable, scene.loading.depth, scene.loading.direction
     law = FrictionLaw(float(scene.friction.mu), scene.friction.cap)
 
     def direct() -> float:
@@ -65,7 +65,7 @@ def _finite(scene: Scene) -> Marched:
     mesh = FiniteMeshed(scene, FINENESS["finite"], False)
     friction, loading = scene.friction, scene.loading
     course = press_and_slide(
-        loading.indentation, friction.mu, friction.cap if friction.tau_max is not None else np.inf, loading.direction,
+        loading.depth, friction.mu, friction.cap if friction.tau_max is not None else np.inf, loading.direction,
         press=PRESS, slides=SLIDES, distance=DISTANCE,
     )  # fmt: skip
     span = timed(lambda: mesh.numbers(mesh.solve(scene)), 5)

@@ -2,13 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 from time import perf_counter
 from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from solver.carrying import carried
 from solver.elements import Q2P1
 from solver.existence import steady
 from solver.finger import FingerModel
@@ -17,7 +15,6 @@ from solver.mesh import Array
 from solver.mesher import Sizing
 from solver.newton import Pull, Shape
 from solver.scene import Scene
-from solver.sliding import settled as slid
 from solver.solution import numbers_on, settled
 
 Kinematics = Literal["small", "finite"]
@@ -66,7 +63,7 @@ class SmallMeshed:
     def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
         """Mesh and reduce the finger of `scene`."""
         begun = perf_counter()
-        self.finger = FingerModel.of(scene, Sizing(fineness, scene.loading.indentation, shift, margin=4.0))
+        self.finger = FingerModel.of(scene, Sizing(fineness, scene.loading.depth, shift, margin=4.0))
         self.prepared_s = self.finger.solve_s
         self.setup_s = perf_counter() - begun - self.prepared_s
         self.dofs = self.finger.body.dofs
@@ -118,49 +115,21 @@ class FiniteMeshed:
         return perf_counter() - begun
 
 
-class CarriedMeshed(FiniteMeshed):
-    """Finite strain, each mesh starting from the state of a coarser one."""
-
-    LADDER = (5.0, 12.0)  # finenesses of the coarser meshes
-
-    def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
-        """Mesh the finger of `scene`, and coarser."""
-        super().__init__(scene, fineness, shift)
-        begun = perf_counter()
-        self.coarser = [_finite(scene, n, False) for n in self.LADDER if n < 0.7 * fineness]
-        self.setup_s += perf_counter() - begun
-
-    def solve(self, scene: Scene, before: State | None = None) -> State:
-        """Return the settled shape, carried up from the coarsest mesh unless there is a state `before`."""
-        if before is not None:
-            return super().solve(scene, before)
-        levels = [*self.coarser, self.finger]
-        shape = slid(levels[0].newton, pull_of(scene), tolerance=1e-3)
-        for coarse, fine in pairwise(levels):
-            start = carried(shape, coarse.geometry, fine.geometry, fine.newton.body)
-            if fine is not self.finger:
-                shape = slid(fine.newton, pull_of(scene), start, 1e-3)
-            else:
-                return super().solve(scene, start)
-        return super().solve(scene)
-
-
 def _finite(scene: Scene, fineness: float, shift: bool) -> FiniteFinger:
-    return FiniteFinger.of(scene, Sizing(fineness, scene.loading.indentation, shift, margin=MARGIN))
+    return FiniteFinger.of(scene, Sizing(fineness, scene.loading.depth, shift, margin=MARGIN))
 
 
 def pull_of(scene: Scene) -> Pull:
     """Return what the surface does in a scene of settled sliding."""
     friction, loading = scene.friction, scene.loading
-    return Pull(loading.indentation, float(friction.mu), friction.cap, -(loading.direction or 1))
+    return Pull(loading.depth, float(friction.mu), friction.cap, -(loading.direction or 1))
 
 
-_BAND = "band factorisation in compiled loops"
+_FRONTS = "nested dissection in compiled loops"
 SMALL = Method(
     "small strain", "small", Q2P1.name, Q2P1.order, "nested dissection, dense contact", "one guess", SmallMeshed
 )
-FINITE = Method("finite strain", "finite", Q2P1.name, Q2P1.order, _BAND, "undeformed", FiniteMeshed)
-CARRIED = Method("finite strain, carried up", "finite", Q2P1.name, Q2P1.order, _BAND, "coarser meshes", CarriedMeshed)
+FINITE = Method("finite strain", "finite", Q2P1.name, Q2P1.order, _FRONTS, "undeformed", FiniteMeshed)
 
-METHODS = (SMALL, FINITE, CARRIED)
+METHODS = (SMALL, FINITE)
 MAIN: dict[Kinematics, Method] = {"small": SMALL, "finite": FINITE}  # the one an answer comes from

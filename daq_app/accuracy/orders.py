@@ -127,7 +127,7 @@ def finite_finger(quick: bool) -> Iterator[Order]:
     asked = scene(SLIPPERINESS[4])
 
     def sed(fineness: float, shift: bool) -> float:
-        finger = FiniteFinger.of(asked, Sizing(fineness, asked.loading.indentation, shift, margin=3.0))
+        finger = FiniteFinger.of(asked, Sizing(fineness, asked.loading.depth, shift, margin=3.0))
         return finger.sed_ending(finger.settled(asked, lambda: False))
 
     finenesses = (4.0, 6.0, 8.0) if quick else (4.0, 6.0, 8.0, 12.0)

@@ -8,7 +8,7 @@ from statistics import median
 import numpy as np
 
 from daq_app.accuracy.asked import Asked, Found, LeftOut, timed, within
-from daq_app.accuracy.methods import CARRIED, METHODS, Method
+from daq_app.accuracy.methods import METHODS, Method
 from daq_app.accuracy.truth import JUDGED, Truth, cases, known
 from solver.contact import ContactLost
 from solver.failures import SolveFailure
@@ -51,10 +51,7 @@ class Speed:
 def measure(asked: Asked, found: Found) -> Iterator[Speed | LeftOut]:
     """Yield a row for every way and mesh, coarse meshes of all ways before fine ones."""
     pairs = [
-        (fineness, method)
-        for method in METHODS
-        for fineness in (QUICK if asked.quick else MESHES)[method.kinematics]
-        if method is not CARRIED or fineness > 1.5 * 5.0
+        (fineness, method) for method in METHODS for fineness in (QUICK if asked.quick else MESHES)[method.kinematics]
     ]
     for item in within(asked, sorted(pairs, key=lambda pair: pair[0]), "meshes and ways of solving"):
         if isinstance(item, LeftOut):
@@ -66,7 +63,7 @@ def measure(asked: Asked, found: Found) -> Iterator[Speed | LeftOut]:
 
 def _row(method: Method, fineness: float, truths: dict[str, Truth]) -> Speed:
     chosen = [scene for scene in cases(method.kinematics) if scene.title in truths]
-    deepest = max(chosen, key=lambda scene: scene.loading.indentation)
+    deepest = max(chosen, key=lambda scene: scene.loading.depth)
     builds = [method.meshed(deepest, fineness, False) for _ in range(3)]
     mesh = builds[-1]
     prepared = median(b.prepared_s for b in builds)
@@ -87,7 +84,7 @@ def _row(method: Method, fineness: float, truths: dict[str, Truth]) -> Speed:
         first.append(timed(lambda s=scene: mesh.numbers(mesh.solve(s)), 5, 0.25))
     onward: list[float] = []
     for (one, before), (scene, _) in pairwise(states):
-        if one.loading.indentation == scene.loading.indentation and one.loading.slide == scene.loading.slide:
+        if one.loading.depth == scene.loading.depth and one.loading.slide == scene.loading.slide:
             onward.append(timed(lambda s=scene, b=before: mesh.numbers(mesh.solve(s, b)), 5, 0.25))
     next_s = median(onward) if onward else float("nan")
     return Speed(

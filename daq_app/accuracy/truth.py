@@ -12,7 +12,7 @@ from time import perf_counter
 import numpy as np
 
 from daq_app.accuracy.asked import Asked, Found, LeftOut
-from daq_app.accuracy.methods import CARRIED, SMALL, Kinematics, Meshed, Method
+from daq_app.accuracy.methods import FINITE, SMALL, Kinematics, Meshed, Method
 from solver.contact import ContactLost
 from solver.failures import SolveFailure
 from solver.reference import scenes
@@ -55,7 +55,7 @@ def measure(asked: Asked, found: Found) -> Iterator[Truth | LeftOut]:
     """Yield the truth of every case; a quick run takes coarser overkill and only the cases speeds are asked at."""
     del found
     overkill = QUICK if asked.quick else OVERKILL
-    for method in (SMALL, CARRIED):
+    for method in (SMALL, FINITE):
         chosen = [s for s in cases(method.kinematics) if s.title in JUDGED or not asked.quick]
         yield from _truths(asked, method, chosen, overkill[method.kinematics])
 
@@ -65,7 +65,7 @@ def _truths(
 ) -> Iterator[Truth | LeftOut]:
     refused, todo = _sorted_out(method.kinematics, chosen)
     yield from refused
-    deepest = max(chosen, key=lambda scene: scene.loading.indentation)
+    deepest = max(chosen, key=lambda scene: scene.loading.depth)
     begun = perf_counter()
     meshes = [method.meshed(deepest, fineness, shift) for fineness, shift in overkill]
     shared = (perf_counter() - begun) / max(len(todo), 1)

@@ -82,7 +82,7 @@ def _small(scene: Scene) -> Iterator[Reading]:
     finger = SmallMeshed(scene, FINER["small"], False).finger
     course = Course(finger.body.touchable, FrictionLaw(scene.friction.mu, np.inf))
     state = untouched(finger.body.touchable)
-    depth, direction = scene.loading.indentation, scene.loading.direction
+    depth, direction = scene.loading.depth, scene.loading.direction
     press = [(depth * (n + 1) / PRESS, 0.0) for n in range(PRESS)]
     slide = [(depth, direction * DISTANCE * (n + 1) / SLIDES) for n in range(SLIDES)]
     for down, along in press + slide:
@@ -93,7 +93,7 @@ def _small(scene: Scene) -> Iterator[Reading]:
 
 def _finite(scene: Scene) -> Iterator[Reading]:
     finger = FiniteMeshed(scene, FINER["finite"], False).finger
-    depth, mu, direction = scene.loading.indentation, scene.friction.mu, scene.loading.direction
+    depth, mu, direction = scene.loading.depth, scene.friction.mu, scene.loading.direction
     course = press_and_slide(depth, mu, np.inf, direction, press=PRESS, slides=SLIDES, distance=DISTANCE)
     for shape in march(finger.newton, course, tolerance=1e-6):
         yield float(shape.force[1]), float(shape.force[0]), finger.sed_ending(shape)
