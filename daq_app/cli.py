@@ -22,6 +22,7 @@ VERBS = {
     "analyse": "find the strokes of a session and their friction",
     "predict": "predict the receptor's strain-energy density for each trial",
     "solve": "run the solver on a scene file",
+    "accuracy": "measure how fast the solver is and how true, on this machine, as one page",
     "report": "write a session's report as one page",
     "export": "write a session as CSV, BIDS, HDF5 or NWB",
     "selftest": "pull its own plug on this computer and disk, and write a certificate",

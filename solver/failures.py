@@ -29,6 +29,16 @@ class SolveFailure(Exception):
             }
         }
 
+    def in_a_sentence(self) -> "SolveFailure":
+        """Return this failure with its message begun and ended as a sentence: parts of the solver tell fragments.
+
+        >>> str(SolveFailure("no equilibrium within 25 iterations").in_a_sentence())
+        'No equilibrium within 25 iterations.'
+        """
+        told = str(self)
+        whole = told[:1].upper() + told[1:] + ("" if told.endswith(".") else ".")
+        return type(self)(whole, limit_mu=self.limit_mu, limit_indentation=self.limit_indentation)
+
 
 class NoSteadyState(SolveFailure):
     """The finger cannot slide steadily: its drag wedges it into the surface faster than it yields."""

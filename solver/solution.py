@@ -74,7 +74,8 @@ def answers(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[
     out: dict[int, Prediction | SolveFailure] = {}
     for group in _groups(scenes):
         out |= dict(zip(group, _solve_group([scenes[i] for i in group], progress), strict=True))
-    return tuple(out[i] for i in range(len(scenes)))
+    told = {i: answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer for i, answer in out.items()}
+    return tuple(told[i] for i in range(len(scenes)))
 
 
 def _groups(scenes: Sequence[Scene]) -> list[list[int]]:

@@ -38,7 +38,7 @@ def page(report: Report) -> str:
         question=question(report),
         summary=summary(report),
         figures=figures,
-        drawing=_drawing,
+        drawing=drawn,
         numbers=_numbers(figures, tables),
         contents=_contents(report, figures, tables),
         tables=tables,
@@ -52,7 +52,7 @@ def write_report(report: Report, path: Path) -> None:
     """
     if path.exists() and not _is_page(path):
         raise ReportError(f"{path} holds something that is no report, so it is left alone: choose another file")
-    _swap_in(path, page(report))
+    swap_in(path, page(report))
 
 
 def write_figures(report: Report, folder: Path) -> tuple[Path, ...]:
@@ -62,7 +62,7 @@ def write_figures(report: Report, folder: Path) -> tuple[Path, ...]:
         for panel in plate.panels:
             for ending, text in ((".svg", panel.svg), (".csv", _csv(panel, report))):
                 path = folder / (_file_name(panel.name) + ending)
-                _swap_in(path, text)
+                swap_in(path, text)
                 written.append(path)
     return tuple(written)
 
@@ -92,7 +92,7 @@ def _contents(
     return tuple((anchor, words) for anchor, words, there in parts if there)
 
 
-def _drawing(panel: Panel) -> Markup:
+def drawn(panel: Panel) -> Markup:
     """Return the picture as it stands in a page: without the head an SVG file has."""
     return Markup(panel.svg[panel.svg.index("<svg") :])
 
@@ -123,7 +123,7 @@ def _is_page(path: Path) -> bool:
     return start in (b"", HEAD.encode())
 
 
-def _swap_in(path: Path, text: str) -> None:
+def swap_in(path: Path, text: str) -> None:
     """Write a file beside its place, then put it there in one step."""
     beside = path.with_name(f".{path.name}.{os.getpid()}.new")
     try:
