@@ -8,10 +8,11 @@ import cProfile
 import pstats
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import cast
 
-from daq_app.accuracy.asked import Asked, Found, LeftOut, timed
+from daq_app.accuracy.asked import Asked, Found, LeftOut, timed, within
 from daq_app.accuracy.methods import MAIN, Kinematics
 from daq_app.accuracy.truth import cases
 from solver.scene import Solve
@@ -55,16 +56,22 @@ class Cost:
 def measure(asked: Asked, found: Found) -> Iterator[Cost | LeftOut]:
     """Yield a row a kinematics and tolerance."""
     del found
-    for kinematics in MAIN:
-        for tolerance in asked.pick((0.01, 0.003), (0.01,)):
-            scene = replace(cases(kinematics)[-1], solve=Solve(kinematics, tolerance=tolerance))
-            answer = solve(scene)
-            span = timed(lambda s=scene: solve(s), 5, 1.5)
-            profile = cProfile.Profile(builtins=False)
-            profile.enable()
-            solve(scene)
-            profile.disable()
-            yield Cost(
+    works: list[tuple[Kinematics, float]] = [
+        (kinematics, tolerance) for tolerance in asked.pick((0.01, 0.003), (0.01,)) for kinematics in MAIN
+    ]
+    for work in within(asked, works, "solves whose cost is broken down"):
+        if isinstance(work, LeftOut):
+            yield work
+            return
+        kinematics, tolerance = work
+        scene = replace(cases(kinematics)[-1], solve=Solve(kinematics, tolerance=tolerance))
+        answer = solve(scene)
+        span = timed(partial(solve, scene), 5, 1.5)
+        profile = cProfile.Profile(builtins=False)
+        profile.enable()
+        solve(scene)
+        profile.disable()
+        yield Cost(
                 kinematics, tolerance, answer.dofs, span, answer.setup_s, answer.wall_s, answer.estimate_s,
                 shares(pstats.Stats(profile)),
             )  # fmt: skip

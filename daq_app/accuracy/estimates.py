@@ -6,11 +6,10 @@ solved together, and random scenes, each alone.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from time import perf_counter
 
 import numpy as np
 
-from daq_app.accuracy.asked import Asked, Found, LeftOut
+from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, within
 from daq_app.accuracy.methods import MAIN, Kinematics
 from daq_app.accuracy.random_scenes import random_scene
 from daq_app.accuracy.truth import NUMBERS, QUICK, cases, known
@@ -83,13 +82,13 @@ def measure(asked: Asked, found: Found) -> Iterator[Estimate | Guaranteed | Left
 def _published(asked: Asked, found: Found, kinematics: Kinematics) -> Iterator[Estimate | Guaranteed | LeftOut]:
     truths = known(found, kinematics)
     chosen = [scene for scene in cases(kinematics) if scene.title in truths]
-    for tolerance in asked.pick(TOLERANCES, TOLERANCES[:1] if kinematics == "finite" else TOLERANCES[:2]):
-        if asked.left <= 0.0 or not chosen:
-            yield LeftOut(f"Time was over before a tolerance of {tolerance:g} at {kinematics} strain.")
+    for tolerance in within(asked, asked.pick(TOLERANCES, TOLERANCES[:1]), f"tolerances at {kinematics} strain"):
+        if isinstance(tolerance, LeftOut) or not chosen:
+            yield tolerance if isinstance(tolerance, LeftOut) else LeftOut(f"No truth is known at {kinematics} strain.")
             return
-        begun = perf_counter()
+        begun = clock()
         found_all = answers([replace(s, solve=Solve(kinematics, tolerance=tolerance)) for s in chosen])
-        took = perf_counter() - begun
+        took = clock() - begun
         rows: list[Estimate] = []
         good = [a for a in found_all if isinstance(a, Prediction)]
         for answer in good:

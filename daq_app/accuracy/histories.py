@@ -2,11 +2,10 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from time import perf_counter
 
 import numpy as np
 
-from daq_app.accuracy.asked import Asked, Found, LeftOut, timed, within
+from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, timed, within
 from daq_app.accuracy.methods import FiniteMeshed, Kinematics, SmallMeshed
 from daq_app.accuracy.truth import JUDGED, cases
 from solver.contact import Course, untouched
@@ -51,13 +50,13 @@ def _small(scene: Scene) -> Marched:
         return float(mesh.numbers(Course(touch, law).sliding(depth, way))[0])
 
     span = timed(direct, 9)
-    course, state, begun = Course(touch, law), untouched(touch), perf_counter()
+    course, state, begun = Course(touch, law), untouched(touch), clock()
     for n in range(PRESS):
         state = course.step(state, depth * (n + 1) / PRESS, 0.0)
     for n in range(SLIDES):
         state = course.step(state, depth, way * DISTANCE * (n + 1) / SLIDES)
     sed = float(mesh.numbers(state)[0])
-    took = perf_counter() - begun
+    took = clock() - begun
     return Marched("small", scene.title, mesh.dofs, mesh.prepared_s + span, mesh.prepared_s + took, sed / direct() - 1)
 
 
@@ -69,9 +68,9 @@ def _finite(scene: Scene) -> Marched:
         press=PRESS, slides=SLIDES, distance=DISTANCE,
     )  # fmt: skip
     span = timed(lambda: mesh.numbers(mesh.solve(scene)), 5)
-    begun = perf_counter()
+    begun = clock()
     *_, last = march(mesh.finger.newton, course)
     sed = float(mesh.numbers(last)[0])
-    took = perf_counter() - begun
+    took = clock() - begun
     off = sed / float(mesh.numbers(mesh.solve(scene))[0]) - 1
     return Marched("finite", scene.title, mesh.dofs, span, took, off)

@@ -2,15 +2,18 @@
 
 import datetime
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from daq_app.accuracy.asked import Asked, Found, LeftOut
 from daq_app.accuracy.subjects import SUBJECTS, Subject
+from daq_app.accuracy.truth import cases
 from solver.contact import ContactLost
 from solver.failures import SolveFailure
+from solver.solution import solve
+from solver.stepper import stepper
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -53,6 +56,7 @@ def measured(
 ) -> Measured:
     """Return what the subjects find. Ctrl-C ends the measuring and keeps what was found until then."""
     begun = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+    loaded(progress)  # before the clock starts: the first run ever compiles what later ones load
     start = perf_counter()
     end = start + (seconds or (QUICK_S if quick else FULL_S))
     found = Found()
@@ -83,6 +87,15 @@ def measured(
             left_out.append(f"{subject.told.capitalize()} broke off: {failure}")
         rows[subject.name], took[subject.name] = tuple(mine), perf_counter() - now
     return Measured(begun, quick, stopped, took, rows, tuple(left_out))
+
+
+def loaded(progress: Progress) -> None:
+    """Solve once in each kinematics and follow one reading, so that compiled loops are in memory and nothing waits."""
+    progress(0.0, "loading compiled loops")
+    for kinematics in ("small", "finite"):
+        scene = cases(kinematics)[-1]
+        solve(replace(scene, solve=replace(scene.solve, tolerance=0.1)))
+        stepper(scene).step(1e-3, 0.0)
 
 
 def _share(subject: Subject, quick: bool) -> float:

@@ -2,11 +2,10 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from time import perf_counter
 
 import numpy as np
 
-from daq_app.accuracy.asked import Asked, Found, LeftOut
+from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, within
 from daq_app.accuracy.published import contacts, locking
 from solver.finger import FingerModel
 from solver.finite_solution import FiniteFinger
@@ -44,15 +43,12 @@ def slope(sizes: Errors, errors: Errors) -> float:
 def measure(asked: Asked, found: Found) -> Iterator[Order | LeftOut]:
     """Yield a row for each quantity, until time is over."""
     del found
-    works: list[tuple[str, Callable[[bool], Iterator[Order]]]] = [
-        ("thick cylinders", cylinders), ("Cook's membrane", membranes), ("a pressed half-plane", pressed),
-        ("the finger at small strain", small_finger), ("the finger at finite strain", finite_finger),
-    ]  # fmt: skip
-    for what, work in works:
-        if asked.left <= 0.0:
-            yield LeftOut(f"Time was over before the orders of {what}.")
-            continue
-        yield from work(asked.quick)
+    works: list[Callable[[bool], Iterator[Order]]] = [cylinders, membranes, small_finger, finite_finger, pressed]
+    for work in within(asked, works, "problems whose order is observed"):
+        if isinstance(work, LeftOut):
+            yield work
+        else:
+            yield from work(asked.quick)
 
 
 def _row(
@@ -70,9 +66,9 @@ def cylinders(quick: bool) -> Iterator[Order]:
         errors: list[tuple[float, ...]] = []
         took: list[float] = []
         for size in sizes:
-            begun = perf_counter()
+            begun = clock()
             errors.append(locking.cylinder_errors(nu, round(1 / size)))
-            took.append(perf_counter() - begun)
+            took.append(clock() - begun)
         for (quantity, least), column in zip(
             (("displacement", 2.9), ("stress", 1.9), ("energy", 3.7)), zip(*errors, strict=True), strict=True
         ):
@@ -88,9 +84,9 @@ def membranes(quick: bool) -> Iterator[Order]:
     risen: list[float] = []
     took: list[float] = []
     for count in counts:
-        begun = perf_counter()
+        begun = clock()
         risen.append(locking.cook(240.565, 0.4999, 100.0, count)[0])
-        took.append(perf_counter() - begun)
+        took.append(clock() - begun)
     gained = np.diff(risen) / risen[-1]
     sizes = [1 / count for count in counts[:-1]]
     yield _row("Cook's membrane, nu 0.4999", "displacement", "small", sizes, gained.tolist(), took[:-1], 0.9)
@@ -103,9 +99,9 @@ def pressed(quick: bool) -> Iterator[Order]:
     errors: list[float] = []
     took: list[float] = []
     for size in sizes:
-        begun = perf_counter()
+        begun = clock()
         errors.append(_rms([contacts.press(size * s, 0.4999) / true - 1 for s in np.linspace(0.9, 1.1, 4).tolist()]))
-        took.append((perf_counter() - begun) / 4)
+        took.append((clock() - begun) / 4)
     yield _row("half-plane under a round body", "force", "small", sizes, errors, took, 1.7)
 
 
@@ -142,9 +138,9 @@ def _finger(
     took: list[float] = []
     for fineness in meshes:
         near = [(fineness * part, shift) for part in (0.92, 1.0, 1.08) for shift in (False, True)]
-        begun = perf_counter()
+        begun = clock()
         errors.append(_rms([sed(*mesh) / true - 1 for mesh in near]))
-        took.append((perf_counter() - begun) / len(near))
+        took.append((clock() - begun) / len(near))
     sizes = [meshes[0] / fineness for fineness in meshes]
     return _row(f"finger, {title}", "SED of the ending", kinematics, sizes, errors, took, least)
 

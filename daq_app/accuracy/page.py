@@ -5,6 +5,7 @@ from pathlib import Path
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, select_autoescape
 
+from daq_app.accuracy.asked import PROCESSOR_TIME
 from daq_app.accuracy.figures import plates
 from daq_app.accuracy.measuring import Measured
 from daq_app.accuracy.tables import tables
@@ -45,6 +46,7 @@ def page(found: Measured) -> str:
         parts={name: parts for name, _, parts in there},
         wide=("benchmarks", "orders", "costs"),
         drawn=drawn,
+        processor_time=PROCESSOR_TIME,
     )
 
 

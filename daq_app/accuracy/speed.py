@@ -53,6 +53,9 @@ def measure(asked: Asked, found: Found) -> Iterator[Speed | LeftOut]:
     pairs = [
         (fineness, method) for method in METHODS for fineness in (QUICK if asked.quick else MESHES)[method.kinematics]
     ]
+    if not all(known(found, method.kinematics) for method in METHODS):
+        yield LeftOut("Speeds need the truth of both kinematics, which is not known.")
+        return
     for item in within(asked, sorted(pairs, key=lambda pair: pair[0]), "meshes and ways of solving"):
         if isinstance(item, LeftOut):
             yield item

@@ -7,11 +7,10 @@ each reading counts with its median over several passes, and the percentile of o
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from time import perf_counter
 
 import numpy as np
 
-from daq_app.accuracy.asked import Asked, Found, LeftOut, within
+from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, within
 from daq_app.accuracy.methods import FiniteMeshed, Kinematics, SmallMeshed
 from daq_app.accuracy.truth import cases
 from solver.contact import Course, untouched
@@ -53,9 +52,9 @@ def measure(asked: Asked, found: Found) -> Iterator[Warm | LeftOut]:
 def _row(scene: Scene) -> Warm:
     kinematics = scene.solve.kinematics
     readings = list(_small(scene) if kinematics == "small" else _finite(scene))
-    begun = perf_counter()
+    begun = clock()
     follows = stepper(scene)
-    setup = perf_counter() - begun
+    setup = clock() - begun
     spans, found = timed_passes(follows, readings)
     truth = np.array([sed for _, _, sed in readings])
     each = np.median(spans, axis=0)
@@ -72,9 +71,9 @@ def timed_passes(follows: Stepper, readings: list[Reading]) -> tuple[np.ndarray,
     for number in range(PASSES):
         follows.forget()
         for n, (normal, tangential, _) in enumerate(readings):
-            begun = perf_counter()
+            begun = clock()
             found[n] = follows.step(normal, tangential)
-            spans[number, n] = perf_counter() - begun
+            spans[number, n] = clock() - begun
     return spans, found
 
 

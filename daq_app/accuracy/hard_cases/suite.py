@@ -3,10 +3,9 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from time import perf_counter
 from types import ModuleType
 
-from daq_app.accuracy.asked import Asked, Found, LeftOut, within
+from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, within
 from daq_app.accuracy.hard_cases import finite, small
 from daq_app.accuracy.hard_cases.outcome import Outcome, of_scene
 from daq_app.accuracy.hard_cases.scenes import ANSWER, Must, hard_scenes
@@ -63,7 +62,7 @@ def cases(kinematics: Kinematics) -> tuple[Case, ...]:
 
 def judged(case: Case, neighbour: Outcome | None = None) -> HardCase:
     """Run one case and say what is wrong, if anything; `neighbour` is the outcome of the case it must be `same_as`."""
-    begun = perf_counter()
+    begun = clock()
     return _row(case, case.run(), neighbour, begun)
 
 
@@ -77,7 +76,7 @@ def _row(case: Case, found: Outcome, neighbour: Outcome | None, begun: float) ->
         off = abs(found.numbers[0] / neighbour.numbers[0] - 1.0)
         if off > case.within:
             flaws.append(f"{off:.1g} from {case.same_as}, not {case.within:g}")
-    took = perf_counter() - begun
+    took = clock() - begun
     return HardCase(case.kinematics, case.name, case.must, found.answered, "; ".join(flaws), found.told, took)
 
 
@@ -93,7 +92,7 @@ def measure(asked: Asked, found: Found) -> Iterator[HardCase | LeftOut]:
         if isinstance(case, LeftOut):
             yield case
             return
-        begun = perf_counter()
+        begun = clock()
         outcome = case.run()
         kept[case.kinematics, case.name] = replace(outcome, told="")
         yield _row(case, outcome, kept.get((case.kinematics, case.same_as)), begun)

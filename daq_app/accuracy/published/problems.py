@@ -3,11 +3,10 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from time import perf_counter
 
 import numpy as np
 
-from daq_app.accuracy.asked import Asked, Found, LeftOut
+from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, within
 from daq_app.accuracy.published import contacts, locking
 from solver.friction import FrictionLaw
 
@@ -71,24 +70,24 @@ def measure(asked: Asked, found: Found) -> Iterator[Problem | LeftOut]:
     works = [thick_cylinders, membranes, hertz, partial_slip, capped, *([] if asked.quick else [cylinder, below])]
     if asked.quick:
         yield LeftOut("The whole cylinder and the stresses below a contact are left to a full run.")
-    for work in works:
-        if asked.left <= 0.0:
-            yield LeftOut(f"Time was over before {work.__name__.replace('_', ' ')}.")
-            continue
-        yield from work()
+    for work in within(asked, works, "groups of published problems"):
+        if isinstance(work, LeftOut):
+            yield work
+        else:
+            yield from work()
 
 
 def _row(
     problem: str, source: str, quantity: str, expected: float, obtained: float, allowed: float, begun: float
 ) -> Problem:
     off = abs(obtained / expected - 1.0)
-    return Problem(problem, source, quantity, expected, obtained, off, allowed, perf_counter() - begun)
+    return Problem(problem, source, quantity, expected, obtained, off, allowed, clock() - begun)
 
 
 def thick_cylinders() -> Iterator[Problem]:
     """Yield the widening of a thick cylinder, five elements across its wall."""
     for nu in (0.3, 0.48, 0.49, 0.499, 0.4999, 0.49999, 0.4999999):
-        begun = perf_counter()
+        begun = clock()
         found = locking.widened(nu, 5, 20)
         source = "MacNeal and Harder 1985"
         yield _row(f"thick cylinder, nu {nu}", source, "u(a) [mm]", locking.widening(nu), found, 2e-4, begun)
@@ -97,7 +96,7 @@ def thick_cylinders() -> Iterator[Problem]:
 def membranes() -> Iterator[Problem]:
     """Yield the rise of Cook's membrane, 32 elements along each side."""
     for problem, source, young, nu, force, middle, corner in COOK:
-        begun = perf_counter()
+        begun = clock()
         found = locking.cook(young, nu, force, 32)
         yield _row(problem, source, "u_y at (48, 52)", middle, found[0], 0.002, begun)
         if corner is not None:
@@ -107,7 +106,7 @@ def membranes() -> Iterator[Problem]:
 def hertz() -> Iterator[Problem]:
     """Yield half-width and peak pressure under the gap of a parabola."""
     for problem, young, nu, radius, load, half_width, peak in HERTZ:
-        begun = perf_counter()
+        begun = clock()
         found = contacts.hertz(young, nu, radius, load, half_width, peak)
         source = KONTER if radius == 50.0 else JOHNSON
         yield _row(problem, source, "half-width a [mm]", half_width, found.half_width, 0.01, begun)
@@ -116,7 +115,7 @@ def hertz() -> Iterator[Problem]:
 
 def cylinder() -> Iterator[Problem]:
     """Yield what a whole cylinder between plates shows; a/R = 0.16, whose square is what the theory neglects."""
-    begun = perf_counter()
+    begun = clock()
     found = contacts.whole_cylinder(0.01, 0.782578, 0.008135)
     problem, source = "whole cylinder between plates", "Johnson 1985, eq. 5.57"
     yield _row(problem, source, "approach [mm]", 0.167860, found.approach, 0.005, begun)
@@ -127,7 +126,7 @@ def cylinder() -> Iterator[Problem]:
 def below() -> Iterator[Problem]:
     """Yield the largest difference of stresses below a contact, by p0, with and without friction."""
     for mu, table in BELOW.items():
-        begun = perf_counter()
+        begun = clock()
         light = contacts.light(wide=300.0)
         rows = np.array(table)
         got = light.stress(light.slid(FrictionLaw(mu, math.inf), -1), rows[:, :2])
@@ -135,7 +134,7 @@ def below() -> Iterator[Problem]:
         worst = float(np.abs(parts - rows[:, 2:]).max())
         yield Problem(
             f"stresses below a contact, mu {mu:g}", "Smith and Liu 1953", "largest difference by p0", 0.0, worst, worst,
-            0.005, perf_counter() - begun,
+            0.005, clock() - begun,
         )  # fmt: skip
 
 
@@ -143,15 +142,13 @@ def partial_slip() -> Iterator[Problem]:
     """Yield half the stick's width and the traction in its middle, the pressure being that of nu = 0.4999."""
     light, law = contacts.light(), FrictionLaw(0.3, math.inf)
     for part in PARTS:
-        begun = perf_counter()
+        begun = clock()
         found = light.sheared(law, part)
         half = math.sqrt(1 - part)
         problem, source = f"partial slip, Q/(mu P) {part:g}", "Cattaneo 1938, Mindlin 1949"
         width = contacts.stick_width(light, found)
         traction = -float(found.tangential[len(light.x) // 2] / light.length[len(light.x) // 2])
-        yield Problem(
-            problem, source, "half stick c, by a", half, width, abs(width - half), 0.02, perf_counter() - begun
-        )
+        yield Problem(problem, source, "half stick c, by a", half, width, abs(width - half), 0.02, clock() - begun)
         yield _row(problem, source, "q(0)/(mu p0)", 1 - half, traction / (law.mu * light.peak), 0.02, begun)
 
 
@@ -159,7 +156,7 @@ def capped() -> Iterator[Problem]:
     """Yield the drag of a bound on a Hertz pressure."""
     light, mu = contacts.light(), 0.3
     for k, force in CAPPED:
-        begun = perf_counter()
+        begun = clock()
         found = light.slid(FrictionLaw(mu, k * mu * light.peak))
         drag = -float(found.tangential.sum()) / (mu * light.load)
         yield _row(f"bound on a Hertz pressure, k {k:g}", "elementary integral", "Q/(mu P)", force, drag, 0.005, begun)
