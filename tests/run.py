@@ -19,7 +19,10 @@ STATIC = [
     ("types agree (strict)", ["basedpyright", "--level", "error", *PACKAGES]),
 ]
 QUICK = [("every sentence a test proves", ["pytest", "-n", "2", "-m", "not slow and not hardware"])]
-LONG = [("the endurance runs", ["pytest", "-s", "-m", "slow", "tests/endurance"])]
+LONG = [
+    ("every slow sentence about the solver", ["pytest", "-n", "2", "-m", "slow", "tests/solver", "tests/daq_app"]),
+    ("the endurance runs", ["pytest", "-s", "-m", "slow", "tests/endurance"]),
+]
 
 
 def main() -> int:

@@ -1,6 +1,7 @@
 """The accuracy page: one self-contained HTML file, its pictures as SVG, its data as JSON."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, select_autoescape
@@ -9,6 +10,7 @@ from daq_app.accuracy.asked import PROCESSOR_TIME
 from daq_app.accuracy.figures import plates
 from daq_app.accuracy.measuring import Measured
 from daq_app.accuracy.tables import tables
+from sessions.exports.figures.style import Plate
 from sessions.exports.html import drawn, swap_in
 
 PAGE, DATA, FIGURES = "accuracy.html", "accuracy.json", "figures"
@@ -27,9 +29,9 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 )
 
 
-def page(found: Measured) -> str:
-    """Return the page: no script, nothing asked of any network."""
-    figures, listed = plates(found), tables(found)
+def page(found: Measured, figures: Mapping[str, Plate] | None = None) -> str:
+    """Return the page: no script, nothing asked of any network; `figures` where they are drawn already."""
+    figures, listed = plates(found) if figures is None else figures, tables(found)
     environment = Environment(
         loader=ChoiceLoader([PackageLoader("daq_app.accuracy", "."), PackageLoader("sessions.exports", ".")]),
         autoescape=select_autoescape(default=True, default_for_string=True),
@@ -55,10 +57,11 @@ def write(found: Measured, folder: Path) -> tuple[Path, ...]:
     data = folder / DATA
     swap_in(data, json.dumps(found.to_dict(), indent=1, allow_nan=False) + "\n")
     written = [data]
-    for plate in plates(found).values():
+    figures = plates(found)
+    for plate in figures.values():
         for panel in plate.panels:
             path = folder / FIGURES / f"{panel.name}.svg"
             swap_in(path, panel.svg)
             written.append(path)
-    swap_in(folder / PAGE, page(found))
+    swap_in(folder / PAGE, page(found, figures))
     return (folder / PAGE, *written)

@@ -1,0 +1,242 @@
+"""The accuracy page: what is measured is told as it is, whatever was met, missed, left out or stopped."""
+
+import json
+import re
+import xml.etree.ElementTree as ET
+from time import perf_counter
+
+import pytest
+
+from daq_app.accuracy import estimates, targets
+from daq_app.accuracy.asked import Asked, Found, LeftOut, timed, within
+from daq_app.accuracy.costs import Cost, shares
+from daq_app.accuracy.estimates import Estimate, Guaranteed
+from daq_app.accuracy.growth import Growth, exponent
+from daq_app.accuracy.hard_cases import HardCase
+from daq_app.accuracy.machine import Machine
+from daq_app.accuracy.measuring import Measured, measured
+from daq_app.accuracy.orders import Order
+from daq_app.accuracy.page import page, write
+from daq_app.accuracy.published.problems import Problem
+from daq_app.accuracy.random_scenes import random_scene
+from daq_app.accuracy.speed import Speed
+from daq_app.accuracy.subjects import Subject
+from daq_app.accuracy.tables import tables
+from daq_app.accuracy.truth import JUDGED, Truth
+from daq_app.accuracy.warm import Warm
+
+FOREVER = Asked(quick=True, until=perf_counter() + 1e6)
+OVER = Asked(quick=True, until=perf_counter() - 1.0)
+
+
+def speed(kinematics, dofs, error, first, floor=1e-3, failed=()):
+    errors = {name: (error, 0.0, 0.0) for name in JUDGED if name not in failed}
+    return Speed(
+        f"{kinematics} strain", kinematics, "Q2/P-1", 2, "some", "some", 5.0, dofs, 0.01, 0.0, floor, first, first / 2,
+        6 * first, 6, errors, dict.fromkeys(failed, "no state"),
+    )  # fmt: skip
+
+
+def estimate(value, error, doubt=0.0, tolerance=0.01):
+    return Estimate("small", "slipperiness 0", "SED of the ending", tolerance, 900, value, error, doubt)
+
+
+ROWS = {
+    "machine": (Machine("System", "Processor", 2, "1", 0.5, {"daq-app": "1"}),),
+    "truth": (
+        Truth("small", "slipperiness 0", (5e-3, 0.1, 0.06), (1e-5, 1e-5, 1e-5), (9, 9, 9), 1.0, ""),
+        Truth("finite", "stickiness 50", (), (), (), 1.0, "There is none."),
+    ),
+    "speed": (
+        speed("finite", 900, 0.02, 4e-3), speed("finite", 1800, 0.008, 9e-3), speed("finite", 3600, 0.002, 5e-2),
+        speed("small", 900, 0.005, 4e-3),
+    ),
+    "estimates": (
+        estimate(0.01, 0.004), estimate(0.002, 0.004), estimate(0.003, 0.0001, 0.1),
+        Guaranteed("small", 0.01, 6, 900, 0.3, 0.1, 0.1, 0.1, 0.009, 0.003),
+    ),
+    "costs": (Cost("small", 0.01, 900, 0.1, 0.04, 0.03, 0.03, {"assembly": 0.75, "the rest": 0.25}),),
+    "warm": (Warm("finite", "slipperiness 0", 260, 5e-4, 9e-4, 1e-3, 0.013, 0.1),),
+    "problems": (
+        Problem("Cook", "Cook 1989", "u", 23.967, 23.963, 1.6e-4, 2e-3, 0.1),
+        Problem("Hertz", "Johnson 1985", "a", 1.0, 1.2, 0.2, 0.01, 0.1),
+    ),
+    "orders": (Order("cylinder", "energy", "small", "Q2/P-1", (1.0, 0.5), (1e-3, 6e-5), (0.1, 0.2), 4.0, 3.7),),
+    "growth": tuple(Growth("small", n / 100, n, 0.01, 1e-9 * n**1.25) for n in (1000, 4000, 16000, 64000)),
+    "hard_cases": (
+        HardCase("small", "mu 0", "answer", True, "", "SED 0.005", 0.1),
+        HardCase("finite", "mu 9", "answer", False, "no answer", "No <state> & no | answer.", 0.1),
+    ),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def example():
+    found = Found([row for rows in ROWS.values() for row in rows])
+    rows = {**ROWS, "targets": tuple(targets.measure(FOREVER, found))}
+    took = dict.fromkeys(rows, 1.0)
+    return Measured("2026-11-21T20:00:00+00:00", False, False, took, rows, ("Growth was not followed further.",))
+
+
+@pytest.fixture(scope="module")
+def written(example, tmp_path_factory):
+    return write(example, tmp_path_factory.mktemp("accuracy") / "out")
+
+
+def test_the_page_asks_nothing_of_any_network_and_holds_every_number_of_the_tables(example, written):
+    text = written[0].read_text(encoding="utf-8")
+    assert text.startswith("<!DOCTYPE html>")
+    assert not re.search(r"""(src|href)\s*=\s*["'](?!#)""", text)
+    assert "<script" not in text
+    assert "No &lt;state&gt; &amp; no | answer." in text
+    assert "Growth was not followed further." in text
+    for name in tables(example):
+        assert f'id="{name}"' in text
+
+
+def test_pictures_are_files_of_their_own_and_the_data_is_json(written):
+    pictures = [path for path in written if path.suffix == ".svg"]
+    assert {path.stem for path in pictures} >= {
+        "speed-first",
+        "speed-next",
+        "estimate-sed",
+        "orders",
+        "costs",
+        "growth",
+    }
+    for path in pictures:
+        ET.fromstring(path.read_text(encoding="utf-8"))
+    data = json.loads((written[0].parent / "accuracy.json").read_text(encoding="utf-8"))
+    assert data["truth"][0]["numbers"] == [5e-3, 0.1, 0.06]
+    assert data["speed"][0]["kind"] == "Speed"
+
+
+def verdict(example, work, at=None):
+    (row,) = [r for r in example.of(targets.Target) if r.work == work and at in (None, r.at_error)]
+    return row
+
+
+def test_a_speed_is_that_of_the_cheapest_mesh_that_meets_the_error_with_its_ratio_to_the_floor(example):
+    row = verdict(example, "finite strain, one surface from undeformed")
+    assert row.measured == pytest.approx(9.0)  # 4 ms is at 2 %, 50 ms at 0.2 %
+    assert row.floors == pytest.approx(9.0)
+    assert row.verdict == "reach met"
+    assert verdict(example, "small strain, all ten surfaces, from scratch").verdict == "missed"  # 24 ms
+
+
+def test_an_error_that_no_mesh_met_is_missed_and_the_best_is_told(example):
+    row = verdict(example, "finite strain, one surface", "0.06 %")
+    assert row.measured is None
+    assert row.verdict == "missed"
+    assert "0.2 %" in row.how
+
+
+def test_a_mesh_that_gives_no_answer_for_one_of_the_surfaces_meets_nothing():
+    lame = speed("finite", 900, 1e-6, 1e-3, failed=("slipperiness 55",))
+    assert lame.judged_error is None
+    rows = {r.work: r for r in targets.measure(FOREVER, Found([lame]))}
+    assert rows["finite strain, one surface from undeformed"].measured is None
+
+
+def test_what_was_not_measured_is_said_to_be_so_and_not_missed():
+    rows = list(targets.measure(FOREVER, Found()))
+    assert {row.verdict for row in rows} == {"not measured"}
+
+
+def test_an_estimate_counts_only_where_the_truth_can_tell():
+    assert estimate(0.01, 0.004).above is True
+    assert estimate(0.002, 0.004).above is False
+    assert estimate(0.003, 0.0001, doubt=0.002).above is None
+    assert estimate(0.01, 0.004).near is True
+    assert estimate(0.0021, 0.0).near is False  # ten times 0.02 %
+    assert estimate(0.01, 0.02).met is False
+    assert estimate(0.01, 0.0).met is True
+
+
+def test_growth_is_the_power_of_the_unknowns():
+    assert exponent(list(ROWS["growth"])) == pytest.approx(1.25)
+    assert exponent(list(ROWS["growth"])[:2]) is None  # two meshes, one of them too small to tell
+
+
+def test_a_table_stands_in_the_docs_as_markdown_whatever_its_cells_hold(example):
+    lines = tables(example)["hard-finite"].markdown().splitlines()
+    assert lines[0] == "| case | must | verdict | outcome |"
+    assert lines[2] == "| mu 9 | answer | FAILED: no answer | No <state> & no \\| answer. |"
+
+
+def test_random_scenes_are_the_same_every_time_and_differ_from_each_other():
+    assert random_scene(3) == random_scene(3)
+    assert random_scene(3) != random_scene(5)
+    assert random_scene(3, "finite").loading == random_scene(3).loading
+
+
+def test_when_time_is_over_one_thing_is_still_measured_and_the_rest_is_named():
+    assert list(within(FOREVER, [1, 2, 3], "things")) == [1, 2, 3]
+    assert list(within(OVER, [1, 2, 3], "things")) == [1, LeftOut("Time was over after 1 of 3 things.")]
+
+
+def test_a_time_is_the_median_of_runs_and_slow_work_is_run_once():
+    runs = []
+    timed(lambda: runs.append(1), repeats=5)
+    assert len(runs) == 5
+    timed(lambda: runs.append(1), repeats=5, most_s=-1.0)
+    assert len(runs) == 6
+
+
+def subject(name, *rows):
+    def measure(*_):
+        for row in rows:
+            if row is KeyboardInterrupt:
+                raise KeyboardInterrupt
+            if isinstance(row, Exception):
+                raise row
+            yield row
+
+    return Subject(name, f"the {name}", 1.0, 1.0, measure)
+
+
+def quiet(*_):
+    """Show no progress, load nothing."""
+
+
+@pytest.fixture
+def unloaded(monkeypatch):
+    monkeypatch.setattr("daq_app.accuracy.measuring.loaded", quiet)
+
+
+@pytest.mark.usefixtures("unloaded")
+def test_ctrl_c_keeps_what_was_measured_and_names_what_was_not():
+    first, second = ROWS["growth"][:2]
+    parts = [subject("one", first), subject("two", second, KeyboardInterrupt), subject("three", first)]
+    found = measured(True, quiet, parts, seconds=5.0)
+    assert found.stopped
+    assert found.rows == {"one": (first,), "two": (second,)}
+    assert found.left_out == ("Stopped during: the two.", "Stopped before: the three.")
+    assert "Stopped by hand" in page(found)
+
+
+@pytest.mark.usefixtures("unloaded")
+def test_a_subject_that_breaks_off_loses_nothing_of_the_others():
+    first, second = ROWS["growth"][:2]
+    parts = [subject("one", first, ValueError("bad luck")), subject("two", second)]
+    found = measured(True, quiet, parts, seconds=5.0)
+    assert found.rows == {"one": (first,), "two": (second,)}
+    assert found.left_out == ("The one broke off: bad luck",)
+
+
+def test_time_within_a_part_of_the_solver_counts_for_that_part_and_that_outside_for_its_caller():
+    mesher, contact, library = ("/x/solver/mesher.py", 1, "a"), ("/x/solver/contact.py", 1, "b"), ("/lib/np.py", 1, "c")
+    calls = {mesher: (1, 1, 3.0, 4.0), contact: (1, 1, 1.0, 3.0)}
+    profile = {mesher: (1, 1, 2.0, 6.0, {}), contact: (1, 1, 1.0, 4.0, {}), library: (2, 2, 4.0, 7.0, calls)}
+    found = shares(type("Profile", (), {"__init__": lambda self: vars(self).update(stats=profile)})())
+    assert found["mesh and tables"] == pytest.approx((2 + 4 * 4 / 7) / 7)
+    assert found["contact"] == pytest.approx((1 + 4 * 3 / 7) / 7)
+
+
+@pytest.mark.slow
+def test_a_quick_run_measures_something_of_every_subject(tmp_path):
+    found = measured(True, quiet, seconds=1.0)
+    assert {name for name, rows in found.rows.items() if not rows} == set()
+    assert not [told for told in found.left_out if "broke off" in told]
+    write(found, tmp_path)
+    assert {row.kinematics for row in found.of(estimates.Estimate)} == {"small", "finite"}
