@@ -1,0 +1,192 @@
+"""Every driver through hundreds of pulled plugs and minutes of random faults: `make test-long`."""
+
+import contextlib
+import gc
+import os
+import random
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers import usb_link
+from drivers.catalog import open_transducer
+from drivers.clock import Clock, PacedClock, RealClock
+from drivers.transducer import LinkLost, SetupError, Transducer
+from simulators.bench import RATED, Bench
+from simulators.digital_ft_box import DigitalFtBox
+from simulators.faults import KINDS, Fault, Faults
+from simulators.gauges import FT32831
+from simulators.labjack_u6_box import LabJackU6Box
+from simulators.net_ft_box import NetFtBox
+from simulators.serial_ft_box import SerialFtBox
+from simulators.usb_backend import SimulatedBus
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")]
+
+CYCLES = 500
+AWAY, CYCLE = (1.2, 1.6), 2.0  # the plug is out between these, in each cycle [s]
+TOLD = 600.0  # of random faults [s]
+CAL = """<FTSensor Serial="SIM00003" BodyStyle="Nano43" Family="DAQ" NumGages="6" CalFileVersion="1.0"><Calibration
+PartNumber="SIMULATED" CalDate="1/1/2026" ForceUnits="N" TorqueUnits="N-mm" DistUnits="mm">{axes}</Calibration>
+</FTSensor>"""
+
+
+@dataclass
+class Run:
+    """What one driver went through."""
+
+    readings: int = 0
+    lost: int = 0
+    restarted: int = 0
+    reopened: int = 0
+    error: str = ""
+
+
+def cal_file(folder: Path) -> Path:
+    axes = "".join(
+        f'<Axis Name="{name}" values="{" ".join(map(repr, row))}" max="{rated}" scale="1"/>'
+        for name, row, rated in zip(("Fx", "Fy", "Fz", "Tx", "Ty", "Tz"), FT32831.tolist(), RATED, strict=True)
+    )
+    path = folder / "SIM.cal"
+    path.write_text(CAL.format(axes=axes))
+    return path
+
+
+def boxes(clock: Clock, faults: Callable[[], Faults], cal: Path):
+    """Return address and closing of every simulated device, started."""
+    net, serial = NetFtBox(Bench(3), clock, faults=faults()), SerialFtBox(Bench(3), clock, faults=faults())
+    digital, labjack = DigitalFtBox(Bench(3), clock, faults=faults()), LabJackU6Box(Bench(3), clock, faults=faults())
+    for box in (net, serial, digital):
+        box.start()
+    usb_link.BACKEND = SimulatedBus([labjack])
+    usb = f"labjack-u6://?cal={cal}&rate=500"
+    return {
+        "net-ft": (net.uri, net.close),
+        "serial-ft": (serial.uri, serial.close),
+        "digital-ft": (digital.uri, digital.close),
+        "labjack-u6": (usb, lambda: None),
+    }
+
+
+def started(transducer: Transducer) -> None:
+    """Start it as soon as its plug is in for long enough."""
+    for _ in range(600):
+        with contextlib.suppress(LinkLost, SetupError):
+            transducer.start()
+            return
+        time.sleep(0.05)
+    raise AssertionError("it never came back")
+
+
+def followed(transducer: Transducer, clock: Clock, until: float, begun_ns: int) -> Run:
+    """Read until so many told seconds have passed; every number is received or lost, times never run back."""
+    run, last, time_ = Run(), 0, 0.0
+    started(transducer)
+    counted = 0
+    while (clock.now_ns() - begun_ns) * 1e-9 < until:
+        try:
+            block = transducer.read(0.1)
+        except LinkLost:
+            run.lost += transducer.health.lost
+            run.reopened += 1
+            counted, last, time_ = 0, 0, 0.0
+            transducer.stop()
+            started(transducer)
+            continue
+        if len(block):
+            assert block.sequence[0] > last
+            assert np.all(np.diff(block.sequence) > 0)
+            assert block.time[0] >= time_
+            last, time_ = int(block.sequence[-1]), float(block.time[-1])
+            counted += len(block)
+            run.readings += len(block)
+    transducer.stop()
+    counted += len(transducer.read(0.0))
+    health = transducer.health
+    assert health.received == counted
+    run.lost += health.lost
+    run.restarted = health.restarted
+    return run
+
+
+def together(clock: Clock, faults: Callable[[], Faults], cal: Path, until: float) -> dict[str, Run]:
+    """Follow all drivers at once, each in a thread of its own."""
+    devices = boxes(clock, faults, cal)
+    runs = {name: Run(error="never ended") for name in devices}
+    begun_ns = clock.now_ns()
+
+    def follow(name: str, uri: str) -> None:
+        try:
+            while True:
+                try:
+                    transducer = open_transducer(uri, clock)
+                    break
+                except Exception as error:  # the plug may be out just now
+                    if (clock.now_ns() - begun_ns) * 1e-9 > until:
+                        raise error
+            runs[name] = followed(transducer, clock, until, begun_ns)
+            transducer.close()
+        except BaseException as error:  # noqa: BLE001 - told by the test
+            runs[name] = Run(error=f"{type(error).__name__}: {error}")
+
+    threads = [threading.Thread(target=follow, args=(name, uri)) for name, (uri, _) in devices.items()]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for _, close in devices.values():
+        close()
+    usb_link.BACKEND = None
+    return runs
+
+
+def held() -> tuple[int, int, float]:
+    """Return threads, open files and resident memory [MB] of this process."""
+    gc.collect()
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return threading.active_count(), len(list(Path("/dev/fd").iterdir())), pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="memory is read from Linux's /proc")
+def test_hundreds_of_pulled_plugs_leave_nothing_behind_and_every_reading_counted(tmp_path):
+    cal = cal_file(tmp_path)
+    faults = lambda: Faults([Fault("unplug", *AWAY)], seed=1, repeat=CYCLE)  # noqa: E731
+    together(RealClock(), faults, cal, 3 * CYCLE)
+    threads, files, memory = held()
+    begun = time.monotonic()
+    runs = together(RealClock(), faults, cal, CYCLES * CYCLE)
+    after = held()
+    for name, run in runs.items():
+        assert not run.error, f"{name}: {run.error}"
+        assert run.readings > 0
+        assert run.lost > 0
+        print(f"\n{name}: {CYCLES} unplugs, {run.readings} readings, {run.lost} lost, {run.restarted} restarts")
+    assert after[:2] == (threads, files)
+    assert after[2] - memory < 30.0
+    print(f"{time.monotonic() - begun:.0f} s; threads and files as before, memory {after[2] - memory:+.1f} MB")
+
+
+def test_ten_told_minutes_of_random_faults_leave_every_reading_received_or_lost(tmp_path):
+    chance = random.Random(5)
+
+    def faults() -> Faults:
+        kinds = [kind for kind in KINDS if kind not in ("steal", "reboot", "unplug", "drift", "miscalibrate")]
+        begins = np.arange(2.0, TOLD - 10.0, 6.0)
+        return Faults(
+            [
+                Fault(chance.choice(kinds), at, at + chance.uniform(0.2, 3.0), chance.uniform(0.05, 0.6))
+                for at in begins
+            ],
+            seed=chance.randrange(1000),
+        )
+
+    runs = together(PacedClock(4.0), faults, cal_file(tmp_path), TOLD)
+    for name, run in runs.items():
+        assert not run.error, f"{name}: {run.error}"
+        assert run.readings > 0
+        print(f"\n{name}: {run.readings} readings, {run.lost} lost, given up and started again {run.reopened} times")
