@@ -1,0 +1,149 @@
+"""What subjects tell beside their own level: intervals within subjects, correlation within subjects, agreement."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+CONFIDENCE = 0.95
+
+Array = NDArray[np.float64]
+Table = Mapping[str, Mapping[int, float]]  # subject -> stimulus' index -> score, as `scores.score_matrix` gives it
+
+
+@dataclass(frozen=True, slots=True)
+class WithinMean:
+    """Mean of one stimulus with its within-subject interval."""
+
+    index: int
+    n: int  # subjects who scored every stimulus
+    mean: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class RepeatedCorrelation:
+    """How y goes with x within subjects, the same slope for all (Bakdash & Marusich 2017)."""
+
+    r: float
+    low: float  # 95 % interval by Fisher's z, for `dof` degrees of freedom
+    high: float
+    p: float  # two-sided
+    dof: int  # N - k - 1 for N pairs from k subjects
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """How far subjects order the stimuli alike."""
+
+    n: int  # subjects who scored every stimulus
+    kendall_w: float  # 0 none, 1 the same order
+    friedman_p: float  # of no difference between stimuli
+    page_p: float  # of no rise with the index (Page's L, one-sided)
+
+
+def complete(table: Table) -> tuple[tuple[str, ...], tuple[int, ...], Array]:
+    """Return subjects who scored every stimulus, indices in order, and their scores (subjects, indices)."""
+    indices = tuple(sorted({index for row in table.values() for index in row}))
+    whole = tuple(subject for subject, row in table.items() if len(row) == len(indices))
+    return whole, indices, np.array([[table[s][i] for i in indices] for s in whole]).reshape(len(whole), len(indices))
+
+
+def within_means(table: Table) -> tuple[WithinMean, ...]:
+    """Return each stimulus' mean with the 95 % interval within subjects (Cousineau 2005, corrected by Morey 2008).
+
+    Each subject's own mean is exchanged for the mean of all, and the variance multiplied by C / (C - 1) for C stimuli.
+    These intervals are for comparing stimuli; they say nothing of the mean's own uncertainty. Only subjects who scored
+    every stimulus count. Empty for fewer than two of them or of stimuli.
+    """
+    subjects, indices, scores = complete(table)
+    n, c = scores.shape
+    if n < 2 or c < 2:
+        return ()
+    levelled = scores - scores.mean(axis=1, keepdims=True) + scores.mean()
+    deviation = levelled.std(axis=0, ddof=1) * math.sqrt(c / (c - 1))
+    half = float(stats.t.ppf((1 + CONFIDENCE) / 2, n - 1)) * deviation / math.sqrt(n)
+    means = scores.mean(axis=0)
+    return tuple(
+        WithinMean(index, len(subjects), float(mean), float(mean - h), float(mean + h))
+        for index, mean, h in zip(indices, means, half, strict=True)
+    )
+
+
+def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequence[float]) -> RepeatedCorrelation | None:
+    """Return the repeated-measures correlation of pairs (N), each with its subject; None where nothing can be said.
+
+    It is the correlation of what is left of x and y when each subject's own means are taken away, tested with
+    N - k - 1 degrees of freedom (Bland & Altman 1995; Bakdash & Marusich 2017, Front. Psychol. 8:456).
+    """
+    codes = np.unique(np.array(subjects), return_inverse=True)[1]
+    dof = len(codes) - (int(codes.max()) + 1 if len(codes) else 0) - 1
+    if dof < 2:
+        return None
+    left_x, left_y = (_without_means(np.array(values, np.float64), codes) for values in (x, y))
+    size = math.sqrt(float(left_x @ left_x) * float(left_y @ left_y))
+    if size < 1e-12 * (1.0 + float(np.abs(x).max()) * float(np.abs(y).max())):
+        return None
+    r = float(np.clip(left_x @ left_y / size, -1.0, 1.0))
+    if 1.0 - abs(r) < 1e-12:
+        return RepeatedCorrelation(r, r, r, 0.0, dof)
+    t = r * math.sqrt(dof / (1.0 - r * r))
+    half = float(stats.norm.ppf((1 + CONFIDENCE) / 2)) / math.sqrt(dof - 1)
+    z = math.atanh(r)
+    p = 2.0 * float(stats.t.sf(abs(t), dof))
+    return RepeatedCorrelation(r, math.tanh(z - half), math.tanh(z + half), p, dof)
+
+
+def agreement(table: Table) -> Agreement | None:
+    """Return how far subjects agree on the order; None for fewer than two subjects or three stimuli, or all ties."""
+    subjects, _, scores = complete(table)
+    n, c = scores.shape
+    if n < 2 or c < 3 or np.all(np.ptp(scores, axis=1) == 0):
+        return None
+    friedman = stats.friedmanchisquare(*scores.T)
+    page = stats.page_trend_test(scores)
+    return Agreement(
+        len(subjects), float(friedman.statistic) / (n * (c - 1)), float(friedman.pvalue), float(page.pvalue)
+    )
+
+
+def standardised(table: Table) -> dict[str, dict[int, float]]:
+    """Return scores as each subject's own z-scores, which takes away the part of the scale a subject uses.
+
+    A subject whose scores do not vary is left out: nothing can be said of the order it gave.
+    """
+    rows: dict[str, dict[int, float]] = {}
+    for subject, row in table.items():
+        values = np.array(list(row.values()))
+        if len(values) > 1 and (spread := float(values.std(ddof=1))) > 0.0:
+            rows[subject] = {index: (score - float(values.mean())) / spread for index, score in row.items()}
+    return rows
+
+
+def equal_moduli(table: Table) -> dict[str, dict[int, float]]:
+    """Return free-modulus estimates brought to one modulus: divided by the subject's geometric mean, times that of all.
+
+    Raises ValueError for an estimate that is not above 0: a free modulus has no zero.
+    """
+    logs = {subject: {index: _log(subject, value) for index, value in row.items()} for subject, row in table.items()}
+    means = {subject: float(np.mean(list(row.values()))) for subject, row in logs.items() if row}
+    grand = float(np.mean(list(means.values()))) if means else 0.0
+    return {
+        subject: {index: math.exp(value - means[subject] + grand) for index, value in row.items()}
+        for subject, row in logs.items()
+        if row
+    }
+
+
+def _log(subject: str, value: float) -> float:
+    if value <= 0.0:
+        raise ValueError(f"{subject} gave the estimate {value:g}; with a free modulus every estimate is above 0")
+    return math.log(value)
+
+
+def _without_means(values: Array, codes: NDArray[np.intp]) -> Array:
+    return values - (np.bincount(codes, values) / np.bincount(codes))[codes]

@@ -1,0 +1,131 @@
+"""Statistics over subjects, against published numbers and closed forms."""
+
+import math
+from itertools import chain
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from sessions.analysis.mixed import mixed_model
+from sessions.analysis.within import (
+    agreement,
+    equal_moduli,
+    repeated_correlation,
+    standardised,
+    within_means,
+)
+
+# Intramural pH and PaCO2 of eight subjects: Bland & Altman 1995 (BMJ 310:446), table 1.
+PH = """6.68 6.53 6.43 6.33|6.85 7.06 7.13 7.17|7.40 7.42 7.41 7.37 7.34 7.35 7.28 7.30 7.34|7.36 7.33 7.29 7.30 7.35|
+7.35 7.30 7.30 7.37 7.27 7.28 7.32 7.32|7.38 7.30 7.29 7.33 7.31 7.33|6.86 6.94 6.92|
+7.19 7.29 7.21 7.25 7.20 7.19 6.77 6.82"""
+CO2 = """3.97 4.12 4.09 3.97|5.27 5.37 5.41 5.44|5.67 3.64 4.32 4.73 4.96 5.04 5.22 4.82 5.07|5.67 5.10 5.53 4.75 5.51|
+4.28 4.44 4.32 3.23 4.46 4.72 4.75 4.99|4.78 4.73 5.12 4.93 5.03 4.93|6.85 6.44 6.52|
+5.28 4.56 4.34 4.32 4.41 3.69 6.09 5.58"""
+
+
+def test_the_correlation_within_subjects_is_the_published_one():
+    rows = [[float(word) for word in part.split()] for part in PH.split("|")]
+    others = [[float(word) for word in part.split()] for part in CO2.split("|")]
+    subjects = [str(i) for i, row in enumerate(rows) for _ in row]
+    found = repeated_correlation(subjects, [*chain(*rows)], [*chain(*others)])
+    assert found is not None
+    # The value of R's rmcorr (Bakdash & Marusich 2017) and of pingouin: r(38) = -0.507, p = 0.000847, -0.71 to -0.23.
+    assert found.dof == 38
+    assert found.r == pytest.approx(-0.507, abs=5e-4)
+    assert found.low == pytest.approx(-0.71, abs=5e-3)
+    assert found.high == pytest.approx(-0.23, abs=5e-3)
+    assert found.p == pytest.approx(0.000847, abs=2e-6)
+
+
+def test_levels_of_subjects_do_not_matter_within_them():
+    x, y = [1, 2, 3, 1, 2, 3], [1.0, 2.5, 3.0, 101.0, 102.5, 103.0]
+    found = repeated_correlation(["a"] * 3 + ["b"] * 3, x, y)
+    alone = stats.pearsonr([1, 2, 3], [1.0, 2.5, 3.0]).statistic
+    assert found is not None
+    assert found.r == pytest.approx(alone)
+    assert repeated_correlation(["a", "b"], [1, 2], [1, 2]) is None
+
+
+def test_of_two_stimuli_the_interval_within_is_the_paired_one_over_the_root_of_two():
+    table = {"a": {0: 10.0, 1: 30.0}, "b": {0: 20.0, 1: 35.0}, "c": {0: 50.0, 1: 80.0}, "left out": {0: 5.0}}
+    found = within_means(table)
+    differences = np.array([20.0, 15.0, 30.0])
+    half = stats.t.ppf(0.975, 2) * differences.std(ddof=1) / math.sqrt(2 * 3)
+    assert [one.n for one in found] == [3, 3]
+    assert [one.mean for one in found] == pytest.approx([80 / 3, 145 / 3])
+    assert [one.high - one.mean for one in found] == pytest.approx([half, half])
+
+
+def test_agreement_is_one_where_all_order_alike_and_kendalls_example_comes_out():
+    alike = {str(k): {i: float(i * (k + 1)) for i in range(5)} for k in range(4)}
+    found = agreement(alike)
+    assert found is not None
+    assert found.kendall_w == pytest.approx(1.0)
+    # Kendall & Babington Smith's form by hand: ranks of three judges over four objects, R = 4, 8, 8, 10; S = 19.
+    ranks = {"a": {0: 1, 1: 3, 2: 2, 3: 4}, "b": {0: 1, 1: 2, 2: 4, 3: 3}, "c": {0: 2, 1: 3, 2: 1, 3: 4}}
+    sums = [4, 8, 7, 11]
+    s = sum((total - 7.5) ** 2 for total in sums)
+    found = agreement(ranks)
+    assert found is not None
+    assert found.kendall_w == pytest.approx(12 * s / (9 * (64 - 4)))
+
+
+def test_a_balanced_mixed_model_has_the_slope_and_error_of_the_closed_form():
+    rng = np.random.default_rng(4)
+    x = np.tile(np.arange(5.0), 12)
+    subjects = [f"S{k}" for k in range(12) for _ in range(5)]
+    levels = np.repeat(rng.normal(0, 20, 12), 5)
+    score = 10.0 + 3.0 * x + levels + rng.normal(0, 4, 60)
+    model = mixed_model(subjects, score.tolist(), {"sed": x.tolist()})
+    assert model is not None
+    slope = model.term("sed")
+    # Balanced, with the same x for all: the slope is that of least squares within subjects.
+    centred = score - np.repeat(score.reshape(12, 5).mean(axis=1), 5)
+    expected = float((x - 2.0) @ centred) / float((x - 2.0) @ (x - 2.0))
+    left = centred - expected * (x - 2.0)
+    residual = math.sqrt(float(left @ left) / (60 - 12 - 1))
+    assert slope.estimate == pytest.approx(expected, rel=1e-6)
+    assert model.within_sd == pytest.approx(residual, rel=1e-3)
+    assert (slope.high - slope.low) / 2 == pytest.approx(1.95996 * residual / math.sqrt(12 * 10.0), rel=1e-3)
+    assert not model.singular
+
+
+def test_drift_and_carry_over_are_told_apart_from_the_energy():
+    rng = np.random.default_rng(5)
+    subjects, sed, place, before, score = [], [], [], [], []
+    for k in range(40):
+        order = rng.permutation(5)
+        for i, index in enumerate(order):
+            previous = float(order[i - 1]) if i else 2.0
+            subjects.append(str(k))
+            sed.append(float(index))
+            place.append(float(i))
+            before.append(previous)
+            score.append(5.0 * index + 1.5 * i - 2.0 * previous + 3.0 * (k % 7) + rng.normal(0, 1))
+    model = mixed_model(subjects, score, {"sed": sed, "place": place, "before": before})
+    assert model is not None
+    for name, planted in (("sed", 5.0), ("place", 1.5), ("before", -2.0)):
+        assert model.term(name).low < planted < model.term(name).high
+        assert model.term(name).high - model.term(name).low < 0.5
+
+
+def test_where_nothing_can_be_said_nothing_is():
+    assert mixed_model(["a"] * 5, [1.0] * 5, {"x": [1.0, 2, 3, 4, 5]}) is None
+    assert mixed_model(["a", "b"] * 5, list(range(10)), {"x": [1.0] * 10}) is None
+    assert within_means({"a": {0: 1.0}}) == ()
+    assert agreement({}) is None
+
+
+def test_standardised_scores_have_no_level_and_equal_moduli_keep_ratios():
+    table = {"a": {0: 10.0, 1: 20.0, 2: 40.0}, "b": {0: 1.0, 1: 2.0, 2: 4.0}, "flat": {0: 5.0, 1: 5.0}}
+    z = standardised(table)
+    assert list(z) == ["a", "b"]
+    assert sum(z["a"].values()) == pytest.approx(0.0)
+    assert z["a"][2] == pytest.approx(z["b"][2])
+    equal = equal_moduli({name: table[name] for name in "ab"})
+    assert equal["a"] == pytest.approx(equal["b"])
+    assert equal["a"][2] / equal["a"][0] == pytest.approx(4.0)
+    with pytest.raises(ValueError, match="b gave the estimate 0"):
+        equal_moduli({"b": {0: 0.0}})
