@@ -61,9 +61,9 @@ def mixed_model(
         fit = model.fit(reml=True, method=["lbfgs", "powell"])
     between, within = float(np.sqrt(max(fit.cov_re[0, 0], 0.0))), float(np.sqrt(fit.scale))
     half = float(stats.norm.ppf((1 + CONFIDENCE) / 2))
-    errors = np.sqrt(
-        np.diag(np.linalg.inv(columns.T @ np.linalg.solve(_covariance(subjects, between, within), columns)))
-    )
+    information = columns.T @ np.linalg.solve(_covariance(subjects, between, within), columns)
+    errors = np.sqrt(np.diag(np.linalg.inv(information)))
+    estimates: list[float] = np.asarray(fit.fe_params, np.float64).tolist()
     terms = tuple(
         Term(name, b, b - half * e, b + half * e, 2.0 * float(stats.norm.sf(abs(b) / e)))
         for name, b, e in zip(names, estimates, errors.tolist(), strict=True)
