@@ -1,6 +1,7 @@
 """The score as a straight line of the predicted energy, subjects differing in level, with what the order adds."""
 
 import importlib
+import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -65,7 +66,7 @@ def mixed_model(
     errors = np.sqrt(np.diag(np.linalg.inv(information)))
     estimates: list[float] = np.asarray(fit.fe_params, np.float64).tolist()
     terms = tuple(
-        Term(name, b, b - half * e, b + half * e, 2.0 * float(stats.norm.sf(abs(b) / e)))
+        Term(name, b, b - half * e, b + half * e, math.erfc(abs(b / e) / math.sqrt(2.0)))
         for name, b, e in zip(names, estimates, errors.tolist(), strict=True)
     )
     return MixedModel(terms, between, within, len(score), count, between < 0.02 * within)
