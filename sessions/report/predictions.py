@@ -4,7 +4,7 @@ import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,16 +163,25 @@ def _plain(value: float) -> str:
 
 
 def _values(table: Mapping[str, Any]) -> str:
-    """Return a scene's table in words, mm, degrees and MPa as in a scene file."""
-    return "; ".join(f"{name.replace('_', ' ')} {_value(value)}" for name, value in table.items())
+    """Return a scene's table in words, mm, degrees and MPa as in a scene file; what is not set is left out.
+
+    >>> _values({"E": 0.08, "law": None, "prony": ({"g": 0.2, "tau": 0.07},)})
+    'E 0.08; prony (g 0.2, tau 0.07)'
+    """
+    return "; ".join(f"{name.replace('_', ' ')} {_value(value)}" for name, value in table.items() if _is_set(value))
 
 
-def _value(value: float | tuple[float, ...] | Mapping[str, float]) -> str:
+def _is_set(value: object) -> bool:
+    return value is not None and value != ()
+
+
+def _value(value: Any) -> str:  # noqa: ANN401  whatever a scene file holds
     if isinstance(value, Mapping):
-        return ", ".join(f"{name} {number:g}" for name, number in value.items())
+        inside = cast("Mapping[str, Any]", value)
+        return ", ".join(f"{name} {_value(item)}" for name, item in inside.items() if _is_set(item))
     if isinstance(value, tuple):
-        return "(" + ", ".join(f"{number:g}" for number in value) + ")"
-    return f"{value:g}"
+        return "(" + ", ".join(_value(item) for item in cast("tuple[Any, ...]", value)) + ")"
+    return value if isinstance(value, str) else f"{value:g}"
 
 
 def _numbers(values: NDArray[np.float64]) -> tuple[float, ...]:
