@@ -103,6 +103,11 @@ class SessionPrediction:
             "width": self.width,
             "width_origin": self.width_origin,
             "options": asdict(self.options),
+            "options_origin": {
+                field.name: "default" if getattr(self.options, field.name) == field.default else "set"
+                for field in fields(self.options)
+            },
+            "scene": asdict(_template(self.options)),  # finger, materials and settings as used, defaults filled in
         }
 
 

@@ -19,8 +19,9 @@ from daq_app.derived import ANALYSIS, PREDICTION, predicted_again
 from sessions.analysis import analyse
 from sessions.recording import Recording
 from sessions.recording.derived import load_derived
+from sessions.recording.provenance import software_versions
 from sessions.replay import Stopped, different_events, different_readings, replay
-from sessions.verification import differences, told
+from sessions.verification import differences, told, why
 
 EXAMPLE = "daq-app replay recordings/P07 --fast"
 
@@ -53,11 +54,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
         fresh = _plain(analyse(replayed).to_dict())
         stored = load_derived(options.session, ANALYSIS)
         expected = _plain(analyse(recording).to_dict()) if stored is None else stored
-        found += told(list(differences(expected, fresh, ANALYSIS)))
+        found += _changed(ANALYSIS, expected, fresh)
         if not options.no_prediction:
             predicted = load_derived(options.session, PREDICTION)
             if predicted is not None:
-                found += told(list(_predicted_otherwise(replayed, predicted, console)))
+                console.progress(0.9, f"making {PREDICTION} again")
+                again = _plain(predicted_again(replayed, analyse(replayed), predicted))
+                found += _changed(PREDICTION, predicted, again)
                 compared.append(PREDICTION)
     lasted = _duration(recording)
     notes = list(_notes(recording))
@@ -81,9 +84,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     return 3 if found else 0
 
 
-def _predicted_otherwise(replayed: Recording, stored: dict[str, Any], console: Console) -> Iterator[str]:
-    console.progress(0.9, f"making {PREDICTION} again")
-    yield from differences(stored, _plain(predicted_again(replayed, analyse(replayed), stored)), PREDICTION)
+def _changed(name: str, stored: dict[str, Any], fresh: dict[str, Any]) -> list[str]:
+    """Return a sentence for each number that came out otherwise, and why that may be."""
+    found = told(list(differences(stored, fresh, name)))
+    return [*found, why(name, stored, software_versions())] if found else []
 
 
 def _notes(recording: Recording) -> Iterator[str]:

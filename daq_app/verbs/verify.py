@@ -6,7 +6,6 @@ Exit code 0: whole; 3: readable, with what is lost or differs named; 1: unreadab
 import argparse
 import json
 from pathlib import Path
-from typing import Any
 
 from daq_app.console import Console
 from daq_app.derived import ANALYSIS, PREDICTION, predicted_again
@@ -14,8 +13,9 @@ from sessions.analysis import analyse
 from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems
 from sessions.recording.derived import load_derived
+from sessions.recording.provenance import software_versions
 from sessions.toml_file import SettingsError
-from sessions.verification import MADE_BY, differences, told
+from sessions.verification import differences, told, why
 
 EXAMPLE = "daq-app verify recordings/P07"
 
@@ -45,14 +45,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
             continue
         changed = told(list(differences(stored, json.loads(json.dumps(fresh)), name)))
         if changed:
-            found += [*changed, f"{name} was made by {_versions(stored)}"]
+            found += [*changed, why(name, stored, software_versions())]
         checked.append(name)
     console.result({"session": str(folder), "checked": checked, "problems": found})
     for sentence in found:
         console.say(sentence)
     console.say(f"{folder}: {'whole' if not found else 'readable, with the above'} ({', '.join(checked)} checked)")
     return 3 if found else 0
-
-
-def _versions(stored: dict[str, Any]) -> str:
-    return ", ".join(f"{name} {version}" for name, version in stored.get(MADE_BY, {}).items())

@@ -48,6 +48,7 @@ class Analysis:
             "filter": self.filtered,
             "interval": self.settings.interval_kind,
             "settings": asdict(self.settings),
+            "settings_origin": "default" if self.settings == AnalysisSettings() else "set",
         }
 
 

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 from sessions.exports import ExportSource
 from sessions.recording import Recording
-from sessions.recording.log import OUTCOMES
+from sessions.recording.log import ANSWERS, OUTCOMES
 
 Cell = str | int | float | None
 
@@ -108,10 +108,15 @@ def trials(recording: Recording) -> Table:
 
 def answers(recording: Recording) -> Table:
     """Return a row for each answer a subject gave, with all that was recorded of it but its positions."""
-    scored = [event for event in recording.events if event.kind == "scored"]
+    given = [event for event in recording.events if event.kind in ANSWERS]
     rows = [
-        {"trial": event.trial, "time": event.time_ns, **{k: v for k, v in event.data.items() if k != "positions"}}
-        for event in scored
+        {
+            "trial": event.trial,
+            "time": event.time_ns,
+            "kind": event.kind,
+            **{k: v for k, v in event.data.items() if k != "positions"},
+        }
+        for event in given
     ]
     return _of("answers", "a row for each answer, those of discarded takes too", rows, _ANSWER)
 
@@ -225,6 +230,7 @@ _FLAW = {
 _ANSWER = {
     "trial": ("", "number of the trial"),
     "time": ("ns", "when the answer was recorded, session clock"),
+    "kind": ("", "scored, number_given or chosen"),
     "score": ("", "the answer, 0 to 100; none where the subject gave none"),
     "first_touch": ("s", "when the line was first touched, session clock"),
     "corrections": ("", "how often the answer was changed"),

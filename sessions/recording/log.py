@@ -83,7 +83,7 @@ def _record(trial: Trial, events: Sequence[LoggedEvent]) -> TrialRecord:
                 last = max(takes)
                 takes[last] = replace(takes[last], strokes=takes[last].strokes + 1)
             case "scored" | "number_given" | "chosen":
-                answer = event.data[_ANSWERS[event.kind]]
+                answer = event.data[ANSWERS[event.kind]]
             case "take_kept" if number in takes:
                 takes[number] = replace(takes[number], stop_ns=event.time_ns)
                 outcome, kept = _OUTCOMES[trial.answer] if answer is not None else _unanswered(trial), number
@@ -110,7 +110,7 @@ def _record(trial: Trial, events: Sequence[LoggedEvent]) -> TrialRecord:
     )
 
 
-_ANSWERS = {"scored": "score", "number_given": "number", "chosen": "choice"}
+ANSWERS = {"scored": "score", "number_given": "number", "chosen": "choice"}
 _OUTCOMES: Mapping[Answer, Outcome] = {
     "line": "scored",
     "number": "numbered",

@@ -9,10 +9,13 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+import numpy as np
+
 from drivers.clock import Clock
 from sessions.plan import Origin
 
-LIBRARIES = ("numpy", "scipy", "numba", "h5py", "msgspec", "matplotlib")
+LIBRARIES = ("numpy", "scipy", "numba", "h5py", "msgspec", "matplotlib", "pyserial", "pyusb")
+OPTIONAL = ("nidaqmx", "distributed")  # told where they are installed
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,14 +58,26 @@ def machine() -> dict[str, Any]:
 
 
 def software_versions() -> dict[str, str]:
-    """Return the version of this program, of Python, and of every library a number may depend on."""
-    try:
-        program = version("daq-app")
-    except PackageNotFoundError:
-        program = "not installed"
+    """Return the version of this program, of Python, and of every library a number may depend on.
+
+    `blas` and `simd` too: the last bits of a number depend on who adds, and on what the processor adds at once.
+    """
+    known = {"daq-app": _version("daq-app") or "not installed", "python": platform.python_version()}
+    libraries = {name: _version(name) for name in (*LIBRARIES, *OPTIONAL)}
+    arithmetic: Any = np.show_config(mode="dicts")
+    blas = arithmetic.get("Build Dependencies", {}).get("blas", {})
+    simd = arithmetic.get("SIMD Extensions", {})
     return {
-        "daq-app": program,
-        "python": platform.python_version(),
+        **known,
         "sqlite": sqlite3.sqlite_version,
-        **{name: version(name) for name in LIBRARIES},
+        **{name: told for name, told in libraries.items() if told is not None},
+        "blas": f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip(),
+        "simd": " ".join(map(str, [*simd.get("baseline", []), *simd.get("found", [])])) or "unknown",
     }
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None

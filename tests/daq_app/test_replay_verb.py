@@ -30,8 +30,9 @@ def test_a_stored_number_that_comes_out_otherwise_is_named_with_exit_code_3(reco
     stored["strokes"][2]["mu_dynamic"] += 1e-9
     (session / "analysis.json").write_text(json.dumps(stored))
     assert run(["replay", str(session), "--fast", "--json"]) == 3
-    (difference,) = json.loads(capsys.readouterr().out)["differences"]
+    difference, why = json.loads(capsys.readouterr().out)["differences"]
     assert difference.startswith("analysis.json.strokes[2].mu_dynamic was stored as")
+    assert why.startswith("analysis.json was made by the same versions as now")
 
 
 def test_a_replay_leaves_the_session_as_it_was(recorded):

@@ -112,9 +112,9 @@ def test_verify_names_every_number_that_a_changed_constant_of_the_analysis_chang
     capsys.readouterr()
     assert run(["verify", str(session), "--json"]) == 3
     problems = printed(capsys)["problems"]
-    assert "analysis.json.settings.smoothing was stored as 0.1 and comes out as 0.2" in problems
+    assert "analysis.json.settings.smoothing was stored as 0.1 and comes out as 0.2 (+100 %)" in problems
     assert any("mu_max was stored as" in problem for problem in problems)
-    assert any("analysis.json was made by daq-app" in problem for problem in problems)
+    assert any("analysis.json was made by the same versions as now" in problem for problem in problems)
 
 
 def test_verify_names_what_a_changed_constant_inside_the_analysis_changes(session, capsys, monkeypatch):
