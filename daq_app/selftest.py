@@ -133,7 +133,7 @@ class _Watched:
                     raise SelfTestFailed(report.sentence)
         raise SelfTestFailed(f"the recorder did not answer within {DEADLINE:g} s")
 
-    def listen(self, seconds: float) -> None:
+    def hear(self, seconds: float) -> None:
         """Note what comes within so many seconds."""
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
@@ -176,7 +176,7 @@ def _killed(room: Path, chance: random.Random, progress: Progress) -> tuple[Kill
         progress(0.75 * number / KILLS, f"killing the recorder, {number + 1} of {KILLS}")
         watched = _Watched()
         trial = _begun_or_resumed(watched, folder)
-        watched.listen(chance.uniform(*RUNNING))
+        watched.hear(chance.uniform(*RUNNING))
         watched.killed()
         recording = Recording.open(folder)
         _check_kept(recording, watched, trial)
@@ -223,7 +223,7 @@ def _stopped(room: Path) -> float:
         watched = _Watched()
         with watched.recorder:
             _begun_or_resumed(watched, room / str(number))
-            watched.listen(0.3)
+            watched.hear(0.3)
             began = time.monotonic()
             watched.recorder.send(Stop())
             watched.until(SessionEnded)
