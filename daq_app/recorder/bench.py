@@ -20,7 +20,7 @@ from sessions.recording import RecordingError
 from sessions.resuming import check_same_transducer
 
 TRY_AGAIN = 1.0  # between two attempts to reach a transducer that was lost [real s]
-GLANCE = 0.005  # longest wait for readings while no session runs [real s]
+GLANCE = 0.01  # between two looks while no session runs [real s]
 
 
 class NotNow(Exception):
@@ -153,12 +153,12 @@ class Bench:
 
     def look(self) -> None:
         """Take what was measured, or try to find a lost transducer again. Raises NotNow when a tare is refused."""
+        time.sleep(GLANCE)
         if self._connected is None:
             self._look_for_it()
-            time.sleep(GLANCE)
             return
         try:
-            block = self._connected.transducer.read(GLANCE * self._clock.factor)
+            block = self._connected.transducer.read(0.0)
         except (LinkLost, DeviceFault) as error:
             self._lost(str(error))
             return

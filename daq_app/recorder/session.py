@@ -35,6 +35,7 @@ from drivers.transducer import TransducerInfo
 from sessions.plan import SessionPlan
 from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, Setting, provenance
 from sessions.recording.certificate import certificate_for
+from sessions.recording.folding import fold_log
 from sessions.recording.head import simulated_sentence
 from sessions.recording.manifest import is_sealed
 from sessions.recording.place import unsafe
@@ -103,6 +104,7 @@ def gone_on(request: ResumeSession, bench: Bench, clock: Clock) -> Prepared:
     folder = Path(request.folder)
     if is_sealed(folder):
         raise RecordingError(f"{folder} is sealed: nothing is added to it; begin a new session")
+    fold_log(Recording.open(folder))  # fails while another recorder writes: its transducer is left alone then
     recording = Recording.open(folder)
     check_resumable(recording)
     _allowed(folder, any_folder=ANY_FOLDER in recording.provenance.get("settings", {}))

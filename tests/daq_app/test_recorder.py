@@ -4,6 +4,8 @@ import itertools
 import os
 import signal
 import socket
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -13,6 +15,8 @@ from desk import DEADLINE, PACE, PLAN, Desk
 
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import (
+    REPORTS,
+    REQUESTS,
     Connect,
     Device,
     Failed,
@@ -30,6 +34,7 @@ from daq_app.recorder.messages import (
     Tare,
     Tared,
 )
+from daq_app.recorder.wire import Codec, Splitter
 from sessions.recording import LoggedEvent, Recording
 from sessions.runner import Status
 from sessions.steps import (
@@ -54,6 +59,7 @@ def whole(tmp_path_factory):
         listening = sockets_of(recorder.pid)
         recorder.send(Tare(2.0))
         desk.until(Tared)
+        desk.until(Live)
         recorder.send(StartSession(PLAN, str(folder), People("simulated hand", 7)))
         desk.until(AskStroke)
         recorder.send(Tare())
@@ -196,6 +202,9 @@ def test_a_recorder_that_is_killed_has_lost_nothing_it_told_of_and_its_session_g
     with Recorder.start(PACE) as first:
         desk = Desk(first)
         started(desk, folder)
+        with Recorder.start(PACE) as another:
+            another.send(ResumeSession(str(folder)))
+            assert "is in use" in Desk(another).until(Failed).sentence
         os.kill(first.pid, signal.SIGKILL)
         gone = desk.until(Gone)
     assert not gone.asked
@@ -212,6 +221,31 @@ def test_a_recorder_that_is_killed_has_lost_nothing_it_told_of_and_its_session_g
         desk.until(Sealed)
     assert end.end.complete
     assert all(record.outcome == "scored" for record in Recording.open(folder).trials)
+
+
+def test_a_client_that_fetches_nothing_holds_up_nothing(tmp_path):
+    folder = tmp_path / "s"
+    recorder = subprocess.Popen(
+        [sys.executable, "-m", "daq_app.recorder", "20"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    codec = Codec(REQUESTS)
+    recorder.stdin.write(codec.packed(Connect("sim:?seed=7")))
+    recorder.stdin.write(codec.packed(StartSession(PLAN, str(folder), People("simulated people", 7))))
+    recorder.stdin.flush()
+    deadline = time.monotonic() + 2 * DEADLINE
+    while not (folder / "MANIFEST.json").exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    recording = Recording.open(folder)
+    assert recording.end["complete"]
+    assert recording.losses == ()
+    recorder.stdin.close()
+    reports = [Codec(REPORTS).unpacked(body) for body in Splitter().feed(recorder.stdout.read())]
+    recorder.stdout.close()
+    assert recorder.wait() == 0
+    assert tuple(report for report in reports if isinstance(report, LoggedEvent)) == recording.events
+    live = [report for report in reports if isinstance(report, Live) and report.stream == 1]
+    assert sum(len(report.sequence) for report in live) < len(recording.readings())
 
 
 def test_a_stop_with_nothing_in_hand_changes_nothing_and_during_a_tare_ends_that():
