@@ -1,0 +1,93 @@
+"""Every version of the format still opens: sessions that the code of that version wrote, kept as they were."""
+
+import json
+import shutil
+from pathlib import Path
+
+import h5py
+import pytest
+from recordings import begun, change, ended, rows
+
+from daq_app.cli import run
+from sessions.analysis import analyse
+from sessions.recording import Recording, RecordingError, writer
+from sessions.recording.archive import problems, seal
+from sessions.recording.head import plan_to_dict
+from sessions.recording.schema import FORMAT_VERSION
+
+KEPT = Path(__file__).parents[1] / "data" / "sessions"
+VERSIONS = range(1, FORMAT_VERSION + 1)
+
+
+def kept(version, name, tmp_path):
+    """A copy: a log beside a live file may be folded by whoever opens it with leave to write."""
+    return shutil.copytree(KEPT / f"version-{version}" / name, tmp_path / name)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_sealed_session_of_every_version_opens_and_is_whole(tmp_path, version):
+    folder = kept(version, "sealed", tmp_path)
+    assert problems(folder) == ()
+    assert json.loads((folder / "session.json").read_text())["format"]["version"] == version
+    recording = Recording.open(folder)
+    assert recording.plan.subject == "G01"
+    assert [record.outcome for record in recording.trials] == ["scored", "scored"]
+    assert recording.flaws == ("2 readings never arrived",)
+    assert run(["verify", str(folder)]) == 0
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_sealed_session_of_every_version_gives_what_was_planted_in_it(tmp_path, version):
+    strokes = analyse(Recording.open(kept(version, "sealed", tmp_path))).strokes
+    assert len(strokes) == 2
+    for stroke in strokes:
+        assert stroke.mu_dynamic == pytest.approx(0.5, abs=0.002)  # 1 N of drag under 2 N
+        assert stroke.speed == pytest.approx(20.0, rel=0.01)
+        assert stroke.direction == 1
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_session_of_every_version_that_a_crash_left_opens_and_can_be_sealed(tmp_path, version):
+    folder = kept(version, "live", tmp_path)
+    recording = Recording.open(folder)
+    assert [record.outcome for record in recording.trials] == ["scored", "open"]
+    assert recording.losses == ("the session has no end: it was cut short, or is still running",)
+    (stroke,) = analyse(recording).strokes
+    assert stroke.mu_dynamic == pytest.approx(0.5, abs=0.002)
+    readings = len(recording.readings())
+    seal(folder)
+    assert problems(folder) == recording.losses
+    assert len(Recording.open(folder).readings()) == readings == rows(folder, "SELECT sum(readings) FROM blocks")[0][0]
+
+
+def test_what_later_programs_add_to_a_plan_leaves_sealed_sessions_whole(tmp_path, monkeypatch):
+    def older(plan):
+        return {name: value for name, value in plan_to_dict(plan).items() if name not in {"answering_hand"}}
+
+    monkeypatch.setattr(writer, "plan_to_dict", older)
+    folder = ended(tmp_path / "s")
+    seal(folder)
+    monkeypatch.undo()
+    assert "answering_hand" not in rows(folder, "SELECT value FROM head WHERE name = 'plan'")[0][0]
+    assert Recording.open(folder).plan.answering_hand is None
+    assert problems(folder) == ()
+    with h5py.File(folder / "session.h5") as copy:
+        assert b"answering_hand" not in copy["head/plan"][0]
+
+
+def test_what_an_earlier_program_did_not_know_in_a_plan_is_left_out(tmp_path, monkeypatch):
+    monkeypatch.setattr(writer, "plan_to_dict", lambda plan: {**plan_to_dict(plan), "gloves": "none"})
+    folder = ended(tmp_path / "s")
+    seal(folder)
+    assert Recording.open(folder).plan.subject == "S01"
+    assert problems(folder) == ()
+
+
+def test_a_later_version_is_refused_by_name(tmp_path):
+    folder = begun(tmp_path / "s").folder
+    value = json.dumps({"name": "daq-app session", "version": FORMAT_VERSION + 1})
+    import zlib
+
+    change(folder, "UPDATE head SET value = ?, crc32 = ? WHERE name = 'format'", (value, zlib.crc32(value.encode())))
+    with pytest.raises(RecordingError, match=f"up to version {FORMAT_VERSION}: use a later program"):
+        Recording.open(folder)
