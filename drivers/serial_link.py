@@ -65,7 +65,7 @@ class SerialLink:
             first = self._port.read(1)
             waiting = self._port.in_waiting if first else 0
             return (first + self._port.read(waiting) if waiting else first) or None
-        except _GONE:
+        except (*_GONE, ValueError):  # the latter from a port that vanishes while its waiting time is set
             raise LinkLost(f"{self._where} is gone; check that its plug is in") from None
 
     def close(self) -> None:

@@ -256,6 +256,9 @@ class StreamingTransducer:
                     break
                 tries = 0 if silent < 2.0 * _QUIET else tries + 1
                 self._stopping.wait(_BACK_OFF[min(tries, len(_BACK_OFF) - 1)])
+            except Exception as error:  # noqa: BLE001 - an error of ours must not look like a device that is silent
+                self._ended = LinkLost(f"{self._info.uri}: unexpected {type(error).__name__} ({error}); open it anew")
+                break
         self._arrived.set()
 
     def _stream(self) -> None:

@@ -126,3 +126,15 @@ def test_a_port_that_cannot_be_opened_is_named_with_the_reason(tmp_path, monkeyp
 def test_an_address_without_a_port_is_refused():
     with pytest.raises(SetupError, match="names no port"):
         port_of(parse_address("serial-ft://?baud=9600"))
+
+
+def test_a_port_that_vanishes_while_its_waiting_time_is_set_is_lost(stand_in, monkeypatch):
+    link = SerialLink("/dev/ttyUSB7", 1_250_000)
+
+    def refuse(*_):
+        raise ValueError("Failed to set custom baud rate (1250000): [Errno 5] Input/output error")
+
+    monkeypatch.setattr(serial_link.serial.Serial, "timeout", property(fset=refuse), raising=False)
+    with pytest.raises(LinkLost, match="/dev/ttyUSB7 is gone"):
+        link.receive(0.1)
+    assert len(stand_in) == 1
