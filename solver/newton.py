@@ -84,6 +84,7 @@ class Newton:
         self.body = body
         self.tangent = np.zeros((count, 16, 16))
         self.force = np.zeros(body.size)
+        self.load = np.zeros(body.size)  # dead loads on the body, of `solver.dead_loads`
         self.fold, self.dilate = np.zeros((count, 2, 17)), np.zeros((count, 3, 18))
         self.core, self.volume = np.zeros((count, 3)), np.zeros((count, 3))
         self.inside = Elimination(body.plan)
@@ -124,6 +125,7 @@ class Newton:
 
     def _touch(self, shape: Shape, pull: Pull, anchor: Array, rounds: int) -> bool:
         body = self.body
+        self.force -= self.load
         self._felt = self.inside.condense(self.force)
         self._state[:], self._sense[:] = shape.state, shape.sense
         x = self.skin_x + shape.u[body.skin, 0]

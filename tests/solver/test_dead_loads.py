@@ -1,0 +1,84 @@
+"""Bodies that are no finger: dead loads, prescribed displacements and contact, at both kinematics."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.body import Body, edge_load
+from solver.dead_loads import loaded
+from solver.finite_body import FiniteBody
+from solver.hyperelastic import NeoHooke, stress
+from solver.kernels import SLIP
+from solver.materials import Hooke
+from solver.newton import Newton, Pull, Shape
+from tests.solver.finite_examples import block
+
+DERMIS = NeoHooke(0.08, 0.48)
+
+
+def on_the_flat():
+    """A block on the surface, held in the middle of its foot only, everything below touching."""
+    mesh = block(columns=4, rows=2)
+    middle = mesh.skin[np.isclose(mesh.nodes[mesh.skin, 0], 1.0)]
+    newton = Newton(FiniteBody.of(replace(mesh, held=middle), [DERMIS]))
+    start = Shape.undeformed(newton.body)
+    touching = np.full(len(mesh.skin), SLIP, np.int32)
+    return newton, replace(start, state=touching, sense=np.ones_like(touching))
+
+
+@pytest.mark.parametrize(
+    ("stretch", "across", "nominal"),
+    [(0.9, 1.101300, -0.012098), (0.8, 1.224285, -0.029016), (0.7, 1.376321, -0.054219)],
+)
+def test_a_block_pressed_on_the_flat_by_a_dead_traction_takes_the_closed_forms_shape(stretch, across, nominal):
+    newton, start = on_the_flat()
+    mesh = newton.body.mesh
+    top = np.flatnonzero(np.isclose(mesh.nodes[:, 1], 1.0))
+    top = top[np.argsort(mesh.nodes[top, 0])]
+    pressed = edge_load(mesh, top, np.ones((len(top), 1)) @ [[0.0, nominal]])
+    found = loaded(newton, pressed, pull=Pull(0.0, 0.0, sense=1), start=start)
+    exact = (mesh.nodes - [1.0, 0.0]) * [across - 1.0, stretch - 1.0]
+    np.testing.assert_allclose(found.u, exact, atol=3e-5)  # the traction is given to five figures
+    # the held corner of two of the four edges takes a sixth of each
+    assert found.force[1] == pytest.approx(-2.0 * nominal * (1.0 - 1.0 / 12.0), rel=1e-9)
+
+
+def test_a_prescribed_affine_boundary_is_affine_inside():
+    mesh = block(columns=3, rows=3, distortion=0.15, seed=4)
+    low, high = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)
+    boundary = np.flatnonzero(np.any((mesh.nodes < low + 1e-9) | (mesh.nodes > high - 1e-9), axis=1))
+    newton = Newton(FiniteBody.of(replace(mesh, held=boundary), [DERMIS]))
+    gradient = np.array([[0.2, 0.3], [-0.1, -0.1]])
+    found = loaded(newton, prescribed=mesh.nodes[boundary] @ gradient.T, pull=Pull(-1e3, 0.0))
+    np.testing.assert_allclose(found.u, mesh.nodes @ gradient.T, atol=1e-9)
+
+
+def test_a_hanging_bar_carries_its_dead_traction_far_from_the_clamp():
+    mesh = block(columns=2, rows=6, width=0.5, height=3.0)
+    newton = Newton(FiniteBody.of(mesh, [DERMIS]))
+    pulled = edge_load(mesh, mesh.skin, np.ones((len(mesh.skin), 1)) @ [[0.0, -0.01]])
+    place = mesh.nodes + loaded(newton, pulled, pull=Pull(-1e3, 0.0)).u
+    low, next_up = (np.isclose(mesh.nodes[:, 1], height) for height in (0.0, 0.5))
+    stretches = np.ptp(place[low, 0]) / 0.5, (place[next_up, 1].mean() - place[low, 1].mean()) / 0.5
+    P = stress(DERMIS, np.diag(stretches))  # noqa: N806
+    np.testing.assert_allclose(P, [[0.0, 0.0], [0.0, 0.01]], atol=2e-4)
+
+
+def test_small_loads_give_the_small_strain_answer():
+    mesh = block(columns=4, rows=3, distortion=0.1, seed=2)
+    right = edge_load(mesh, mesh.skin, np.ones((len(mesh.skin), 1)) @ [[1e-5, -2e-5]])
+    newton = Newton(FiniteBody.of(mesh, [NeoHooke(1.0, 0.3)]))
+    finite = loaded(newton, right, pull=Pull(-1e3, 0.0), steps=1)
+    body = Body.of(mesh, [Hooke(1.0, 0.3)], right)
+    free = np.concatenate([body.touchable.normal_free, body.touchable.tangential_free])[:, None]
+    small = body.displacement(free)[:, :, 0]
+    np.testing.assert_allclose(finite.u, small, rtol=1e-3, atol=1e-4 * np.abs(small).max())
+
+
+def test_a_load_on_an_elements_centre_is_refused():
+    mesh = block()
+    loads = np.zeros(mesh.nodes.shape)
+    loads[mesh.elements[0, 8]] = 1.0
+    with pytest.raises(ValueError, match="centre of an element"):
+        loaded(Newton(FiniteBody.of(mesh, [DERMIS])), loads)
