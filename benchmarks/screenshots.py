@@ -46,8 +46,10 @@ def _settings() -> list[str]:
 
 def _take(setting: str, out: Path) -> None:
     """Take the pictures of one setting."""
-    from PySide6.QtCore import QLocale, QSettings, Qt
+    from PySide6.QtCore import QLocale, QSettings
     from PySide6.QtWidgets import QApplication
+
+    from daq_app.qt.tokens import DARK, LIGHT
 
     size, scale, theme, locale = setting.split("-")
     width, height = (round(int(part) / float(scale)) for part in size.split("x"))
@@ -56,26 +58,25 @@ def _take(setting: str, out: Path) -> None:
     QSettings.setDefaultFormat(QSettings.Format.IniFormat)
     QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, str(out / "settings"))
     application = QApplication([])
-    dark = Qt.ColorScheme.Dark if theme == "dark" else Qt.ColorScheme.Light
-    application.styleHints().setColorScheme(dark)
-    _Places(application, width, height, lambda name: out / f"{name}-{setting}.png").all()
+    chosen = DARK if theme == "dark" else LIGHT
+    _Places(application, (width, height), chosen, lambda name: out / f"{name}-{setting}.png").all()
     os._exit(0)
 
 
 class _Places:
     """The window, brought to each of its places."""
 
-    def __init__(self, application, width, height, path) -> None:  # noqa: ANN001
+    def __init__(self, application, size, theme, path) -> None:  # noqa: ANN001
         from benchmarks.played_recorder import PlayedRecorder
         from daq_app.qt.start import opened
 
         self.application, self.path = application, path
         self.recorder = PlayedRecorder()
-        self.window = opened(application, lambda: self.recorder)
-        self.window.resize(width, height)
+        self.window = opened(application, lambda: self.recorder, theme)
+        self.window.resize(*size)
         self.window.show()
         self.subject = self.window.subject
-        self.subject.resize(width, height)
+        self.subject.resize(*size)
         self.window.show_subject = self.subject.show
         self.now = 0.0
 

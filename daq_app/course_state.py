@@ -57,7 +57,8 @@ class SessionState:
     asked: steps.Command | None = None  # what is waited for
     told: str | None = None  # the last sentence that needs no answer, or that refuses one
     judged: int | None = None  # number of the trial whose stroke was looked at last
-    marks: tuple[Mark, ...] = ()  # the last ones
+    time_offset: float = 0.0  # of the times in the log to those of the stream that is shown, after a resumption [s]
+    marks: tuple[Mark, ...] = ()  # the last ones, in the time of the stream that is shown
     notes: tuple[str, ...] = ()
     status: Status | None = None
     saved_ns: int = 0  # instant of the last thing that is safe [ns, session clock]
@@ -170,9 +171,11 @@ def _logged(session: SessionState, event: LoggedEvent) -> SessionState:
     match event.kind:
         case "contact_onset":
             phase = "stroking" if session.phase == "ready" else session.phase
-            return _marked(replace(session, phase=phase), Mark("onset", data["time"], data["time"]))
+            return _marked(replace(session, phase=phase), _instant(session, "onset", data))
         case "finger_lifted":
-            return _marked(session, Mark("lift", data["time"], data["time"]))
+            return _marked(session, _instant(session, "lift", data))
+        case "readings_joined":
+            return replace(session, time_offset=data["time_offset"], marks=())
         case "pause":
             return replace(session, phase="paused", before_pause=session.phase)
         case "resume" if session.phase == "paused":
@@ -213,6 +216,11 @@ def _judged(session: SessionState, trial: int, take: int, quality: Quality) -> S
     if quality.steady is None:
         return session
     return _marked(session, Mark("steady", *quality.steady))
+
+
+def _instant(session: SessionState, kind: Literal["onset", "lift"], data: Mapping[str, Any]) -> Mark:
+    at = float(data["time"]) - session.time_offset
+    return Mark(kind, at, at)
 
 
 def _marked(session: SessionState, mark: Mark) -> SessionState:

@@ -93,6 +93,15 @@ def checked(
     return StartSession(planned, str(folder), people, (*own, *settings))
 
 
+def is_code(subject: str) -> bool:
+    """Say whether a text may stand for a subject.
+
+    >>> is_code("P07"), is_code("Ada Lovelace"), is_code("")
+    (True, False, False)
+    """
+    return re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", subject.strip()) is not None
+
+
 def session_folder(form: SessionForm, protocol_name: str, now: datetime) -> Path:
     """Return the folder the session will be in: a new one for every visit."""
     name = f"{form.subject.strip()}_{protocol_name}_{now.strftime('%Y%m%dT%H%M%S')}"
@@ -126,7 +135,7 @@ def _age(path: Path) -> float:
 
 def _refusals(form: SessionForm, bench: Bench) -> dict[str, str]:
     wrong: dict[str, str] = {}
-    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", form.subject.strip()):
+    if not is_code(form.subject):
         wrong["subject"] = "Give a code of letters, digits, - and _ (at most 32), never a name."
     if re.search(r"[/\\]|^\.", form.study.strip()):
         wrong["study"] = "A study's name has no slash in it and does not begin with a dot."

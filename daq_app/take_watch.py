@@ -25,6 +25,7 @@ class Judge:
         self._say = say
         self._worker = ThreadPoolExecutor(1, "stroke quality")
         self._take: tuple[int, int] | None = None  # trial and take in hand
+        self._offset = 0.0  # of the times in the log to those of the stream [s]
         self._due: float | None = None  # when the take is to be looked at [s, device time]
 
     def close(self) -> None:
@@ -37,9 +38,12 @@ class Judge:
             case steps.StartTake(trial, take):
                 self._take, self._due = (trial, take), None
                 feed.take_begins()
-            case LoggedEvent(kind="finger_lifted"):
-                newest = feed.trace.newest
-                self._due = None if newest is None else newest + AFTER
+            case LoggedEvent(kind="finger_lifted", data=data):
+                self._due = float(data["time"]) - self._offset + AFTER
+            case LoggedEvent(kind="readings_joined", data=data):
+                self._offset = float(data["time_offset"])
+            case m.SessionBegun():
+                self._offset, self._due = 0.0, None
             case LoggedEvent(kind="contact_onset"):
                 self._due = None
             case _:

@@ -77,7 +77,7 @@ def course_view(session: SessionState, bench: BenchState, now: float, *, alone: 
         primary=primary,
         direction=trial.trial.direction if trial is not None and session.phase in IN_A_TRIAL else 0,
         timer="" if over else _clock(now - session.since),
-        told=session.told or "",
+        told=f"It is kept in {session.folder}" if over else session.told or "",
         rows=_rows(session),
         stroke=stroke,
         redo=Button("Redo", "R", redo, stroke.redo if redo else None),
@@ -152,7 +152,7 @@ def _ended(session: SessionState) -> tuple[str, Button | None]:
         resume = Button("Resume session", "Space", sends=m.ResumeSession(session.folder))
         return "The session was cut short and can go on at the same trial.", resume
     done = sum(t.outcome == "done" for t in session.trials)
-    sentence = f"Session ended: {done} of {len(session.trials)} trials done. It is kept in {session.folder}."
+    sentence = f"Session ended: {done} of {len(session.trials)} trials done."
     return sentence, Button("New session", "Space", sends=NewSession())
 
 
@@ -165,7 +165,7 @@ def _pause(session: SessionState) -> Button:
 def _rows(session: SessionState) -> tuple[PlanRow, ...]:
     rows: list[PlanRow] = []
     for block in session.plan.blocks:
-        way = "proximal → distal" if block.direction == PROXIMAL_TO_DISTAL else "distal → proximal"
+        way = "↑ away" if block.direction == PROXIMAL_TO_DISTAL else "↓ towards"
         rows.append(PlanRow("block", "", block.name, way))
         numbers = {trial.number for trial in block.trials}
         rows += [_row(session, trial) for trial in session.trials if trial.trial.number in numbers]

@@ -4,20 +4,18 @@ from collections.abc import Callable
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
-    QComboBox,
     QFrame,
     QGridLayout,
     QHBoxLayout,
     QLabel,
     QScrollArea,
-    QSizePolicy,
     QVBoxLayout,
     QWidget,
 )
 
 from daq_app.bench_load import AXES
 from daq_app.qt.indicators import Lamp, LoadBar
-from daq_app.qt.parts import button, label, regrade, say
+from daq_app.qt.parts import button, choice, label, regrade, say
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.view_bench import BenchView
@@ -44,15 +42,13 @@ class BenchPanel(QFrame):
         self._name = label("no transducer", "title", wrap=True)
         self._counters = {name: label("0") for name in SHOWN_COUNTERS}
         self._bars = {name: LoadBar(tokens, name, scale) for name in (*AXES, "combined")}
-        self._choice = QComboBox()
-        self._choice.setAccessibleName("transducer to connect: choose one, or type its address")
+        self._choice = choice("transducer to connect: choose one, or type its address")
         self._choice.setEditable(True)
-        self._choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.search = button("Search", "search for transducers", search)
         self.connect_button = button("Connect", "connect the chosen transducer", self._connect)
-        self.tare = button("Zero  T", "measure the zero of the bench", lambda: send(Tare()))
+        self.tare = button("Zero T", "measure the zero of the bench", lambda: send(Tare()))
         self.acknowledge = button(
-            "Acknowledge  A", "acknowledge overloads: begin to watch anew", lambda: send(AcknowledgeOverloads())
+            "Acknowledge A", "acknowledge overloads: begin to watch anew", lambda: send(AcknowledgeOverloads())
         )
         self._content = self._built()
         layout = QVBoxLayout(self)
@@ -134,12 +130,16 @@ class BenchPanel(QFrame):
         layout.addLayout(lamp)
         layout.addLayout(_rows([(name, self._fields[name]) for name in ("serial", "calibration", "rate")]))
         layout.addWidget(label("Load: share of the rated range, most since acknowledged, noise", "section", wrap=True))
+        bars = QVBoxLayout()
+        bars.setSpacing(0)
         for bar in self._bars.values():
-            layout.addWidget(bar)
-        layout.addWidget(self.acknowledge)
-        layout.addWidget(label("Zero", "section"))
+            bars.addWidget(bar)
+        layout.addLayout(bars)
+        acts = QHBoxLayout()
+        acts.addWidget(self.tare, 2)
+        acts.addWidget(self.acknowledge, 3)
+        layout.addLayout(acts)
         layout.addLayout(_rows([("zero", self._fields["tare"]), ("drift", self._fields["drift"])]))
-        layout.addWidget(self.tare)
         layout.addWidget(label("Readings since the stream began", "section", wrap=True))
         layout.addLayout(_counters([(name, self._counters[name]) for name in SHOWN_COUNTERS]))
         layout.addStretch(1)

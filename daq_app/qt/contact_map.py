@@ -23,7 +23,7 @@ class ContactMap(QWidget):
         self._scale = scale
         self._trail: Array = np.empty((0, 2))
         self._direction = 0
-        self.setMinimumSize(120, 120)
+        self.setMinimumSize(100, 60)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("centre of pressure on the sample: nothing touches")
 

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from daq_app.qt.parts import button, label, say
-from daq_app.qt.tokens import GRID, Tokens
+from daq_app.qt.tokens import GRID, TARGET, Tokens
 from daq_app.view_course import Button, CourseView, PlanRow
 from daq_app.window_messages import Message
 from sessions import steps
@@ -45,11 +45,11 @@ class CoursePanel(QFrame):
         self._plan = QListWidget()
         self._plan.setAccessibleName("plan: trials done, in hand and coming")
         self._plan.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.redo = button("Redo  R", "redo the trial, with a reason", lambda: self.ask("redo"))
-        self.skip = button("Skip  S", "skip the trial, with a reason", lambda: self.ask("skip"))
-        self.pause = button("Pause  P", "pause", self._pause)
-        self.note = button("Note  N", "write a note", lambda: self.ask("note"))
-        self.end = button("End session", "end the session, with a reason", self._end)
+        self.redo = button("Redo R", "redo the trial, with a reason", lambda: self.ask("redo"), "small")
+        self.skip = button("Skip S", "skip the trial, with a reason", lambda: self.ask("skip"), "small")
+        self.pause = button("Pause P", "pause", self._pause, "small")
+        self.note = button("Note N", "write a note", lambda: self.ask("note"), "small")
+        self.end = button("End session", "end the session, with a reason", self._end, "small")
         self.line = ReasonLine(self._given, self.leave)
         self._question = label("", wrap=True)
         self._bottom = QStackedWidget()
@@ -130,8 +130,9 @@ class CoursePanel(QFrame):
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setSpacing(GRID)
         for at, made in enumerate((self.redo, self.skip, self.pause, self.note)):
-            grid.addWidget(made, at // 2, at % 2)
-        grid.addWidget(self.end, 2, 0, 1, 2)
+            grid.addWidget(made, at // 3, at % 3)
+        grid.addWidget(self.end, 1, 1, 1, 2)
+        self._plan.setMinimumHeight(3 * TARGET // 2)
         return page
 
     def _asked(self, scale: float) -> QWidget:
@@ -146,7 +147,7 @@ class CoursePanel(QFrame):
         row.addWidget(button("Keep  Enter", "keep what was typed", self._given))
         row.addWidget(button("Leave  Esc", "leave it", self.leave))
         layout.addLayout(row)
-        page.setMinimumHeight(round(100 * scale))
+        page.setMinimumHeight(round(88 * scale))
         return page
 
     def _show_rows(self, rows: tuple[PlanRow, ...]) -> None:
@@ -177,6 +178,7 @@ class ReasonLine(QLineEdit):
     def __init__(self, given: Callable[[], None], left: Callable[[], None]) -> None:
         """Call `given` at Enter and `left` at Esc."""
         super().__init__()
+        self.setAccessibleName("reason or note")
         self._given = given
         self._left = left
 
@@ -195,5 +197,5 @@ def _buttons(view: CourseView) -> tuple[Button, ...]:
 
 
 def _show_button(made: QPushButton, shown: Button) -> None:
-    made.setText(f"{shown.label}  {shown.key}")
+    made.setText(f"{shown.label} {shown.key}")
     made.setEnabled(shown.enabled)

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QWidget
 
 from daq_app.qt.indicators import Arrow, Lamp
-from daq_app.qt.parts import button, label, regrade, say
+from daq_app.qt.parts import Shortened, button, label, regrade, say
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.view import Banner, View
 from daq_app.view_course import Button
@@ -19,8 +19,7 @@ class Header(QWidget):
     def __init__(self, tokens: Tokens, subject: Callable[[], None], keys: Callable[[], None]) -> None:
         """Show no session; `subject` and `keys` show the subject's window and the keys."""
         super().__init__()
-        self._heading = label("daq-app", "title")
-        self._heading.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._heading = Shortened("title")
         self._simulated = label("SIMULATED", "simulated")
         self._simulated.setVisible(False)
         self._lamp = Lamp(tokens, "recording")
@@ -42,8 +41,7 @@ class Header(QWidget):
 
     def show_view(self, view: View) -> None:
         """Show the top line."""
-        say(self._heading, view.heading)
-        self._heading.setToolTip(view.heading)
+        self._heading.show_whole(view.heading)
         self._simulated.setVisible(view.simulated is not None)
         self._simulated.setToolTip(view.simulated or "")
         self._simulated.setAccessibleName(view.simulated or "nothing is simulated")
@@ -71,7 +69,9 @@ class Notice(QFrame):
         self._words.setAccessibleName("notice")
         self._button = button("", "what the notice offers", self._do)
         self._button.setVisible(False)
-        self.setMinimumHeight(round(52 * scale))
+        self._scale = scale
+        self._folds = False
+        self.show_folding(False)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(2 * GRID, 2, GRID, 2)
         layout.addWidget(self._words, 1)
@@ -90,9 +90,17 @@ class Notice(QFrame):
         self._words.setAccessibleDescription(text)
         regrade(self, banner.grade if banner else "")
         self._button.setVisible(banner is not None and banner.sends is not None)
+        if self._folds:
+            self.setVisible(bool(text))
         if banner is not None:
             self._button.setText(banner.action)
             self._button.setAccessibleName(banner.action)
+
+    def show_folding(self, folds: bool) -> None:
+        """Keep the line's place while it is empty; or give it up, where there is no room to keep."""
+        self._folds = folds
+        self.setMinimumHeight(0 if folds else round(52 * self._scale))
+        self.setVisible(not folds or bool(self._words.text()))
 
     def warn(self, sentence: str) -> None:
         """Show a sentence of the window's own."""

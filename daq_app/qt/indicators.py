@@ -62,7 +62,7 @@ class Lamp(QWidget):
 class LoadBar(QWidget):
     """How far one axis is loaded now, and the most it was loaded since somebody acknowledged it."""
 
-    NAME, NOISE = 78, 92  # widths of the words beside the bar, before the font's scale
+    NAME, NOISE = 86, 104  # widths of the words beside the bar, before the font's scale
 
     def __init__(self, tokens: Tokens, name: str, scale: float) -> None:
         """Start empty."""
@@ -70,8 +70,9 @@ class LoadBar(QWidget):
         self._tokens = tokens
         self._scale = scale
         self._bar = Bar(name, 0.0, 0.0, over=False, noise="")
+        self.setAccessibleName(f"load on {name}")
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setFixedHeight(round(3 * GRID * scale))
+        self.setFixedHeight(round(2.75 * GRID * scale))
 
     def sizeHint(self) -> QSize:  # noqa: N802  Qt's name
         """Return the usual size."""

@@ -2,12 +2,14 @@
 
 from dataclasses import dataclass
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QGridLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from daq_app.qt.parts import button, label, panel
 from daq_app.qt.tokens import GRID
+
+WIDTH, HEIGHT = 720, 560  # of the page, before the font's scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,17 +74,33 @@ class KeysPage(QWidget):
         super().__init__(parent)
         self.setAccessibleName("keys")
         frame, inside = panel("keys of this window")
-        inside.addWidget(label("Keys", "title"))
-        grid = QGridLayout()
+        head = QHBoxLayout()
+        head.addWidget(label("Keys", "title"), 1)
+        head.addWidget(button("Close  F1", "close the keys", self.hide))
+        inside.addLayout(head)
+        rows = QWidget()
+        rows.setObjectName("inside")
+        grid = QGridLayout(rows)
+        grid.setContentsMargins(0, 0, GRID, 0)
         grid.setHorizontalSpacing(3 * GRID)
         grid.setVerticalSpacing(4)
         for row, known in enumerate(KEYS):
-            grid.addWidget(label(known.key, "value"), row, 0)
+            grid.addWidget(label(known.key, "value"), row, 0, Qt.AlignmentFlag.AlignTop)
             grid.addWidget(label(known.words, "value", wrap=True), row, 1)
         grid.setColumnStretch(1, 1)
-        inside.addLayout(grid)
-        inside.addWidget(button("Close  F1", "close the keys", self.hide))
+        scroll = QScrollArea()
+        scroll.setWidget(rows)
+        scroll.setWidgetResizable(True)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        scroll.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")
+        inside.addWidget(scroll, 1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(frame)
         self.hide()
+
+    def fit(self, window: QSize, scale: float) -> None:
+        """Take the middle of a window, as much as there is need for."""
+        size = QSize(round(WIDTH * scale), round(HEIGHT * scale)).boundedTo(window - QSize(4 * GRID, 4 * GRID))
+        self.resize(size)
+        self.move((window.width() - size.width()) // 2, (window.height() - size.height()) // 2)

@@ -2,8 +2,8 @@
 
 import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QComboBox, QFrame, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtGui import QResizeEvent, QShowEvent
+from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from daq_app.course_state import Mark
 from daq_app.live_feed import LiveFeed
@@ -11,10 +11,11 @@ from daq_app.live_trace import CHANNELS
 from daq_app.plot_scale import PlotScale
 from daq_app.qt.contact_map import ContactMap
 from daq_app.qt.live_plot import Curve, LivePlot
-from daq_app.qt.parts import button, label, say
+from daq_app.qt.parts import button, choice, label, say
 from daq_app.qt.tokens import FX, FY, GRID, MU, N, T, Tokens
 
 LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
+LEAST_FOR_SPEED = 280  # a lower panel shows force and ratio alone
 TRAIL = 2.0  # of the centre of pressure [s]
 READ_EVERY = 0.25  # numbers beside the plots change no more often than they can be read [s]
 
@@ -49,11 +50,14 @@ class LivePanel(QFrame):
         self._tokens = tokens
         self.plots = [LivePlot(*plot, tokens, scale) for plot in (*PLOTS, *AXES)]
         self.map = ContactMap(tokens, scale)
+        self._numbers = QWidget()
         self._values: dict[str, QLabel] = {}
         self.hold = button("Hold  H", "hold the picture; readings go on", self._toggle_hold)
         self.hold.setCheckable(True)
-        self.length = QComboBox()
-        grid = QGridLayout()
+        self.length = choice("stretch of time that is shown")
+        self.length.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.length.setFixedWidth(round(120 * scale))
+        grid = self._grid = QGridLayout()
         grid.setSpacing(4)
         for row, plot in enumerate(self.plots[:3]):
             grid.addWidget(plot, row, 0)
@@ -97,6 +101,7 @@ class LivePanel(QFrame):
     def show_side(self, shown: bool) -> None:
         """Show or fold the six axes and the sample, where there is little room."""
         self._side.setVisible(shown)
+        self._grid.setColumnStretch(1, 3 if shown else 0)
 
     def show_seconds(self, seconds: int) -> None:
         """Show the last so many seconds."""
@@ -142,10 +147,21 @@ class LivePanel(QFrame):
         super().showEvent(event)
         self.show_seconds(self._seconds)
 
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Leave out the numbers where they would be cut."""
+        super().resizeEvent(event)
+        needed = self._numbers.sizeHint().width() + self.length.width() + self.hold.sizeHint().width() + 5 * GRID
+        self._numbers.setVisible(self.width() >= needed)
+        room = self.height() >= LEAST_FOR_SPEED
+        self.plots[2].setVisible(room)
+        self._grid.setRowStretch(2, 2 if room else 0)
+
     def _bar(self, scale: float) -> QHBoxLayout:
         """Return the row above the plots: numbers that are read, and what is shown."""
         row = QHBoxLayout()
         row.setSpacing(GRID)
+        inside = QHBoxLayout(self._numbers)
+        inside.setContentsMargins(0, 0, 0, 0)
         for channel, unit, _, colour in READ:
             name = {"mu": "µ"}.get(channel, channel)
             made = label("–", "title")
@@ -155,16 +171,20 @@ class LivePanel(QFrame):
             caption = label(f"{name}", "quiet")
             if colour:
                 caption.setStyleSheet(f"border-bottom: 3px solid {colour};")
-            row.addWidget(caption)
-            row.addWidget(made)
+            inside.addWidget(caption)
+            inside.addWidget(made)
             self._values[channel] = made
-        row.addStretch(1)
+        inside.addStretch(1)
+        # They give way where there is no room for all of them.
+        self._numbers.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        row.addWidget(self._numbers, 1)
         for seconds in LENGTHS:
             self.length.addItem(f"last {seconds} s", seconds)
-        self.length.setAccessibleName("stretch of time that is shown")
         self.length.activated.connect(self._length_chosen)
+        row.addStretch(0)
         row.addWidget(self.length)
         row.addWidget(self.hold)
+        self.hold.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         return row
 
     def _read(self, now: float) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
 from PySide6.QtCore import QPointF, Qt
-from PySide6.QtGui import QColor
+from PySide6.QtGui import QColor, QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from daq_app.course_state import Mark
@@ -18,6 +18,7 @@ from daq_app.qt.tokens import SMALL, Tokens, font
 pg: Any = pyqtgraph  # it has no types
 
 AXIS_WIDTH = 52  # the same for all, so that their times stand under each other [before the font's scale]
+LEAST_FOR_HALVES = 100  # a lower plot has numbers at its ends alone
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +44,7 @@ class LivePlot(QWidget):
         self._seconds = 0.0
         self.setAccessibleName(f"plot of {name}")
         self._plot: Any = pg.PlotWidget()
+        self._plot.setMinimumSize(40, 32)
         self._plot.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -104,7 +106,17 @@ class LivePlot(QWidget):
         self._show_marks(marks, now)
 
     def _show_scale(self) -> None:
-        self._item.getViewBox().setYRange(self._scale.low, self._scale.high, padding=0.03)
+        low, high = self._scale.low, self._scale.high
+        self._item.getViewBox().setYRange(low, high, padding=0.03)
+        ends = [value for value in (low, 0.0, high) if value == 0.0 or abs(value) >= 0.2 * (high - low)]
+        halves = [low / 2, high / 2] if self.height() >= LEAST_FOR_HALVES else []
+        ticks = sorted({value for value in (*ends, *halves) if low <= value <= high})
+        self._item.getAxis("left").setTicks([[(value, f"{value:g}".replace("-", "−")) for value in ticks]])
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Show as many numbers as there is room for."""
+        super().resizeEvent(event)
+        self._show_scale()
 
     def _show_marks(self, marks: Sequence[Mark], now: float) -> None:
         """Move the marks with the readings: a line for onset and lift, a shaded stretch for the steady window."""

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.new_session import Bench, Refused, checked, unfinished
+from daq_app.new_session import Bench, Refused, checked, is_code, unfinished
 from daq_app.qt.bench_panel import BenchPanel, BenchStrip
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.course_panel import CoursePanel
@@ -40,6 +40,7 @@ from sessions.recording import Setting
 WIDE = 1366  # below it the bench folds to a strip of lamps
 ROOMY = 1100  # below it the six axes and the sample fold away
 TALL = 620  # below it the type of the headline is smaller
+LOW = 500  # below it an empty notice gives up its line
 LEAVING = 10.0  # closing twice within so long leaves a session that is being recorded [s]
 
 
@@ -51,6 +52,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.setWindowTitle("daq-app")
         self.setAccessibleName("experimenter's window")
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.bridge = bridge
         self._scale = scale
         self._tokens = tokens
@@ -82,6 +84,7 @@ class MainWindow(QMainWindow):
         for made in self.findChildren(QAbstractButton):
             made.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves Space to the primary button
         self.page.subject.setFocus()
+        self._fit()
 
     def sizeHint(self) -> QSize:  # noqa: N802  Qt's name
         """Return the size the window opens with."""
@@ -94,7 +97,7 @@ class MainWindow(QMainWindow):
         self.notice.show_view(view.banner, "" if course is None else course.told)
         self.bench.show_view(view.bench)
         self.strip.show_view(view.bench)
-        self._left.setCurrentIndex(0 if course is None else 1)
+        self._turn(0 if course is None else 1)
         if course is None:
             self._form_changed()
         else:
@@ -218,7 +221,6 @@ class MainWindow(QMainWindow):
         if made.people.kind == "simulated people":
             self.subject.hide()
         self.bridge.send(made)
-        self.setFocus()
 
     def _form_changed(self) -> None:
         """Say what is to be done on the page of a new session."""
@@ -228,12 +230,18 @@ class MainWindow(QMainWindow):
         sentence = "Give the subject's code, then press Enter to start."
         if form.forces and not bench.connected:
             sentence = "Connect a transducer, or choose scores only."
-        elif form.subject.strip():
+        elif is_code(form.subject):
             sentence = f"Press Enter to start the session of {form.subject.strip()}."
         self.to_do.show_what(sentence, Button("Start", "Enter"), 0)
         self.redo.setEnabled(False)
         say(self.stroke, "No stroke yet.")
         regrade(self.stroke, "")
+
+    def _turn(self, page: int) -> None:
+        """Show the page of a new session (0) or the course (1); keys go where they are of use there."""
+        if page != self._left.currentIndex():
+            self._left.setCurrentIndex(page)
+            (self.page.subject if page == 0 else self).setFocus()
 
     def _bench(self) -> Bench:
         bench = self.bridge.state.bench
@@ -303,10 +311,8 @@ class MainWindow(QMainWindow):
         self.strip.setVisible(not shown and self.width() >= 800)
         self.live.show_side(self.width() >= ROOMY and not (shown and not wide))
         self.to_do.show_small(self.height() < TALL or self.width() < ROOMY)
-        size = self.keys.sizeHint().boundedTo(self.size() - QSize(4 * GRID, 4 * GRID))
-        self.keys.setGeometry(
-            (self.width() - size.width()) // 2, (self.height() - size.height()) // 2, size.width(), size.height()
-        )
+        self.notice.show_folding(self.height() < LOW)
+        self.keys.fit(self.size(), self._scale)
 
     def _placed(self) -> QWidget:
         window = QWidget()

@@ -14,14 +14,13 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QRadioButton,
     QScrollArea,
-    QSizePolicy,
     QVBoxLayout,
     QWidget,
 )
 
 from daq_app.new_session import Bench, SessionForm, Unfinished
-from daq_app.qt.parts import button, label, regrade, say
-from daq_app.qt.tokens import GRID
+from daq_app.qt.parts import button, choice, label, regrade, say
+from daq_app.qt.tokens import GRID, TARGET
 from daq_app.recorder.messages import ResumeSession
 from daq_app.window_messages import Message
 from sessions.plan import Hand
@@ -45,10 +44,8 @@ class NewSessionPage(QFrame):
         self._shown: tuple[Unfinished, ...] = ()
         self.subject = _line("subject code, never a name")
         self.subject.setPlaceholderText("e.g. P07")
-        self.protocol = QComboBox()
-        self.protocol.setAccessibleName("protocol")
+        self.protocol = choice("protocol")
         self.protocol.addItems([*protocol_names(), "choose a file …"])
-        self.protocol.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.protocol.activated.connect(self._choose_protocol)
         self.study = _line("study, a folder of its own; may be empty")
         self.folder = _line("folder in which sessions are kept")
@@ -65,11 +62,10 @@ class NewSessionPage(QFrame):
             for made in pair:
                 group.addButton(made)
                 made.setAccessibleName(made.text())
+                made.setMinimumHeight(TARGET - GRID)
             pair[chosen].setChecked(True)
         self._people_words = label("", "quiet", wrap=True)
-        self._resume = QComboBox()
-        self._resume.setAccessibleName("sessions that were cut short")
-        self._resume.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self._resume = choice("sessions that were cut short")
         self._go_on = button("Go on with it", "go on with the session that was cut short", self._resumed)
         self._unfinished = QWidget()
         self._build(scale)
@@ -238,7 +234,6 @@ def _line(name: str) -> QLineEdit:
 
 
 def _hands(name: str) -> QComboBox:
-    made = QComboBox()
-    made.setAccessibleName(name)
+    made = choice(name)
     made.addItems([words for words, _ in HANDS])
     return made

@@ -3,9 +3,10 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QComboBox, QFrame, QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
-from daq_app.qt.tokens import GRID
+from daq_app.qt.tokens import GRID, TARGET
 
 
 def label(text: str = "", role: str = "value", *, wrap: bool = False) -> QLabel:
@@ -17,6 +18,34 @@ def label(text: str = "", role: str = "value", *, wrap: bool = False) -> QLabel:
     return made
 
 
+class Shortened(QLabel):
+    """A label that ends in dots where there is no room for all of it, and says the whole to screen readers."""
+
+    def __init__(self, role: str) -> None:
+        """Show nothing."""
+        super().__init__()
+        self._whole = ""
+        self.setProperty("role", role)
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+
+    def show_whole(self, text: str) -> None:
+        """Show as much of a text as there is room for."""
+        if text != self._whole:
+            self._whole = text
+            self.setToolTip(text)
+            self.setAccessibleName(text)
+            self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Fit the text anew."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        self.setText(self.fontMetrics().elidedText(self._whole, Qt.TextElideMode.ElideRight, max(self.width(), 1)))
+
+
 def button(text: str, name: str, does: Callable[[], object], role: str = "") -> QPushButton:
     """Return a button that says `name` to screen readers."""
     made = QPushButton(text)
@@ -25,6 +54,15 @@ def button(text: str, name: str, does: Callable[[], object], role: str = "") -> 
         made.setProperty("role", role)
     made.setAutoDefault(False)
     made.clicked.connect(lambda: does())
+    return made
+
+
+def choice(name: str) -> QComboBox:
+    """Return a list to choose from that says `name` to screen readers, and takes the room it is given."""
+    made = QComboBox()
+    made.setAccessibleName(name)
+    made.setMinimumHeight(TARGET)
+    made.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
     return made
 
 

@@ -47,6 +47,7 @@ class ScoreLine(QWidget):
         self._pixels_per_mm = 96 / 25.4
         self._answer = Answer()
         self._ends = ("", "")
+        self.setAccessibleName("line to answer on")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_AcceptTouchEvents)
         self.setCursor(Qt.CursorShape.PointingHandCursor)

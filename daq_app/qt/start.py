@@ -12,6 +12,7 @@ if TYPE_CHECKING:  # Qt is loaded only once it is known that it can be
 
     from daq_app.qt.bridge import Client
     from daq_app.qt.main_window import MainWindow
+    from daq_app.qt.tokens import Tokens
 
 SIMULATED_BENCH = "sim:?rate=200"
 FAILED = 1  # exit code: could not be done
@@ -31,8 +32,13 @@ def main() -> int:
     return application.exec()
 
 
-def opened(application: "QApplication", start: "Callable[[], Client] | None" = None) -> "MainWindow":
-    """Return the experimenter's window with the simulated bench being connected; `start` makes a recorder."""
+def opened(
+    application: "QApplication", start: "Callable[[], Client] | None" = None, theme: "Tokens | None" = None
+) -> "MainWindow":
+    """Return the experimenter's window with the simulated bench being connected; `start` makes a recorder.
+
+    Without a `theme` that of the system is followed.
+    """
     from daq_app.recorder.client import Recorder
     from daq_app.recorder.messages import Connect
 
@@ -41,11 +47,13 @@ def opened(application: "QApplication", start: "Callable[[], Client] | None" = N
     recorder.send(Connect(SIMULATED_BENCH))
     from daq_app.qt.bridge import Bridge
     from daq_app.qt.main_window import MainWindow
-    from daq_app.qt.tokens import current_tokens, font_scale, style_sheet
+    from daq_app.qt.tokens import current_tokens, font_scale, palette, style_sheet
 
     application.setApplicationName("daq-app")
     application.setQuitOnLastWindowClosed(False)
-    scale, tokens = font_scale(), current_tokens()
+    application.setStyle("Fusion")  # the one style that draws alike, and takes our colours, everywhere
+    scale, tokens = font_scale(), theme or current_tokens()
+    application.setPalette(palette(tokens))
     application.setStyleSheet(style_sheet(tokens, scale))
     bridge = Bridge(recorder, start or Recorder.start)
     bridge.connecting(SIMULATED_BENCH)
@@ -53,10 +61,12 @@ def opened(application: "QApplication", start: "Callable[[], Client] | None" = N
 
     def theme_changed() -> None:
         chosen = current_tokens()
+        application.setPalette(palette(chosen))
         application.setStyleSheet(style_sheet(chosen, scale))
         window.set_tokens(chosen)
 
-    application.styleHints().colorSchemeChanged.connect(theme_changed)
+    if theme is None:
+        application.styleHints().colorSchemeChanged.connect(theme_changed)
 
     def slipped(_kind: type[BaseException], error: BaseException, _trace: TracebackType | None) -> None:
         """Say what went wrong in the window, which goes on: an error of ours there never stops a recording."""

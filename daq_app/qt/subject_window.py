@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import QEvent, Qt, Signal
-from PySide6.QtGui import QCloseEvent, QKeyEvent, QMoveEvent
+from PySide6.QtGui import QCloseEvent, QKeyEvent, QMoveEvent, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedWidget, QVBoxLayout, QWidget
 
 from daq_app.qt.parts import button, label, say
@@ -16,6 +16,7 @@ from sessions.plan import Hand
 from sessions.steps import Scored
 
 LARGE, LARGER = 24, 36  # type that is read from where a hand rests on a transducer
+WIDEST = 1100  # row of the button
 TEXT_WIDTH = 900  # of a text that is still easily read
 
 
@@ -38,9 +39,7 @@ class SubjectWindow(QWidget):
         self._text = _large(label(wrap=True), LARGE, scale)
         self._question = _large(label(role="title", wrap=True), LARGER, scale, bold=True)
         self.line = ScoreLine(tokens, now)
-        self._low, self._high = (_large(label(wrap=True), LARGE, scale) for _ in range(2))
-        self._high.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop)
-        self._low.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
+        self._scale = _Scale(self.line, scale)
         self.next = button("Next", "next: give this answer", self._give, "primary")
         self.next.setMinimumSize(round(180 * scale), round(64 * scale))
         self.ruler = RulerCheck(tokens, scale)
@@ -54,6 +53,7 @@ class SubjectWindow(QWidget):
         layout.addWidget(self._pages)
         self.line.changed.connect(self._answer_changed)
         self.setMinimumSize(round(560 * min(scale, 1.25)), 340)
+        self.resize(1000, 640)
         self.fit_screen()
 
     @property
@@ -71,8 +71,7 @@ class SubjectWindow(QWidget):
             if before is None or before.kind != "scale" or before.key != view.key:
                 self.line.begin(view.ends)
             say(self._question, view.title)
-            say(self._low, view.ends[0])
-            say(self._high, view.ends[1])
+            self._scale.show_ends(view.ends)
             self._answer_changed()
         else:
             say(self._title, view.title)
@@ -91,9 +90,7 @@ class SubjectWindow(QWidget):
         """Make the line as long as it should be on the screen the window is on."""
         known = millimetres(self.screen())
         self.line.set_pixels_per_mm(known.pixels)
-        width = round(self.line.width() / 2 - GRID)
-        for end in (self._low, self._high):
-            end.setFixedWidth(width)
+        self._scale.fit()
         return known
 
     def set_tokens(self, tokens: Tokens) -> None:
@@ -150,20 +147,19 @@ class SubjectWindow(QWidget):
         self._question.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         layout.addWidget(self._question)
         layout.addStretch(2)
-        layout.addWidget(self.line, 0, Qt.AlignmentFlag.AlignHCenter)
-        ends = QHBoxLayout()
-        ends.addStretch(1)
-        ends.addWidget(self._low)
-        ends.addWidget(self._high)
-        ends.addStretch(1)
-        layout.addLayout(ends)
+        layout.addWidget(self._scale)
         layout.addStretch(2)
         self._next_row = QHBoxLayout()
         self._next_row.setContentsMargins(4 * GRID, 0, 4 * GRID, 0)
         held = QWidget()  # keeps the button's place while there is none
         held.setLayout(self._next_row)
         held.setFixedHeight(self.next.minimumHeight() + 2 * GRID)
-        layout.addWidget(held)
+        held.setMaximumWidth(WIDEST)
+        row = QHBoxLayout()
+        row.addStretch(1)
+        row.addWidget(held, 1000)
+        row.addStretch(1)
+        layout.addLayout(row)
         self._place_next("right")
         return page
 
@@ -202,6 +198,43 @@ class SubjectWindow(QWidget):
         say(self._text, "")
         self._pages.setCurrentIndex(0)
         self.answered.emit(given)
+
+
+class _Scale(QWidget):
+    """The line with the words for its two ends, each under the end it is for."""
+
+    def __init__(self, line: ScoreLine, scale: float) -> None:
+        super().__init__()
+        self._line = line
+        line.setParent(self)
+        self._ends = [_large(label(wrap=True), LARGE, scale) for _ in range(2)]
+        for end in self._ends:
+            end.setParent(self)
+            end.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
+
+    def show_ends(self, ends: tuple[str, str]) -> None:
+        """Show what the two ends mean."""
+        for shown, words in zip(self._ends, ends, strict=True):
+            say(shown, words)
+        self.fit()
+
+    def fit(self) -> None:
+        """Place the words: beside each other without touching, as wide as there is room."""
+        line = self._line
+        line.move((self.width() - line.width()) // 2, 0)
+        ends = [line.x() + line.place_of(position).x() for position in (0.0, 100.0)]
+        width = int(min(ends[1] - ends[0] - 2 * GRID, 2 * ends[0]))
+        tallest = 0
+        for shown, at in zip(self._ends, ends, strict=True):
+            tallest = max(tallest, shown.heightForWidth(width))
+            shown.setGeometry(int(at - width / 2), line.height(), width, shown.heightForWidth(width))
+        self.setFixedHeight(line.height() + tallest + GRID)
+        self.setMinimumWidth(line.width())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Take the room there is."""
+        super().resizeEvent(event)
+        self.fit()
 
 
 def _large(made: QLabel, size: int, scale: float, *, bold: bool = False) -> QLabel:

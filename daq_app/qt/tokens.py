@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QFont, QFontInfo, QGuiApplication, QPalette
+from PySide6.QtGui import QColor, QFont, QFontInfo, QGuiApplication, QPalette
 
 GRID = 8  # everything keeps to multiples of it [device-independent pixels]
 TARGET = 40  # least height of what is clicked or touched
@@ -93,6 +93,32 @@ def font(size: int, scale: float, *, bold: bool = False) -> QFont:
     return made
 
 
+def palette(t: Tokens) -> QPalette:
+    """Return the palette for what the style draws by itself: radio buttons, arrows of lists, focus."""
+    made = QPalette()
+    role = QPalette.ColorRole
+    for name, colour in (
+        (role.Window, t.ground),
+        (role.WindowText, t.text),
+        (role.Base, t.raised),
+        (role.AlternateBase, t.surface),
+        (role.Text, t.text),
+        (role.Button, t.raised),
+        (role.ButtonText, t.text),
+        (role.ToolTipBase, t.raised),
+        (role.ToolTipText, t.text),
+        (role.PlaceholderText, t.quiet),
+        (role.Highlight, t.act),
+        (role.Accent, t.act),
+        (role.HighlightedText, t.on_act),
+        (role.Mid, t.line),
+    ):
+        made.setColor(name, QColor(colour))
+    for name in (role.Text, role.ButtonText, role.WindowText):
+        made.setColor(QPalette.ColorGroup.Disabled, name, QColor(t.quiet))
+    return made
+
+
 def style_sheet(t: Tokens, scale: float) -> str:
     """Return the style sheet of every widget of the window."""
 
@@ -123,26 +149,19 @@ QPushButton {{ background: {t.raised}; border: 1px solid {t.line}; border-radius
 QPushButton:hover {{ border-color: {t.quiet}; }}
 QPushButton:pressed {{ background: {t.line}; }}
 QPushButton:disabled {{ color: {t.quiet}; background: {t.ground}; border-style: dashed; }}
-QPushButton:focus, QLineEdit:focus, QComboBox:focus, QPlainTextEdit:focus, QListWidget:focus, QRadioButton:focus,
-QTreeWidget:focus, QCheckBox:focus {{ border: 2px solid {t.act}; }}
+QPushButton:focus, QLineEdit:focus, QPlainTextEdit:focus, QListWidget:focus, QTreeWidget:focus {{
+  border: 2px solid {t.act}; }}
 QPushButton[role="primary"] {{ background: {t.act}; color: {t.on_act}; border: 2px solid {t.act}; font-weight: 600;
   font-size: {px(TITLE)}; min-height: {TARGET}px; padding: 8px 28px; }}
 QPushButton[role="primary"]:focus {{ border: 3px solid {t.text}; }}
 QPushButton[role="primary"]:disabled {{ background: {t.ground}; color: {t.quiet}; border: 2px dashed {t.line}; }}
 QPushButton:checked {{ border: 2px solid {t.act}; font-weight: 600; }}
-QPushButton[role="flat"] {{ border: 1px solid transparent; background: transparent; padding: 4px 8px; }}
-QPushButton[role="flat"]:checked {{ border: 2px solid {t.act}; background: {t.raised}; }}
-QPushButton[role="flat"]:focus {{ border: 2px solid {t.act}; }}
-QLineEdit, QComboBox, QSpinBox, QPlainTextEdit {{ background: {t.raised}; border: 1px solid {t.line};
+QPushButton[role="small"] {{ padding: 4px 4px; }}
+QLineEdit, QPlainTextEdit {{ background: {t.raised}; border: 1px solid {t.line};
   border-radius: 4px; padding: 4px 8px; min-height: {TARGET - 12}px; selection-background-color: {t.act};
   selection-color: {t.on_act}; }}
-QLineEdit[wrong="true"] {{ border: 2px solid {t.wrong}; }}
-QComboBox::drop-down {{ width: 28px; border: none; }}
-QComboBox QAbstractItemView {{ background: {t.raised}; selection-background-color: {t.act};
-  selection-color: {t.on_act}; }}
-QRadioButton, QCheckBox {{ spacing: 10px; min-height: {TARGET - 8}px; padding: 2px 6px; border: 2px solid transparent;
-  border-radius: 4px; background: transparent; }}
 QListWidget, QTreeWidget {{ background: {t.surface}; border: 2px solid transparent; }}
+QListWidget::item {{ padding: 3px 2px; }}
 QScrollBar:vertical {{ background: transparent; width: 12px; }}
 QScrollBar::handle:vertical {{ background: {t.line}; border-radius: 4px; min-height: 24px; margin: 2px; }}
 QScrollBar::add-line:vertical, QScrollBar::sub-line:vertical {{ height: 0; }}

@@ -1,0 +1,228 @@
+"""The window without a mouse, without colours, without eyes, on small screens and in other countries."""
+
+import re
+
+import pytest
+from PySide6.QtCore import QEvent, QLocale, QPointF, Qt
+from PySide6.QtGui import QColor, QKeyEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLineEdit, QListWidget, QWidget
+
+from daq_app.qt import score_line, screens, tokens
+from daq_app.qt.keys import KEYS, act_of
+
+pytestmark = pytest.mark.qt
+
+CONTROLS = (QAbstractButton, QComboBox, QLineEdit, QListWidget)
+
+
+def controls(window):
+    found = [w for kind in CONTROLS for w in window.findChildren(kind)]
+    return [w for w in found if not isinstance(w.parent(), QComboBox | QAbstractScrollArea)]
+
+
+def test_every_control_has_a_name_for_screen_readers(driver):
+    for window in (driver.window, driver.window.subject):
+        nameless = [w for w in controls(window) if not w.accessibleName().strip()]
+        assert nameless == []
+
+
+def test_every_painted_widget_says_what_it_shows(driver):
+    window = driver.window
+    painted = [window.live.map, *window.live.plots, window.subject.line, *window.bench._bars.values()]
+    assert all(widget.accessibleName() for widget in painted)
+
+
+def test_the_tab_key_goes_through_the_page_from_top_to_bottom_and_reaches_every_control(driver):
+    window = driver.window
+    page = window.page
+    page.subject.setFocus()
+    order, seen = [], set()
+    for _ in range(60):
+        focused = window.focusWidget()
+        if focused in seen:
+            break
+        seen.add(focused)
+        order.append(focused)
+        QTest.keyClick(focused, Qt.Key.Key_Tab)
+    asked = [page.subject, page.protocol, page.stroking, page.answering, page.with_forces, page.people_score]
+    asked += [page.study, page.folder, page.seed]
+    places = [order.index(widget) for widget in asked]
+    assert places == sorted(places)
+    visible = [
+        w for w in controls(window) if w.isVisible() and w.isEnabled() and w.focusPolicy() & Qt.FocusPolicy.TabFocus
+    ]
+    unreached = [w.accessibleName() for w in visible if w not in seen and not _in_a_group_with_one_of(w, seen)]
+    assert unreached == []
+
+
+def _in_a_group_with_one_of(widget, seen):
+    """Radio buttons of a group are one stop; arrows go on within it."""
+    group = widget.group() if isinstance(widget, QAbstractButton) else None
+    return group is not None and any(button in seen for button in group.buttons())
+
+
+def test_a_click_leaves_space_to_the_primary_button(driver):
+    for made in driver.window.findChildren(QAbstractButton):
+        assert not made.focusPolicy() & Qt.FocusPolicy.ClickFocus, made.accessibleName()
+
+
+def test_every_key_of_the_list_is_obeyed_and_no_two_are_the_same():
+    assert len({known.key for known in KEYS}) == len(KEYS)
+    special = {"Space": Qt.Key.Key_Space, "F1": Qt.Key.Key_F1, "F6": Qt.Key.Key_F6, "Esc": Qt.Key.Key_Escape}
+    for known in KEYS:
+        held = Qt.KeyboardModifier.ControlModifier if known.key.startswith("Ctrl+") else Qt.KeyboardModifier.NoModifier
+        name = known.key.removeprefix("Ctrl+")
+        key = special.get(name) or Qt.Key(ord(name))
+        assert act_of(QKeyEvent(QEvent.Type.KeyPress, key, held)) == known.act
+
+
+def test_f1_shows_the_keys_and_escape_hides_them(driver):
+    driver.window.setFocus()
+    QTest.keyClick(driver.window, Qt.Key.Key_F1)
+    assert driver.window.keys.isVisible()
+    QTest.keyClick(driver.window, Qt.Key.Key_Escape)
+    assert not driver.window.keys.isVisible()
+
+
+@pytest.mark.parametrize("size", [(1366, 768), (911, 512), (3840, 2160)])
+def test_the_window_fits_the_screen_and_nothing_is_laid_over_anything_else(driver, size):
+    window = driver.window
+    window.resize(*size)
+    driver.application.processEvents()
+    assert (window.width(), window.height()) == size
+    panels = [
+        w for w in (window.header, window.to_do, window._left, window.live, window.bench, window.strip) if w.isVisible()
+    ]
+    boxes = [w.rect().translated(w.mapTo(window, w.rect().topLeft())) for w in panels]
+    for i, box in enumerate(boxes):
+        assert window.rect().contains(box)
+        assert not any(box.intersects(other) for other in boxes[i + 1 :])
+    window.resize(1440, 900)
+
+
+def test_below_1366_pixels_the_bench_folds_and_a_key_unfolds_it(driver):
+    window = driver.window
+    window.resize(1200, 800)
+    assert window.strip.isVisible()
+    assert not window.bench.isVisible()
+    window.act("bench")
+    assert window.bench.isVisible()
+    window.act("bench")
+    window._bench_shown = None
+    window.resize(1440, 900)
+    assert window.bench.isVisible()
+
+
+@pytest.mark.parametrize("locale", ["de_DE", "ja_JP", "tr_TR"])
+def test_numbers_have_a_point_in_every_country(driver, locale):
+    before = QLocale()
+    QLocale.setDefault(QLocale(locale))
+    try:
+        driver.window.live._read_at = 0.0
+        driver.until(lambda: "." in driver.window.live._values["N"].text(), "a number")
+        shown = repr(driver.view)
+        assert not re.search(r"\d,\d", shown)
+    finally:
+        QLocale.setDefault(before)
+
+
+def contrast(first, second):
+    """Contrast ratio of two colours (WCAG 2.1, relative luminance)."""
+
+    def luminance(name):
+        parts = [channel / 255 for channel in QColor(name).getRgb()[:3]]
+        linear = [c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+    bright, dim = sorted((luminance(first), luminance(second)), reverse=True)
+    return (bright + 0.05) / (dim + 0.05)
+
+
+@pytest.mark.parametrize("theme", [tokens.LIGHT, tokens.DARK])
+def test_text_and_states_stand_out_from_their_grounds_in_both_themes(theme):
+    for ground in (theme.ground, theme.surface, theme.raised):
+        assert contrast(theme.text, ground) >= 7.0
+        for colour in (theme.quiet, theme.wrong, theme.look, theme.act):
+            assert contrast(colour, ground) >= 4.5
+    assert contrast(theme.on_act, theme.act) >= 4.5
+    assert contrast(theme.surface, theme.wrong) >= 4.5
+
+
+# ---- the subject's line
+
+
+def shown_line(driver):
+    line = driver.window.subject.line
+    driver.window.subject.show()
+    driver.window.subject._pages.setCurrentIndex(1)
+    driver.application.processEvents()
+    line.begin(("low", "high"))
+    return line
+
+
+def test_a_click_is_answered_where_it_was_seen_at_every_place_of_the_line(driver):
+    line = shown_line(driver)
+    half_a_pixel = 100 * 0.5 / (score_line.LENGTH * line.pixels_per_mm)
+    for position in (0.0, 12.5, 50.0, 87.5, 100.0):
+        QTest.mouseClick(line, Qt.MouseButton.LeftButton, pos=line.place_of(position).toPoint())
+        assert line.answer.score == pytest.approx(position, abs=half_a_pixel + 0.06)
+    assert line.answer.device == "mouse"
+    assert line.answer.corrections == 4
+
+
+def test_there_is_no_mark_before_the_first_touch_and_no_next_without_an_answer(driver):
+    line = shown_line(driver)
+    empty = line.grab().toImage()
+    driver.window.subject._answer_changed()
+    assert not driver.window.subject.next.isVisibleTo(driver.window.subject)
+    QTest.mouseClick(line, Qt.MouseButton.LeftButton, pos=line.place_of(30.0).toPoint())
+    assert line.grab().toImage() != empty
+    assert driver.window.subject.next.isVisibleTo(driver.window.subject._pages.widget(1))
+    line.begin(("low", "high"))
+    assert line.grab().toImage() == empty
+
+
+def test_a_touch_is_recorded_as_a_touch(driver):
+    line = shown_line(driver)
+    device = QTest.createTouchDevice()
+    place = line.place_of(25.0).toPoint()
+    QTest.touchEvent(line, device).press(0, place, line).commit()
+    QTest.touchEvent(line, device).release(0, place, line).commit()
+    assert line.answer.device == "touch"
+    assert line.answer.score == pytest.approx(25.0, abs=0.3)
+
+
+def test_the_line_is_100_mm_long_by_the_ruler_that_was_held_to_it(driver):
+    subject = driver.window.subject
+    screen = subject.screen()
+    before = subject.fit_screen().pixels
+    assert screens.checked(screen, 80.0) is not None  # a line meant to be 100 mm measured 80
+    assert subject.fit_screen().pixels == pytest.approx(before * 100 / 80)
+    assert subject.fit_screen().checked
+    length = subject.line.place_of(100.0) - subject.line.place_of(0.0)
+    assert QPointF(length).x() == pytest.approx(100 * before * 100 / 80, abs=1e-6)
+    assert screens.checked(screen, 3.0) is None
+    screens.settings().clear()
+    assert subject.fit_screen().pixels == pytest.approx(before)
+
+
+def test_next_stands_where_the_answering_hand_is(driver):
+    subject = driver.window.subject
+    subject.show()
+    subject._pages.setCurrentIndex(1)
+    subject.next.show()
+    middle = subject.width() / 2
+    for hand, right in (("left", False), ("right", True)):
+        subject._place_next(hand)
+        driver.application.processEvents()
+        place = subject.next.mapTo(subject, subject.next.rect().center()).x()
+        assert (place > middle) is right
+
+
+def test_no_widget_of_the_subject_shows_a_number_or_a_tick(driver):
+    subject: QWidget = driver.window.subject
+    line = shown_line(driver)
+    QTest.keyClick(line, Qt.Key.Key_Right)
+    texts = [w.text() for w in subject._pages.widget(1).findChildren(QWidget) if hasattr(w, "text")]
+    assert not any(re.search(r"\d", text) for text in texts)
