@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from sessions.plan import Hand
-from sessions.steps import Scored
+from sessions.steps import Chosen, NumberGiven, Scored
 
 Device = Literal["mouse", "touch", "pen", "keyboard"]
 
@@ -60,3 +60,26 @@ class Answer:
         if self.positions and self.positions[-1][1] == place:
             return replace(self, device=device)
         return replace(self, positions=(*self.positions, (time, place)), device=device)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A number, or one of two, as it is given: what stands, and how it came to stand."""
+
+    value: float | Literal["first", "second"] | None = None
+    first_touch: float | None = None  # [s, session clock]
+    corrections: int = 0  # how often another value took the place of one
+    device: Device | None = None
+
+    def changed(self, time: float, value: float | Literal["first", "second"] | None, device: Device) -> "Choice":
+        """Return the answer with another value at `time` [s]; None takes it back."""
+        first = time if self.first_touch is None else self.first_touch
+        again = self.corrections + (self.value is not None and value is not None and value != self.value)
+        return Choice(value, first, again, device)
+
+    def given(self, hand: Hand | None) -> NumberGiven | Chosen:
+        """Return the event of an answer that is given."""
+        if self.value in ("first", "second"):
+            return Chosen(self.value, self.first_touch, self.corrections, hand, self.device)
+        number = self.value if isinstance(self.value, float) else None
+        return NumberGiven(number, self.first_touch, self.corrections, hand, self.device)

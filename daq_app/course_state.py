@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, cast, get_args
 
 from daq_app.recorder import messages as m
 from daq_app.recorder.messages import Kind
@@ -13,7 +13,21 @@ from sessions.plan import Block, SessionPlan, Trial
 from sessions.recording import LoggedEvent
 from sessions.runner import SessionEnd, Status
 
-Phase = Literal["idle", "mounting", "taring", "ready", "stroking", "scoring", "paused", "closing", "ended", "resuming"]
+Phase = Literal[
+    "idle",
+    "resting",
+    "mounting",
+    "taring",
+    "ready",
+    "stroking",
+    "scoring",
+    "settling",
+    "paused",
+    "closing",
+    "ended",
+    "resuming",
+]
+TOLD: frozenset[str] = frozenset(get_args(Phase)) - {"resuming"}  # phases that the recorder tells
 Outcome = Literal["coming", "done", "skipped"]
 MARKS = 40  # that are kept for the plots: more than a minute can hold
 
@@ -25,8 +39,7 @@ class TrialState:
     trial: Trial
     outcome: Outcome = "coming"
     takes: int = 0
-    score: float | None = None
-    answered: bool = False
+    answer: str | None = None  # in words; None: none was asked for yet
     quality: Quality | None = None
 
 
@@ -112,7 +125,8 @@ def _after(session: SessionState, message: Message, now: float) -> SessionState:
         case Status():
             moved = message.safe.time_ns != session.saved_ns
             saved = now if moved else session.saved
-            return replace(session, status=message, saved_ns=message.safe.time_ns, saved=saved)
+            phase = cast("Phase", message.state) if message.state in TOLD else session.phase
+            return replace(session, status=message, saved_ns=message.safe.time_ns, saved=saved, phase=phase)
         case Judged(trial, take, quality):
             return _judged(session, trial, take, quality)
         case m.SessionEnded(_, end, resumable):
@@ -142,8 +156,10 @@ def _shown(session: SessionState, message: Message) -> SessionState:
             return replace(session, phase="taring", asked=message, told=None)
         case steps.AskStroke(trial):
             return replace(session, phase="ready", trial=trial.number, asked=message, told=None)
-        case steps.AskScore(trial):
+        case steps.AskScore(trial) | steps.AskNumber(trial) | steps.AskChoice(second=trial):
             return replace(session, phase="scoring", trial=trial.number, asked=message)
+        case steps.AskRest():
+            return replace(session, phase="resting", trial=None, asked=message, told=None)
         case steps.AskFinish():
             return replace(session, phase="closing", trial=None, asked=message, told=None)
         case _:
@@ -180,8 +196,8 @@ def _logged(session: SessionState, event: LoggedEvent) -> SessionState:
             return replace(session, phase="paused", before_pause=session.phase)
         case "resume" if session.phase == "paused":
             return replace(session, phase=session.before_pause)
-        case "noted":
-            return replace(session, notes=(*session.notes, str(data.get("text", ""))))
+        case "note":
+            return replace(session, notes=(*session.notes, str(data["text"])))
         case _:
             return _of_trial(session, number, event.kind, data)
 
@@ -190,17 +206,27 @@ def _of_trial(session: SessionState, number: int | None, kind: str, data: Mappin
     """Return the session after something that became of a trial."""
     match kind:
         case "scored":
-            return session.with_trial(number, score=data["score"], answered=data["score"] is not None)
+            return session.with_trial(number, answer=_words("score {:.0f}", data["score"]))
+        case "number_given":
+            return session.with_trial(number, answer=_words("number {:g}", data["number"]))
+        case "chosen":
+            return session.with_trial(number, answer=_words("the {}", data["choice"]))
+        case "left_out":
+            return session.with_trial(number, outcome="skipped")
         case "take_started":
             return session.with_trial(number, takes=data["take"], outcome="coming")
         case "take_kept":
             return session.with_trial(number, outcome="done")
         case "take_discarded":
-            return session.with_trial(number, outcome=_discarded(data), score=None, answered=False)
+            return session.with_trial(number, outcome=_discarded(data), answer=None)
         case "skip":
             return session.with_trial(number, outcome="skipped")
         case _:
             return session
+
+
+def _words(form: str, answer: float | str | None) -> str:
+    return "no answer" if answer is None else form.format(answer)
 
 
 def _discarded(data: Mapping[str, Any]) -> Outcome:

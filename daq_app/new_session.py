@@ -31,6 +31,7 @@ class SessionForm:
     stroking_hand: Hand | None = None
     answering_hand: Hand | None = None
     forces: bool = True
+    practice: bool = False  # before the trials that count
     simulated: bool = False  # the subject's judgement too, where the bench is simulated
 
 
@@ -82,6 +83,7 @@ def checked(
             frame=bench.frame if form.forces else None,
             stroking_hand=form.stroking_hand,
             answering_hand=form.answering_hand,
+            phases=("practice", "main") if form.practice else None,
         )
     except SettingsError as error:
         return Refused({"subject": _told(error)})

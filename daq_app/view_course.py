@@ -12,8 +12,8 @@ from sessions import steps
 from sessions.plan import PROXIMAL_TO_DISTAL, Trial
 
 WAYS = {1: "away from the subject", -1: "towards the subject"}
-TO_BE_REDONE = frozenset({"mounting", "taring", "ready", "stroking", "scoring", "closing"})
-IN_A_TRIAL = frozenset({"mounting", "taring", "ready", "stroking", "scoring"})
+IN_A_TRIAL = frozenset({"mounting", "taring", "ready", "stroking", "scoring", "settling"})
+TO_BE_REDONE = IN_A_TRIAL | {"closing"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,9 @@ class CourseView:
     skip: Button
     pause: Button
     note: Button
+    no_answer: Button
     end: Button
+    forces_shown: bool  # False where the protocol keeps them from the experimenter
 
 
 def course_view(session: SessionState, bench: BenchState, now: float, *, alone: bool = False) -> CourseView:
@@ -84,7 +86,9 @@ def course_view(session: SessionState, bench: BenchState, now: float, *, alone: 
         skip=Button("Skip", "S", session.phase in IN_A_TRIAL),
         pause=_pause(session),
         note=Button("Note", "N", not over),
-        end=Button("New session", "Ctrl+N", sends=NewSession()) if over else Button("End session", "Ctrl+E"),
+        no_answer=Button("No answer", "0", session.phase == "scoring", _no_answer(session.asked)),
+        end=Button("New session", "Ctrl+N", sends=NewSession()) if over else Button("End", "Ctrl+E"),
+        forces_shown="forces" in session.plan.shown.experimenter,
     )
 
 
@@ -97,6 +101,8 @@ def _to_do(session: SessionState, bench: BenchState) -> tuple[str, Button | None
             return "Everything is set up. Press Space to begin.", Button("Begin", "Space", sends=steps.Begin())
         case "paused":
             return "Paused. Press Space to go on.", Button("Resume", "Space", sends=steps.Resume())
+        case "resting":
+            return _rest(session)
         case "resuming":
             return "Wait: the session is being taken up again.", None
         case "closing":
@@ -116,16 +122,48 @@ def _to_do_in(trial: Trial, session: SessionState) -> tuple[str, Button | None]:
         case "mounting":
             then = "to zero" if session.plan.forces else "to go on"
             label = "Zero" if session.plan.forces else "Mounted"
-            words = f"Mount sample {code}, its arrow {WAYS[trial.direction]}. Then press Space {then}."
-            return words, Button(label, "Space", sends=steps.StimulusMounted(code))
+            practice = "" if trial.phase == "main" else f"{trial.phase.capitalize()}: "
+            words = f"{practice}mount sample {code}, its arrow {WAYS[trial.direction]}. Then press Space {then}."
+            return words[:1].upper() + words[1:], Button(label, "Space", sends=steps.StimulusMounted(code))
         case "taring":
             return f"Hands off: zero is being measured with sample {code} on.", None
         case "ready":
             return _stroke_sentence(session, trial), _stroke_button(session)
         case "stroking":
             return f"Stroke on {code} is being recorded.", None
+        case "settling":
+            return f"Fingers off: the recording of {code} ends in a moment.", None
         case _:
-            return f"The subject scores sample {code}.", None
+            return _answer_sentence(session, code), None
+
+
+def _answer_sentence(session: SessionState, code: str) -> str:
+    match session.asked:
+        case steps.AskNumber():
+            return f"The subject gives sample {code} a number."
+        case steps.AskChoice(first, second):
+            return f"The subject chooses between {first.stimulus.code} and {second.stimulus.code}."
+        case _:
+            return f"The subject scores sample {code}."
+
+
+def _no_answer(asked: steps.Command | None) -> steps.Event | None:
+    """Return the event of a subject who cannot say."""
+    match asked:
+        case steps.AskScore():
+            return steps.Scored(None)
+        case steps.AskNumber():
+            return steps.NumberGiven(None)
+        case steps.AskChoice():
+            return steps.Chosen(None)
+        case _:
+            return None
+
+
+def _rest(session: SessionState) -> tuple[str, Button]:
+    duration = session.asked.duration if isinstance(session.asked, steps.AskRest) else None
+    by_itself = "" if duration is None else f" It goes on by itself after {duration:g} s."
+    return f"The subject rests.{by_itself}", Button("Go on", "Space", sends=steps.Resume())
 
 
 def _alone(session: SessionState) -> tuple[str, Button | None]:
@@ -137,7 +175,9 @@ def _stroke_sentence(session: SessionState, trial: Trial) -> str:
     hand = session.plan.stroking_hand
     finger = f"{hand} index finger" if hand else "index finger"
     way = "away from the body" if trial.direction == PROXIMAL_TO_DISTAL else "towards the body"
-    sentence = f"Subject strokes {trial.stimulus.code} once, {way}, with the {finger}."
+    allowed = session.plan.strokes_allowed(trial)
+    often = "once" if allowed == 1 else f"up to {allowed} times"
+    sentence = f"Subject strokes {trial.stimulus.code} {often}, {way}, with the {finger}."
     return sentence if session.plan.forces else f"{sentence} Then press Space."
 
 
@@ -166,7 +206,8 @@ def _rows(session: SessionState) -> tuple[PlanRow, ...]:
     rows: list[PlanRow] = []
     for block in session.plan.blocks:
         way = "↑ away" if block.direction == PROXIMAL_TO_DISTAL else "↓ towards"
-        rows.append(PlanRow("block", "", block.name, way))
+        name = block.name if block.phase == "main" else f"{block.name}, {block.phase}"
+        rows.append(PlanRow("block", "", name, way))
         numbers = {trial.number for trial in block.trials}
         rows += [_row(session, trial) for trial in session.trials if trial.trial.number in numbers]
     return tuple(rows)
@@ -181,11 +222,15 @@ def _row(session: SessionState, trial: TrialState) -> PlanRow:
         return PlanRow("skipped", "–", name, "skipped")
     if trial.outcome == "coming":
         return PlanRow("coming", " ", name)
-    score = f"score {trial.score:.0f}" if trial.score is not None else "no answer"
-    found = [score if trial.quality is None else f"{_mu(trial.quality)}   {score}"]
+    shown = session.plan.shown.experimenter
+    found: list[str] = []
+    if trial.quality is not None and "forces" in shown:
+        found.append(_mu(trial.quality))
+    if trial.answer is not None and "answer" in shown:
+        found.append(trial.answer)
     if trial.quality is not None and trial.quality.words:
         found.append("!")
-    return PlanRow("done", "✓", name, "  ".join(found))
+    return PlanRow("done", "✓", name, "   ".join(found))
 
 
 def _mu(quality: Quality) -> str:

@@ -1,49 +1,94 @@
-"""What the subject sees: never a code, an index or a score, so that nothing gives the stimulus away."""
+"""What the subject sees: nothing that gives the stimulus away, save what the protocol says is to be shown."""
 
 from dataclasses import dataclass
 from typing import Literal
 
 from daq_app.course_state import SessionState
 from sessions import steps
+from sessions.plan import Hand
+
+Kind = Literal["read", "line", "number", "choice"]
 
 
 @dataclass(frozen=True, slots=True)
 class SubjectView:
     """One page for the subject."""
 
-    kind: Literal["wait", "read", "stroke", "scale"]
+    kind: Kind  # something to read, or a way to answer
     title: str
     text: str = ""
-    ends: tuple[str, str] = ("", "")
-    key: tuple[int, int] = (0, 0)  # trial and take: another one begins with an empty line
-    hand: Literal["left", "right"] = "right"  # that answers: where Next stands
+    ends: tuple[str, str] = ("", "")  # of the line
+    ticks: int = 0  # on the line, between its ends
+    key: tuple[int, int] = (0, 0)  # trial and take: another one begins with an empty answer
+    hand: Hand = "right"  # that answers: where Next stands
+
+    @property
+    def asks(self) -> bool:
+        """Say whether an answer is waited for."""
+        return self.kind != "read"
+
+
+WAITING = ("Welcome", "The experimenter will begin in a moment.")
 
 
 def subject_view(session: SessionState | None) -> SubjectView:
     """Return what is shown to the subject now."""
     if session is None:
-        return SubjectView("wait", "Welcome", "The experimenter will begin in a moment.")
+        return SubjectView("read", *WAITING)
     hand = session.plan.answering_hand or "right"
-    instruction = session.block.instruction if session.block else ""
     match session.phase:
         case "idle":
-            return SubjectView("wait", "Welcome", "The experimenter will begin in a moment.", hand=hand)
+            return SubjectView("read", *WAITING, hand=hand)
         case "mounting" | "taring":
-            return SubjectView("read", "Please wait", instruction, hand=hand)
+            return SubjectView("read", "Please wait", _told(session), hand=hand)
         case "ready" | "stroking":
-            return SubjectView("stroke", "Stroke the surface once", instruction, hand=hand)
+            return SubjectView("read", _stroke(session), _told(session), hand=hand)
         case "scoring":
-            return _scale(session, hand)
+            return _question(session, hand)
+        case "settling":
+            return SubjectView("read", "Thank you", "Please lift your finger off the surface.", hand=hand)
+        case "resting":
+            return SubjectView("read", "Rest", "Rest your hand. The experimenter will go on with you.", hand=hand)
         case "paused" | "resuming":
-            return SubjectView("wait", "Pause", "The experimenter will go on in a moment.", hand=hand)
+            return SubjectView("read", "Pause", "The experimenter will go on in a moment.", hand=hand)
         case "closing" | "ended":
-            return SubjectView("wait", "Thank you", "You can rest your hand now.", hand=hand)
+            return SubjectView("read", "Thank you", "You can rest your hand now.", hand=hand)
 
 
-def _scale(session: SessionState, hand: Literal["left", "right"]) -> SubjectView:
+def _stroke(session: SessionState) -> str:
     trial = session.of(session.trial)
-    if trial is None or not isinstance(session.asked, steps.AskScore):
-        return SubjectView("wait", "Please wait", hand=hand)
-    title = f"Judge the {trial.trial.stimulus.descriptor} of the surface"
+    allowed = 1 if trial is None else session.plan.strokes_allowed(trial.trial)
+    return "Stroke the surface once" if allowed == 1 else f"Stroke the surface up to {allowed} times"
+
+
+def _told(session: SessionState) -> str:
+    """Return what the protocol lets the subject know beside what to do."""
+    shown, trial = session.plan.shown.subject, session.of(session.trial)
+    parts: list[str] = []
+    if session.block is not None and session.block.phase != "main":
+        parts.append("This one is for practice." if session.block.phase == "practice" else "")
+    if "instruction" in shown and session.block is not None:
+        parts.append(session.block.instruction)
+    if trial is not None and "trial count" in shown:
+        parts.append(f"Surface {trial.trial.number} of {len(session.trials)}.")
+    if trial is not None and "code" in shown:
+        parts.append(f"Sample {trial.trial.stimulus.code}.")
+    return " ".join(part for part in parts if part)
+
+
+def _question(session: SessionState, hand: Hand) -> SubjectView:
+    trial = session.of(session.trial)
+    if trial is None:
+        return SubjectView("read", "Please wait", hand=hand)
     key = (trial.trial.number, trial.takes)
-    return SubjectView("scale", title, "", session.asked.scale_ends, key, hand)
+    usual = f"Judge the {trial.trial.stimulus.descriptor} of the surface"
+    match session.asked:
+        case steps.AskScore(_, ends, ticks, question):
+            return SubjectView("line", question or usual, "", ends, ticks, key, hand)
+        case steps.AskNumber(_, question):
+            text = "Give a number above 0, on your own scale."
+            return SubjectView("number", question or usual, text, key=key, hand=hand)
+        case steps.AskChoice(_, _, question):
+            return SubjectView("choice", question or "Which one?", "", key=key, hand=hand)
+        case _:
+            return SubjectView("read", "Please wait", hand=hand)

@@ -49,7 +49,9 @@ class CoursePanel(QFrame):
         self.skip = button("Skip S", "skip the trial, with a reason", lambda: self.ask("skip"), "small")
         self.pause = button("Pause P", "pause", self._pause, "small")
         self.note = button("Note N", "write a note", lambda: self.ask("note"), "small")
-        self.end = button("End session", "end the session, with a reason", self._end, "small")
+        self.no_answer = button("No answer 0", "the subject gives no answer", lambda: self.ask("no answer"), "small")
+        self.end = button("End Ctrl+E", "end the session, with a reason", self._end, "small")
+        self._all = (self.redo, self.skip, self.pause, self.note, self.no_answer, self.end)
         self.line = ReasonLine(self._given, self.leave)
         self._question = label("", wrap=True)
         self._bottom = QStackedWidget()
@@ -80,7 +82,9 @@ class CoursePanel(QFrame):
             return
         if before is None or before.rows != view.rows:
             self._show_rows(view.rows)
-        for made, shown in zip((self.redo, self.skip, self.pause, self.note, self.end), _buttons(view), strict=True):
+        for made, shown in zip(
+            (self.redo, self.skip, self.pause, self.note, self.no_answer, self.end), _buttons(view), strict=True
+        ):
             _show_button(made, shown)
 
     def ask(self, what: str) -> None:
@@ -88,7 +92,13 @@ class CoursePanel(QFrame):
         view = self._view
         if view is None:
             return
-        shown = {"redo": view.redo, "skip": view.skip, "note": view.note, "end": view.end}[what]
+        shown = {
+            "redo": view.redo,
+            "skip": view.skip,
+            "note": view.note,
+            "no answer": view.no_answer,
+            "end": view.end,
+        }[what]
         if not shown.enabled:
             return
         if shown.sends is not None:
@@ -112,10 +122,14 @@ class CoursePanel(QFrame):
         if not text:
             say(self._question, f"{QUESTIONS[self._asking]} A word is enough; Esc leaves it.")
             return
-        made: dict[str, Callable[[str], Message]] = {"redo": steps.Redo, "skip": steps.Skip, "end": steps.Abort}
+        made: dict[str, Callable[[str], Message]] = {
+            "redo": steps.Redo,
+            "skip": steps.Skip,
+            "note": steps.Note,
+            "end": steps.Abort,
+        }
         self.leave()
-        if self._asking in made:
-            self._send(made[self._asking](text))
+        self._send(made[self._asking](text))
 
     def _pause(self) -> None:
         if self._view is not None and self._view.pause.enabled and self._view.pause.sends is not None:
@@ -129,9 +143,8 @@ class CoursePanel(QFrame):
         grid = QGridLayout(page)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setSpacing(GRID)
-        for at, made in enumerate((self.redo, self.skip, self.pause, self.note)):
+        for at, made in enumerate(self._all):
             grid.addWidget(made, at // 3, at % 3)
-        grid.addWidget(self.end, 1, 1, 1, 2)
         self._plan.setMinimumHeight(3 * TARGET // 2)
         return page
 
@@ -193,7 +206,7 @@ class ReasonLine(QLineEdit):
 
 
 def _buttons(view: CourseView) -> tuple[Button, ...]:
-    return (view.redo, view.skip, view.pause, view.note, view.end)
+    return (view.redo, view.skip, view.pause, view.note, view.no_answer, view.end)
 
 
 def _show_button(made: QPushButton, shown: Button) -> None:

@@ -50,6 +50,7 @@ class LivePanel(QFrame):
         self._tokens = tokens
         self.plots = [LivePlot(*plot, tokens, scale) for plot in (*PLOTS, *AXES)]
         self.map = ContactMap(tokens, scale)
+        self._forces_shown = True
         self._numbers = QWidget()
         self._values: dict[str, QLabel] = {}
         self.hold = button("Hold  H", "hold the picture; readings go on", self._toggle_hold)
@@ -78,7 +79,11 @@ class LivePanel(QFrame):
         layout.setContentsMargins(GRID, GRID, GRID, GRID)
         layout.setSpacing(4)
         layout.addLayout(self._bar(scale))
-        layout.addLayout(grid, 1)
+        self._pictures = QWidget()
+        self._pictures.setLayout(grid)
+        grid.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self._pictures, 1)
+        layout.addStretch(0)
         self.show_seconds(self._seconds)
 
     @property
@@ -103,6 +108,13 @@ class LivePanel(QFrame):
         self._side.setVisible(shown)
         self._grid.setColumnStretch(1, 3 if shown else 0)
 
+    def show_forces(self, shown: bool) -> None:
+        """Show readings, or nothing of them where the protocol keeps them from the experimenter."""
+        if shown != self._forces_shown:
+            self._forces_shown = shown
+            self._pictures.setVisible(shown)
+            self._numbers.setVisible(shown)
+
     def show_seconds(self, seconds: int) -> None:
         """Show the last so many seconds."""
         self._seconds = seconds
@@ -122,6 +134,8 @@ class LivePanel(QFrame):
 
     def draw(self, marks: tuple[Mark, ...], clock: float) -> None:
         """Draw a frame; `clock` [s] is the machine's."""
+        if not self._forces_shown:
+            return
         trace = self._feed.trace
         newest = trace.newest
         now = self._held if self._held is not None else newest
@@ -151,7 +165,7 @@ class LivePanel(QFrame):
         """Leave out the numbers where they would be cut."""
         super().resizeEvent(event)
         needed = self._numbers.sizeHint().width() + self.length.width() + self.hold.sizeHint().width() + 5 * GRID
-        self._numbers.setVisible(self.width() >= needed)
+        self._numbers.setVisible(self._forces_shown and self.width() >= needed)
         room = self.height() >= LEAST_FOR_SPEED
         self.plots[2].setVisible(room)
         self._grid.setRowStretch(2, 2 if room else 0)

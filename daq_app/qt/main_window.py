@@ -104,7 +104,8 @@ class MainWindow(QMainWindow):
             self.course.show_view(course)
             self.to_do.show_what(course.headline, course.primary, course.direction)
             self.live.map.show_direction(course.direction)
-            say(self.stroke, course.stroke.words)
+            self.live.show_forces(course.forces_shown)
+            say(self.stroke, course.stroke.words if course.forces_shown else "Forces are not shown in this protocol.")
             self.stroke.setToolTip(course.stroke.details)
             regrade(self.stroke, {"refused": "wrong", "doubtful": "look"}.get(course.stroke.grade, ""))
             self.redo.setEnabled(course.redo.enabled)
@@ -133,7 +134,7 @@ class MainWindow(QMainWindow):
         match act:
             case "primary":
                 self._primary()
-            case "redo" | "skip" | "note" | "end" if self.course.isVisible():
+            case "redo" | "skip" | "note" | "no answer" | "end" if self.course.isVisible():
                 self.course.ask(act)
             case "pause" if self.course.isVisible():
                 self.course.pause.click()
@@ -225,6 +226,7 @@ class MainWindow(QMainWindow):
     def _form_changed(self) -> None:
         """Say what is to be done on the page of a new session."""
         bench = self._bench()
+        self.live.show_forces(True)
         self.page.show_bench(bench)
         form = self.page.form()
         sentence = "Give the subject's code, then press Enter to start."

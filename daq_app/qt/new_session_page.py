@@ -6,6 +6,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QButtonGroup,
+    QCheckBox,
     QComboBox,
     QFileDialog,
     QFrame,
@@ -46,6 +47,7 @@ class NewSessionPage(QFrame):
         self.subject.setPlaceholderText("e.g. P07")
         self.protocol = choice("protocol")
         self.protocol.addItems([*protocol_names(), "choose a file …"])
+        self.protocol.setCurrentText(SessionForm().protocol)
         self.protocol.activated.connect(self._choose_protocol)
         self.study = _line("study, a folder of its own; may be empty")
         self.folder = _line("folder in which sessions are kept")
@@ -53,6 +55,9 @@ class NewSessionPage(QFrame):
         self.seed = _line("seed of the stimulus order; empty for a new one")
         self.seed.setPlaceholderText("a new one")
         self.stroking, self.answering = _hands("stroking hand"), _hands("answering hand")
+        self.practice = QCheckBox("Practice first")
+        self.practice.setAccessibleName("practice before the trials that count")
+        self.practice.setMinimumHeight(TARGET - GRID)
         self.with_forces = QRadioButton("Forces, with the transducer")
         self.scores_only = QRadioButton("Scores only")
         self.people_score = QRadioButton("People")
@@ -85,6 +90,7 @@ class NewSessionPage(QFrame):
             seed=self.seed.text(),
             stroking_hand=HANDS[self.stroking.currentIndex()][1],
             answering_hand=HANDS[self.answering.currentIndex()][1],
+            practice=self.practice.isChecked(),
             forces=self.with_forces.isChecked(),
             simulated=self.simulated.isChecked(),
         )
@@ -166,6 +172,7 @@ class NewSessionPage(QFrame):
         layout.addWidget(label("New session", "title"))
         self._field(layout, "subject", "Subject code", self.subject)
         self._field(layout, "protocol", "Protocol", self.protocol)
+        layout.addWidget(self.practice)
         hands = QHBoxLayout()
         for name, box in (("Stroking hand", self.stroking), ("Answering hand", self.answering)):
             column = QVBoxLayout()

@@ -17,6 +17,8 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from daq_app.answer import LEAP, STEP, Answer, Device
 from daq_app.qt.tokens import Tokens
+from sessions.plan import Hand
+from sessions.steps import Scored
 
 LENGTH = 100.0  # of the line [mm]
 REACH = 12.0  # above and below the line that counts as touching it [mm]
@@ -47,6 +49,7 @@ class ScoreLine(QWidget):
         self._pixels_per_mm = 96 / 25.4
         self._answer = Answer()
         self._ends = ("", "")
+        self._ticks = 0
         self.setAccessibleName("line to answer on")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_AcceptTouchEvents)
@@ -75,10 +78,19 @@ class ScoreLine(QWidget):
         self._tokens = tokens
         self.update()
 
-    def begin(self, ends: tuple[str, str]) -> None:
-        """Begin another answer, with an empty line between these ends."""
-        self._ends = ends
+    @property
+    def answered(self) -> bool:
+        """Say whether there is an answer."""
+        return self._answer.score is not None
+
+    def begin(self, ends: tuple[str, str], ticks: int = 0) -> None:
+        """Begin another answer, with an empty line between these ends, and ticks where a protocol asks for them."""
+        self._ends, self._ticks = ends, ticks
         self._take(Answer())
+
+    def given(self, hand: Hand | None) -> Scored:
+        """Return the answer."""
+        return self._answer.released().scored(hand)
 
     def place_of(self, position: float) -> QPointF:
         """Return where a position from 0 to 100 lies in the widget."""
@@ -132,6 +144,9 @@ class ScoreLine(QWidget):
         painter.drawLine(QPointF(line.left(), middle), QPointF(line.right(), middle))
         for x in (line.left(), line.right()):
             painter.drawLine(QPointF(x, middle - 2 * mm), QPointF(x, middle + 2 * mm))
+        for number in range(1, self._ticks + 1):
+            at = self.place_of(100.0 * number / (self._ticks + 1))
+            painter.drawLine(at - QPointF(0, mm), at + QPointF(0, mm))
         score = self._answer.positions[-1][1] if self._answer.positions else None
         if score is not None:
             at = self.place_of(score)

@@ -6,6 +6,7 @@ from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QMoveEvent, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedWidget, QVBoxLayout, QWidget
 
+from daq_app.qt.free_answers import ChoiceOfTwo, NumberField
 from daq_app.qt.parts import button, label, say
 from daq_app.qt.ruler_check import RulerCheck
 from daq_app.qt.score_line import ScoreLine
@@ -13,7 +14,6 @@ from daq_app.qt.screens import Millimetres, millimetres
 from daq_app.qt.tokens import GRID, Tokens, font
 from daq_app.view_subject import SubjectView
 from sessions.plan import Hand
-from sessions.steps import Scored
 
 LARGE, LARGER = 24, 36  # type that is read from where a hand rests on a transducer
 WIDEST = 1100  # row of the button
@@ -23,7 +23,7 @@ TEXT_WIDTH = 900  # of a text that is still easily read
 class SubjectWindow(QWidget):
     """A window of its own, for a second screen or a tablet."""
 
-    answered = Signal(object)  # Scored
+    answered = Signal(object)  # Scored, NumberGiven or Chosen
     screen_changed = Signal()
 
     def __init__(self, tokens: Tokens, scale: float, now: Callable[[], float]) -> None:
@@ -38,8 +38,14 @@ class SubjectWindow(QWidget):
         self._title = _large(label(role="title", wrap=True), LARGER, scale, bold=True)
         self._text = _large(label(wrap=True), LARGE, scale)
         self._question = _large(label(role="title", wrap=True), LARGER, scale, bold=True)
+        self._hint = _large(label(wrap=True), LARGE, scale)
         self.line = ScoreLine(tokens, now)
         self._scale = _Scale(self.line, scale)
+        self.number = NumberField(scale, now)
+        self.choice = ChoiceOfTwo(scale, now)
+        self._ways = QStackedWidget()
+        for way in (self._scale, self.number, self.choice):
+            self._ways.addWidget(way)
         self.next = button("Next", "next: give this answer", self._give, "primary")
         self.next.setMinimumSize(round(180 * scale), round(64 * scale))
         self.ruler = RulerCheck(tokens, scale)
@@ -51,7 +57,8 @@ class SubjectWindow(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self._pages)
-        self.line.changed.connect(self._answer_changed)
+        for way in (self.line, self.number, self.choice):
+            way.changed.connect(self._answer_changed)
         self.setMinimumSize(round(560 * min(scale, 1.25)), 340)
         self.resize(1000, 640)
         self.fit_screen()
@@ -59,7 +66,13 @@ class SubjectWindow(QWidget):
     @property
     def scoring(self) -> bool:
         """Say whether an answer is waited for."""
-        return self._view is not None and self._view.kind == "scale"
+        return self._view is not None and self._view.asks
+
+    @property
+    def _way(self) -> ScoreLine | NumberField | ChoiceOfTwo:
+        """Return what the answer is given with."""
+        kind = None if self._view is None else self._view.kind
+        return self.number if kind == "number" else self.choice if kind == "choice" else self.line
 
     def show_view(self, view: SubjectView, hand: Hand | None) -> None:
         """Show what is to be done now; `hand` is the answering one, where somebody stated it."""
@@ -67,17 +80,28 @@ class SubjectWindow(QWidget):
         if before == view:
             return
         self._place_next(view.hand)
-        if view.kind == "scale":
-            if before is None or before.kind != "scale" or before.key != view.key:
-                self.line.begin(view.ends)
+        if view.asks:
+            if before is None or (before.kind, before.key) != (view.kind, view.key):
+                self._begin(view)
             say(self._question, view.title)
-            self._scale.show_ends(view.ends)
+            say(self._hint, view.text)
             self._answer_changed()
         else:
             say(self._title, view.title)
             say(self._text, view.text)
         if self._pages.currentWidget() is not self.ruler:
             self._turn()
+
+    def _begin(self, view: SubjectView) -> None:
+        """Begin an answer."""
+        way = self._way
+        if isinstance(way, ScoreLine):
+            way.begin(view.ends, view.ticks)
+            self._scale.show_ends(view.ends)
+            self._ways.setCurrentWidget(self._scale)
+        else:
+            way.begin()
+            self._ways.setCurrentWidget(way)
 
     def check_ruler(self) -> None:
         """Show the page on which the line is held against a ruler."""
@@ -147,7 +171,9 @@ class SubjectWindow(QWidget):
         self._question.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         layout.addWidget(self._question)
         layout.addStretch(2)
-        layout.addWidget(self._scale)
+        self._hint.setAlignment(Qt.AlignmentFlag.AlignHCenter)
+        layout.addWidget(self._hint)
+        layout.addWidget(self._ways)
         layout.addStretch(2)
         self._next_row = QHBoxLayout()
         self._next_row.setContentsMargins(4 * GRID, 0, 4 * GRID, 0)
@@ -177,7 +203,7 @@ class SubjectWindow(QWidget):
     def _turn(self) -> None:
         self._pages.setCurrentIndex(1 if self.scoring else 0)
         if self.scoring:
-            self.line.setFocus()
+            self._way.setFocus()
 
     def _ruler_done(self) -> None:
         self.fit_screen()
@@ -185,13 +211,12 @@ class SubjectWindow(QWidget):
         self._turn()
 
     def _answer_changed(self) -> None:
-        self.next.setVisible(self.line.answer.score is not None)
+        self.next.setVisible(self._way.answered)
 
     def _give(self) -> None:
-        answer = self.line.answer
-        if not self.scoring or answer.score is None:
+        if not self.scoring or not self._way.answered:
             return
-        given: Scored = answer.released().scored(self._stated_hand)
+        given = self._way.given(self._stated_hand)
         self.next.hide()  # nobody gives an answer twice
         self._view = None
         say(self._title, "Thank you")

@@ -124,7 +124,7 @@ def test_a_redone_trial_loses_its_score_and_says_which_take_it_is():
         steps.MeasureZero(),
     )
     state = after(*again)
-    assert state.session.trials[0].score is None
+    assert state.session.trials[0].answer is None
     row = derive_view(state).course.rows[1]
     assert (row.kind, row.found) == ("current", "take 2")
 
@@ -313,7 +313,7 @@ def test_nothing_the_subject_sees_gives_the_stimulus_away(messages):
 
 def test_the_subject_gets_the_line_with_its_ends_when_it_is_time_to_score():
     subject = derive_view(after(*SCORE)).subject
-    assert subject.kind == "scale"
+    assert subject.kind == "line"
     assert subject.ends == ("low end", "high end")
     assert "stickiness" in subject.title
     assert derive_view(after(*READY)).subject.text == PLAN.blocks[0].instruction

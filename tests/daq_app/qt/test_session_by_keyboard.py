@@ -8,6 +8,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
+from sessions import steps
 from sessions.recording import Recording
 
 pytestmark = pytest.mark.qt
@@ -24,12 +25,12 @@ def begin(driver, subject="P07"):
     driver.phase("mounting")
 
 
-def one_trial(driver, *, steps=3):
+def one_trial(driver, *, presses=3):
     """Mount, let the simulated hand stroke, score with the arrow keys."""
     window, number = driver.window, driver.session.trial
     QTest.keyClick(window, SPACE)
     driver.phase("scoring")
-    for _ in range(steps):
+    for _ in range(presses):
         QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
     QTest.keyClick(window.subject.line, ENTER)
     driver.until(lambda: driver.session.phase == "closing" or driver.session.trial != number, "the next trial")
@@ -42,8 +43,8 @@ def test_a_whole_session_with_a_tare_and_a_redo_by_keyboard_alone(driver):
     driver.until(lambda: driver.state.bench.zero is not None, "the zero")
     window.page.subject.setFocus()
     begin(driver)
-    one_trial(driver, steps=1)
-    one_trial(driver, steps=4)
+    one_trial(driver, presses=1)
+    one_trial(driver, presses=4)
     # The second trial is taken up again, with a reason that is typed.
     if driver.view.course.redo.sends is None:
         QTest.keyClick(window, Qt.Key.Key_R)
@@ -136,3 +137,50 @@ def test_closing_while_a_session_is_recorded_asks_once_and_leaves_a_session_that
     driver.window.close()
     assert driver.window.isVisible()
     assert "close once more" in driver.window.notice._words.text()
+
+
+def test_numbers_on_ones_own_scale_and_practice_before_them_are_asked_for_and_kept(driver):
+    window = driver.window
+    window.page.protocol.setCurrentText("magnitude-estimation")
+    window.page.practice.setChecked(True)
+    window.page.scores_only.setChecked(True)
+    begin(driver, "P11")
+    assert driver.view.course.headline.startswith("Practice: mount sample")
+    QTest.keyClick(window, SPACE)
+    driver.phase("ready")
+    QTest.keyClick(window, SPACE)
+    driver.phase("scoring")
+    assert driver.view.subject.kind == "number"
+    QTest.keyClicks(window.subject.number.field, "12,5")
+    QTest.keyClick(window.subject.number.field, ENTER)
+    driver.until(lambda: driver.session.trials[0].outcome == "done", "the next trial")
+    assert driver.session.trials[0].answer == "number 12.5"
+    window.act("note")
+    QTest.keyClicks(window.course.line, "a door slammed")
+    QTest.keyClick(window.course.line, ENTER)
+    driver.until(lambda: driver.session.notes == ("a door slammed",), "the note")
+    window.bridge.send(steps.Abort("enough"))
+    driver.until(lambda: driver.session.sealing == "sealed", "the sealed session")
+    recording = Recording.open(Path(driver.session.folder))
+    [given] = [event.data for event in recording.events if event.kind == "number_given"]
+    assert (given["number"], given["input_device"]) == (12.5, "keyboard")
+
+
+def test_which_of_two_is_chosen_with_a_key_and_kept(driver):
+    window = driver.window
+    window.page.protocol.setCurrentText("paired-comparison")
+    window.page.scores_only.setChecked(True)
+    begin(driver, "P12")
+    for _ in range(2):
+        number = driver.session.trial
+        QTest.keyClick(window, SPACE)
+        driver.phase("ready")
+        QTest.keyClick(window, SPACE)
+        driver.until(lambda n=number: driver.session.trial != n or driver.session.phase == "scoring", "the second")
+    driver.phase("scoring")
+    assert driver.view.subject.kind == "choice"
+    QTest.keyClick(window.subject.choice, Qt.Key.Key_1)
+    QTest.keyClick(window.subject.choice, Qt.Key.Key_2)
+    QTest.keyClick(window.subject.choice, ENTER)
+    driver.until(lambda: driver.session.trials[1].outcome == "done", "the next trial")
+    assert driver.session.trials[1].answer == "the second"

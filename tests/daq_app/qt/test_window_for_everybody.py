@@ -156,6 +156,7 @@ def shown_line(driver):
     line = driver.window.subject.line
     driver.window.subject.show()
     driver.window.subject._pages.setCurrentIndex(1)
+    driver.window.subject._ways.setCurrentWidget(driver.window.subject._scale)
     driver.application.processEvents()
     line.begin(("low", "high"))
     return line
@@ -224,5 +225,7 @@ def test_no_widget_of_the_subject_shows_a_number_or_a_tick(driver):
     subject: QWidget = driver.window.subject
     line = shown_line(driver)
     QTest.keyClick(line, Qt.Key.Key_Right)
-    texts = [w.text() for w in subject._pages.widget(1).findChildren(QWidget) if hasattr(w, "text")]
+    shown = [w for w in subject._pages.widget(1).findChildren(QWidget) if w.isVisible()]
+    assert line in shown
+    texts = [w.text() for w in shown if hasattr(w, "text")]
     assert not any(re.search(r"\d", text) for text in texts)

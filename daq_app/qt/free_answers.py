@@ -1,0 +1,128 @@
+"""The other two ways to answer: a number on one's own scale, and which of two."""
+
+from collections.abc import Callable
+from math import isfinite
+from typing import Literal
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QWidget
+
+from daq_app.answer import Choice
+from daq_app.qt.parts import button
+from daq_app.qt.tokens import GRID
+from sessions.plan import Hand
+from sessions.steps import Event
+
+Which = Literal["first", "second"]
+LARGE = 36  # type of the number [device-independent pixels]
+
+
+class NumberField(QWidget):
+    """Takes a number above 0; a comma is a point."""
+
+    changed = Signal()
+
+    def __init__(self, scale: float, now: Callable[[], float]) -> None:
+        """Show an empty field; `now` tells the session clock [s]."""
+        super().__init__()
+        self._now = now
+        self._answer = Choice()
+        self.field = QLineEdit()
+        self.field.setAccessibleName("your number, above 0")
+        self.field.setFixedWidth(round(260 * scale))
+        self.field.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.field.setStyleSheet(f"font-size: {round(LARGE * scale)}px;")
+        self.field.textEdited.connect(self._typed)
+        layout = QHBoxLayout(self)
+        layout.addStretch(1)
+        layout.addWidget(self.field)
+        layout.addStretch(1)
+        self.setFocusProxy(self.field)
+
+    @property
+    def answered(self) -> bool:
+        """Say whether there is an answer."""
+        return self._answer.value is not None
+
+    def begin(self) -> None:
+        """Begin another answer."""
+        self._answer = Choice()
+        self.field.clear()
+        self.changed.emit()
+
+    def given(self, hand: Hand | None) -> Event:
+        """Return the answer."""
+        return self._answer.given(hand)
+
+    def _typed(self, text: str) -> None:
+        try:
+            number = float(text.strip().replace(",", "."))
+        except ValueError:
+            number = 0.0
+        value = number if number > 0.0 and isfinite(number) else None
+        first = self._answer.first_touch
+        # What stands while a number is typed is not yet an answer that is corrected.
+        self._answer = Choice(value, self._now() if first is None else first, self._answer.corrections, "keyboard")
+        self.changed.emit()
+
+
+class ChoiceOfTwo(QWidget):
+    """Two buttons of the same size; the one that is chosen stays pressed."""
+
+    changed = Signal()
+
+    def __init__(self, scale: float, now: Callable[[], float]) -> None:
+        """Show two buttons; `now` tells the session clock [s]."""
+        super().__init__()
+        self._now = now
+        self._answer = Choice()
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAccessibleName("which of the two: 1 for the first, 2 for the second")
+        self.first = self._button("The first", "first", scale)
+        self.second = self._button("The second", "second", scale)
+        layout = QHBoxLayout(self)
+        layout.setSpacing(4 * GRID)
+        layout.addStretch(1)
+        layout.addWidget(self.first)
+        layout.addWidget(self.second)
+        layout.addStretch(1)
+
+    @property
+    def answered(self) -> bool:
+        """Say whether there is an answer."""
+        return self._answer.value is not None
+
+    def begin(self) -> None:
+        """Begin another answer."""
+        self._take(Choice())
+
+    def given(self, hand: Hand | None) -> Event:
+        """Return the answer."""
+        return self._answer.given(hand)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
+        """Choose with 1 and 2, or the arrows."""
+        keys: dict[int, Which] = {
+            Qt.Key.Key_1: "first",
+            Qt.Key.Key_Left: "first",
+            Qt.Key.Key_2: "second",
+            Qt.Key.Key_Right: "second",
+        }
+        if event.key() in keys:
+            self._take(self._answer.changed(self._now(), keys[event.key()], "keyboard"))
+        else:
+            super().keyPressEvent(event)
+
+    def _button(self, words: str, which: Which, scale: float) -> QPushButton:
+        made = button(words, words, lambda: self._take(self._answer.changed(self._now(), which, "mouse")))
+        made.setCheckable(True)
+        made.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        made.setMinimumSize(round(220 * scale), round(96 * scale))
+        return made
+
+    def _take(self, answer: Choice) -> None:
+        self._answer = answer
+        self.first.setChecked(answer.value == "first")
+        self.second.setChecked(answer.value == "second")
+        self.changed.emit()
