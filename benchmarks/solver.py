@@ -12,10 +12,12 @@ from dataclasses import replace
 from statistics import median
 from time import perf_counter
 
+from solver.contact import Contact, Course, untouched
 from solver.finger import FingerModel
+from solver.friction import FrictionLaw
 from solver.mesher import Sizing
 from solver.reference import scenes
-from solver.scene import Solve
+from solver.scene import Scene, Solve
 from solver.solution import DEFAULT, FINENESS, solve, solve_together
 
 REPEATS = 9
@@ -28,6 +30,37 @@ TRUTH = {
     "slipperiness 55": 0.00525,
     "slipperiness 100": 0.005185,
 }
+
+
+def history_row(asked: Scene, fineness: float) -> str:
+    """Return what a course of 200 substeps costs beside the direct state, assembly and elimination included in both."""
+    finger = FingerModel.of(asked, Sizing(fineness, 2.0, margin=3.0))
+    touch, loading = finger.body.touchable, asked.loading
+    law = FrictionLaw(float(asked.friction.mu), asked.friction.cap)
+    depth, direction = loading.depth, loading.direction
+
+    def course() -> Contact:
+        steps, now = Course(touch, law), untouched(touch)
+        for step in range(1, 41):
+            now = steps.step(now, depth * step / 40, 0.0)
+        for step in range(1, 161):
+            now = steps.step(now, depth, direction * 8.0 * step / 160)
+        return now
+
+    spans: list[list[float]] = [[], []]
+    for _ in range(REPEATS):
+        for span, work in zip(spans, (lambda: Course(touch, law).sliding(depth, direction), course), strict=True):
+            begun = perf_counter()
+            work()
+            span.append(1e3 * (perf_counter() - begun + finger.solve_s))
+    found = [
+        finger.sed_ending(finger.displacement(c)) for c in (Course(touch, law).sliding(depth, direction), course())
+    ]
+    direct, marched = map(median, spans)
+    return (
+        f"{asked.title:17} {marched:6.1f} ms, {marched / direct:4.1f} times the direct solve of {direct:.1f} ms, "
+        f"SED differs by {found[1] / found[0] - 1.0:.0e}"
+    )
 
 
 def main() -> None:
@@ -58,6 +91,9 @@ def main() -> None:
         estimate = max(p.error_estimate for p in found)
         print(f"{tolerance:9g} {found[0].dofs:6d} {100 * max(errors):15.3f} {100 * estimate:18.3f} {took_ms:16.1f}")
     print(f"meshes that can be asked for: {FINENESS}; without a tolerance: {DEFAULT}")
+    print("history of 200 substeps:")
+    for asked in ten[::3]:
+        print(f"  {history_row(asked, 6.0)}")
     begun = perf_counter()
     solve(ten[0])
     print(f"one surface alone: {1e3 * (perf_counter() - begun):.0f} ms")
