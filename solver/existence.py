@@ -16,7 +16,7 @@ def steady(
     newton: Newton,
     pull: Pull,
     outline: Indices,
-    tolerance: float = 1e-9,
+    tolerance: float = 1e-10,
     start: Shape | None = None,
     stop: Callable[[], bool] = lambda: False,
 ) -> Shape:

@@ -159,7 +159,7 @@ class Newton:
         changed = kernels.restate(state, sense, reaction, above, x - anchor, self.length, pull.mu, pull.tau, pull.sense)
         return Shape(u, pressure, state, sense, reaction, pull, shape.iterations + 1), largest, changed
 
-    def settle(self, start: Shape, pull: Pull, tolerance: float = 1e-9, limit: int = 25) -> Shape:
+    def settle(self, start: Shape, pull: Pull, tolerance: float = 1e-10, limit: int = 25) -> Shape:
         """Return the equilibrium under `pull`, from `start`, its displacements good to `tolerance` [mm].
 
         Tangents are kept, factors and all, where steps are small or fall fast. What is still missing is judged from how

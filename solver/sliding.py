@@ -13,7 +13,7 @@ def settled(
     newton: Newton,
     pull: Pull,
     start: Shape | None = None,
-    tolerance: float = 1e-9,
+    tolerance: float = 1e-10,
     stop: Callable[[], bool] = lambda: False,
 ) -> Shape:
     """Return the sliding state under `pull` (sense +1 or -1), from undeformed or from `start`, in one step.
