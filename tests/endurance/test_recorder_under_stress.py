@@ -16,16 +16,22 @@ from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import (
     Connect,
     Device,
+    LinkBack,
+    LinkDown,
     Live,
     People,
+    ResumeSession,
     SessionBegun,
     SessionEnded,
     StartSession,
     Stop,
 )
+from drivers.clock import RealClock
 from sessions.recording import Recording
 from sessions.runner import Status
-from sessions.steps import AskMount, AskStroke, Pause
+from sessions.steps import AskMount, AskStroke, Pause, Redo
+from simulators.bench import Bench
+from simulators.net_ft_box import NetFtBox
 
 pytestmark = pytest.mark.slow
 
@@ -108,3 +114,46 @@ def test_a_recorder_that_slept_loses_no_reading_that_the_system_kept_for_it(tmp_
     finally:
         box.terminate()
         box.communicate()
+
+
+PULLS = 4
+
+
+def test_a_cable_pulled_again_and_again_costs_a_trial_each_time_and_the_session_ends_whole(tmp_path):
+    clock = RealClock()
+    box = NetFtBox(Bench(7), clock)
+    box.start()
+    numbers = dict(pair.split("=") for pair in box.uri.partition("?")[2].split("&"))
+    ports = {f"{name}_port": int(port) for name, port in numbers.items()}
+    folder = tmp_path / "s"
+    with Recorder.start() as recorder:
+        desk = Desk(recorder, {AskStroke: lambda _: recorder.send(Redo("nobody strokes this bench"))})
+        recorder.send(Connect(box.uri))
+        desk.until(Device)
+        box.close()
+        desk.until(LinkDown)
+        box = NetFtBox(Bench(7), clock, **ports)
+        box.start()
+        assert desk.until(LinkBack).same
+        recorder.send(StartSession(PLAN, str(folder)))
+        for _ in range(PULLS):
+            desk.until(AskStroke)
+            box.close()
+            ended = desk.until(SessionEnded)
+            assert (ended.end.cause, ended.resumable) == ("device", True)
+            box = NetFtBox(Bench(7), clock, **ports)
+            box.start()
+            assert desk.until(LinkBack).same
+            recorder.send(ResumeSession(str(folder)))
+            desk.until(SessionBegun)
+        desk.until(AskStroke)
+        recorder.send(Stop())
+        assert desk.until(SessionEnded).end.cause == "stopped"
+    box.close()
+    recording = Recording.open(folder)
+    assert sum(event.kind == "resumed" for event in recording.events) == PULLS
+    assert np.all(np.diff(recording.readings().time) > 0)
+    assert np.all(np.diff(recording.readings().sequence) >= 1)
+    print(
+        f"\n{PULLS} times unplugged during a session: {len(recording.readings())} readings, none twice or out of order"
+    )
