@@ -5,7 +5,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from sessions.analysis.onset import Baseline, ContactDetector, Lift, Onset
 from sessions.analysis.settings import AnalysisSettings
@@ -45,6 +44,8 @@ def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: Ana
 
     `normal` (n,) [N] is zeroed and filtered, of all readings; nan counts as no force.
     """
+    from scipy import signal  # slow to load, and a recorder has no need of it
+
     force = np.maximum(np.nan_to_num(normal[contact.start : contact.stop]), 0.0)
     padded = np.concatenate([[0.0], force, [0.0]])
     peaks, found = signal.find_peaks(padded, prominence=0.0)

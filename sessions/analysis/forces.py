@@ -5,7 +5,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from sessions.plan import Frame
 
@@ -33,6 +32,8 @@ class Filter:
 
     def applied(self, values: Array, rate: float, segments: list[slice]) -> Array:
         """Return values (n, k) filtered within each segment [positions]; nan outside them and in the shortest ones."""
+        from scipy import signal  # slow to load, and a recorder has no need of it
+
         filtered = np.full_like(values, np.nan)
         sections = _sections(self.cut_off, rate)
         for segment in segments:
@@ -50,6 +51,8 @@ class Filter:
 @lru_cache
 def _sections(cut_off: float, rate: float) -> Array:
     """Return one pass of the filter as second-order sections; every stroke of a recording asks for the same."""
+    from scipy import signal
+
     # The bilinear transform bends frequencies as the tangent does: the factor belongs to the bent ones.
     design = rate / np.pi * np.arctan(_TWO_PASSES * np.tan(np.pi * cut_off / rate))
     return signal.butter(2, design, fs=rate, output="sos")

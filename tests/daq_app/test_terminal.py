@@ -33,8 +33,8 @@ def meant(command, line, *, forces=True):
     ("command", "line", "event"),
     [
         (AskMount(TRIAL), "", StimulusMounted(TRIAL.stimulus.code)),
-        (AskScore(TRIAL, ENDS), "37.5", Scored(37.5)),
-        (AskScore(TRIAL, ENDS), "-", Scored(None)),
+        (AskScore(TRIAL, ENDS), "37.5", Scored(37.5, input_device="keyboard")),
+        (AskScore(TRIAL, ENDS), "-", Scored(None, input_device="keyboard")),
         (AskScore(TRIAL, ENDS), "redo wrong finger", Redo("wrong finger")),
         (AskStroke(TRIAL), "abort ill", Abort("ill")),
         (AskStroke(TRIAL), "pause", Pause()),
