@@ -14,7 +14,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from recordings import PLAN, begun, plainly_read, readings
+from recordings import PLAN, TRIAL, begun, ended, plainly_read, readings
 from stand_ins import INFO, ToldClock
 from test_runner import Session
 
@@ -420,3 +420,16 @@ def test_an_infinite_number_which_bids_does_not_know_is_named_when_it_comes_back
     ):
         made = import_session(exported(export(source, form, tmp_path / form)), tmp_path / f"{form}-again")
         assert made.differences == named
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_blinded_session_is_exported_without_the_indices_and_comes_back_blinded(tmp_path, form):
+    hidden = replace(TRIAL, stimulus=replace(TRIAL.stimulus, index=None))
+    plan = replace(PLAN, blocks=(replace(PLAN.blocks[0], trials=(hidden,)),), key_sha256="0" * 64)
+    ended(tmp_path / "s", plan=plan)
+    recording = Recording.open(tmp_path / "s")
+    source = ExportSource(recording, {"made_by": {}, "strokes": [], "friction": [], "flaws": []}, None)
+    out = export(source, form, tmp_path / "out")
+    if form in AGAIN:
+        import_session(exported(out), tmp_path / "again")
+        assert Recording.open(tmp_path / "again").plan == plan
