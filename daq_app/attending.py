@@ -26,6 +26,7 @@ from sessions.recording import RecordingError
 from sessions.runner import SessionEnd, Status
 from sessions.steps import Command
 
+SILENCE = 3.0  # after which a recorder that should answer four times a second is wondered about [s]
 LOOK = 0.02  # between two looks at recorder, terminal and Ctrl-C [s]
 _WRONG = frozenset({"AddressError", "NotNow"})  # failures that come of the command line
 
@@ -55,7 +56,8 @@ def opened(recorder: Recorder, uri: str) -> Device:
 def attended(recorder: Recorder, asked: StartSession | ResumeSession, console: Console) -> Attended:
     """Attend a session until it is sealed, or cut short; people answer at this terminal unless they are simulated.
 
-    A stop is passed on at once; a second one no longer waits for the sealing, which the recorder finishes alone.
+    A stop is passed on at once; a second one no longer waits: for the sealing, which the recorder finishes alone, or
+    for a recorder that does not answer (KeyboardInterrupt). Raises as a driver does, RecordingError, WrongValue.
     """
     recorder.send(asked)
     with interruptions() as interrupted:
@@ -72,6 +74,8 @@ class _Attendance:
         self._terminal: Terminal | None = None
         self._begun: SessionBegun | None = None
         self._end: SessionEnd | None = None
+        self._stopping = False
+        self._silent = False
 
     def to_the_end(self) -> Attended:
         while True:
@@ -83,14 +87,30 @@ class _Attendance:
                 if self._end is not None:
                     self._console.note("the recorder goes on sealing the session by itself")
                     return Attended(self._end, sealed=False)
+                if self._stopping:
+                    raise KeyboardInterrupt
+                self._stopping = True
                 self._console.note("stopping")
                 self._recorder.send(Stop())
+            self._watch_silence()
             if self._terminal is not None:
                 for event in self._terminal.poll():
                     self._recorder.send(event)
                 if self._terminal.closed and self._end is None:
                     self._terminal = None
                     self._recorder.leave()
+
+    def _watch_silence(self) -> None:
+        """Say so once where the recorder does not answer, and once when it does again."""
+        running = self._begun is not None and self._end is None  # it is silent while it starts, and while it seals
+        silent = running and self._recorder.silence > SILENCE
+        if silent != self._silent:
+            self._silent = silent
+            self._console.note(
+                f"the recorder has not answered for {SILENCE:g} s: the computer is busy, or its disk does not answer"
+                if silent
+                else "the recorder answers again"
+            )
 
     def _took(self, report: Report) -> Attended | None:
         """Take a report, and return the outcome when it is the last."""

@@ -74,9 +74,10 @@ class Recorder:
             stdout=subprocess.PIPE,
             stderr=None if debug else subprocess.DEVNULL,
             bufsize=0,
-            # Out of reach of Ctrl-C and of a terminal that is closed: a session of its own, on Windows a group.
+            # Out of reach of Ctrl-C and of a terminal that is closed: a session of its own; on Windows a group and a
+            # console of its own, without a window (CREATE_NEW_PROCESS_GROUP, CREATE_NO_WINDOW).
             start_new_session=os.name == "posix",
-            creationflags=0x200 if os.name == "nt" else 0,
+            creationflags=0x0800_0200 if os.name == "nt" else 0,
         )
         return cls(process, wake)
 
@@ -116,6 +117,7 @@ class Recorder:
     def close(self, patience: float = PATIENCE) -> None:
         """End session and recorder, and wait for that; after `patience` [s] it is left to end by itself.
 
+        A session that runs is stopped and sealed: it is over. To have it cut short so that it can be resumed, `leave`.
         Harmless when repeated.
         """
         if self._process.poll() is None:

@@ -175,7 +175,7 @@ class SessionEnded:
 
 @dataclass(frozen=True, slots=True)
 class Sealing:
-    """The sealed copy of a session is being made; the live file is whole already."""
+    """The sealed copy of a session is being made; the live file is whole already. The recorder is silent meanwhile."""
 
     folder: str
 

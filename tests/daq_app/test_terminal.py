@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -96,3 +97,22 @@ def test_a_terminal_that_closes_leaves_a_session_that_can_be_resumed(at_a_termin
     assert "is gone" in out
     assert "daq-app resume" in said
     assert Recording.open(folder).end["cause"] == "client"
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the recorder's process as Linux tells of it")
+def test_a_second_ctrl_c_leaves_a_recorder_that_does_not_answer_and_it_ends_the_session_when_it_wakes(at_a_terminal):
+    folder, process = at_a_terminal
+    recorder = int(Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()[0])
+    os.kill(recorder, signal.SIGSTOP)
+    os.killpg(process.pid, signal.SIGINT)
+    said = ""
+    while "stopping" not in said:
+        said += process.stderr.read(1)
+    os.killpg(process.pid, signal.SIGINT)
+    process.communicate()
+    assert process.returncode == 130
+    assert Recording.open(folder).end is None
+    os.kill(recorder, signal.SIGCONT)
+    while not (folder / "MANIFEST.json").exists():
+        time.sleep(0.05)
+    assert Recording.open(folder).end["cause"] == "stopped"
