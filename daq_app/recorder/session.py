@@ -9,6 +9,7 @@ from pathlib import Path
 import msgspec
 
 from daq_app.life import remember_zero
+from daq_app.recorder.awake import awake
 from daq_app.recorder.bench import Bench, NotNow
 from daq_app.recorder.display import Display
 from daq_app.recorder.messages import (
@@ -135,16 +136,17 @@ def run(prepared: Prepared, bench: Bench, display: Display, inbox: Inbox, send: 
     folder = str(writer.folder)
     kind, offset_ns = prepared.people.kind, prepared.clock_offset_ns
     send(SessionBegun(folder, prepared.plan, kind, simulated, offset_ns, prepared.clock.factor, prepared.before))
-    end = run_session(
-        prepared.plan,
-        writer,
-        course,
-        bench.lent() if prepared.plan.forces else None,
-        prepared.clock,
-        resumed=prepared.resumed,
-        stop=course.stop,
-        progress=course.progress,
-    )
+    with awake():
+        end = run_session(
+            prepared.plan,
+            writer,
+            course,
+            bench.lent() if prepared.plan.forces else None,
+            prepared.clock,
+            resumed=prepared.resumed,
+            stop=course.stop,
+            progress=course.progress,
+        )
     resumable = end.cause in RESUMABLE
     send(SessionEnded(folder, end, resumable))
     if end.cause == "device":
