@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, within
-from daq_app.accuracy.published import contacts, locking
+from daq_app.accuracy.published import contacts, finite_contacts, locking
 from solver.friction import FrictionLaw
 
 
@@ -61,13 +61,15 @@ BELOW = {
     ),
 }
 CAPPED = ((1.0, 1.0), (0.8, 0.895912), (0.6, 0.715243), (0.4, 0.495368))  # k, Q/(mu P)
+FINITE_PARTS = (0.25, 0.5, 0.75)  # at finite strain, on elements three times as long: c is known to 0.05 a
 PARTS = (0.1, 0.25, 0.5, 0.75, 0.9, 0.99)  # Q/(mu P) of partial slip
 
 
 def measure(asked: Asked, found: Found) -> Iterator[Problem | LeftOut]:
     """Yield every number, until time is over; a quick run leaves out the largest bodies."""
     del found
-    works = [thick_cylinders, membranes, hertz, partial_slip, capped, *([] if asked.quick else [cylinder, below])]
+    works = [thick_cylinders, membranes, hertz, partial_slip, capped, at_finite_strain]
+    works += [] if asked.quick else [cylinder, below]
     if asked.quick:
         yield LeftOut("The whole cylinder and the stresses below a contact are left to a full run.")
     for work in within(asked, works, "groups of published problems"):
@@ -160,3 +162,24 @@ def capped() -> Iterator[Problem]:
         found = light.slid(FrictionLaw(mu, k * mu * light.peak))
         drag = -float(found.tangential.sum()) / (mu * light.load)
         yield _row(f"bound on a Hertz pressure, k {k:g}", "elementary integral", "Q/(mu P)", force, drag, 0.005, begun)
+
+
+def at_finite_strain() -> Iterator[Problem]:
+    """Yield the same contacts at finite strain, so light that they must be those of the theory."""
+    begun = clock()
+    light = finite_contacts.light_finite()
+    name = "Hertz at finite strain, a/R 0.001"
+    yield _row(name, JOHNSON, "half-width a, by a", 1.0, light.found_width() / light.half_width, 0.01, begun)
+    yield _row(name, JOHNSON, "peak p0, by p0", 1.0, light.found_peak() / light.peak, 0.01, begun)
+    for k, force in CAPPED:
+        begun = clock()
+        name = f"bound on a Hertz pressure at finite strain, k {k:g}"
+        yield _row(name, "elementary integral", "Q/(mu P)", force, light.capped(0.3, k)[0], 0.005, begun)
+    for part in FINITE_PARTS:
+        begun = clock()
+        drag, width, traction = light.sheared(0.3, part)
+        half = math.sqrt(1 - drag)
+        name, source = f"partial slip at finite strain, Q/(mu P) {drag:.3f}", "Cattaneo 1938, Mindlin 1949"
+        off = abs(width - half)
+        yield Problem(name, source, "half stick c, by a", half, width, off, 0.05, clock() - begun)
+        yield _row(name, source, "q(0)/(mu p0)", 1 - half, traction, 0.02, begun)
