@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import NullFormatter
 
 from daq_app.accuracy.costs import Cost
 from daq_app.accuracy.estimates import Estimate
@@ -19,7 +20,7 @@ from sessions.exports.figures.style import GREEN, GREY, PALE, PURPLE, SKY, VERMI
 
 COLOURS = {"small": GREEN, "finite": VERMILLION}
 MARKS = {"small": "o", "finite": "s"}
-WIDE, SQUARE = (640, 300), (328, 300)  # [CSS px]
+WIDE, SQUARE = (900, 320), (328, 300)  # [CSS px]
 
 
 def plates(found: Measured) -> dict[str, Plate]:
@@ -68,8 +69,7 @@ def _speed_panel(rows: Sequence[Speed], doubt: float, time: str, title: str) -> 
         axes.annotate(method, (100 * error, span), xytext=(4, 5), textcoords="offset points", color=colour)
     if not table:
         return None
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    _logarithmic(axes)
     if doubt > 0.0:
         axes.axvspan(axes.get_xlim()[0], 100 * doubt, color=PALE, alpha=0.5, linewidth=0)
     axes.set_xlabel("true error of the SED [%]")
@@ -127,8 +127,7 @@ def _order_panel(
     for quantity in dict.fromkeys(row.quantity for row in rows):
         axes.plot([], [], "-", marker="o", color=shown.get(quantity, GREEN), markersize=3.5, label=quantity)
     axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    _logarithmic(axes)
     axes.set_xlabel("error [–]" if time is not None else "element size, by the unit of each problem [–]")
     axes.set_ylabel(label)
     header = ("problem", "quantity", "kinematics", "element size", "error [-]", "time of a solve [s]")
@@ -160,8 +159,7 @@ def _estimate_panel(rows: Sequence[Estimate], number: str) -> Panel | None:
             100 * max(row.error, 1e-7), 100 * row.estimate, MARKS[row.kinematics], color=COLOURS[row.kinematics],
             markerfacecolor=face, markersize=4, markeredgewidth=0.7, gid=drawn.note(words),
         )  # fmt: skip
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    _logarithmic(axes)
     low, high = axes.get_xlim()
     line = np.geomspace(low, max(high, axes.get_ylim()[1]), 50)
     axes.plot(line, line, color=GREY, linewidth=0.8)
@@ -186,7 +184,7 @@ def cost_plate(found: Measured) -> Plate:
     caption = "Where the time of one solve through the front door goes, mesh and error estimate included."
     if not rows:
         return Plate("costs", caption, ())
-    drawn = sheet(WIDE[0], 60 + 45 * len(rows))
+    drawn = sheet(WIDE[0], max(190, 60 + 45 * len(rows)))
     axes = drawn.axes[0]
     parts = list(dict.fromkeys(name for row in rows for name in row.parts))
     colours = dict(zip(parts, _distinct(len(parts)), strict=True))
@@ -237,8 +235,7 @@ def growth_plate(found: Measured) -> Plate:
             marker=MARKS[kinematics], markersize=4, linewidth=0.9,
         )  # fmt: skip
     _power_line(axes, rows)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    _logarithmic(axes)
     axes.legend(frameon=False, loc="upper left")
     axes.set_xlabel("unknowns")
     axes.set_ylabel("time [ms]")
@@ -247,6 +244,22 @@ def growth_plate(found: Measured) -> Plate:
     title = "Growth of the time with the unknowns"
     panel = Panel("growth", title, svg(drawn, "growth", title, simulated=False), header, table)
     return Plate("growth", caption, (panel,))
+
+
+def _logarithmic(axes: Axes) -> None:
+    """Make both axes logarithmic, from a power of ten to another, so that their labels are few and short."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlim(_decades(axes.get_xlim()))
+    axes.set_ylim(_decades(axes.get_ylim()))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _decades(limits: tuple[float, float]) -> tuple[float, float]:
+    """Return the powers of ten at or beyond both ends, but for a hair."""
+    low, high = np.log10(limits)
+    return float(10.0 ** np.floor(low + 0.05)), float(10.0 ** np.ceil(high - 0.05))
 
 
 def _power_line(axes: Axes, rows: Sequence[Growth]) -> None:
