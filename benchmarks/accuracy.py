@@ -8,11 +8,12 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: threads cost more than they bring at these sizes
 
+import json
 import sys
 from argparse import ArgumentParser
 from pathlib import Path
 
-from daq_app.accuracy.measuring import measured
+from daq_app.accuracy.measuring import measured, restored
 from daq_app.accuracy.page import write
 from daq_app.accuracy.subjects import SUBJECTS
 from daq_app.accuracy.tables import tables
@@ -41,6 +42,7 @@ def main() -> int:
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("accuracy"), help="folder of page, pictures and data")
     parser.add_argument("--seconds", type=float, help="more time than daq-app accuracy takes, for a busy machine")
+    parser.add_argument("--data", type=Path, metavar="accuracy.json", help="tables and pictures of a run made before")
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("subjects", nargs="*", choices=[[], *(subject.name for subject in SUBJECTS)], default=[])
     asked = parser.parse_args()
@@ -52,7 +54,10 @@ def main() -> int:
             if name != "truths" or "truth" in asked.subjects:
                 print(f"\n{made.caption}\n\n{made.markdown()}")
         return 0
-    found = measured(asked.quick, console.progress, seconds=asked.seconds)
+    if asked.data:
+        found = restored(json.loads(asked.data.read_text(encoding="utf-8")))
+    else:
+        found = measured(asked.quick, console.progress, seconds=asked.seconds)
     write(found, asked.out)
     made = tables(found)
     text = DOCUMENT.read_text(encoding="utf-8")

@@ -55,8 +55,8 @@ def _speed_panel(rows: Sequence[Speed], doubt: float, time: str, title: str) -> 
     axes = drawn.axes[0]
     table: list[tuple[str | float, ...]] = []
     for method in dict.fromkeys(row.method for row in rows):
-        points = [(r.judged_error, 1e3 * getattr(r, time), r) for r in rows if r.method == method]
-        known = [(error, span, r) for error, span, r in points if error is not None and span == span]
+        points = [(r.judged_error, getattr(r, time), r) for r in rows if r.method == method]
+        known = [(error, 1e3 * span, r) for error, span, r in points if error is not None and span is not None]
         if not known:
             continue
         colour, mark = COLOURS[known[0][2].kinematics], MARKS[known[0][2].kinematics]

@@ -1,15 +1,29 @@
 """Run the subjects one after another, within the time there is, and keep what was found however it ends."""
 
 import datetime
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+import msgspec
+
 from daq_app.accuracy.asked import Asked, Found, LeftOut
+from daq_app.accuracy.costs import Cost
+from daq_app.accuracy.estimates import Estimate, Guaranteed
+from daq_app.accuracy.growth import Growth
+from daq_app.accuracy.hard_cases import HardCase
+from daq_app.accuracy.histories import Marched
+from daq_app.accuracy.machine import Machine
+from daq_app.accuracy.orders import Order
+from daq_app.accuracy.processes import Cold, Memory
+from daq_app.accuracy.published.problems import Problem
+from daq_app.accuracy.speed import Speed
 from daq_app.accuracy.subjects import SUBJECTS, Subject
-from daq_app.accuracy.truth import cases
+from daq_app.accuracy.targets import Target
+from daq_app.accuracy.truth import Truth, cases
+from daq_app.accuracy.warm import Warm
 from solver.contact import ContactLost
 from solver.failures import SolveFailure
 from solver.solution import solve
@@ -19,6 +33,14 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 FULL_S, QUICK_S = 165.0, 17.0  # what the subjects may take; drawing the page comes on top
+# every kind of row, by its name in the JSON file
+KINDS = {
+    kind.__name__: kind
+    for kind in (
+        Machine, Truth, Speed, Estimate, Guaranteed, Cost, Warm, Marched, Cold, Memory, Problem, Order, Growth,
+        HardCase, Target,
+    )
+}  # fmt: skip
 ALWAYS = ("machine", "targets")  # cost nothing, and are told of what there is even when stopped
 Progress = Callable[[float, str], None]
 
@@ -31,7 +53,7 @@ class Measured:
     quick: bool
     stopped: bool  # by the user, before everything was measured
     took_s: dict[str, float]  # by subject
-    rows: "dict[str, tuple[DataclassInstance, ...]]"  # by subject
+    rows: "Mapping[str, tuple[DataclassInstance, ...]]"  # by subject
     left_out: tuple[str, ...]
 
     def of(self, kind: type[Any]) -> list[Any]:
@@ -49,6 +71,21 @@ class Measured:
                 "left_out": list(self.left_out), **rows,
             }
         )  # fmt: skip
+
+
+def restored(document: dict[str, Any]) -> Measured:
+    """Return what `to_dict` made plain data of. Raises msgspec.ValidationError where it is something else."""
+    rows = {
+        subject.name: tuple(
+            msgspec.convert({name: value for name, value in row.items() if name != "kind"}, KINDS[row["kind"]])
+            for row in document[subject.name]
+        )
+        for subject in SUBJECTS
+        if subject.name in document
+    }
+    return Measured(
+        document["begun"], document["quick"], document["stopped"], document["took_s"], rows, tuple(document["left_out"])
+    )
 
 
 def measured(

@@ -34,7 +34,7 @@ class Speed:
     prepared_s: float  # assembly and factorisation shared by all surfaces
     floor_s: float  # one assembly, factorisation and solve of the same system
     first_s: float  # one surface from undeformed, `prepared_s` included: median over the cases
-    next_s: float  # each further surface
+    next_s: float | None  # each further surface; None where no two are neighbours
     all_s: float  # all cases one after another, `prepared_s` included
     surfaces: int  # how many those are
     errors: dict[str, tuple[float, ...]]
@@ -89,7 +89,7 @@ def _row(method: Method, fineness: float, truths: dict[str, Truth]) -> Speed:
     for (one, before), (scene, _) in pairwise(states):
         if one.loading.depth == scene.loading.depth and one.loading.slide == scene.loading.slide:
             onward.append(timed(lambda s=scene, b=before: mesh.numbers(mesh.solve(s, b)), 5, 0.25))
-    next_s = median(onward) if onward else float("nan")
+    next_s = median(onward) if onward else None
     return Speed(
         method.name, method.kinematics, method.element, method.order, method.linear_solver, method.start,
         fineness, mesh.dofs, median(b.setup_s for b in builds), prepared, median(mesh.floor() for _ in range(7)),

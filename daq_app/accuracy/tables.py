@@ -243,8 +243,8 @@ def percent(part: float) -> str:
     return f"{100 * part:.2g} %"
 
 
-def _ms(seconds: float) -> str:
-    return "–" if seconds != seconds else number(1e3 * seconds)
+def _ms(seconds: float | None) -> str:
+    return "–" if seconds is None else number(1e3 * seconds)
 
 
 def _limit(value: float | None, unit: str) -> str:

@@ -76,17 +76,27 @@ def measure(asked: Asked, found: Found) -> Iterator[Target]:
 
 
 def _at_error(
-    found: Found, work: str, kinematics: str, error: float, reach: float, aim: float, time: Callable[[Speed], float]
+    found: Found,
+    work: str,
+    kinematics: str,
+    error: float,
+    reach: float,
+    aim: float,
+    time: Callable[[Speed], float | None],
 ) -> Target:
     rows = [row for row in found.of(Speed) if row.kinematics == kinematics]
-    good = [r for r in rows if r.judged_error is not None and r.judged_error <= error and time(r) == time(r)]
+    good = [
+        (took, r)
+        for r in rows
+        if r.judged_error is not None and r.judged_error <= error and (took := time(r)) is not None
+    ]
     if not good:
         least = min((r.judged_error for r in rows if r.judged_error is not None), default=None)
         how = "" if least is None else f"no mesh that was tried is below: the best is at {_percent(least)}"
         return Target(work, _percent(error), "ms", reach, aim, None, None, how)
-    best = min(good, key=time)
+    took, best = min(good, key=lambda pair: pair[0])
     how = f"{best.method}, {best.dofs} unknowns, error {_percent(best.judged_error or 0.0)}"
-    return Target(work, _percent(error), "ms", reach, aim, 1e3 * time(best), time(best) / best.floor_s, how)
+    return Target(work, _percent(error), "ms", reach, aim, 1e3 * took, took / best.floor_s, how)
 
 
 def _warm(found: Found, work: str, kinematics: str, reach: float, aim: float) -> Target:

@@ -14,7 +14,7 @@ from daq_app.accuracy.estimates import Estimate, Guaranteed
 from daq_app.accuracy.growth import Growth, exponent
 from daq_app.accuracy.hard_cases import HardCase
 from daq_app.accuracy.machine import Machine
-from daq_app.accuracy.measuring import Measured, measured
+from daq_app.accuracy.measuring import Measured, measured, restored
 from daq_app.accuracy.orders import Order
 from daq_app.accuracy.page import page, write
 from daq_app.accuracy.published.problems import Problem
@@ -109,6 +109,13 @@ def test_pictures_are_files_of_their_own_and_the_data_is_json(written):
     data = json.loads((written[0].parent / "accuracy.json").read_text(encoding="utf-8"))
     assert data["truth"][0]["numbers"] == [5e-3, 0.1, 0.06]
     assert data["speed"][0]["kind"] == "Speed"
+
+
+def test_pictures_and_tables_can_be_made_again_from_the_data_alone(example, written):
+    data = json.loads((written[0].parent / "accuracy.json").read_text(encoding="utf-8"))
+    again = restored(data)
+    assert again == example
+    assert tables(again) == tables(example)
 
 
 def verdict(example, work, at=None):
