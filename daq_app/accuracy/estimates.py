@@ -106,9 +106,9 @@ def _published(asked: Asked, found: Found, kinematics: Kinematics) -> Iterator[E
 def _random(asked: Asked, kinematics: Kinematics) -> Iterator[Estimate | LeftOut]:
     wanted = 2 if asked.quick else RANDOM[kinematics]
     refused = 0
-    for number in range(wanted):
-        if asked.left <= 0.0:
-            yield LeftOut(f"Time was over after {number} of {wanted} random scenes at {kinematics} strain.")
+    for number in within(asked, range(wanted), f"random scenes at {kinematics} strain"):
+        if isinstance(number, LeftOut):
+            yield number
             break
         scene = random_scene(number, kinematics)
         (answer,) = answers([replace(scene, solve=Solve(kinematics, tolerance=TOLERANCES[0]))])

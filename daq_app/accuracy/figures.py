@@ -3,7 +3,7 @@
 # pyright: reportUnknownMemberType=false
 # matplotlib does not type the keyword arguments it passes on.
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -36,21 +36,21 @@ def plates(found: Measured) -> dict[str, Plate]:
 def speed_plate(found: Measured) -> Plate:
     """Draw time against true error, one curve a way of solving."""
     rows: list[Speed] = found.of(Speed)
-    truths: list[Truth] = found.of(Truth)
-    doubt = max((truth.doubt[0] for truth in truths if truth.doubt), default=0.0)
+    truths: list[Truth] = [truth for truth in found.of(Truth) if truth.case in JUDGED]
+    doubt = {kind: max((t.doubt[0] for t in truths if t.kinematics == kind), default=0.0) for kind in COLOURS}
     panels = [
         _speed_panel(rows, doubt, "first_s", "one surface from undeformed"),
         _speed_panel(rows, doubt, "next_s", "each further surface"),
     ]
     caption = (
         f"Time against true error: largest error of the SED on {len(JUDGED)} surfaces (slipperiness 0 to 100, "
-        "stickiness 0), median time of a solve, mesh and estimate not included. One point a mesh. Pale: the doubt of "
-        "the truth, left of which an error is not known."
+        "stickiness 0), median time of a solve, mesh and estimate not included. One point a mesh; hollow where the "
+        "error is below three times the doubt of the truth."
     )
     return Plate("speed", caption, tuple(panel for panel in panels if panel is not None))
 
 
-def _speed_panel(rows: Sequence[Speed], doubt: float, time: str, title: str) -> Panel | None:
+def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, title: str) -> Panel | None:
     drawn = sheet(*SQUARE)
     axes = drawn.axes[0]
     table: list[tuple[str | float, ...]] = []
@@ -63,15 +63,15 @@ def _speed_panel(rows: Sequence[Speed], doubt: float, time: str, title: str) -> 
         axes.plot([100 * e for e, _, _ in known], [s for _, s, _ in known], color=colour, linewidth=0.8)
         for error, span, row in known:
             words = f"{row.method}: {row.dofs} unknowns, {100 * error:.2g} %, {span:.3g} ms"
-            axes.plot(100 * error, span, mark, color=colour, markersize=4.5, gid=drawn.note(words))
+            face = "white" if error < 3.0 * doubt[row.kinematics] else colour
+            gid = drawn.note(words)
+            axes.plot(100 * error, span, mark, color=colour, markerfacecolor=face, markersize=4.5, gid=gid)
             table.append((row.method, row.element, row.order, row.linear_solver, row.dofs, error, 1e-3 * span))
         error, span, row = known[-1]
         axes.annotate(method, (100 * error, span), xytext=(4, 5), textcoords="offset points", color=colour)
     if not table:
         return None
     _logarithmic(axes)
-    if doubt > 0.0:
-        axes.axvspan(axes.get_xlim()[0], 100 * doubt, color=PALE, alpha=0.5, linewidth=0)
     axes.set_xlabel("true error of the SED [%]")
     axes.set_ylabel("time [ms]")
     axes.set_title(title)

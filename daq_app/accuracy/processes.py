@@ -24,20 +24,23 @@ kinematics = "{kinematics}"
 """
 TOLERANCE = 0.0015  # of the solve whose memory is measured
 LONGEST = 60.0  # seconds after which a process is given up
-# Run alone: the peak before it is the idle process, loops loaded, and what it rises by is the solve's.
+# Run alone: what the process holds, loops loaded, is idle; the peak is counted afresh from there (Linux alone lets it).
 MEMORY = """
-import json, resource, sys
+import json
 from dataclasses import replace
 from solver.reference import SLIPPERINESS, scene
 from solver.scene import Solve
 from solver.solution import solve
 asked = scene(SLIPPERINESS[4])
 solve(replace(asked, solve=Solve("{kinematics}", tolerance=0.05)))
-unit = 1.0 if sys.platform == "darwin" else 1024.0
-before = unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+def held(name):
+    with open("/proc/self/status") as file:
+        return next(float(line.split()[1]) * 1024 / 1e6 for line in file if line.startswith(name))
+with open("/proc/self/clear_refs", "w") as file:
+    file.write("5")
+before = held("VmRSS")
 found = solve(replace(asked, solve=Solve("{kinematics}", tolerance={tolerance})))
-after = unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-print(json.dumps([before / 1e6, (after - before) / 1e6, found.dofs, found.error_estimate]))
+print(json.dumps([before, held("VmHWM") - before, found.dofs, found.error_estimate]))
 """
 
 

@@ -66,7 +66,7 @@ def targets(found: Measured) -> Table:
     cells = [
         (
             row.work, row.at_error, _limit(row.reach, row.unit), _limit(row.aim, row.unit),
-            "–" if row.measured is None else f"{number(row.measured)} {row.unit}",
+            "–" if row.measured is None else f"{short(row.measured)} {row.unit}",
             "–" if row.floors is None else number(row.floors, 2), row.verdict, row.how,
         )
         for row in rows
@@ -244,7 +244,16 @@ def percent(part: float) -> str:
 
 
 def _ms(seconds: float | None) -> str:
-    return "–" if seconds is None else number(1e3 * seconds)
+    return "–" if seconds is None else short(1e3 * seconds)
+
+
+def short(value: float) -> str:
+    """Return a number with three digits, or all before the point where there are more.
+
+    >>> short(0.0123), short(5423.4)
+    ('0.0123', '5,423')
+    """
+    return number(value) if value < 1000.0 else f"{value:,.0f}"
 
 
 def _limit(value: float | None, unit: str) -> str:

@@ -22,7 +22,7 @@ NUMBERS = ("SED of the ending", "normal force", "drag")
 # fineness of the three meshes, and whether moved along the skin by half an element
 OVERKILL: dict[Kinematics, tuple[tuple[float, bool], ...]] = {
     "small": ((64.0, False), (64.0, True), (56.0, False)),
-    "finite": ((28.0, False), (28.0, True), (25.0, False)),
+    "finite": ((40.0, False), (40.0, True), (36.0, False)),
 }
 QUICK: dict[Kinematics, tuple[tuple[float, bool], ...]] = {
     "small": ((40.0, False), (40.0, True), (36.0, False)),
