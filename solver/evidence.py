@@ -1,5 +1,6 @@
 """What a result leaves out, each with a number computed for its scene: how much that could have changed."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ DENSITY = 1.1e-9  # of soft tissue [t/mm3 = N s2/mm4]
 # not in the abstract, so a fifth of the instantaneous stiffness is assumed for each, and two fifths stay.
 RELAXATION = ((0.004, 0.2), (0.07, 0.2), (1.4, 0.2))
 STAYS = 0.4
+WORTH_TELLING = 0.02  # part of the SED from which something left out is worth a warning [-]
 LARGE_STRAIN = 0.1  # a strain from which finite strain ought to be considered [-]
 
 
@@ -91,16 +93,40 @@ def finite_model(scene: Scene, *, force: Array, width: float, sticking: float, s
     }
 
 
-def warnings(left_out: dict[str, Any]) -> tuple[str, ...]:
+def warnings(scene: Scene, left_out: Mapping[str, Any]) -> tuple[str, ...]:
     """Return a sentence for everything left out that this scene would have needed."""
-    strains = left_out["finite strain"]["from"]
-    if strains["largest_strain"] <= LARGE_STRAIN:
-        return ()
-    return (
-        f"Strains reach {100 * strains['largest_strain']:.0f} % in the skin and "
-        f"{100 * strains['strain_at_ending']:.0f} % at the ending, beyond what small strain is meant for: "
-        "finite strain would give another answer.",
-    )
+    told: list[str] = []
+    if "finite strain" in left_out:
+        told += _of_strain(left_out["finite strain"])
+    needs = {
+        "bone compliance": 'ask for finger.bone = "meshed"',
+        "history": 'ask for solve.course = "history"',
+        "inertia": "nothing here models it",
+    }
+    if scene.solve.course == "history" and scene.solve.kinematics == "small":
+        needs["viscosity"] = "give the tissues a Prony series"
+    for name, cure in needs.items():
+        change = left_out[name]["estimate"] if name in left_out else None
+        if change is not None and change > WORTH_TELLING:
+            told.append(f"Leaving out {name} may have changed the ending's SED by {100 * change:.2g} %: {cure}.")
+    return tuple(told)
+
+
+def _of_strain(entry: Mapping[str, Any]) -> list[str]:
+    numbers, change = entry["from"], entry["estimate"]
+    if "limit_mu" in numbers:
+        return ["At finite strain this scene has no settled state: the skin folds first. Small strain hides that."]
+    if "with_MPa" in numbers:
+        if change is None or change <= WORTH_TELLING:
+            return []
+        return [f"At finite strain the ending's SED differs by {100 * change:.2g} %: small strain is not meant for it."]
+    if numbers["largest_strain"] <= LARGE_STRAIN:
+        return []
+    return [
+        f"Strains reach {100 * numbers['largest_strain']:.0f} % in the skin and "
+        f"{100 * numbers['strain_at_ending']:.0f} % at the ending, beyond what small strain is meant for: "
+        "finite strain would give another answer."
+    ]
 
 
 def _course(scene: Scene) -> str:
@@ -136,6 +162,9 @@ def _finite_strain(finger: FingerModel, displacement: Array) -> dict[str, Any]:
 
 
 def _bone(scene: Scene, force: Array) -> dict[str, Any]:
+    if scene.finger.bone == "meshed":
+        how = "the bone was meshed"
+        return {"estimate": 0.0, "from": {"E_MPa": scene.materials.bone.E}, "how": how}
     bone = scene.materials.bone
     pressure = float(np.hypot(*force)) / (2.0 * scene.finger.bone_radius)
     yields = pressure * (1.0 - bone.nu**2) / bone.E * 2.0 * scene.finger.bone_radius
@@ -157,6 +186,10 @@ def _inertia(scene: Scene, normal: float, length: float) -> dict[str, Any]:
 
 
 def _viscosity(scene: Scene, slide: float) -> dict[str, Any]:
+    if scene.materials.relax:
+        longest = scene.materials.longest_relaxation
+        how = "tissues relax as the scene says; in the end they have their relaxed moduli"
+        return {"estimate": 0.0, "from": {"longest_relaxation_s": longest}, "how": how}
     lasting = 2.0 * slide / scene.loading.speed if scene.loading.direction else 0.0
     after = sum(g * tau * (np.exp(-lasting / tau) - np.exp(-(lasting + 1.0) / tau)) for tau, g in RELAXATION)
     return {

@@ -170,6 +170,9 @@ def _predicted(
     drag = _drag(scene, float(force[0]))
     sed_error, normal_error, tangential_error = _errors(scene, coarse, (sed, float(force[1]), drag), stop)
     width = _contact_width(skin)
+    model = evidence.finite_model(
+        driven, force=force, width=width, sticking=_sticking(shape), slide=_slide(finger, shape)
+    )
     return Prediction(
         scene=scene,
         sed_ending=sed,
@@ -188,15 +191,13 @@ def _predicted(
         setup_s=setup,
         estimate_s=perf_counter() - solved,
         row=row,
-        model=evidence.finite_model(
-            driven, force=force, width=width, sticking=_sticking(shape), slide=_slide(finger, shape)
-        ),
+        model=model,
         audits=checks,
         skin=skin,
         mesh=finger.geometry.mesh,
         displacement=shape.u,
         history=_history(scene, finger, way) if way else None,
-        warnings=(),
+        warnings=evidence.warnings(driven, model["left_out"]),
     )
 
 

@@ -16,6 +16,7 @@ from solver.finger import FingerModel
 from solver.friction import FrictionLaw
 from solver.grid import MeshError
 from solver.matching import DEEPEST, expected_depth
+from solver.measured import measured
 from solver.mesh import Array
 from solver.mesher import FINEST, Sizing
 from solver.prediction import History, Prediction, Row, Skin
@@ -75,7 +76,14 @@ def answers(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[
     for group in _groups(scenes):
         out |= dict(zip(group, _solve_group([scenes[i] for i in group], progress), strict=True))
     told = {i: answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer for i, answer in out.items()}
-    return tuple(told[i] for i in range(len(scenes)))
+    return tuple(_with_evidence(told[i], progress) for i in range(len(scenes)))
+
+
+def _with_evidence(found: _Answer, progress: Progress | None) -> _Answer:
+    """Return the answer with its evidence measured, where its scene asks for that."""
+    if not isinstance(found, Prediction) or found.scene.solve.evidence == "estimated":
+        return found
+    return measured(found, lambda scenes: answers(scenes, progress))
 
 
 def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
@@ -298,7 +306,7 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Pred
         mesh=finger.geometry.mesh,
         displacement=displacement,
         history=history,
-        warnings=(*warnings(left["left_out"]), *_doubts(unbalanced, checks["penetration"])),
+        warnings=(*warnings(scene, left["left_out"]), *_doubts(unbalanced, checks["penetration"])),
     )
 
 

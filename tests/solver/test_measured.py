@@ -1,0 +1,67 @@
+"""Evidence for what was left out can be measured, and scenes that need more than was asked are told so."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from solver.reference import SLIPPERINESS, STICKINESS, scene
+from solver.scene import Material, SceneError, Solve
+from solver.solution import solve
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return solve(replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5, evidence="measured")))
+
+
+def entry(found, name):
+    return found.model["left_out"][name]
+
+
+def test_measured_differences_are_those_of_two_solves(measured):
+    plain = replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5))
+    base = solve(plain).sed_ending
+    with_bone = solve(replace(plain, finger=replace(plain.finger, bone="meshed"))).sed_ending
+    assert entry(measured, "bone compliance")["estimate"] == pytest.approx(abs(with_bone / base - 1.0))
+    finite = solve(replace(plain, solve=Solve("finite", tolerance=0.5))).sed_ending
+    assert entry(measured, "finite strain")["estimate"] == pytest.approx(abs(finite / base - 1.0))
+    assert entry(measured, "history")["estimate"] < 1e-9  # a settled slide has none left
+    assert 0.0 < entry(measured, "viscosity")["estimate"] < 1.0
+    assert measured.sed_ending == base
+
+
+def test_the_estimate_stays_beside_the_measured_number_and_the_cost_is_told(measured):
+    assert "measured" in entry(measured, "bone compliance")["how"]
+    assert entry(measured, "bone compliance")["estimated"] > 0.0
+    assert measured.evidence_s > 0.0
+    printed = json.loads(json.dumps(measured.to_dict()))
+    assert printed["evidence_s"] == measured.evidence_s
+    assert any("finite strain" in told and "%" in told for told in measured.warnings)
+
+
+def test_without_being_asked_nothing_is_measured():
+    found = solve(replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5)))
+    assert found.evidence_s is None
+    assert all("measured" not in told["how"] for told in found.model["left_out"].values())
+
+
+def test_a_bone_too_soft_to_count_as_rigid_is_told():
+    given = replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5))
+    soft = replace(given, materials=replace(given.materials, bone=Material(1.0, 0.3)))
+    assert any('finger.bone = "meshed"' in told for told in solve(soft).warnings)
+    meshed = replace(soft, finger=replace(soft.finger, bone="meshed"))
+    assert not any("bone" in told for told in solve(meshed).warnings)
+
+
+@pytest.mark.slow
+def test_a_scene_that_folds_at_finite_strain_is_told_at_small_strain():
+    found = solve(replace(scene(STICKINESS[4]), solve=Solve(tolerance=0.5, evidence="measured")))
+    assert entry(found, "finite strain")["estimate"] is None
+    assert 0.3 < entry(found, "finite strain")["from"]["limit_mu"] < 0.5
+    assert any("no settled state" in told for told in found.warnings)
+
+
+def test_evidence_of_another_kind_is_refused():
+    with pytest.raises(SceneError, match=r"solve\.evidence"):
+        Solve(evidence="guessed")
