@@ -16,6 +16,7 @@ VERBS = {
     "demo": "run the whole study on the simulated transducer and simulated subjects",
     "devices": "list the transducers that can be reached, or probe one",
     "run": "run one session",
+    "enrol": "enrol a subject in a study, or make one",
     "resume": "go on with a session that was cut short",
     "import": "make a session folder of a foreign recording",
     "replay": "run a recorded session once more and compare what comes out",
@@ -27,6 +28,7 @@ VERBS = {
     "export": "write a session as CSV, BIDS, HDF5 or NWB",
     "selftest": "pull its own plug on this computer and disk, and write a certificate",
     "simulate": "serve the other end of a wire, to try a driver without hardware",
+    "unblind": "open the sealed key of a blinded study or session",
     "verify": "check every checksum of a session and recompute every derived number",
 }
 
@@ -47,6 +49,7 @@ _FAILED = (
     "sessions.import_csv.ImportRefused",
     "sessions.plan.Blinded",
     "sessions.recording.errors.RecordingError",
+    "sessions.study.StudyError",
     "solver.failures.SolveFailure",
 )
 

@@ -1,14 +1,19 @@
 """Numbers made from a session: made, kept in its folder, and made once more to verify them."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
+from daq_app.cli import WrongValue
 from daq_app.console import Console
 from sessions.analysis import Analysis, analyse
+from sessions.blinding import revealed
 from sessions.prediction import PredictionOptions, SessionPrediction, predict
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import store_derived
+from sessions.study_file import is_study
 from sessions.toml_file import from_table
+from sessions.visits import force_visit
 
 ANALYSIS = "analysis.json"
 PREDICTION = "prediction.json"
@@ -36,9 +41,29 @@ def predicted(
 
 
 def predicted_again(recording: Recording, analysis: Analysis, stored: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the prediction made once more, with the options stored beside it. Raises SettingsError where damaged."""
+    """Return the prediction made once more, with the options stored beside it, as blind as it was made.
+
+    Raises SettingsError where damaged.
+    """
     options = from_table(stored.get("options", {}), PredictionOptions, PREDICTION)
-    return predict(analysis, recording.plan, options).to_dict()
+    stimuli: list[Mapping[str, Any]] = [row.get("stimulus") or {} for row in stored.get("trials", ())]
+    blind = all(stimulus.get("index") is None for stimulus in stimuli)
+    return predict(analysis, (recording if blind else revealed(recording)).plan, options).to_dict()
+
+
+def visit(path: Path, subject: str | None) -> Recording:
+    """Return a session with all that is known of its stimuli, or a subject's visit with forces to a study.
+
+    Raises RecordingError, StudyError, WrongValue.
+    """
+    if is_study(path):
+        if subject is None:
+            raise WrongValue(f"{path} is a study: say whose visit with --subject")
+        return force_visit(path, subject)
+    recording = revealed(Recording.open(path))
+    if subject not in (None, recording.plan.subject):
+        raise WrongValue(f"--subject {subject} is not allowed: {path} is a session of {recording.plan.subject}")
+    return recording
 
 
 def _keep(recording: Recording, name: str, document: Mapping[str, Any], console: Console) -> None:

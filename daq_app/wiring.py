@@ -45,6 +45,7 @@ __all__ = [
     "SimulatedPeople",
     "TimetableError",
     "connected",
+    "itself",
     "planted_surface",
     "serve_digital_ft",
     "serve_net_ft",
@@ -106,26 +107,38 @@ def connected(uri: str, clock: Clock) -> Generator[Connected]:
         box.close()
 
 
+Known = Callable[[Trial], Trial]  # a trial with the index of its stimulus
+
+
+def itself(trial: Trial) -> Trial:
+    """Return the trial: its stimulus is known."""
+    return trial
+
+
 class SimulatedHand:
     """Mounts and strokes the simulated bench when a session asks for it, and does nothing else: people do the rest."""
 
-    def __init__(self, subject_seed: int, bench: Connected) -> None:
-        """Let the subject of that seed stroke. Raises SetupError where the bench is not simulated in this process."""
+    def __init__(self, subject_seed: int, bench: Connected, known: Known = itself) -> None:
+        """Let the subject of that seed stroke; `known` tells a blinded trial's stimulus.
+
+        Raises SetupError where the bench is not simulated in this process.
+        """
         if bench.bench is None or bench.bench_now is None:
             raise SetupError("a simulated hand strokes the simulated bench only: connect sim:")
         self._subject = SimulatedSubject(subject_seed)
         self._bench = bench.bench
         self._now = bench.bench_now
+        self._known = known
         self._takes: dict[int, int] = {}  # by trial number
 
     def show(self, command: Command) -> None:
         """Do what the command asks a hand for."""
         match command:
             case AskMount(trial):
-                self._bench.mount(planted_surface(trial))
+                self._bench.mount(planted_surface(self._known(trial)))
             case AskStroke(trial):
                 self._takes[trial.number] = self._takes.get(trial.number, 0) + 1
-                stroke = self._subject.stroke(planted_surface(trial), self._takes[trial.number])
+                stroke = self._subject.stroke(planted_surface(self._known(trial)), self._takes[trial.number])
                 self._bench.begin_stroke(stroke, self._now())
             case _:
                 pass
@@ -141,11 +154,12 @@ class SimulatedPeople:
     With a bench the subject strokes it, and judges when the finger has left; without one it strokes and judges unseen.
     """
 
-    def __init__(self, subject_seed: int, clock: Clock, bench: Connected | None = None) -> None:
-        """Let the subject of that seed stroke the bench, where there is one."""
+    def __init__(self, subject_seed: int, clock: Clock, bench: Connected | None = None, known: Known = itself) -> None:
+        """Let the subject of that seed stroke the bench, where there is one; `known` tells a blinded stimulus."""
         self._subject = SimulatedSubject(subject_seed)
         self._clock = clock
-        self._hand = None if bench is None or bench.bench is None else SimulatedHand(subject_seed, bench)
+        self._hand = None if bench is None or bench.bench is None else SimulatedHand(subject_seed, bench, known)
+        self._known = known
         self._takes: dict[int, int] = {}  # by trial number
         self._due: list[tuple[int, Event]] = []  # session clock [ns]
 
@@ -186,7 +200,7 @@ class SimulatedPeople:
                 score = self._judged(trial)
                 return Scored(score, ((at, score),), at, 0, None, INPUT)
             case AskNumber(trial):
-                number = self._subject.number(planted_surface(trial), self._takes[trial.number])
+                number = self._subject.number(planted_surface(self._known(trial)), self._takes[trial.number])
                 return NumberGiven(number, at, 0, None, INPUT)
             case AskChoice(first, second):
                 more = self._judged(first) > self._judged(second)
@@ -197,7 +211,7 @@ class SimulatedPeople:
         return JUDGING if self._hand else 0.0
 
     def _judged(self, trial: Trial) -> float:
-        return self._subject.score(planted_surface(trial), self._takes[trial.number])
+        return self._subject.score(planted_surface(self._known(trial)), self._takes[trial.number])
 
     def _answer(self, event: Event, after: float = 0.0) -> None:
         self._due.append((self._clock.now_ns() + int(after * 1e9), event))

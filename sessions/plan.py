@@ -26,6 +26,11 @@ class Stimulus:
     code: str  # opaque label on its back, all that experimenter and subject are shown
 
     @property
+    def called(self) -> str:
+        """Return what people call it: its descriptor with its index, or with its code while that is sealed."""
+        return f"{self.descriptor} {self.code if self.index is None else self.index}"
+
+    @property
     def known_index(self) -> int:
         """Return the index. Raises Blinded while it is sealed."""
         if self.index is None:

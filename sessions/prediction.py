@@ -266,7 +266,7 @@ def _scene(row: TrialPrediction, options: PredictionOptions) -> Scene:
     assert row.indentation is not None
     assert row.direction is not None
     base = _template(options)
-    surface = "" if row.stimulus is None else f"{row.stimulus.descriptor} {row.stimulus.index}"
+    surface = "" if row.stimulus is None else row.stimulus.called
     return replace(
         base,
         title=f"trial {row.trial}: {surface}" if surface else f"stroke {row.stroke}",

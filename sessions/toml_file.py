@@ -38,17 +38,22 @@ def load_toml(path: Path, cls: type[T]) -> T:
         raise FileNotFoundError(f"{path}: there is no such file; give the path of a TOML file")
     try:
         text = path.read_bytes().decode()
-        table = tomllib.loads(text)
     except UnicodeDecodeError as error:
         raise SettingsError(f"{path}: byte {error.start} is no UTF-8 text; save the file as UTF-8") from error
-    except tomllib.TOMLDecodeError as error:
-        raise SettingsError(f"{path}: this is not TOML: {error}") from error
+    return from_toml(text, cls, str(path))
+
+
+def from_toml(text: str, cls: type[T], where: str) -> T:
+    """Return the dataclass that a TOML text describes; `where` is how messages call it. Raises SettingsError."""
     try:
-        return from_table(table, cls, str(path))
+        return from_table(tomllib.loads(text), cls, where)
+    except tomllib.TOMLDecodeError as error:
+        raise SettingsError(f"{where}: this is not TOML: {error}") from error
     except _Wrong as wrong:
         line = _line_of(text, wrong.key)
-        where = f"{path}, line {line}" if line else str(path)
-        raise SettingsError(f"{where}: {wrong.sentence}") from wrong
+        raise SettingsError(
+            f"{where}, line {line}: {wrong.sentence}" if line else f"{where}: {wrong.sentence}"
+        ) from wrong
 
 
 def from_table(table: Mapping[str, Any], cls: type[T], where: str) -> T:

@@ -30,10 +30,10 @@ from daq_app.recorder.messages import (
     Tare,
 )
 from daq_app.recorder.pipes import Inbox
-from daq_app.wiring import SimulatedHand, SimulatedPeople, planted_surface
+from daq_app.wiring import SimulatedHand, SimulatedPeople, itself, planted_surface
 from drivers.clock import Clock
 from drivers.transducer import TransducerInfo
-from sessions.plan import SessionPlan
+from sessions.plan import SessionPlan, Trial
 from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, Setting, provenance
 from sessions.recording.certificate import certificate_for
 from sessions.recording.folding import fold_log
@@ -53,6 +53,8 @@ from sessions.resuming import (
 )
 from sessions.runner import STOPPED, Ending, Operator, Resumed, Status, run_session
 from sessions.steps import Command, Event
+from sessions.study import StudyError
+from sessions.study_file import study_key
 
 LIFT_PATIENCE_NS = 30_000_000_000  # for a finger that touches when the client goes [session clock]
 CLIENT_GONE = "the window or terminal that ran the session is gone"
@@ -80,8 +82,8 @@ def begun(request: StartSession, bench: Bench, clock: Clock) -> Prepared:
     if plan.forces and bench.connected is None:
         raise NotNow("a session with forces needs a transducer, and none is connected; connect one")
     info = bench.connected.transducer.info if plan.forces and bench.connected is not None else None
-    _check_people(people, plan, bench)
     folder = Path(request.folder)
+    _check_people(people, plan, bench, folder)
     check_room(folder, need(plan, None if info is None else info.rate))
     settings = [*request.settings, *_told(people, bench.uri if info is not None else None)]
     settings += _allowed(folder, any_folder=request.any_folder)
@@ -117,7 +119,7 @@ def gone_on(request: ResumeSession, bench: Bench, clock: Clock) -> Prepared:
     going_on, gap = continued(recording, last, clock, datetime.now(UTC))
     people = request.people or recorded_people(recording)
     info = _opened_again(request, recording, bench, going_on)
-    _check_people(people, recording.plan, bench)
+    _check_people(people, recording.plan, bench, folder)
     if simulated_sentence(info, people.kind != "people") != recording.simulated_sentence:
         raise NotNow("what was simulated at the beginning must be simulated again, and nothing else")
     writer = SessionWriter.open(folder, going_on, reserve=RESERVE)
@@ -248,18 +250,31 @@ class _Course:
 def _helper(prepared: Prepared, bench: Bench) -> Operator | None:
     people = prepared.people
     connected = bench.connected if prepared.plan.forces else None
+    if people.kind == "people":
+        return None
+    known = _knowing(prepared.plan, prepared.writer.folder)
     if people.kind == "simulated people":
-        return SimulatedPeople(people.seed, prepared.clock, connected)
-    if people.kind == "simulated hand" and connected is not None:
-        return SimulatedHand(people.seed, connected)
-    return None
+        return SimulatedPeople(people.seed, prepared.clock, connected, known)
+    return None if connected is None else SimulatedHand(people.seed, connected, known)
 
 
-def _check_people(people: People, plan: SessionPlan, bench: Bench) -> None:
+def _knowing(plan: SessionPlan, folder: Path) -> Callable[[Trial], Trial]:
+    """Return how a simulated bench knows what is on it: where codes are blinded, from the study's key."""
+    if not plan.blinded:
+        return itself
+    try:
+        key = study_key(folder.parent)
+    except StudyError as error:
+        raise NotNow(f"simulated people must know which stimulus is which: {error}") from error
+    return itself if key is None else key.of
+
+
+def _check_people(people: People, plan: SessionPlan, bench: Bench, folder: Path) -> None:
     """Raise NotNow where simulated people would have to stroke a real bench, SetupError where it lacks a surface."""
     if people.kind != "people":
+        known = _knowing(plan, folder)
         for trial in plan.trials:
-            planted_surface(trial)
+            planted_surface(known(trial))
     simulated_bench = bench.connected is not None and bench.connected.bench is not None
     if people.kind == "simulated people" and plan.forces and not simulated_bench:
         raise NotNow("simulated people stroke the simulated bench only: connect sim:")

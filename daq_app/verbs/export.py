@@ -11,6 +11,7 @@ from daq_app.cli import FLAWED
 from daq_app.console import Console
 from daq_app.derived import ANALYSIS, PREDICTION
 from sessions.analysis import analyse
+from sessions.blinding import revealed
 from sessions.exports import FORMATS, ExportSource, export
 from sessions.recording import Recording
 from sessions.recording.derived import load_derived
@@ -28,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Export, and name what the session had lost."""
-    recording = Recording.open(options.session)
+    recording = revealed(Recording.open(options.session))
     folder = options.out or Path("exports") / f"{options.session.resolve().name}-{options.format}"
     analysis = load_derived(options.session, ANALYSIS)
     if analysis is None:

@@ -8,9 +8,8 @@ import argparse
 from pathlib import Path
 
 from daq_app.console import Console, number, table
-from daq_app.derived import analysed, predicted
+from daq_app.derived import analysed, predicted, visit
 from sessions.prediction import PredictionOptions
-from sessions.recording import Recording
 from sessions.toml_file import load_toml
 from solver.scene import Scene
 
@@ -20,7 +19,8 @@ HEAD = ["trial", "surface", "mu", "tau_max [kPa]", "SED [kPa]", "error", "model 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the session and what may be asked of the model."""
-    parser.add_argument("session", type=Path, metavar="SESSION")
+    parser.add_argument("session", type=Path, metavar="SESSION|STUDY")
+    parser.add_argument("--subject", metavar="CODE", help="of a study: whose visit with forces")
     parser.add_argument(
         "--kinematics",
         choices=["small", "finite"],
@@ -45,7 +45,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         indentation=options.indentation,
         kinematics=options.kinematics,
     )
-    recording = Recording.open(options.session)
+    recording = visit(options.session, options.subject)
     prediction = predicted(recording, analysed(recording, console), console, asked)
     console.result(prediction.to_dict())
     if recording.simulated_sentence:
@@ -53,7 +53,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     rows = [
         [
             str(row.trial or (row.stroke or 0) + 1),
-            "–" if row.stimulus is None else f"{row.stimulus.descriptor} {row.stimulus.index}",
+            "–" if row.stimulus is None else row.stimulus.called,
             number(row.mu),
             number(None if row.tau_max is None else row.tau_max * 1e3),
             number(None if row.sed is None else row.sed * 1e3, 4),

@@ -59,7 +59,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             predicted = load_derived(options.session, PREDICTION)
             if predicted is not None:
                 console.progress(0.9, f"making {PREDICTION} again")
-                again = _plain(predicted_again(replayed, analyse(replayed), predicted))
+                again = _plain(predicted_again(recording, analyse(replayed), predicted))
                 found += _changed(PREDICTION, predicted, again)
                 compared.append(PREDICTION)
     lasted = _duration(recording)

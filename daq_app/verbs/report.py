@@ -7,9 +7,13 @@ import argparse
 from pathlib import Path
 
 from daq_app.console import Console
-from daq_app.derived import analysed, predicted
+from daq_app.derived import analysed, predicted, visit
+from sessions.blinding import revealed
+from sessions.plan import Blinded
 from sessions.recording import Recording
 from sessions.recording.derived import store_page
+from sessions.study_file import is_study
+from sessions.visits import score_visits
 
 PAGE = "report.html"
 EXAMPLE = "daq-app report recordings/P07 -o P07.html --scores recordings/P01 recordings/P02"
@@ -17,7 +21,8 @@ EXAMPLE = "daq-app report recordings/P07 -o P07.html --scores recordings/P01 rec
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the session, the page and further scores."""
-    parser.add_argument("session", type=Path, metavar="SESSION")
+    parser.add_argument("session", type=Path, metavar="SESSION|STUDY")
+    parser.add_argument("--subject", metavar="CODE", help="of a study: whose visit with forces; all its scores join in")
     parser.add_argument("-o", "--out", type=Path, metavar="FILE.html", help="the page (SESSION/report.html)")
     parser.add_argument("--scores", type=Path, nargs="+", default=[], metavar="SESSION", help="further visits")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="also write every picture as SVG, its data as CSV")
@@ -26,17 +31,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     """Analyse, predict and write the page."""
     # Imported here: drawing is slow to load, and what is wrong with the session should be said before.
-    recording = Recording.open(options.session)
-    visits = [Recording.open(folder) for folder in options.scores]
+    recording = visit(options.session, options.subject)
+    others = [revealed(Recording.open(folder)) for folder in options.scores]
+    if is_study(options.session):
+        others += score_visits(options.session, besides=recording)
+    for one in (recording, *others):
+        if one.plan.blinded:
+            raise Blinded(f"{one.folder} is blinded: a report tells scores by index; 'daq-app unblind' opens the key")
     analysis = analysed(recording, console)
     prediction = predicted(recording, analysis, console)
     from sessions.exports import html
     from sessions.report import findings, score_table
 
-    report = findings(recording, analysis, prediction, [score_table(visit) for visit in visits])
+    report = findings(recording, analysis, prediction, [score_table(one) for one in others])
     console.progress(0.9, "drawing")
     if options.out is None:  # beside the recording it is one more thing made of it, and listed in its manifest
-        page = store_page(options.session, PAGE, html.page(report))
+        page = store_page(recording.folder, PAGE, html.page(report))
     else:
         page = options.out
         html.write_report(report, page)

@@ -72,7 +72,7 @@ def plan(
     try:
         check_seed("seed", seed)
         check_phases(protocol, asked)
-        _check_body(own, protocol)
+        check_body(own, protocol)
     except NotAllowed as error:
         raise SettingsError(str(error)) from error
     area = protocol.face.contact_area if contact_area is None else contact_area
@@ -122,7 +122,7 @@ def _hidden(trial: Trial) -> Trial:
     return replace(trial, stimulus=replace(trial.stimulus, index=None))
 
 
-def _check_body(body: Body, protocol: Protocol) -> None:
+def check_body(body: Body, protocol: Protocol) -> None:
     """Raise NotAllowed where a subject's own value is out of range."""
     ranges = (
         ("contact_angle", body.contact_angle, 10, 90, "degrees"),

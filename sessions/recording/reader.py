@@ -114,9 +114,11 @@ class Recording:
             if count:
                 trouble.append(sentence.format(count))
         for record in self.trials:
-            if record.take and record.take.strokes > 1:
+            allowed = self.plan.strokes_allowed(record.trial)
+            if record.take and record.take.strokes > allowed:
+                asked = "one was" if allowed == 1 else f"{allowed} were"
                 trouble.append(
-                    f"trial {record.trial.number} holds {record.take.strokes} strokes where one was asked for"
+                    f"trial {record.trial.number} holds {record.take.strokes} strokes where {asked} asked for"
                 )
         return tuple(trouble)
 

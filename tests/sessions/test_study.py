@@ -1,0 +1,255 @@
+"""Enrolment, blinding and visits of a study."""
+
+import json
+import multiprocessing
+import shutil
+from collections import Counter
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from stand_ins import Hands, ToldClock
+
+from sessions.analysis.scores import score_table
+from sessions.blinding import UNBLINDING, Key, revealed
+from sessions.plan import Blinded, Finger
+from sessions.protocols import Body, design_rows, plan
+from sessions.protocols.protocol import FOLDER
+from sessions.recording import Recording, RecordingError, SessionWriter, provenance
+from sessions.recording.archive import problems, seal
+from sessions.recording.derived import store_derived
+from sessions.replay import different_events, different_readings, replay
+from sessions.runner import run_session
+from sessions.steps import AskScore, Scored
+from sessions.study import Member, StudyError, free_slot
+from sessions.study_file import KEY_FILE, create_study, enrol, note, open_study, study_key, withdraw
+from sessions.toml_file import SettingsError
+from sessions.visits import score_visits, sessions_of
+
+TEXT = (FOLDER / "sensotact-friction.toml").read_text()
+WILLIAMS = TEXT.replace('rule = "shuffled"', 'rule = "williams"')
+
+
+@pytest.fixture
+def folder(tmp_path):
+    create_study(tmp_path / "study", WILLIAMS, 5, blinded=False)
+    return tmp_path / "study"
+
+
+@pytest.fixture
+def blind(tmp_path):
+    create_study(tmp_path / "blind", TEXT, 5, blinded=True)
+    return tmp_path / "blind"
+
+
+def plan_of(folder, subject, **options):
+    study = open_study(folder)
+    member = study.member(subject)
+    place = study.place(member, study_key(folder))
+    return plan(study.protocol, subject, study.session_seed(member.slot), body=member.body, place=place, **options)
+
+
+# ---- rows
+
+
+def test_ten_subjects_take_the_ten_rows_of_the_design_in_an_order_by_chance(folder):
+    for number in range(20):
+        enrol(folder, f"P{number:02d}", Body())
+    rows = [plan_of(folder, f"P{number:02d}").order_row for number in range(20)]
+    assert sorted(rows[:10]) == sorted(rows[10:]) == list(range(1, 11))
+    assert rows[:10] != sorted(rows[:10])
+    assert rows[:10] != rows[10:]
+    indices = [[t.stimulus.index for t in plan_of(folder, f"P{n:02d}").blocks[0].trials] for n in range(10)]
+    assert set(Counter(pair for row in indices for pair in pairwise(row)).values()) == {2}
+
+
+def test_a_row_is_given_back_when_a_subject_drops_out_and_taken_by_the_next(folder):
+    for subject in ("P01", "P02", "P03"):
+        enrol(folder, subject, Body())
+    given_back = plan_of(folder, "P02").order_row
+    withdraw(folder, "P02", "moved away")
+    with pytest.raises(StudyError, match="was withdrawn"):
+        plan_of(folder, "P02")
+    assert enrol(folder, "P04", Body()).slot == 1
+    assert plan_of(folder, "P04").order_row == given_back
+    assert enrol(folder, "P05", Body()).slot == 3
+    with pytest.raises(StudyError, match="was enrolled in study before"):
+        enrol(folder, "P02", Body())
+
+
+@given(walk=st.lists(st.tuples(st.booleans(), st.integers(0, 6)), max_size=60))
+def test_no_two_enrolled_subjects_ever_hold_the_same_place_and_no_place_stays_empty(walk):
+    members = {}
+    for joins, number in walk:
+        subject = f"P{number}"
+        if joins and subject not in members:
+            members[subject] = Member(subject, free_slot(list(members.values())), Body())
+        elif not joins and subject in members:
+            gone = members.pop(subject)
+            members[f"{subject} gone {len(members)}"] = Member(gone.subject, gone.slot, gone.body, "left")
+    held = [member.slot for member in members.values() if member.withdrawn is None]
+    assert len(set(held)) == len(held)
+    assert free_slot(list(members.values())) == min(set(range(len(held) + 1)) - set(held))
+
+
+def _enrol_many(folder, first):
+    for number in range(first, first + 10):
+        enrol(folder, f"P{number}", Body())
+
+
+def test_two_experimenters_who_enrol_at_once_never_reserve_the_same_row(folder):
+    context = multiprocessing.get_context("fork")
+    both = [context.Process(target=_enrol_many, args=(folder, first)) for first in (0, 100)]
+    for process in both:
+        process.start()
+    for process in both:
+        process.join()
+        assert process.exitcode == 0
+    members = open_study(folder).members
+    assert sorted(member.slot for member in members.values()) == list(range(20))
+    assert [event.number for event in open_study(folder).events] == list(range(1, 22))
+
+
+def test_both_visits_of_a_subject_have_the_same_order_and_the_same_finger(folder):
+    enrol(folder, "P01", Body(Finger(6.5), 40.0, {"stickiness": 1.7}))
+    scores, forces = plan_of(folder, "P01", forces=False), plan_of(folder, "P01")
+    assert scores.trials == forces.trials
+    assert (forces.finger.tip_radius, forces.contact_angle, forces.blocks[0].indentation) == (6.5, 40.0, 1.7)
+    assert forces.study == "study"
+
+
+def test_a_study_keeps_the_protocol_it_was_made_with(folder):
+    assert design_rows(open_study(folder).protocol) == 10
+    with pytest.raises(StudyError, match="a study already"):
+        create_study(folder, TEXT, 1, blinded=False)
+
+
+@pytest.mark.parametrize(
+    ("act", "named"),
+    [
+        (lambda f: enrol(f, "Jane Doe", Body()), "never a name"),
+        (lambda f: enrol(f, "P01", Body(contact_angle=200.0)), "between 10 and 90 degrees"),
+        (lambda f: withdraw(f, "P01", "left"), "not enrolled in study"),
+        (lambda f: withdraw(f, "P01", " "), "say why"),
+        (lambda f: enrol(f / "elsewhere", "P01", Body()), "is no study"),
+    ],
+)
+def test_what_a_study_does_not_allow_is_refused_in_a_sentence_and_changes_nothing(folder, act, named):
+    before = open_study(folder)
+    with pytest.raises((StudyError, SettingsError), match=named):
+        act(folder)
+    assert open_study(folder) == before
+
+
+# ---- blinding
+
+
+def scored_visit(folder, subject, *, sealed=True):
+    clock = ToldClock()
+    planned = plan_of(folder, subject, forces=False)
+    key = study_key(folder)
+
+    def judge(command):
+        return [Scored(float(key.of(command.trial).stimulus.index))]
+
+    path = folder / f"{subject}_scores"
+    writer = SessionWriter.create(path, planned, None, provenance(clock), subject_simulated=True, clock=clock)
+    run_session(planned, writer, Hands(clock, None, {AskScore: judge}), None, clock)
+    if sealed:
+        seal(path)
+    return path
+
+
+def open_key(folder, session):
+    store_derived(session, UNBLINDING, {"by": "E01", "key": study_key(folder).to_dict()})
+
+
+def test_a_blinded_session_names_no_index_in_any_of_its_files(blind):
+    enrol(blind, "P01", Body())
+    session = scored_visit(blind, "P01")
+    told = json.loads((session / "session.json").read_text())
+    assert {trial["index"] for trial in told["trials"]} == {None}
+    assert {t["stimulus"]["index"] for block in told["plan"]["blocks"] for t in block["trials"]} == {None}
+    assert told["plan"]["key_sha256"] == study_key(blind).sha256
+    # Nor does the study's folder tell it to whoever looks into its files by chance.
+    assert b"stickiness" not in (blind / KEY_FILE).read_bytes()
+
+
+def test_labels_of_a_blinded_study_are_dealt_anew_and_hold_throughout_it(blind, tmp_path):
+    create_study(tmp_path / "other", TEXT, 5, blinded=True)
+    assert study_key(blind).stimuli != study_key(tmp_path / "other").stimuli
+    for subject in ("P01", "P02"):
+        enrol(blind, subject, Body())
+    codes = [{t.stimulus.code for t in plan_of(blind, subject).trials} for subject in ("P01", "P02")]
+    assert codes[0] == codes[1] == set(study_key(blind).stimuli)
+
+
+def test_scores_by_index_say_that_they_are_sealed_and_come_out_when_the_key_is_opened(blind):
+    enrol(blind, "P01", Body())
+    session = scored_visit(blind, "P01")
+    assert revealed(Recording.open(session)).plan.blinded
+    with pytest.raises(Blinded, match="daq-app unblind"):
+        score_table(revealed(Recording.open(session)))
+    open_key(blind, session)
+    scores = score_table(revealed(Recording.open(session))).scores
+    assert len(scores) == 10
+    assert all(score.score == score.index for score in scores)  # the subject knew the key
+
+
+def test_an_unblinded_session_is_as_it_was_recorded_still_whole_and_replays(blind, tmp_path):
+    enrol(blind, "P01", Body())
+    session = scored_visit(blind, "P01")
+    before = Recording.open(session)
+    open_key(blind, session)
+    after = Recording.open(session)
+    assert after.plan == before.plan
+    assert problems(session) == ()
+    again = replay(after, tmp_path / "again", None, lambda *_: None)
+    assert [*different_readings(after, again), *different_events(after, again)] == []
+
+
+def test_a_key_that_was_changed_is_found(blind):
+    enrol(blind, "P01", Body())
+    session = scored_visit(blind, "P01")
+    key = study_key(blind)
+    (first, one), (second, other), *rest = key.stimuli.items()
+    swapped = Key(key.salt, {first: other, second: one, **dict(rest)})
+    store_derived(session, UNBLINDING, {"by": "E01", "key": swapped.to_dict()})
+    with pytest.raises(RecordingError, match="not the key that was sealed"):
+        revealed(Recording.open(session))
+    (blind / KEY_FILE).write_text(json.dumps({"sealed": swapped.sealed()}))
+    with pytest.raises(StudyError, match="its SHA-256 differs"):
+        study_key(blind)
+
+
+def test_a_lost_or_damaged_key_is_named_in_a_sentence(blind):
+    (blind / KEY_FILE).write_text('{"sealed": "%%%"}')
+    with pytest.raises(StudyError, match="cannot be read"):
+        study_key(blind)
+    (blind / KEY_FILE).unlink()
+    with pytest.raises(StudyError, match="restore it from a copy"):
+        study_key(blind)
+
+
+def test_after_a_study_was_unblinded_its_later_sessions_are_open(blind):
+    enrol(blind, "P01", Body())
+    assert plan_of(blind, "P01").blinded
+    note(blind, "unblinded", {"by": "E01", "session": "P01_scores"})
+    assert plan_of(blind, "P01").blinded  # that was one session of it
+    note(blind, "unblinded", {"by": "E01", "session": None})
+    assert not plan_of(blind, "P01").blinded
+    assert {t.stimulus.code for t in plan_of(blind, "P01").trials} == set(study_key(blind).stimuli)
+
+
+# ---- visits
+
+
+def test_visits_are_joined_by_the_subjects_code(blind):
+    for subject in ("P01", "P02"):
+        enrol(blind, subject, Body())
+        scored_visit(blind, subject)
+    shutil.copytree(blind / "P01_scores", blind / "P01_scores_again")
+    assert [r.folder.name for r in sessions_of(blind, "P01")] == ["P01_scores", "P01_scores_again"]
+    one = Recording.open(blind / "P01_scores")
+    assert [r.folder.name for r in score_visits(blind, besides=one)] == ["P01_scores_again", "P02_scores"]
