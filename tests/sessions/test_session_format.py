@@ -9,7 +9,16 @@ import pytest
 from recordings import rows
 from test_runner import Session
 
-from sessions.protocols.protocol import BlockOutline, Face, Protocol
+from sessions.plan import Shown
+from sessions.protocols.protocol import (
+    BlockOutline,
+    Face,
+    OrderRules,
+    PreEvaluation,
+    Protocol,
+    RestRules,
+    Scale,
+)
 from sessions.recording.archive import seal
 from sessions.runner import LOSSES
 from sessions.steps import Event
@@ -58,6 +67,16 @@ def test_every_kind_of_event_is_told(recorded):
 
 def test_every_key_of_a_protocol_is_told():
     page = (DOCS / "how-to" / "add-a-protocol.md").read_text(encoding="utf-8")
-    for prefix, kind in (("", Protocol), ("face.", Face), ("blocks.", BlockOutline)):
+    tables = {
+        "": Protocol,
+        "order.": OrderRules,
+        "scale.": Scale,
+        "rests.": RestRules,
+        "shown.": Shown,
+        "pre_evaluation.": PreEvaluation,
+        "face.": Face,
+        "blocks.": BlockOutline,
+    }
+    for prefix, kind in tables.items():
         for name in kind.__dataclass_fields__:
             assert f"`{prefix}{name}`" in page or f"[{name}]" in page
