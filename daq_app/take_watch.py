@@ -1,17 +1,15 @@
-"""Has the last stroke looked at while its stimulus is still mounted, off the window's thread."""
+"""Has the last stroke looked at while its stimulus is still mounted, in a process of its own."""
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
+from multiprocessing import get_context
 
 from daq_app.live_feed import LiveFeed
 from daq_app.recorder import messages as m
 from daq_app.state import AppState
-from daq_app.stroke_quality import in_newtons, stroke_quality
-from daq_app.window_messages import Judged
-from drivers.readings import ReadingBlock
-from drivers.transducer import TransducerInfo
+from daq_app.stroke_quality import Quality, in_newtons, stroke_quality
+from daq_app.window_messages import DrawingFailed, Judged
 from sessions import steps
-from sessions.plan import SessionPlan
 from sessions.recording import LoggedEvent
 
 AFTER = 0.35  # unloaded readings after a lift that belong to the picture of a stroke [s]
@@ -20,17 +18,24 @@ AFTER = 0.35  # unloaded readings after a lift that belong to the picture of a s
 class Judge:
     """Watches the takes that pass, and says of each stroke how good it was."""
 
-    def __init__(self, say: Callable[[Judged], None]) -> None:
-        """Tell by `say`, from a thread of its own."""
+    def __init__(self, say: Callable[[Judged | DrawingFailed], None]) -> None:
+        """Tell by `say`, from another thread."""
         self._say = say
-        self._worker = ThreadPoolExecutor(1, "stroke quality")
+        self._worker: ProcessPoolExecutor | None = None
         self._take: tuple[int, int] | None = None  # trial and take in hand
         self._offset = 0.0  # of the times in the log to those of the stream [s]
         self._due: float | None = None  # when the take is to be looked at [s, device time]
 
+    def prepare(self) -> None:
+        """Start the process, so that the first stroke need not wait for it."""
+        if self._worker is None:
+            self._worker = ProcessPoolExecutor(1, get_context("spawn"))
+            self._worker.submit(_warm)
+
     def close(self) -> None:
-        """Let go of the thread."""
-        self._worker.shutdown(wait=False, cancel_futures=True)
+        """Let go of the process."""
+        if self._worker is not None:
+            self._worker.shutdown(wait=False, cancel_futures=True)
 
     def heard(self, report: m.Report, feed: LiveFeed) -> None:
         """Follow the course: a take begins, the finger lifts."""
@@ -57,10 +62,25 @@ class Judge:
         self._due = None
         if session is None or info is None or self._take is None:
             return
-        self._worker.submit(self._judge, feed.take(), session.plan, info, *self._take)
-
-    def _judge(self, block: ReadingBlock, plan: SessionPlan, info: TransducerInfo, number: int, take: int) -> None:
-        trial = next((t for t in plan.trials if t.number == number), None)
+        number, take = self._take
+        trial = session.of(number)
+        block = feed.take()
         if trial is None or not len(block):
             return
-        self._say(Judged(number, take, stroke_quality(block, plan, in_newtons(info), trial)))
+        self.prepare()
+        assert self._worker is not None
+        future = self._worker.submit(stroke_quality, block, session.plan, in_newtons(info), trial.trial)
+        future.add_done_callback(lambda done: self._told(number, take, done))
+
+    def _told(self, number: int, take: int, done: "Future[Quality]") -> None:
+        if done.cancelled():
+            return
+        if error := done.exception():
+            self._worker = None  # the next stroke gets another
+            self._say(DrawingFailed(f"the last stroke was not looked at: {type(error).__name__} {error}"))
+            return
+        self._say(Judged(number, take, done.result()))
+
+
+def _warm() -> None:
+    """Load what the analysis needs."""

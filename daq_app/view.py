@@ -118,7 +118,7 @@ def _banner(state: AppState) -> Banner | None:
         return Banner("look", sentence(state.failed.sentence), "Dismiss", Dismissed())
     if state.drawing is not None:
         return Banner(
-            "look", f"A picture could not be drawn ({state.drawing}); the recording goes on.", "Dismiss", Dismissed()
+            "look", f"Something in the window failed ({state.drawing}); the recording goes on.", "Dismiss", Dismissed()
         )
     if bench.link == "none" and bench.problem is not None:
         return Banner("look", f"No transducer: {bench.problem}")

@@ -18,6 +18,7 @@ from daq_app.window_messages import DrawingFailed, Loaded, Message, Tick
 from sessions.plan import Frame
 
 FRAME = 16  # between two looks at the recorder [ms]: 60 a second
+AFTER_OPENING = 1500  # what is not needed at once waits until the window stands [ms]
 TICK = 0.1  # between two looks at the clock, for what tells an age [s]
 
 
@@ -78,6 +79,7 @@ class Bridge(QObject):
     def begin(self) -> None:
         """Look at the recorder from now on."""
         self._timer.start()
+        QTimer.singleShot(AFTER_OPENING, self._judge.prepare)
 
     def end(self) -> None:
         """Stop looking, and let the recorder end; a session in hand can be resumed."""

@@ -1,5 +1,7 @@
 """What the transducer measures now: forces, ratio, speed, all six axes, and the finger on the sample."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent, QShowEvent
@@ -10,9 +12,12 @@ from daq_app.live_feed import LiveFeed
 from daq_app.live_trace import CHANNELS
 from daq_app.plot_scale import PlotScale
 from daq_app.qt.contact_map import ContactMap
-from daq_app.qt.live_plot import Curve, LivePlot
+from daq_app.qt.curve import Curve
 from daq_app.qt.parts import button, choice, label, say
 from daq_app.qt.tokens import FX, FY, GRID, MU, N, T, Tokens
+
+if TYPE_CHECKING:
+    from daq_app.qt.live_plot import LivePlot
 
 LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
 LEAST_FOR_SPEED = 280  # a lower panel shows force and ratio alone
@@ -48,7 +53,8 @@ class LivePanel(QFrame):
         self._held: float | None = None  # device time the picture is held at; readings go on behind it
         self._read_at = 0.0
         self._tokens = tokens
-        self.plots = [LivePlot(*plot, tokens, scale) for plot in (*PLOTS, *AXES)]
+        self._scale = scale
+        self.plots: list[LivePlot] = []
         self.map = ContactMap(tokens, scale)
         self._forces_shown = True
         self._numbers = QWidget()
@@ -60,13 +66,9 @@ class LivePanel(QFrame):
         self.length.setFixedWidth(round(120 * scale))
         grid = self._grid = QGridLayout()
         grid.setSpacing(4)
-        for row, plot in enumerate(self.plots[:3]):
-            grid.addWidget(plot, row, 0)
-        side = QVBoxLayout()
+        side = self._side_layout = QVBoxLayout()
         side.setSpacing(4)
         side.addWidget(self.map, 3)
-        for plot in self.plots[3:]:
-            side.addWidget(plot, 2)
         self._side = QWidget()
         self._side.setLayout(side)
         side.setContentsMargins(0, 0, 0, 0)
@@ -85,6 +87,20 @@ class LivePanel(QFrame):
         layout.addWidget(self._pictures, 1)
         layout.addStretch(0)
         self.show_seconds(self._seconds)
+
+    def build(self) -> None:
+        """Make the plots: they take longer to load than all else together, so the window stands before them."""
+        from daq_app.qt.live_plot import LivePlot
+
+        if self.plots:
+            return
+        self.plots = [LivePlot(*plot, self._tokens, self._scale) for plot in (*PLOTS, *AXES)]
+        for row, plot in enumerate(self.plots[:3]):
+            self._grid.addWidget(plot, row, 0)
+        for plot in self.plots[3:]:
+            self._side_layout.addWidget(plot, 2)
+        self.show_seconds(self._seconds)
+        self._fit()
 
     @property
     def holding(self) -> bool:
@@ -134,7 +150,7 @@ class LivePanel(QFrame):
 
     def draw(self, marks: tuple[Mark, ...], clock: float) -> None:
         """Draw a frame; `clock` [s] is the machine's."""
-        if not self._forces_shown:
+        if not self._forces_shown or not self.plots:
             return
         trace = self._feed.trace
         newest = trace.newest
@@ -164,10 +180,14 @@ class LivePanel(QFrame):
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Leave out the numbers where they would be cut."""
         super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
         needed = self._numbers.sizeHint().width() + self.length.width() + self.hold.sizeHint().width() + 5 * GRID
         self._numbers.setVisible(self._forces_shown and self.width() >= needed)
         room = self.height() >= LEAST_FOR_SPEED
-        self.plots[2].setVisible(room)
+        for plot in self.plots[2:3]:
+            plot.setVisible(room)
         self._grid.setRowStretch(2, 2 if room else 0)
 
     def _bar(self, scale: float) -> QHBoxLayout:

@@ -1,33 +1,24 @@
 """One live plot: curves over the last seconds, with gaps left as gaps and what was found in them marked."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
 from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QColor, QResizeEvent
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 
 from daq_app.course_state import Mark
 from daq_app.live_trace import CHANNELS, Columns
 from daq_app.plot_scale import PlotScale
+from daq_app.qt.curve import Curve
 from daq_app.qt.tokens import SMALL, Tokens, font
 
 pg: Any = pyqtgraph  # it has no types
 
 AXIS_WIDTH = 52  # the same for all, so that their times stand under each other [before the font's scale]
 LEAST_FOR_HALVES = 100  # a lower plot has numbers at its ends alone
-
-
-@dataclass(frozen=True, slots=True)
-class Curve:
-    """One curve of a plot."""
-
-    channel: str
-    colour: str  # a token's name, or a colour
-    dashed: bool = False
 
 
 class LivePlot(QWidget):
@@ -56,6 +47,8 @@ class LivePlot(QWidget):
         item.showGrid(x=False, y=True, alpha=0.15)
         for side in ("left", "bottom"):
             axis = item.getAxis(side)
+            # Painted once and copied from then on: the axes stand still while the curves move.
+            axis.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
             axis.setStyle(tickFont=font(SMALL, type_scale), tickLength=-4, autoExpandTextSpace=False)
         item.getAxis("left").setWidth(round(AXIS_WIDTH * type_scale))
         item.getAxis("bottom").setHeight(round(22 * type_scale))

@@ -6,7 +6,7 @@ from datetime import datetime
 from pathlib import Path
 
 from PySide6.QtCore import QEvent, QObject, QSize, Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent
+from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QHBoxLayout,
@@ -41,6 +41,7 @@ WIDE = 1366  # below it the bench folds to a strip of lamps
 ROOMY = 1100  # below it the six axes and the sample fold away
 TALL = 620  # below it the type of the headline is smaller
 LOW = 500  # below it an empty notice gives up its line
+SOON = 30  # after the window is shown [ms]
 LEAVING = 10.0  # closing twice within so long leaves a session that is being recorded [s]
 
 
@@ -75,7 +76,7 @@ class MainWindow(QMainWindow):
         self._left.addWidget(self.page)
         self._left.addWidget(self.course)
         self.setCentralWidget(self._placed())
-        self.keys = KeysPage(self)
+        self.keys: KeysPage | None = None  # made when somebody asks for it
         self.page.changed.connect(self._form_changed)
         bridge.changed.connect(self.show_view)
         bridge.frame.connect(self._draw)
@@ -158,7 +159,8 @@ class MainWindow(QMainWindow):
             case "keys":
                 self._show_keys()
             case "leave":
-                self.keys.hide()
+                if self.keys is not None:
+                    self.keys.hide()
                 self.course.leave()
             case _:
                 pass
@@ -177,6 +179,11 @@ class MainWindow(QMainWindow):
             self.keyPressEvent(event)
             return True
         return super().eventFilter(watched, event)
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802  Qt's name
+        """Build the plots once the window stands."""
+        super().showEvent(event)
+        QTimer.singleShot(SOON, self.live.build)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Fold what there is no room for."""
@@ -297,10 +304,11 @@ class MainWindow(QMainWindow):
         return self.bridge.state.session is not None and self.bridge.state.session.over
 
     def _show_keys(self) -> None:
+        if self.keys is None:
+            self.keys = KeysPage(self)
         self.keys.setVisible(not self.keys.isVisible())
-        self._fit()
-        if self.keys.isVisible():
-            self.keys.raise_()
+        self.keys.fit(self.size(), self._scale)
+        self.keys.raise_()
 
     def _fold_bench(self) -> None:
         self._bench_shown = not self.bench.isVisible()
@@ -314,7 +322,8 @@ class MainWindow(QMainWindow):
         self.live.show_side(self.width() >= ROOMY and not (shown and not wide))
         self.to_do.show_small(self.height() < TALL or self.width() < ROOMY)
         self.notice.show_folding(self.height() < LOW)
-        self.keys.fit(self.size(), self._scale)
+        if self.keys is not None:
+            self.keys.fit(self.size(), self._scale)
 
     def _placed(self) -> QWidget:
         window = QWidget()

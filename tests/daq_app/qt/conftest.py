@@ -72,6 +72,7 @@ def one_window(application):
 def driver(application, one_window, tmp_path):
     driver = Driver(application, one_window)
     driver.until(lambda: driver.state.bench.link == "open", "the simulated bench")
+    driver.until(lambda: one_window.live.plots, "the plots")
     one_window.page.folder.setText(str(tmp_path / "recordings"))
     one_window.page.protocol.setCurrentText("sensotact-friction")
     one_window.page.practice.setChecked(False)
