@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from sessions.analysis.onset import Baseline, ContactDetector, Lift, Onset
@@ -49,7 +48,7 @@ def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: Ana
 
     force = np.maximum(np.nan_to_num(normal[contact.start : contact.stop]), 0.0)
     padded = np.concatenate([[0.0], force, [0.0]])
-    peaks, found = scipy.signal.find_peaks(padded, prominence=0.0)
+    peaks, found = signal.find_peaks(padded, prominence=0.0)
     standing = peaks[found["prominences"] >= (1.0 - settings.valley) * padded[peaks]] - 1
     standing = standing[force[standing] >= settings.light_share * force.max(initial=0.0)]
     valleys = [contact.start + int(a + np.argmin(force[a:b])) for a, b in pairwise(standing)]

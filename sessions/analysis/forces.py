@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import scipy  # its parts load when they are first used: a window opens without waiting for them
 from numpy.typing import NDArray
 
 from sessions.plan import Frame
@@ -41,7 +40,7 @@ class Filter:
             length = segment.stop - segment.start
             if length >= _SHORTEST_SEGMENT:
                 padding = min(length - 1, int(np.ceil(3.0 * rate / self.cut_off)))
-                filtered[segment] = scipy.signal.sosfiltfilt(sections, values[segment], axis=0, padlen=padding)
+                filtered[segment] = signal.sosfiltfilt(sections, values[segment], axis=0, padlen=padding)
         return filtered
 
     def fits(self, rate: float) -> bool:
@@ -56,7 +55,7 @@ def _sections(cut_off: float, rate: float) -> Array:
 
     # The bilinear transform bends frequencies as the tangent does: the factor belongs to the bent ones.
     design = rate / np.pi * np.arctan(_TWO_PASSES * np.tan(np.pi * cut_off / rate))
-    return scipy.signal.butter(2, design, fs=rate, output="sos")
+    return signal.butter(2, design, fs=rate, output="sos")
 
 
 def in_face_frame(wrench: Array, frame: Frame) -> Array:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from sessions.analysis.settings import AnalysisSettings
 
@@ -85,7 +85,7 @@ def mean_of(values: Array, rate: float, common: float, settings: AnalysisSetting
     interval = None
     if len(blocks) >= _FEWEST_BLOCKS:
         error = float(blocks.std(ddof=1)) / len(blocks) ** 0.5
-        half = float(scipy.special.stdtrit(len(blocks) - 1, 0.5 + settings.confidence / 2) * np.hypot(error, common))
+        half = float(stdtrit(len(blocks) - 1, 0.5 + settings.confidence / 2) * np.hypot(error, common))
         interval = (mean - half, mean + half)
     return Mean(mean, float(held.std(ddof=1)), len(held), interval)
 
