@@ -27,7 +27,7 @@ def filled(text: str, name: str, made: str) -> str:
     r"""Return the page with the table put between its marks. Raises ValueError where the marks are not there.
 
     >>> filled("a <!-- x: begin -->old<!-- x: end --> b", "x", "new")
-    'a <!-- x: begin -->\\nnew\\n<!-- x: end --> b'
+    'a <!-- x: begin -->\nnew\n<!-- x: end --> b'
     """
     begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
     head, _, rest = text.partition(begin)
