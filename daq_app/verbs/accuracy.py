@@ -30,6 +30,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.progress(0.0, "loading")
     options.out.mkdir(parents=True, exist_ok=True)  # said before three minutes are spent
     found = measured(options.quick, console.progress)
+    if found.stopped:
+        console.note("stopped; drawing what was measured until now")
     console.progress(0.99, "drawing")
     write(found, options.out)
     console.result({"page": str(options.out / PAGE), **found.to_dict()})
