@@ -12,7 +12,10 @@ from solver import kernels_numpy
 from solver.finite_body import FiniteBody
 from solver.grid import quality
 from solver.hyperelastic import LAWS, Demiray, NeoHooke, energy, stress
+from solver.newton import Pull
 from solver.shapes import block
+from solver.sliding import settled
+from tests.solver.finite_examples import finger
 
 MEMBERS = [NeoHooke(0.08, 0.48), NeoHooke(0.08, 0.4999999), Demiray(0.08, 0.48, 1.5)]
 
@@ -67,6 +70,20 @@ def test_a_homogeneous_state_is_an_equilibrium_of_any_mesh_with_the_energy_and_f
     assert kernels_numpy.energy(body, u) == pytest.approx(area * energy(law, gradient), rel=1e-7, abs=1e-15)
     work = np.einsum("na,nb->ab", force, mesh.nodes) / area
     np.testing.assert_allclose(work, stress(law, gradient), atol=1e-9 * scale)
+
+
+def test_without_friction_the_energy_that_is_stored_is_the_work_of_the_press():
+    """dW/dd = N, by central differences (Richardson), so that nothing but the states' own errors is left."""
+    newton, _, _ = finger(5)
+
+    def stored(depth):
+        return kernels_numpy.energy(newton.body, settled(newton, Pull(depth, 0.0, sense=1), tolerance=1e-12).u)
+
+    def slope(step):
+        return (stored(1.5 + step) - stored(1.5 - step)) / (2.0 * step)
+
+    force = settled(newton, Pull(1.5, 0.0, sense=1), tolerance=1e-12).force[1]
+    assert (4.0 * slope(5e-4) - slope(1e-3)) / 3.0 == pytest.approx(force, rel=1e-6)
 
 
 def test_a_light_contact_is_that_of_hertz():

@@ -34,6 +34,13 @@ def hard_scenes(kinematics: Kinematics) -> list[HardScene]:
         *_angles(make),
         *_layers(make),
         HardScene("the whole course at nu 0.4999999", make(0.44, 0.005, nu=0.4999999, history=True), ANSWER),
+        HardScene(
+            "the whole course forth and back",
+            make(0.44, 0.03, history=True, back=True),
+            ANSWER,
+            "angle 45 degrees, backwards",
+            1e-8,
+        ),
     ]
 
 
@@ -55,13 +62,14 @@ class _Maker:
         materials: Materials | None = None,
         receptor: Receptor | None = None,
         history: bool = False,
+        back: bool = False,
     ) -> Scene:
         tissues = materials or Materials(Material(0.136, nu), Material(0.08, nu), Material(0.034, nu))
         return Scene(
             finger=finger or Finger(),
             materials=tissues,
             friction=Friction(mu, bound),
-            loading=Loading(depth, "-x" if backward else "+x"),
+            loading=Loading(depth, ("+x", "-x") if back else "-x" if backward else "+x"),
             receptor=receptor or Receptor(),
             solve=Solve(self.kinematics, "history" if history else "steady"),
         )
