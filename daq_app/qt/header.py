@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QFrame, QHBoxLayout, QWidget
 
 from daq_app.qt.indicators import Arrow, Lamp
 from daq_app.qt.parts import Shortened, button, label, regrade, say
@@ -83,6 +83,8 @@ class Notice(QFrame):
             told = self._warning
         if banner is not None:
             self._warning = None
+        if banner is not None and banner.grade == "wrong" and (self._banner is None or self._banner.grade != "wrong"):
+            QApplication.beep()  # nobody looks at the window all the time
         self._banner = banner
         mark = {"wrong": "■ ", "look": "▲ "}.get(banner.grade, "") if banner else ""
         text = f"{mark}{banner.sentence}" if banner else told[:1].upper() + told[1:]

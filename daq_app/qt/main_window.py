@@ -72,6 +72,7 @@ class MainWindow(QMainWindow):
         self.redo = button("Redo  R", "redo the last stroke", lambda: self.course.ask("redo"))
         self.subject = SubjectWindow(tokens, scale, bridge.session_now)
         self.subject.answered.connect(self._answered)
+        self.subject.screen_changed.connect(self._line_changed)
         self._left = QStackedWidget()
         self._left.addWidget(self.page)
         self._left.addWidget(self.course)
@@ -85,6 +86,7 @@ class MainWindow(QMainWindow):
         for made in self.findChildren(QAbstractButton):
             made.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves Space to the primary button
         self.page.subject.setFocus()
+        self._line_changed()
         self._fit()
 
     def sizeHint(self) -> QSize:  # noqa: N802  Qt's name
@@ -265,6 +267,9 @@ class MainWindow(QMainWindow):
         people = session is not None and session.people != "simulated people"
         if self.subject.scoring and not was_scoring and people:
             self.show_subject()
+
+    def _line_changed(self) -> None:
+        self.page.show_line(millimetres(self.subject.screen()))
 
     def _answered(self, event: Message) -> None:
         self.bridge.send(event)

@@ -21,6 +21,8 @@ from PySide6.QtWidgets import (
 
 from daq_app.new_session import Bench, SessionForm, Unfinished
 from daq_app.qt.parts import button, choice, label, regrade, say
+from daq_app.qt.score_line import LENGTH
+from daq_app.qt.screens import Millimetres
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.recorder.messages import ResumeSession
 from daq_app.window_messages import Message
@@ -70,6 +72,7 @@ class NewSessionPage(QFrame):
                 made.setMinimumHeight(TARGET - GRID)
             pair[chosen].setChecked(True)
         self._people_words = label("", "quiet", wrap=True)
+        self._line_words = label("", "quiet", wrap=True)
         self._resume = choice("sessions that were cut short")
         self._go_on = button("Go on with it", "go on with the session that was cut short", self._resumed)
         self._unfinished = QWidget()
@@ -109,6 +112,10 @@ class NewSessionPage(QFrame):
         self.simulated.setEnabled(may)
         if not may and self.simulated.isChecked():
             self.people_score.setChecked(True)
+
+    def show_line(self, known: Millimetres) -> None:
+        """Say how far the length of the subject's line can be trusted."""
+        say(self._line_words, f"Subject's line: {LENGTH:.0f} mm, {known.words}. Ctrl+M checks it.")
 
     def show_refusals(self, sentences: dict[str, str]) -> None:
         """Say what is wrong beside each field; the first wrong one is where typing goes."""
@@ -193,6 +200,7 @@ class NewSessionPage(QFrame):
         row.addStretch(1)
         layout.addLayout(row)
         layout.addWidget(self._people_words)
+        layout.addWidget(self._line_words)
         self._refusal(layout, "simulated")
         layout.addSpacing(GRID)
         self._field(layout, "study", "Study", self.study)

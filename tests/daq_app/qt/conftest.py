@@ -15,8 +15,35 @@ from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Stop
 from daq_app.window_messages import Dismissed, NewSession
 
-PACE = 20.0
+PACE = 20.0  # told seconds in a real one
 PATIENCE = 60.0  # far beyond what anything takes [s]
+
+
+# Three of the ten surfaces of sensotact-friction: enough for a session from its first trial to its last.
+THREE = """
+name = "three"
+title = "Three surfaces"
+label_seed = 1
+contact_angle = 45.0
+
+[[blocks]]
+name = "stickiness"
+descriptor = "stickiness"
+direction = "proximal to distal"
+indentation = 2.0
+indices = [0, 100]
+instruction = "Push your finger once away from you."
+scale_ends = ["not sticky at all", "as sticky as can be"]
+
+[[blocks]]
+name = "slipperiness"
+descriptor = "slipperiness"
+direction = "distal to proximal"
+indentation = 1.5
+indices = [100]
+instruction = "Pull your finger once towards you."
+scale_ends = ["not slippery at all", "as slippery as can be"]
+"""
 
 
 class Driver:
@@ -74,7 +101,8 @@ def driver(application, one_window, tmp_path):
     driver.until(lambda: driver.state.bench.link == "open", "the simulated bench")
     driver.until(lambda: one_window.live.plots, "the plots")
     one_window.page.folder.setText(str(tmp_path / "recordings"))
-    one_window.page.protocol.setCurrentText("sensotact-friction")
+    (tmp_path / "three.toml").write_text(THREE)
+    one_window.page.add_protocol(str(tmp_path / "three.toml"))
     one_window.page.practice.setChecked(False)
     one_window.page.with_forces.setChecked(True)
     one_window.page.people_score.setChecked(True)
