@@ -32,6 +32,7 @@ from sessions.runner import Status
 from sessions.steps import AskBegin, AskFinish, AskMount, AskScore, AskStroke, Pause, Resume
 
 PACE = 4.0
+DEADLINE = 120.0  # of a machine that hangs [s]
 SHORT = replace(PLAN, blocks=(replace(PLAN.blocks[0], trials=PLAN.blocks[0].trials[:2]),))
 STATES = ("beginning", "idle", "mounting", "taring", "ready", "stroking", "scoring", "paused", "closing", "sealing")
 VICTIMS = ("recorder", "client", "both")
@@ -134,9 +135,9 @@ class Killing:
 
     def _until_due(self, pipe):
         """Wait for the state, and a random while longer; or until the session is done without it."""
-        deadline = time.monotonic() + 120
+        deadline = time.monotonic() + DEADLINE
         while not self.reached and "done" not in self.states:
-            assert time.monotonic() < deadline
+            assert time.monotonic() < deadline, f"{self.state}, {self.victim}: only {self.states} in {DEADLINE:g} s"
             if not self._took(pipe):
                 return
             self.reached = self.state in self.states
