@@ -7,7 +7,7 @@ import time
 from collections import deque
 from dataclasses import replace
 
-from daq_app.recorder.messages import REPORTS, REQUESTS, HealthReport, Live, Report, Request, Shutdown, Stop
+from daq_app.recorder.messages import REPORTS, REQUESTS, Failed, HealthReport, Live, Report, Request, Shutdown, Stop
 from daq_app.recorder.wire import BrokenMessage, Codec, Splitter
 
 POKE_EVERY = 0.05  # between two nudges of the main thread by a stop nobody has answered [s]
@@ -105,7 +105,7 @@ class Outbox:
             self._news.wait()
             self._news.clear()
             while (report := self._next()) is not None:
-                packed = memoryview(self._codec.packed(report))
+                packed = memoryview(self._packed(report))
                 try:
                     while packed:
                         packed = packed[os.write(self._writing, packed) :]
@@ -115,6 +115,13 @@ class Outbox:
                         self._waiting.clear()
                         self._idle.set()
                     return
+
+    def _packed(self, report: Report) -> bytes:
+        """Return the bytes of a report; of one that cannot be packed, a sentence, so that the others still go out."""
+        try:
+            return self._codec.packed(report)
+        except Exception as error:  # noqa: BLE001  the client must not go blind for an error of ours
+            return self._codec.packed(Failed(type(report).__name__, f"a report could not be told ({error})"))
 
     def _next(self) -> Report | None:
         with self._lock:

@@ -1,5 +1,6 @@
 import itertools
 import math
+import os
 from dataclasses import fields, is_dataclass
 
 import numpy as np
@@ -22,6 +23,7 @@ from daq_app.recorder.messages import (
     StartSession,
     Stop,
 )
+from daq_app.recorder.pipes import Outbox
 from daq_app.recorder.wire import LENGTH, BrokenMessage, Codec, Splitter
 from drivers.transducer import Health
 from sessions.plan import Frame
@@ -92,3 +94,17 @@ def test_an_array_of_objects_is_refused():
     body = Codec([Live]).packed(TOLD[2])[LENGTH.size :].replace(b"\xa3<i8", b"\xa3|O8")
     with pytest.raises(BrokenMessage):
         Codec([Live]).unpacked(body)
+
+
+def test_a_report_that_cannot_be_told_does_not_keep_the_others_back():
+    reading, writing = os.pipe()
+    outbox = Outbox(writing)
+    outbox.send(LoggedEvent(1, 0, "made up", None, 0, {"value": object()}))
+    outbox.send(Failed("Tare", "no"))
+    outbox.flush(60.0)
+    bodies = Splitter().feed(os.read(reading, 65536))
+    first, second = map(Codec(REPORTS).unpacked, bodies)
+    assert "could not be told" in first.sentence
+    assert second == Failed("Tare", "no")
+    os.close(reading)
+    os.close(writing)
