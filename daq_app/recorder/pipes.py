@@ -23,6 +23,7 @@ class Inbox:
         self._reading = reading
         self._codec = Codec(REQUESTS)
         self._arrived: deque[Request] = deque()
+        self._nudging = threading.Lock()
         self.client_gone = threading.Event()
         self.stop_wanted = threading.Event()
         self.leaving = threading.Event()  # a shutdown was asked for, or nobody is left to ask
@@ -31,6 +32,11 @@ class Inbox:
     def taken(self) -> tuple[Request, ...]:
         """Return what was asked for since the last call, in order."""
         return tuple(self._arrived.popleft() for _ in range(len(self._arrived)))
+
+    def stop_answered(self) -> None:
+        """End the nudging: what comes next is not to be broken off."""
+        with self._nudging:
+            self.stop_wanted.clear()
 
     def _read(self) -> None:
         splitter = Splitter()
@@ -54,11 +60,14 @@ class Inbox:
     def _nudge(self) -> None:
         """Break off what the main thread waits for, again and again until it has noticed."""
         main = threading.main_thread().ident
-        while self.stop_wanted.is_set():
-            if hasattr(signal, "pthread_kill") and main is not None:
-                signal.pthread_kill(main, signal.SIGINT)
-            else:
-                signal.raise_signal(signal.SIGINT)
+        while True:
+            with self._nudging:
+                if not self.stop_wanted.is_set():
+                    return
+                if hasattr(signal, "pthread_kill") and main is not None:
+                    signal.pthread_kill(main, signal.SIGINT)
+                else:
+                    signal.raise_signal(signal.SIGINT)
             time.sleep(POKE_EVERY)
 
 

@@ -87,7 +87,7 @@ class Recorder:
             case ResumeSession():
                 self._session(lambda: gone_on(request, self._bench, self._clock))
             case Stop() | Shutdown():
-                self._inbox.stop_wanted.clear()
+                self._inbox.stop_answered()
                 self._bench.end_tare()
             case _:
                 raise NotNow("no session is running")
@@ -97,7 +97,7 @@ class Recorder:
         try:
             run(prepare(), self._bench, self._display, self._inbox, self._send)
         finally:
-            self._inbox.stop_wanted.clear()
+            self._inbox.stop_answered()
             self._bench.stream()
 
     def _attempt(self, name: str, work: Callable[[], None]) -> None:

@@ -3,6 +3,7 @@
 import os
 import random
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -16,6 +17,7 @@ from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import (
     Connect,
     Device,
+    Failed,
     LinkBack,
     LinkDown,
     Live,
@@ -53,6 +55,22 @@ def reach(desk, state):
         pass
 
 
+def broken_off(recorder, desk, chance):
+    """Return how long it took to stop connections to a box that accepts calls and says nothing [s]."""
+    found = []
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        for _ in range(ROUNDS):
+            recorder.send(Connect(f"net-ft://127.0.0.1?http={silent.getsockname()[1]}"))
+            caller, _ = silent.accept()
+            time.sleep(chance.uniform(0.0, 0.1))
+            began = time.monotonic()
+            recorder.send(Stop())
+            desk.until(Failed)
+            found.append(time.monotonic() - began)
+            caller.close()
+    return found
+
+
 def test_a_stop_is_answered_within_a_fifth_of_a_second_in_every_state(tmp_path):
     chance = random.Random(3)
     took = defaultdict(list)
@@ -73,6 +91,7 @@ def test_a_stop_is_answered_within_a_fifth_of_a_second_in_every_state(tmp_path):
             took[state].append(time.monotonic() - began)
             assert end.cause == "stopped"
             assert Recording.open(folder).end["cause"] == "stopped"
+        took["connecting"] = broken_off(recorder, desk, chance)
     for state, times in took.items():
         print(f"\nstop while {state}: median {np.median(times) * 1e3:.0f} ms, most {max(times) * 1e3:.0f} ms", end="")
     print(f"\nload of this computer: {os.getloadavg()[0]:.1f}")
