@@ -149,12 +149,18 @@ class Course:
     ) -> Contact:
         """Change states until none contradicts the solution; with `free`, points may stick and turn round."""
         seen: set[bytes] = set()
-        one_by_one = False
+        one_by_one = resticked = False
         for iteration in range(1, self._patience + 1):
             if self._system is None or self._system.key != state.tobytes() + sense.tobytes():
                 self._system = _System(self.body, self.law, state, sense)
             if self._system.singular:
-                raise ContactLost("the touching points have no unique forces")
+                touching = state != OPEN
+                if not free or resticked or (state == STICK).any() or not touching.any():
+                    raise ContactLost("the touching points have no unique forces")
+                # a body that is free along x needs a point that holds it: all are asked again, one by one
+                state = np.where(touching, STICK, OPEN).astype(np.int8)
+                resticked = one_by_one = True
+                continue
             found = self._solved(self._system, depth, travel, anchor, state, sense, iteration)
             wanted, turned, badness = self._corrected(found, anchor, free=free)
             changed = np.flatnonzero((wanted != state) | (turned != sense))

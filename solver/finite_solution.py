@@ -30,6 +30,8 @@ from solver.tissues import finite_laws, settled_moduli
 MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
 SAFETY = 1.0  # of the error estimate; see docs/solver.md for what was measured
 PRESSES = 40  # steps of the pre-indentation, and of a drag that grows
+SEARCHES = 60  # steps of a search for the depth at which a force is met
+MET = 1e-9  # relative difference within which it is
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
 COARSE = 5.0  # mesh on which it is looked how deep a given force presses
 STRIDE = 0.1  # of the bone while it slides, by the indentation [-]
@@ -87,7 +89,12 @@ class FiniteFinger:
         direction, drag = scene.loading.direction, scene.tangential_force
         if direction == 0 and scene.friction.mu > 0.0:
             return _course(scene, self, stop)[-1]
-        sliding = self._sliding_under(scene, force, stop)
+        try:
+            sliding = self._sliding_under(scene, force, stop)
+        except SolveFailure:
+            if drag is None:
+                raise
+            return _course(scene, self, stop)[-1]  # the drag may be met before sliding would fold the skin
         most = abs(float(sliding.force[0]))
         if drag is None or most * (1.0 - ALL_SLIPS) <= drag <= most * (1.0 + ALL_SLIPS):
             return sliding
@@ -100,8 +107,35 @@ class FiniteFinger:
         start = finite_forced.untouched(self.newton, float(scene.friction.mu), scene.friction.cap)
         start = replace(start, pull=start.pull._replace(sense=-(scene.loading.direction or 1)))
         grows = [Given(force * part, None) for part in (0.02, 0.1, 0.25, 0.5, 0.75, 1.0)]
-        *_, shape = finite_forced.march(self.newton, start, Given(0.0, None), grows, stop)
+        shape = start
+        try:
+            for reached in finite_forced.march(self.newton, start, Given(0.0, None), grows, stop):
+                shape = reached
+        except NotConverged:
+            return self._deeper(shape, force, stop)
         return steady(self.newton, shape.pull, self.geometry.whole, start=shape, stop=stop)
+
+    def _deeper(self, shape: Shape, force: float, stop: Callable[[], bool]) -> Shape:
+        """Return settled sliding under `force` [N/mm], looked for by depth from `shape` on. Raises as `settled`."""
+        outline = self.geometry.whole
+        step = 0.1 * max(shape.pull.depth, 0.1)
+        low = shape
+        for _ in range(SEARCHES):  # deeper until it presses as hard
+            begin = low if low.touching.any() else None
+            high = steady(self.newton, low.pull._replace(depth=low.pull.depth + step), outline, start=begin, stop=stop)
+            if high.force[1] >= force:
+                break
+            low, step = high, 1.5 * step
+        else:
+            raise NotConverged(f"No depth was found at which the finger presses with {force:.4g} N/mm.")
+        for _ in range(SEARCHES):  # regula falsi, held inside by bisection
+            part = (force - low.force[1]) / (high.force[1] - low.force[1])
+            depth = low.pull.depth + float(np.clip(part, 0.05, 0.95)) * (high.pull.depth - low.pull.depth)
+            found = steady(self.newton, low.pull._replace(depth=depth), outline, start=high, stop=stop)
+            if abs(found.force[1] / force - 1.0) < MET or high.pull.depth - low.pull.depth < 1e-12:
+                return found
+            low, high = (low, found) if found.force[1] > force else (found, high)
+        raise NotConverged(f"No depth was found at which the finger presses with {force:.4g} N/mm.")
 
 
 def answers(

@@ -114,7 +114,7 @@ class Prony:
         >>> round(Prony(0.08, 0.48, ((0.3, 1.0),)).within(1.0).shear / Prony(0.08, 0.48).shear, 6)
         0.889636
         """
-        return self._with(self.stays + sum(g * kept(step / tau) for g, tau in self.terms))
+        return self._with(self.stays + sum(g * float(kept(np.asarray(step / tau))) for g, tau in self.terms))
 
     def _with(self, part: float) -> Moduli:
         shear = part * self.shear
@@ -129,9 +129,9 @@ class Prony:
         return self.at_once.stress(gradient)
 
 
-def kept(times: float) -> float:
-    """Return what is left of a strain that grew evenly over so many relaxation times: (1 - exp(-x)) / x."""
-    return float(-np.expm1(-times) / times) if times > 0.0 else 1.0
+def kept(times: Array) -> Array:
+    """Return what is left of a strain that grew evenly over so many relaxation times (> 0): (1 - exp(-x)) / x."""
+    return -np.expm1(-times) / times
 
 
 MATERIALS = (Hooke, Prony)

@@ -88,7 +88,7 @@ class RelaxingBody:
         grown = (after - self.displacement)[self.mesh.elements].reshape(len(self._left), 18)
         ages = step / self._tau
         self._left *= np.exp(-ages)[:, None, :]
-        self._left += _kept(ages)[:, None, :] * grown[:, :, None]
+        self._left += kept(ages)[:, None, :] * grown[:, :, None]
         self.displacement = after
 
     def forces(self) -> Array:
@@ -143,7 +143,7 @@ class RelaxingBody:
         local = self.displacement[self.mesh.elements].reshape(len(self._left), 18)
         ages = step / self._tau
         left = np.einsum("eim,em->ei", self._left, self._g * np.exp(-ages))
-        return left - local * np.sum(self._g * _kept(ages), axis=1)[:, None]
+        return left - local * np.sum(self._g * kept(ages), axis=1)[:, None]
 
     def _form(self, step: float) -> _Ready:
         key = f"{step:.9e}"
@@ -154,10 +154,6 @@ class RelaxingBody:
             whole = np.block([[t.normal_by_normal, across], [across.T, t.tangential_by_tangential]])
             self._steps[key] = _Ready(body, whole)
         return self._steps[key]
-
-
-def _kept(ages: Array) -> Array:
-    return np.vectorize(kept, otypes=[float])(ages)
 
 
 class RelaxingWay(Way):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.linalg import LinAlgError
 
 from solver.audits import audits, course_audits
-from solver.contact import NAMES, SLIP, Contact, ContactLost, Course
+from solver.contact import NAMES, SLIP, STICK, Contact, ContactLost, Course
 from solver.evidence import model, warnings
 from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.finger import FingerModel
@@ -38,6 +38,7 @@ UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt 
 DOUBTED = 1e-8  # and from which it is told
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
 PIERCED = 1e-7  # part of the indentation by which skin may lie too low without it being told [-]
+SAME = 1e-6  # relative difference of normal forces up to which two states under a given force are one
 ROUGH = 1e-10  # and from which round-off is taken out of the displacements
 
 _Answer = Prediction | SolveFailure
@@ -201,13 +202,18 @@ def settled(scene: Scene, finger: FingerModel) -> Contact:
     if loading.normal_force is None:
         return Course(touch, law).sliding(loading.depth, loading.direction or 1)
     deepest = DEEPEST * scene.finger.pulp_thickness()
-    found = sliding_under(touch, law, loading.normal_force, loading.direction or 1, deepest)
+    try:
+        found = sliding_under(touch, law, loading.normal_force, loading.direction or 1, deepest)
+    except ContactLost:
+        if loading.tangential_force is None:
+            raise
+        return march(touch, law, loading).instants[-1].contact  # the drag may be met where sliding would wedge
     if loading.tangential_force is None:
         return found
     most = float(np.abs(found.tangential.sum()))
     if loading.tangential_force > most * (1.0 + 1e-9):
         raise beyond_friction(loading.tangential_force, most, loading.normal_force)
-    if loading.tangential_force > most * (1.0 - ALL_SLIPS):
+    if loading.tangential_force >= most * (1.0 - ALL_SLIPS):
         return found
     return march(touch, law, loading).instants[-1].contact
 
@@ -224,21 +230,29 @@ def _direct(scene: Scene, shared: _Shared) -> Contact | None:
     folded, only what is reached by following the state from mu = 0 counts. Raises NoSteadyState, NotConverged.
     """
     finger, direction = shared.fine, scene.loading.direction
+    contact: Contact | None = None
     try:
         contact = settled(scene, finger)
-        if direction == 0 or not _folded(finger, contact):
+        marched = direction == 0 or bool((contact.state == STICK).any())
+        if marched or not _folded(finger, contact):
             return contact
         why = "the state found is folded"
     except ContactLost as lost:
         why = str(lost)
     if not shared.widest:
         return None
-    if direction == 0 or scene.normal_force is not None:
+    if direction == 0 or (scene.normal_force is not None and contact is None):
         raise _no_answer(scene, why, 0.0)
-    contact, limit = followed(finger.body.touchable, _law(scene), scene.loading.depth, direction)
-    if contact is None:
+    depth = scene.loading.depth if contact is None else indentation(scene, contact)
+    reached, limit = followed(finger.body.touchable, _law(scene), depth, direction)
+    if scene.normal_force is not None and contact is not None:
+        # the way leads to sliding at that depth: is that the state that the forces lead to?
+        if reached is None or abs(reached.normal.sum() / scene.normal_force - 1.0) > SAME:
+            raise _no_answer(scene, why, 0.0)
+        return contact
+    if reached is None:
         raise _no_answer(scene, why, limit)
-    return contact
+    return reached
 
 
 def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Prediction | None:

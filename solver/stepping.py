@@ -93,7 +93,8 @@ class Way:
     def __init__(self, body: Touchable, law: FrictionLaw, loading: Loading) -> None:
         """Start at rest, untouched; `loading` says what is driven and what is found."""
         self.by_force = loading.normal_force is not None
-        self.by_drag = loading.tangential_force is not None
+        # without friction there is no drag to speak of, and nothing that it could hold
+        self.by_drag = loading.tangential_force is not None and not law.frictionless
         start = untouched(body)
         if self.by_force:
             body = forced(body, 0.0, 0.0 if self.by_drag else None)

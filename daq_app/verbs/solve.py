@@ -35,6 +35,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         ["normal force", number(found.normal_force, 5), "N/mm"],
         ["tangential force", number(found.tangential_force, 5), "N/mm"],
         ["contact width", number(found.contact_width, 3), "mm"],
+        ["indentation", number(found.indentation, 4), "mm"],
+        *([] if found.shift is None else [["sideways shift", number(found.shift, 4), "mm"]]),
         ["unknowns", str(found.dofs), ""],
         ["solving took", number(found.wall_s * 1e3, 3), "ms"],
         ["setting up took", number(found.setup_s * 1e3, 3), "ms"],

@@ -4,13 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from solver.failures import NoSteadyState
+from solver.failures import NoSteadyState, SolveFailure
 from solver.reference import SLIPPERINESS, STICKINESS, scene
-from solver.scene import Friction, Loading, Scene, SceneError, Solve
+from solver.scene import Finger, Friction, Loading, Scene, SceneError, Solve
 from solver.solution import solve
 
 KINEMATICS = ("small", "finite")
+COURSES = ("small", pytest.param("finite", marks=pytest.mark.slow))  # a course at finite strain takes seconds
 COARSE = 0.5  # tolerance that the coarsest mesh meets
 
 
@@ -32,7 +35,7 @@ def test_the_force_of_a_driven_finger_presses_it_to_the_same_depth(kinematics):
     assert found.shift is None
 
 
-@pytest.mark.parametrize("kinematics", KINEMATICS)
+@pytest.mark.parametrize("kinematics", COURSES)
 def test_a_course_under_a_normal_force_ends_in_the_settled_state_found_directly(kinematics):
     found = solve(loaded(published(kinematics, "history"), normal_force=1.2, force_unit="N"))
     assert found.audits["course_against_direct"] < 1e-9
@@ -40,7 +43,7 @@ def test_a_course_under_a_normal_force_ends_in_the_settled_state_found_directly(
     np.testing.assert_allclose(found.history.normal_force[found.history.time >= 1.0], 0.08, rtol=1e-8)
 
 
-@pytest.mark.parametrize("kinematics", KINEMATICS)
+@pytest.mark.parametrize("kinematics", COURSES)
 def test_a_drag_below_the_limit_shifts_the_finger_until_the_skin_carries_it(kinematics):
     given = loaded(published(kinematics, "history"), normal_force=0.1, tangential_force=0.01)
     found = solve(given)
@@ -52,7 +55,7 @@ def test_a_drag_below_the_limit_shifts_the_finger_until_the_skin_carries_it(kine
     np.testing.assert_allclose(found.history.time[-1], 2.0)
 
 
-@pytest.mark.parametrize("kinematics", KINEMATICS)
+@pytest.mark.parametrize("kinematics", COURSES)
 def test_a_drag_of_the_friction_limit_is_the_settled_slide_and_more_is_refused_in_a_sentence(kinematics):
     given = replace(published(kinematics), friction=Friction(0.24, 0.004), solve=Solve(kinematics))
     given = loaded(given, normal_force=0.1)
@@ -92,7 +95,7 @@ def test_loads_that_contradict_each_other_or_the_friction_are_refused(change, ke
     assert refused.value.key == key
 
 
-@pytest.mark.parametrize("kinematics", KINEMATICS)
+@pytest.mark.parametrize("kinematics", COURSES)
 def test_a_finger_that_slides_there_and_back_ends_as_if_it_had_slid_back_only(kinematics):
     there_and_back = published(kinematics, "history")
     there_and_back = replace(there_and_back, loading=replace(there_and_back.loading, slide=("-x", "+x", "-x")))
@@ -117,8 +120,54 @@ def test_friction_takes_work_in_every_step_of_a_reversal():
     assert found.audits["course_least_dissipation"] > -1e-12
 
 
+@pytest.mark.slow
 def test_at_finite_strain_a_leg_without_a_settled_state_is_refused_with_its_limits():
     given = replace(scene(STICKINESS[4]), solve=Solve("finite", "history", COARSE))
     with pytest.raises(NoSteadyState) as refused:  # the skin folds when it slides along +x at 2 mm
         solve(replace(given, loading=replace(given.loading, slide=("+x", "-x"))))
     assert refused.value.limit_mu < 0.5
+
+
+def test_without_friction_a_drag_of_nothing_is_the_settled_slide():
+    plain = replace(published("small"), friction=Friction(0.0))
+    sliding = solve(loaded(plain, normal_force=0.05))
+    for course in ("steady", "history"):
+        still = loaded(replace(plain, solve=Solve("small", course, COARSE)), normal_force=0.05, tangential_force=0.0)
+        assert solve(still).sed_ending == pytest.approx(sliding.sed_ending, rel=1e-9)
+
+
+FORCED = st.builds(
+    dict,
+    mu=st.sampled_from([0.0, 1e-9, 0.02, 0.3, 0.7, 1.2]),
+    tau_max=st.sampled_from([None, 0.002, 0.03]),
+    normal_force=st.floats(-3.0, -0.5).map(lambda power: 10.0**power),
+    part=st.sampled_from([None, 0.0, 0.3, 0.9, 1.0]),
+    slide=st.sampled_from(["+x", "-x"]),
+    angle=st.sampled_from([20.0, 45.0, 80.0]),
+    nail=st.sampled_from([0.0, 10.0]),
+)
+
+
+@given(drawn=FORCED)
+@settings(max_examples=8, deadline=None)
+def test_any_forces_lead_to_a_state_that_has_them_or_to_a_sentence(drawn):
+    drag = None if drawn["part"] is None else drawn["part"] * drawn["mu"] * drawn["normal_force"]
+    given_scene = Scene(
+        finger=Finger(contact_angle=drawn["angle"], nail_length=drawn["nail"]),
+        friction=Friction(drawn["mu"], drawn["tau_max"]),
+        loading=Loading(normal_force=drawn["normal_force"], tangential_force=drag, slide=drawn["slide"]),
+        solve=Solve(tolerance=COARSE),
+    )
+    try:
+        found = solve(given_scene)
+    except SolveFailure as failure:
+        found = failure
+    if isinstance(found, SolveFailure):
+        assert str(found).endswith(".")
+        return
+    assert found.normal_force == pytest.approx(drawn["normal_force"], rel=1e-6)
+    if drag is not None:
+        assert found.tangential_force == pytest.approx(drag, rel=1e-5, abs=1e-12)
+    assert found.sed_ending > 0.0
+    for name in ("equilibrium_x", "equilibrium_y", "penetration", "tension", "cone_violation"):
+        assert found.audits[name] < 1e-7

@@ -19,6 +19,7 @@ def entry(found, name):
     return found.model["left_out"][name]
 
 
+@pytest.mark.slow
 def test_measured_differences_are_those_of_two_solves(measured):
     plain = replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5))
     base = solve(plain).sed_ending
@@ -31,6 +32,7 @@ def test_measured_differences_are_those_of_two_solves(measured):
     assert measured.sed_ending == base
 
 
+@pytest.mark.slow
 def test_the_estimate_stays_beside_the_measured_number_and_the_cost_is_told(measured):
     assert "measured" in entry(measured, "bone compliance")["how"]
     assert entry(measured, "bone compliance")["estimated"] > 0.0
