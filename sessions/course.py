@@ -41,6 +41,16 @@ class Step:
     end: Mapping[str, Any] | None = None  # how the session ended; empty for one that was cut short
 
 
+def parts(events: Sequence[LoggedEvent]) -> tuple[tuple[LoggedEvent, ...], ...]:
+    """Return the log of a session in parts: a new one begins wherever it was resumed, with what was owed then."""
+    begins = [0]
+    for i, event in enumerate(events):
+        if event.kind == "resumed":
+            last_ns = int(event.data["last_ns"])
+            begins.append(next(j for j in range(i + 1) if events[j].time_ns > last_ns))
+    return tuple(tuple(events[a:b]) for a, b in zip(begins, [*begins[1:], len(events)], strict=True))
+
+
 def steps(events: Sequence[LoggedEvent]) -> tuple[Step, ...]:
     """Return the steps of a session from its log; the last is its end, or where it was cut short."""
     found: list[Step] = []

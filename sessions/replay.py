@@ -3,22 +3,23 @@
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from drivers.clock import Clock
 from drivers.readings import ReadingBlock
 from drivers.transducer import Health, LinkLost, TransducerInfo
-from sessions.course import Step, steps
+from sessions.course import Step, parts, steps
+from sessions.plan import SessionPlan
 from sessions.recording import Acknowledged, LoggedEvent, Recording, RecordingError, SessionWriter
 from sessions.recording.digests import digest_of
 from sessions.recording.reader import TELL_LOSSES
 from sessions.recording.replay import RecordedReadings, health_of
-from sessions.runner import STOPPED, Ending, RunnerSettings, run_session
+from sessions.resuming import Seam, resumption
+from sessions.runner import STOPPED, Ending, Resumed, RunnerSettings, run_session
 from sessions.steps import Command, Event
 from sessions.verification import differences
 
@@ -36,24 +37,21 @@ def replay(recording: Recording, folder: Path, speed: float | None, progress: Pr
     """Run a recorded session once more into `folder`, `speed` times as fast as it was (None: as fast as can be).
 
     An imported recording has no course: its readings are handed over once more, at once, and its events written again.
-    Raises Stopped on Ctrl-C, RecordingError for a session that was resumed, or when the folder takes no more.
+    A session that was resumed is run part by part, as it was; where its readings were joined is taken from its log.
+    Raises Stopped on Ctrl-C, RecordingError when the folder takes no more.
     """
-    if any(event.kind == "resumed" for event in recording.events):
-        raise RecordingError(
-            f"{recording.folder} was resumed after a break, which cannot be replayed; use 'daq-app verify' on it"
-        )
-    player = _Player(recording, speed, progress)
+    clock = _RecordedClock(recording)
     writer = _Rewriter.create(
         folder,
         recording.plan,
         recording.info,
         recording.provenance,
         subject_simulated="subject" in (recording.simulated_sentence or ""),
-        clock=player.clock,
+        clock=clock,
     )
     writer.follow(recording)
     if recording.plan.trials:
-        _run(recording, player, writer)
+        _run(recording, clock, writer, speed, progress)
     else:
         _copy(recording, writer)
     return Recording.open(folder)
@@ -91,13 +89,21 @@ class _Rewriter(SessionWriter):
     """
 
     def follow(self, recording: Recording) -> None:
-        """Take the instants from the log of `recording`."""
-        self._log = [event for event in recording.events if event.kind not in LATER]
+        """Begin to follow `recording`."""
         self._later = [event for event in recording.events if event.kind in LATER]
-        self._cut = not any(event.kind == "ended" for event in self._log)
+        self._log: Sequence[LoggedEvent] = ()
+        self._cut = False
         self._told = 0
         self._closing = False
+        self.made: list[LoggedEvent] = []
         self._connection.execute("PRAGMA synchronous=OFF")
+
+    def follow_part(self, log: Sequence[LoggedEvent]) -> None:
+        """Take the instants from the log of a part, which may have been cut short."""
+        super().commit()  # a part begins with all that came before acknowledged
+        self._log = log
+        self._cut = not any(event.kind == "ended" for event in log)
+        self._told = 0
 
     def event(
         self,
@@ -116,7 +122,8 @@ class _Rewriter(SessionWriter):
         if place is not None:
             self._told = place + 1
             time_ns = self._log[place].time_ns
-        return super().event(kind, trial, data, time_ns=time_ns, commit=commit)
+        self.made.append(super().event(kind, trial, data, time_ns=time_ns, commit=commit))
+        return self.made[-1]
 
     def commit(self) -> Acknowledged:
         """Write in large parts: nobody waits for an acknowledgement."""
@@ -124,16 +131,14 @@ class _Rewriter(SessionWriter):
         return super().commit() if self._closing or waiting >= PART else self._acknowledged
 
     def close(self) -> None:
-        """Write the rest, and close."""
-        self._closing = True
-        super().close()
+        """Wait: what ended may have been resumed."""
 
     def finish(self) -> None:
         """Write down what sealing said of a torn log, and close."""
-        with suppress(RecordingError):  # closed already, by a session that came to its end
-            for event in self._later:
-                super().event(event.kind, data=event.data)
-        self.close()
+        self._closing = True
+        for event in self._later:
+            super().event(event.kind, data=event.data)
+        super().close()
 
 
 class _CutShort(RecordingError):
@@ -147,9 +152,9 @@ class _Again(Exception):
 class _RecordedClock:
     """The session clock of the recording: it stands where the last step was, and nobody waits for it."""
 
-    def __init__(self, factor: float, now_ns: int) -> None:
-        self.factor = factor
-        self._now_ns = now_ns
+    def __init__(self, recording: Recording) -> None:
+        self.factor = float(recording.provenance.get("clock", {}).get("factor", 1.0))
+        self._now_ns = recording.events[0].time_ns if recording.events else 0
 
     def now_ns(self) -> int:
         return self._now_ns
@@ -163,19 +168,29 @@ class _RecordedClock:
 
 
 class _Player:
-    """Transducer, experimenter and subject of a recording. One look of the runner is one step of the log."""
+    """Transducer, experimenter and subject of a part of a recording. One look of the runner is one step of the log."""
 
-    def __init__(self, recording: Recording, speed: float | None, progress: Progress) -> None:
-        self._steps = steps([event for event in recording.events if event.kind not in LATER])
-        first = recording.events[0].time_ns if recording.events else 0
-        factor = float(recording.provenance.get("clock", {}).get("factor", 1.0))
-        self._clock = _RecordedClock(factor, first)
-        self._settings = recorded_settings(recording)
-        self._readings = RecordedReadings(recording)
-        self._info = recording.info
+    def __init__(
+        self,
+        info: TransducerInfo | None,
+        log: Sequence[LoggedEvent],
+        readings: RecordedReadings,
+        limit: int | None,
+        clock: _RecordedClock,
+        settings: RunnerSettings,
+        speed: float | None,
+        progress: Progress,
+    ) -> None:
+        """Play the part whose log is `log`, its readings from where `readings` stands up to number `limit`."""
+        self._steps = steps(log)
+        self._clock = clock
+        self._settings = settings
+        self._readings = readings
+        self._limit = limit
+        self._info = info
         self._speed = speed
         self._progress = progress
-        self._first_ns = first
+        self._first_ns = log[0].time_ns if log else 0
         self._began = time.monotonic()
         self._next = 0
         self._step: Step | None = None  # None while waiting for the next
@@ -183,10 +198,6 @@ class _Player:
         self._said_ns: dict[str, int] = {}  # when losses, and a zero that cannot be measured, were last told of
         self._health: Health | None = None  # at the end
         self._stopped = False
-
-    @property
-    def clock(self) -> Clock:
-        return self._clock
 
     @property
     def done(self) -> bool:
@@ -249,7 +260,7 @@ class _Player:
         """Return the readings of this step; once stopped, all that are left."""
         step = self._step
         if self._stopped:
-            return self._readings.up_to(None)
+            return self._readings.up_to(self._limit)
         if step is None:
             return ReadingBlock.empty()
         if step.end is not None and step.end.get("cause") == "device":
@@ -291,38 +302,78 @@ class _Player:
         self._said_ns[what] = self._clock.now_ns()
 
 
-def recorded_settings(recording: Recording) -> RunnerSettings:
-    """Return how the session was run, as its log tells; what it does not tell is as it is now."""
-    for event in recording.events:
-        if event.kind == "started":
-            told: dict[str, Any] = {name: setting["value"] for name, setting in event.data["settings"].items()}
-            return msgspec.convert(told, RunnerSettings)
+def recorded_settings(log: Sequence[LoggedEvent]) -> RunnerSettings:
+    """Return how a session, or a part of it, was run, as its log tells; what it does not tell is as it is now."""
+    for event in log:
+        if event.kind in ("started", "resumed"):
+            told = event.data["settings"] if event.kind == "started" else event.data["run"]
+            return msgspec.convert({name: setting["value"] for name, setting in told.items()}, RunnerSettings)
     return RunnerSettings()
 
 
-def _run(recording: Recording, player: _Player, writer: _Rewriter) -> None:
-    """Let the runner conduct the session once more."""
-    transducer = player if recording.plan.forces else None
+def _run(
+    recording: Recording, clock: _RecordedClock, writer: _Rewriter, speed: float | None, progress: Progress
+) -> None:
+    """Let the runner conduct the session once more, part by part."""
+    logs = parts([event for event in recording.events if event.kind not in LATER])
+    readings = RecordedReadings(recording)
     try:
-        end = run_session(
-            recording.plan,
-            writer,
-            player,
-            transducer,
-            player.clock,
-            settings=recorded_settings(recording),
-            stop=player.go_on,
-        )
-        if end.cause == "stopped" and not player.done:
-            raise Stopped
-    except (_CutShort, _Again):
-        pass  # as the recording ends
+        for number, log in enumerate(logs):
+            after = logs[number + 1] if number + 1 < len(logs) else None
+            limit = None if after is None else after[0].readings
+
+            def shown(part: float, what: str, number: int = number) -> None:
+                progress((number + part) / len(logs), what)
+
+            settings = recorded_settings(log)
+            player = _Player(recording.info, log, readings, limit, clock, settings, speed, shown)
+            resumed = None if number == 0 else _resumed(recording.plan, writer.made, log)
+            writer.follow_part(log)
+            _run_part(recording.plan, player, writer, clock, settings, resumed)
     finally:
         writer.finish()
 
 
+def _run_part(
+    plan: SessionPlan,
+    player: _Player,
+    writer: _Rewriter,
+    clock: _RecordedClock,
+    settings: RunnerSettings,
+    resumed: Resumed | None,
+) -> None:
+    transducer = player if plan.forces else None
+    with suppress(_CutShort, _Again):  # as the part ends
+        end = run_session(
+            plan, writer, player, transducer, clock, settings=settings, resumed=resumed, stop=player.go_on
+        )
+        if end.cause == "stopped" and not player.done:
+            raise Stopped
+
+
+def _resumed(plan: SessionPlan, before: Sequence[LoggedEvent], log: Sequence[LoggedEvent]) -> Resumed:
+    """Return how a part goes on after those before it, as they came out in the replay."""
+    told = next(event.data for event in log if event.kind == "resumed")
+    seams = [event.data for event in log if event.kind == "readings_joined"]
+
+    def joins(_last: ReadingBlock, _first: ReadingBlock) -> Seam:
+        return _JoinedBefore(**seams[0]) if seams else _JoinedBefore(0, 0.0)
+
+    data = {name: value for name, value in told.items() if name != "run"}
+    return Resumed(resumption(plan, before), data, ReadingBlock.empty(), joins)
+
+
+@dataclass(frozen=True, slots=True)
+class _JoinedBefore(Seam):
+    """A seam whose readings were recorded as they go on."""
+
+    def joined(self, block: ReadingBlock) -> ReadingBlock:
+        return block
+
+
 def _copy(recording: Recording, writer: _Rewriter) -> None:
     """Hand the readings over once more, and write each event where it stood."""
+    writer.follow_part([event for event in recording.events if event.kind not in LATER])
     readings = RecordedReadings(recording)
     for event in recording.events:
         if event.kind not in LATER:

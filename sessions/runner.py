@@ -71,6 +71,7 @@ class Resumed:
     at: Resumption
     data: Mapping[str, Any]  # of the event `resumed`
     last: ReadingBlock  # last readings before; empty where there were none
+    joins: Callable[[ReadingBlock, ReadingBlock], Seam] = Seam.between  # last readings before and first after it
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +205,7 @@ class _Run:
             if self._writer.full is not None:
                 return "disk", self._writer.full
             self._listen()
-            if isinstance(self._state, Resting) and self._rested_ns is not None and began_ns >= self._rested_ns:
+            if isinstance(self._state, Resting) and self._rest_is_over():
                 self._take(RestOver())
             for event in self._operator.poll():
                 self._take(event)
@@ -231,7 +232,7 @@ class _Run:
         if self._resumed is None or not len(block):
             return block
         if self._seam is None:
-            self._seam = Seam.between(self._resumed.last, block)
+            self._seam = self._resumed.joins(self._resumed.last, block)
             self._writer.event("readings_joined", data=asdict(self._seam), commit=False)
         return self._seam.joined(block)
 
@@ -260,6 +261,9 @@ class _Run:
         for command in commands:
             if isinstance(command, AskRest):
                 self._rested_ns = None if command.duration is None else at_ns + round(command.duration * 1e9)
+
+    def _rest_is_over(self) -> bool:
+        return self._rested_ns is not None and self._clock.now_ns() >= self._rested_ns
 
     def _carry_out(self, commands: Sequence[Command]) -> None:
         """Write commands down, make that safe, and only then let anybody see them."""

@@ -7,12 +7,18 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import Health, LinkLost, TransducerInfo
 from sessions.steps import (
     AskBegin,
+    AskChoice,
     AskFinish,
     AskMount,
+    AskNumber,
+    AskRest,
     AskScore,
     AskStroke,
     Begin,
+    Chosen,
     Finish,
+    NumberGiven,
+    Resume,
     Scored,
     StimulusMounted,
     StrokeDone,
@@ -123,6 +129,12 @@ class Hands:
                 self.stroke(now)
             case AskScore(trial):
                 return [Scored(float(trial.stimulus.index))]
+            case AskNumber(trial):
+                return [NumberGiven(trial.stimulus.index + 1.0)]
+            case AskChoice(first, second):
+                return [Chosen("first" if first.stimulus.index > second.stimulus.index else "second")]
+            case AskRest(None):
+                return [Resume()]
             case AskFinish():
                 return [Finish()]
         return []

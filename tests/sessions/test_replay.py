@@ -1,15 +1,18 @@
 import json
 import random
+from dataclasses import replace as replace_fields
 
 import pytest
 from recordings import change, rows
 from stand_ins import INFO, Hands, StandIn, ToldClock
+from test_resuming import resume
 
 from drivers.transducer import LinkLost, SetupError
 from sessions.analysis import analyse
 from sessions.import_csv import import_csv
-from sessions.protocols import plan, protocol
-from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, provenance
+from sessions.protocols import plan, protocol, protocol_names
+from sessions.protocols.protocol import RestRules
+from sessions.recording import Recording, SessionWriter, provenance
 from sessions.recording.archive import seal
 from sessions.recording.replay import ReplayTransducer
 from sessions.recording.schema import event_crc, event_row
@@ -21,6 +24,8 @@ from sessions.steps import (
     AskScore,
     AskStroke,
     Begin,
+    Note,
+    NumberGiven,
     Pause,
     Redo,
     Resume,
@@ -33,10 +38,12 @@ from sessions.steps import (
 PAPER = protocol("sensotact-friction")
 
 
-def recorded(folder, *, forces=True, instead=None, stop=lambda _: False, hands=Hands, **transducer):
+def recorded(
+    folder, *, forces=True, instead=None, stop=lambda _: False, hands=Hands, protocol=PAPER, phases=None, **transducer
+):
     """A session in told time; `stop` is asked with the number of readings sent."""
     clock = ToldClock()
-    planned = plan(PAPER, "S01", 3, forces=forces)
+    planned = plan(protocol, "S01", 3, forces=forces, phases=phases)
     info = INFO if forces else None
     writer = SessionWriter.create(folder, planned, info, provenance(clock), subject_simulated=True, clock=clock)
     device = StandIn(clock, **transducer) if forces else None
@@ -91,13 +98,58 @@ def test_a_whole_session_comes_out_identical_to_the_last_bit(whole, tmp_path):
         {AskStroke: once(Pause(), Resume())},
         {AskMount: once(StimulusMounted("Z99"), Begin(), StimulusMounted("R29"))},
         {AskScore: once(Scored(120.5), Scored(None), Redo(""))},
+        {
+            AskScore: once(
+                Scored(float("nan")), Note("cold hands"), Note(""), NumberGiven(3.0), Scored(5.0, ((1.0, 4.0),))
+            )
+        },
         {AskScore: once(Abort("fire alarm"))},
         {AskMount: once(Abort("fire alarm"))},
     ],
-    ids=["redo", "skip", "pause", "early pause", "wrong stimulus", "wrong score", "abort", "early abort"],
+    ids=[
+        "redo",
+        "skip",
+        "pause",
+        "early pause",
+        "wrong stimulus",
+        "wrong score",
+        "answers of other kinds",
+        "abort",
+        "early abort",
+    ],
 )
 def test_whatever_people_did_or_were_refused_comes_out_identical(instead, tmp_path):
     identical(recorded(tmp_path / "session", instead=instead), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "phases", "forces", "outcomes"),
+    [
+        ("sensotact-friction", ("pre-evaluation", "practice", "main"), False, {"scored"}),
+        ("magnitude-estimation", ("practice", "main"), False, {"numbered"}),
+        ("paired-comparison", ("main",), False, {"presented", "chosen"}),
+        ("paired-comparison", ("practice",), True, {"presented", "chosen"}),
+    ],
+)
+def test_every_built_in_protocol_is_carried_to_its_end_with_its_rests_and_comes_out_identical(
+    name, phases, forces, outcomes, tmp_path
+):
+    assert name in protocol_names()
+    session = recorded(tmp_path / "session", protocol=protocol(name), phases=phases, forces=forces)
+    assert session.end["complete"]
+    assert {record.outcome for record in session.trials} == outcomes
+    kinds = [event.kind for event in session.events]
+    timed = protocol(name).rests.duration is not None
+    assert kinds.count("rest_over") == (kinds.count("rest_asked") if timed else 0)
+    assert ("rest_asked" in kinds) == ("main" in phases and name != "sensotact-friction")
+    identical(session, tmp_path)
+
+
+def test_a_rest_that_ends_by_the_clock_comes_out_at_the_same_reading(tmp_path):
+    often = replace_fields(PAPER, rests=RestRules(after_trials=2, duration=1.5))
+    session = recorded(tmp_path / "session", protocol=often)
+    assert [event.kind for event in session.events].count("rest_over") == 4
+    identical(session, tmp_path)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -244,14 +296,55 @@ def test_at_a_chosen_speed_the_outcome_is_the_same(whole, tmp_path):
     assert differences(whole, again) == []
 
 
-def test_a_session_that_was_resumed_is_refused_with_a_sentence(tmp_path):
-    recording = recorded(tmp_path / "session", stop=lambda sent: sent > 300)
-    change(recording.folder, "DELETE FROM events WHERE kind = 'ended'")
-    last = rows(recording.folder, "SELECT max(number) FROM events")[0][0]
-    event = LoggedEvent(last + 1, 0, "resumed", None, 300, {})
-    change(recording.folder, "INSERT INTO events VALUES (?,?,?,?,?,?,?)", event_row(event))
-    with pytest.raises(RecordingError, match="resumed"):
-        replayed(Recording.open(recording.folder), tmp_path)
+def cut(folder, last):
+    """Leave of a session what a crash leaves: the events up to number `last`, and the blocks committed by then."""
+    keep = rows(folder, f"SELECT readings FROM events WHERE number = {last}")[0][0]
+    change(folder, "DELETE FROM events WHERE number > ?", (last,))
+    total = 0
+    for number, count in rows(folder, "SELECT number, readings FROM blocks ORDER BY number"):
+        if total >= keep:
+            change(folder, "DELETE FROM blocks WHERE number >= ?", (number,))
+            break
+        total += count
+
+
+@pytest.mark.parametrize("lasts", [(9,), (20, 31), (24, 26, 60)])
+def test_a_session_that_was_cut_short_and_resumed_comes_out_identical(lasts, tmp_path):
+    folder = tmp_path / "session"
+    recorded(folder)
+    for last in lasts:
+        cut(folder, last)
+        resume(folder, seed=last)
+    recording = Recording.open(folder)
+    assert recording.end["complete"]
+    assert [event.kind for event in recording.events].count("resumed") == len(lasts)
+    again = identical(recording, tmp_path)
+    assert len(again.readings()) == len(recording.readings()) > 2000
+
+
+def test_a_session_whose_transducer_was_lost_and_that_was_resumed_comes_out_identical(tmp_path):
+    folder = tmp_path / "session"
+    recorded(folder, link_lost_after=1100)
+    resume(folder, link_lost_after=700)
+    resume(folder)
+    recording = Recording.open(folder)
+    assert [event.data["cause"] for event in recording.events if event.kind == "ended"] == ["device"] * 2 + ["finished"]
+    identical(recording, tmp_path)
+
+
+def test_a_resumed_session_that_was_altered_is_found(tmp_path):
+    folder = tmp_path / "session"
+    recorded(folder)
+    cut(folder, 20)
+    resume(folder)
+    (number,) = rows(folder, "SELECT max(number) FROM events WHERE kind = 'contact_onset'")[0]
+    event = Recording.open(folder).events[number - 1]
+    other = replace_fields(event, data={**event.data, "time": event.data["time"] + 0.5})
+    change(folder, "DELETE FROM events WHERE number = ?", (number,))
+    change(folder, "INSERT INTO events VALUES (?,?,?,?,?,?,?)", event_row(other))
+    recording = Recording.open(folder)
+    (found,) = differences(recording, replayed(recording, tmp_path))
+    assert "time was stored as" in found
 
 
 # ---- the transducer of a recording, for anybody
