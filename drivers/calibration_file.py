@@ -60,11 +60,14 @@ class CalibrationFile:
 
 
 def read_calibration_file(path: Path) -> CalibrationFile:
-    """Return what the calibration file at `path` says. Raises SetupError where it cannot be read or makes no sense."""
+    """Return what the calibration file at `path` says, which may begin with ~ for the user's home.
+
+    Raises SetupError where it cannot be read or makes no sense.
+    """
     try:
-        with path.open("rb") as file:
+        with path.expanduser().open("rb") as file:
             data = file.read(LONGEST + 1)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RuntimeError) as error:  # the last: there is no such home
         reason = (getattr(error, "strerror", None) or "not a file name").lower()
         raise SetupError(f"{path}: cannot be read ({reason}); check the name of the calibration file") from None
     return parse_calibration_file(data, path.name)

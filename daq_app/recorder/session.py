@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -40,7 +40,7 @@ from sessions.recording.folding import fold_log
 from sessions.recording.head import simulated_sentence
 from sessions.recording.manifest import is_sealed
 from sessions.recording.place import unsafe
-from sessions.recording.provenance import software_versions
+from sessions.recording.provenance import software_versions, without_home
 from sessions.recording.room import RESERVE, check_room, need
 from sessions.resuming import (
     RESUMABLE,
@@ -81,7 +81,7 @@ def begun(request: StartSession, bench: Bench, clock: Clock) -> Prepared:
     plan, people = request.plan, request.people
     if plan.forces and bench.connected is None:
         raise NotNow("a session with forces needs a transducer, and none is connected; connect one")
-    info = bench.connected.transducer.info if plan.forces and bench.connected is not None else None
+    info = _told_of(bench) if plan.forces else None
     folder = Path(request.folder)
     _check_people(people, plan, bench, folder)
     check_room(folder, need(plan, None if info is None else info.rate))
@@ -288,7 +288,7 @@ def _told(people: People, uri: str | None) -> list[Setting]:
     if people.kind != "people":
         settings.append(Setting("people seed", people.seed, "", "set"))
     if uri is not None:
-        settings.append(Setting("device", uri, "", "set"))
+        settings.append(Setting("device", without_home(uri), "", "set"))
     return settings
 
 
@@ -311,7 +311,13 @@ def _opened_again(
             raise NotNow("the session began without a transducer, and goes on without one")
         return None
     bench.connect(request.uri or recorded_device(recording) or recording.info.uri, clock)
-    assert bench.connected is not None
-    info = bench.connected.transducer.info
+    info = _told_of(bench)
     check_same_transducer(recording.info, info)
     return info
+
+
+def _told_of(bench: Bench) -> TransducerInfo:
+    """Return who the transducer is, as it is written down."""
+    assert bench.connected is not None
+    info = bench.connected.transducer.info
+    return replace(info, uri=without_home(info.uri))

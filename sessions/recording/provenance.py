@@ -7,7 +7,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -45,6 +47,19 @@ def provenance(clock: Clock, settings: Iterable[Setting] = ()) -> dict[str, Any]
             for setting in settings
         },
     }
+
+
+def without_home(address: str) -> str:
+    """Return a device's address with ~ in place of the user's home, whose name is nobody's business.
+
+    >>> without_home(f"nidaq://Dev1?cal={Path.home() / 'FT12345.cal'}").replace(os.sep, "/")
+    'nidaq://Dev1?cal=~/FT12345.cal'
+    """
+    home = str(Path.home())
+    for written in (home, quote(home, safe=""), quote(home)):
+        if len(written) > 1:
+            address = address.replace(written, "~")
+    return address
 
 
 def machine() -> dict[str, Any]:

@@ -2,8 +2,10 @@
 
 import ast
 import getpass
+import os
 import platform
 from pathlib import Path
+from urllib.parse import quote, unquote
 
 import pytest
 from desk import PACE, PLAN, Desk
@@ -11,6 +13,7 @@ from desk import PACE, PLAN, Desk
 from daq_app.cli import run
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Connect, Device, People, Sealed, StartSession
+from sessions.recording.provenance import without_home
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("daq_app", "drivers", "sessions", "simulators", "solver")
@@ -94,6 +97,15 @@ def test_no_file_of_a_session_names_computer_user_or_folder(recorded):
     for path in recorded.rglob("*"):
         content = path.read_bytes().lower() + path.name.lower().encode()
         assert [word for word in words if word.lower().encode() in content] == [], path
+
+
+@pytest.mark.parametrize("written", [str, quote, lambda home: quote(home, safe="")])
+def test_a_device_s_address_is_kept_without_the_name_of_the_user_s_home(monkeypatch, written):
+    for name in ("HOME", "USERPROFILE"):
+        monkeypatch.setenv(name, os.path.join(os.sep, "home", "anna schmidt"))  # noqa: PTH118  as the system writes it
+    uri = f"labjack-u6://?cal={written(str(Path.home() / 'FT1.cal'))}"
+    assert "anna" not in without_home(uri)
+    assert unquote(without_home(uri)) == f"labjack-u6://?cal=~{os.sep}FT1.cal"
 
 
 def test_the_names_of_a_sessions_files_are_the_same_whoever_the_subject_is(recorded):

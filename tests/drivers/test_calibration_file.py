@@ -171,6 +171,15 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path, name):
         read_calibration_file(tmp_path / name)
 
 
+def test_a_file_may_be_named_from_the_home_of_whoever_uses_it(tmp_path, monkeypatch):
+    for variable in ("HOME", "USERPROFILE"):
+        monkeypatch.setenv(variable, str(tmp_path))
+    (tmp_path / "FT.cal").write_text(NANO43)
+    assert read_calibration_file(Path("~/FT.cal")).calibration.serial == "FT32831"
+    with pytest.raises(SetupError, match="cannot be read"):
+        read_calibration_file(Path("~nobody-of-that-name/FT.cal"))
+
+
 @given(st.binary(max_size=300))
 def test_bytes_that_are_no_file_are_refused(data):
     with pytest.raises(SetupError):
