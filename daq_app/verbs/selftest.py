@@ -37,6 +37,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.result({"passed": False, "sentence": str(failure), "left_in": str(room)})
         console.say(f"FAILED: {failure}. What is left of it lies in {room}; report it")
         return FLAWED
+    except KeyboardInterrupt:
+        shutil.rmtree(room, ignore_errors=True)
+        raise
     shutil.rmtree(room)
     path = write_certificate(out, certificate)
     console.result({"passed": True, "certificate": str(path), "warning": warning, **certificate})
