@@ -1,0 +1,98 @@
+"""A blinded study from its making to its report, by the command line alone."""
+
+import json
+
+import pytest
+
+from daq_app.cli import run
+from sessions.recording import Recording
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """A blinded study of two subjects: both score, one strokes as well."""
+    folder = tmp_path_factory.mktemp("studies") / "friction"
+    assert run(["enrol", str(folder), "--protocol", "sensotact-friction", "--blind", "--seed", "5"]) == 0
+    own = ["--finger", "tip_radius=5.5", "contact_angle=40", "--depth", "stickiness=1.8"]
+    assert run(["enrol", str(folder), "--subject", "P01", *own]) == 0
+    assert run(["enrol", str(folder), "--subject", "P02"]) == 0
+    visit = ["run", "--study", str(folder), "--headless"]
+    for subject in ("P01", "P02"):
+        alone = ["--subject", subject, "--scores-only", "--simulate-subject", "4"]
+        assert run([*visit, *alone, "--out", str(folder / f"{subject}_scores")]) == 0
+    stroked = ["--subject", "P01", "--device", "sim:?seed=5", "--simulate-subject", "4", "--pace", "20"]
+    assert run([*visit, *stroked, "--out", str(folder / "P01_forces")]) in (0, 3)  # 3: a busy machine lost readings
+    return folder
+
+
+def said(capsys, *words):
+    """Exit code and JSON document of a command line."""
+    capsys.readouterr()
+    code = run([*map(str, words), "--json"])
+    return code, json.loads(capsys.readouterr().out or "null")
+
+
+def test_a_blinded_study_is_run_predicted_unblinded_and_reported(study, capsys):
+    plan = Recording.open(study / "P01_forces").plan
+    assert plan.blinded
+    assert (plan.finger.tip_radius, plan.contact_angle, plan.blocks[0].indentation) == (5.5, 40.0, 1.8)
+    assert plan.trials == Recording.open(study / "P01_scores").plan.trials
+
+    code, blind = said(capsys, "predict", study, "--subject", "P01")
+    assert code in (0, 3)
+    assert {row["stimulus"]["index"] for row in blind["trials"]} == {None}
+    assert blind["options"]["scene"]["finger"]["tip_radius"] == 5.5
+    assert run(["report", str(study), "--subject", "P01"]) == 1
+    assert "'daq-app unblind' opens the key" in capsys.readouterr().err
+
+    code, opened = said(capsys, "unblind", study, "--by", "E02")
+    assert code == 0
+    assert sorted(opened["sessions"]) == ["P01_forces", "P01_scores", "P02_scores"]
+    told = json.loads((study / "P01_forces" / "unblinding.json").read_text())
+    assert (told["by"], told["unblinded_utc"]) == ("E02", opened["utc"])
+    assert {"analysis.json", "prediction.json"} <= set(told["made_before"])
+    assert said(capsys, "verify", study / "P01_forces")[0] in (0, 3)
+    assert said(capsys, "replay", study / "P01_scores", "--fast")[1]["differences"] == []
+
+    code, clear = said(capsys, "predict", study, "--subject", "P01")
+    assert sorted(row["stimulus"]["index"] for row in clear["trials"])[:2] == [0, 0]
+    assert [row["sed"] for row in clear["trials"]] == [row["sed"] for row in blind["trials"]]
+    assert run(["unblind", str(study), "--by", "E02"]) == 1
+    assert "was unblinded before" in capsys.readouterr().err
+
+
+def test_a_row_is_given_back_by_the_command_line(tmp_path, capsys):
+    folder = tmp_path / "study"
+    assert run(["enrol", str(folder), "--protocol", "paired-comparison"]) == 0
+    assert run(["enrol", str(folder), "--subject", "P01"]) == 0
+    assert run(["enrol", str(folder), "--subject", "P01", "--withdraw", "moved away"]) == 0
+    _, shown = said(capsys, "enrol", folder, "--subject", "P02")
+    assert [(row["subject"], row["row"], row["withdrawn"]) for row in shown["subjects"]] == [
+        ("P01", 1, "moved away"),
+        ("P02", 1, None),
+    ]
+    assert run(["run", "--study", str(folder), "--subject", "P01", "--scores-only"]) == 1
+    assert "was withdrawn" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "named"),
+    [
+        (["run", "--scores-only", "--subject", "P01"], 2, "give a PROTOCOL, or --study"),
+        (
+            ["run", "paired-comparison", "--scores-only", "--subject", "P01", "--finger", "length=3"],
+            2,
+            "tip_radius, width",
+        ),
+        (["run", "paired-comparison", "--scores-only", "--subject", "P01", "--depth", "taste=3"], 2, "no such block"),
+        (["enrol", "nowhere", "--subject", "P01"], 1, "is no study"),
+        (["enrol", "nowhere", "--subject", "P01", "--blind"], 2, "give --protocol"),
+        (["unblind", "nowhere", "--by", "Jane Doe"], 1, "never a name"),
+        (["unblind", "nowhere", "--by", "E01"], 1, "holds no recording"),
+    ],
+)
+def test_what_is_wrong_with_a_command_about_studies_is_said_in_a_sentence(words, code, named, capsys):
+    assert run(words) == code
+    message = capsys.readouterr().err
+    assert named in message
+    assert message.count("\n") == 1
