@@ -13,7 +13,7 @@ from numpy.linalg import LinAlgError
 
 from solver import evidence, finite_forced, kernels_numpy
 from solver.existence import steady
-from solver.failures import Cancelled, NotConverged, SolveFailure, beyond_friction
+from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.finite_body import FiniteBody, FiniteProbes
 from solver.finite_forced import Given
 from solver.grid import MeshError
@@ -171,7 +171,7 @@ def _depth_reached(scene: Scene, expected: float) -> float:
     """Return the depth [mm] of a scene; under a given force, where a coarse mesh finds it, else what was expected."""
     if scene.normal_force is None:
         return scene.loading.depth
-    never = replace(scene, loading=replace(scene.loading, tangential_force=None))
+    never = scene.undragged()
     try:
         return FiniteFinger.of(scene, Sizing(COARSE, expected, margin=MARGIN)).settled(never, lambda: False).pull.depth
     except SolveFailure:
@@ -314,7 +314,7 @@ def _errors(
     nodes: the larger difference from the answer plus the difference of the two.
     """
     try:
-        shapes = [(finger, finger.settled(scene, stop)) for finger in coarse]
+        shapes = [(finger, _nearest(scene, finger, stop)) for finger in coarse]
     except SolveFailure:
         return 1.0, 1.0, 1.0  # so near a limit that a coarser mesh has no state: nothing is known of the error
     seen = np.array([[f.sed_ending(s), s.force[1], _drag(scene, float(s.force[0]))] for f, s in shapes])
@@ -322,6 +322,16 @@ def _errors(
     differences = np.abs(seen - found).max(axis=0) + np.abs(seen[0] - seen[1])
     sed, normal, tangential = (SAFETY * differences / np.where(found != 0.0, np.abs(found), 1.0)).tolist()
     return sed, normal, tangential
+
+
+def _nearest(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool]) -> Shape:
+    """Return the settled state on a coarser mesh, whose friction limit may lie just below the drag asked for."""
+    try:
+        return finger.settled(scene, stop)
+    except NoSteadyState:
+        if not scene.loading.dragged:
+            raise
+        return finger.settled(scene.undragged(), stop)
 
 
 def _drag(scene: Scene, tangential: float) -> float:

@@ -357,6 +357,10 @@ class Scene:
         forces = {"normal_force": self.normal_force, "tangential_force": self.tangential_force}
         return replace(self.loading, **forces, force_unit="N/mm")
 
+    def undragged(self) -> "Scene":
+        """Return the scene that slides on, where a drag was asked for."""
+        return replace(self, loading=replace(self.loading, tangential_force=None))
+
     def driven(self, depth: float) -> "Scene":
         """Return the scene with its bone driven to `depth` [mm], where a normal force was asked for."""
         loading = self.loading

@@ -353,12 +353,22 @@ def _error_estimates(scene: Scene, shared: _Shared, contact: Contact, numbers: A
     element, so that the edges of contact fall differently between nodes.
     """
     try:
-        others = [numbers_on(finger, settled(scene, finger)) for finger in shared.coarse]
+        others = [numbers_on(finger, _nearest(scene, finger)) for finger in shared.coarse]
     except (ContactLost, SolveFailure):
         return 1.0, 1.0, 1.0  # so near a limit that a coarser mesh has no state: nothing is known of the error
     depth = indentation(scene, contact)
     found = estimates(scene.driven(depth), shared.fineness, numbers, np.array(others))
     return float(found[0]), float(found[1]), float(found[2])
+
+
+def _nearest(scene: Scene, finger: FingerModel) -> Contact:
+    """Return the settled state on a coarser mesh, whose friction limit may lie just below the drag asked for."""
+    try:
+        return settled(scene, finger)
+    except NoSteadyState:
+        if not scene.loading.dragged:
+            raise
+        return settled(scene.undragged(), finger)
 
 
 def numbers_on(finger: FingerModel, contact: Contact) -> Array:

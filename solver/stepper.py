@@ -7,7 +7,7 @@ from solver.mesh import Array
 from solver.mesher import Sizing
 from solver.scene import Scene
 
-FINENESS = {"small": 6.0, "finite": 5.0}  # meshes on which the response is good to about 1 % of its peak
+FINENESS = {"small": 6.0, "finite": 4.5}  # meshes on which the response is good to about 1 % of its peak
 MARGIN = {"small": 4.0, "finite": 3.0}  # how far above the indentation undeformed skin is looked at for contact
 
 
