@@ -20,14 +20,14 @@ import numpy as np
 
 from solver.body import Body, elimination
 from solver.finger import FingerModel
-from solver.finite_solution import FiniteFinger
+from solver.finite_finger import FiniteFinger
 from solver.materials import Hooke
 from solver.mesher import Sizing
 from solver.newton import Pull
 from solver.reference import SLIPPERINESS, scene
 from solver.sliding import settled
 
-FINENESS = (5, 8, 12, 16, 24, 32, 48, 64, 86)
+FINENESS = (3, 5, 7, 10, 14, 18, 26, 34, 46)
 SCENE = scene(SLIPPERINESS[4])
 PULL = Pull(1.5, 0.24, 0.00877, 1)  # slipperiness 100
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from solver.crossing import crosses_itself, least_stretch
 from solver.failures import NoSteadyState, NotConverged
-from solver.limit import largest_depth, largest_friction
+from solver.limit import largest_depth, largest_friction, leapt
 from solver.mesh import Indices
 from solver.newton import Newton, Pull, Shape
 from solver.sliding import settled
@@ -19,20 +19,22 @@ def steady(
     tolerance: float = 1e-10,
     start: Shape | None = None,
     stop: Callable[[], bool] = lambda: False,
+    *,
+    proven: bool = False,
 ) -> Shape:
     """Return the settled sliding state under `pull`, proven to lie on the branch that begins without friction.
 
     A state whose skin is squeezed so far that it might have folded, or that was not found directly, is approached by
     raising the friction coefficient along the branch. `outline` (o,) are the nodes of the whole skin in order; `start`
-    a sound state nearby. Raises NoSteadyState with both limits where the branch ends before, NotConverged where it
-    cannot be begun, Cancelled where `stop` says so.
+    a state nearby; where that is `proven`, so is what it leads to without a leap. Raises NoSteadyState with both limits
+    where the branch ends before, NotConverged where it cannot be begun, Cancelled where `stop` says so.
     """
     for begin in dict.fromkeys((start, None)):  # where the nearby state leads nowhere, the undeformed one may
         try:
             shape = settled(newton, pull, begin, tolerance, stop)
         except NotConverged:
             continue
-        if _sound(newton, shape, outline):
+        if sound(newton, shape, outline) or (proven and begin is not None and not leapt(newton, begin, shape, outline)):
             return shape
     branch = largest_friction(newton, pull, outline, pull.mu, stop)
     if not branch.limited:
@@ -54,7 +56,8 @@ def steady(
     )
 
 
-def _sound(newton: Newton, shape: Shape, outline: Indices) -> bool:
+def sound(newton: Newton, shape: Shape, outline: Indices) -> bool:
+    """Return whether the skin is nowhere squeezed so far that it may have folded, and does not cross itself."""
     nodes = newton.body.mesh.nodes[outline]
     moved = nodes + shape.u[outline]
     return least_stretch(nodes, moved) >= SOUND and not crosses_itself(moved)

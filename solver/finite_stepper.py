@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.finite_finger import FiniteFinger
 from solver.finite_forced import Given, corrected
-from solver.finite_solution import FiniteFinger
 from solver.kernels import OPEN, SLIP, STICK
 from solver.mesh import Array
 from solver.newton import Pull, Shape

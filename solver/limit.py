@@ -20,6 +20,7 @@ LARGEST_MU = 2.0  # beyond this a coefficient of friction is not looked for
 TOLERANCE = 1e-6  # of a point on the branch [mm]
 TURN = 0.7  # least cosine between the directions of the branch and of a step along it
 SQUEEZE = 0.85  # least ratio of the skin's least stretches at neighbouring points: a leap to a folded branch has less
+FOLDED = 0.5  # and least stretch there may be: surfaces fold at 0.544 (Biot 1963); beyond, the mesh decides
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +60,7 @@ def follow(
             return Branch(best, largest, limited=True)
         while True:
             found = _next(newton, shape, by, direction, rate, length, target)
-            if found is not None and not _leapt(newton, shape, found, outline):
+            if found is not None and not leapt(newton, shape, found, outline):
                 break
             length /= 2.0
             if length < 1e-4 * reach:
@@ -117,11 +118,11 @@ def _crossed(newton: Newton, shape: Shape, outline: Indices) -> bool:
     return crosses_itself(newton.body.mesh.nodes[outline] + shape.u[outline])
 
 
-def _leapt(newton: Newton, before: Shape, after: Shape, outline: Indices) -> bool:
+def leapt(newton: Newton, before: Shape, after: Shape, outline: Indices) -> bool:
     """Return whether a step went to another branch, where the skin is folded."""
     nodes = newton.body.mesh.nodes[outline]
     squeezed = [least_stretch(nodes, nodes + shape.u[outline]) for shape in (before, after)]
-    return squeezed[1] < SQUEEZE * squeezed[0] or _crossed(newton, after, outline)
+    return squeezed[1] < max(SQUEEZE * squeezed[0], FOLDED) or _crossed(newton, after, outline)
 
 
 def _tangent(newton: Newton, shape: Shape, by: int) -> tuple[Array, float]:

@@ -9,7 +9,7 @@ from solver.mesher import Sizing
 from solver.pressing import depth_of, sliding_under
 from solver.scene import Scene
 
-FINENESS = 8.0  # good to some tenths of a per cent of the depth
+FINENESS = 6.0  # good to some tenths of a per cent of the depth
 DEEPEST = 0.85  # of the tissue between first touch and bone: beyond, a small-strain depth means nothing
 
 

@@ -34,7 +34,7 @@ def settled(
         except NotConverged as reason:
             part /= 2.0
             used += 1
-            if part < SMALLEST or used > 12:
+            if part < SMALLEST or used > 12 or begin == pull:
                 raise NotConverged(
                     f"no sliding state was found beyond {_between(begin, pull, done).depth:.3g} mm of indentation at "
                     f"mu = {_between(begin, pull, done).mu:.3g}: {reason}, in steps of 1/{1 / part:.0f} of the way"

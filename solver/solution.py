@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import sqrt
 from time import perf_counter
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.linalg import LinAlgError
 
 from solver.audits import audits, course_audits
 from solver.contact import NAMES, SLIP, STICK, Contact, ContactLost, Course
+from solver.estimate import DEFAULT, FINENESS, coarsest_for, estimates
 from solver.evidence import model, warnings
 from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.finger import FingerModel
@@ -18,7 +18,7 @@ from solver.grid import MeshError
 from solver.matching import DEEPEST, expected_depth
 from solver.measured import measured
 from solver.mesh import Array
-from solver.mesher import FINEST, Sizing
+from solver.mesher import Sizing
 from solver.prediction import History, Prediction, Row, Skin
 from solver.pressing import depth_of, sliding_under
 from solver.receptor import ROW
@@ -28,12 +28,6 @@ from solver.stepping import March, march
 from solver.tissues import relaxing_laws
 from solver.wedging import WIDE, deepest, followed
 
-FINENESS = (6, 8, 12, 16, 24, 32, 48)  # the meshes that can be asked for
-DEFAULT = 12
-# The error estimate: this part of the larger difference from two coarser meshes, and this by fineness^1.5, the rate at
-# which errors fall. Chosen and measured with benchmarks/error_estimate.py; docs/solver.md has the figures.
-FROM_MESHES = 0.3
-FROM_FINENESS = 0.07
 UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]
 DOUBTED = 1e-8  # and from which it is told
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
@@ -97,13 +91,14 @@ def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
 def _solve_group(scenes: list[Scene], progress: Progress | None) -> list[_Answer]:
     """Refine until every scene's estimate meets its tolerance, or the finest mesh is reached."""
     asked = [s.solve.tolerance for s in scenes]
+    kind = scenes[0].solve.kinematics
     strictest = min((a for a in asked if a is not None), default=None)
     depth = max(expected_depth(scene) for scene in scenes)
-    fineness = DEFAULT if strictest is None else coarsest_for(scenes[0].driven(depth), strictest)
+    fineness = DEFAULT[kind] if strictest is None else coarsest_for(scenes[0].driven(depth), strictest)
     while True:
         done = _on_mesh(scenes, depth, fineness, progress)
         missed = [_misses(answer, tolerance) for answer, tolerance in zip(done, asked, strict=True)]
-        finer = [n for n in FINENESS if n > fineness]
+        finer = [n for n in FINENESS[kind] if n > fineness]
         if not finer or not any(missed):
             break
         fineness = finer[0]
@@ -121,11 +116,6 @@ def _on_mesh(scenes: list[Scene], depth: float, fineness: float, progress: Progr
 
         return finite_answers(scenes, depth, fineness, progress)
     return _solve_on(scenes, depth, fineness, progress)
-
-
-def coarsest_for(scene: Scene, tolerance: float) -> float:
-    """Return the fineness of the coarsest mesh whose estimate can meet the tolerance, the finest where none can."""
-    return next((n for n in FINENESS if _least(scene, n) <= 0.9 * tolerance), FINENESS[-1])
 
 
 def _misses(answer: _Answer, tolerance: float | None) -> bool:
@@ -375,27 +365,6 @@ def numbers_on(finger: FingerModel, contact: Contact) -> Array:
     """Return what errors are estimated of: SED of the ending, normal and tangential force along +x (3,)."""
     sed = finger.sed_ending(finger.displacement(contact))
     return np.array([sed, contact.normal.sum(), contact.tangential.sum()])
-
-
-def estimates(scene: Scene, fineness: float, numbers: Array, others: Array) -> Array:
-    """Return the estimated errors (n,), relative, of `numbers` (n,) that two coarser meshes gave as `others` (2, n).
-
-    A number that is 0 on all meshes, as the drag without friction, is exact.
-    """
-    size = np.abs(numbers)
-    largest = np.maximum(np.abs(others - numbers).max(axis=0), 0.0)
-    safe = np.maximum(size, np.finfo(float).tiny)
-    found = FROM_MESHES * largest / safe + _least(scene, fineness)
-    return np.where((size == 0.0) & (largest == 0.0), 0.0, np.minimum(found, 1.0))
-
-
-def _least(scene: Scene, fineness: float) -> float:
-    """Return the part of an estimate that the mesh alone decides.
-
-    Where half the contact is shorter than `fineness` of the smallest elements, it is as if it were less.
-    """
-    half = sqrt(2.0 * scene.loading.depth / scene.finger.tip_radius)  # by the tip's radius
-    return FROM_FINENESS / min(fineness, half / FINEST) ** 1.5
 
 
 def _skin(finger: FingerModel, contact: Contact, skin: Array) -> Skin:

@@ -7,7 +7,7 @@ from solver.mesh import Array
 from solver.mesher import Sizing
 from solver.scene import Scene
 
-FINENESS = {"small": 6.0, "finite": 4.5}  # meshes on which the response is good to about 1 % of its peak
+FINENESS = {"small": 4.0, "finite": 2.7}  # meshes on which the response is good to about 1 % of its peak
 MARGIN = {"small": 4.0, "finite": 3.0}  # how far above the indentation undeformed skin is looked at for contact
 
 
@@ -62,7 +62,7 @@ def stepper(scene: Scene) -> Stepper:
     mu, tau = float(scene.friction.mu), scene.friction.cap
     # Imported here: only what is asked for is loaded, compiled loops of the other kinematics are not.
     if kind == "finite":
-        from solver.finite_solution import FiniteFinger
+        from solver.finite_finger import FiniteFinger
         from solver.finite_stepper import FiniteStepper
 
         return FiniteStepper(FiniteFinger.of(scene, sizing), mu, tau)

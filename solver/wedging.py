@@ -16,7 +16,7 @@ from solver.scene import Scene
 from solver.tissues import settled_moduli
 
 WIDE = 16.0  # margin at which nearly all the palmar skin may touch
-FINENESS = 10.0  # of the meshes on which the limit of depth is looked for: it hardly depends on the mesh
+FINENESS = 7.0  # of the meshes on which the limit of depth is looked for: it hardly depends on the mesh
 NEAR = (0.5, 1.5)  # depths that a mesh serves, by the depth it was made for
 PATIENCE = 15  # corrections of states that a small step may take
 CLOSE = 0.005  # relative step of mu below which a limit is taken as found

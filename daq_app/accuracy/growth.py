@@ -8,8 +8,8 @@ from daq_app.accuracy.asked import Asked, Found, LeftOut
 from daq_app.accuracy.methods import MAIN
 from daq_app.accuracy.truth import cases
 
-MESHES = (4.0, 6.0, 9.0, 14.0, 21.0, 32.0, 48.0, 64.0, 88.0)
-QUICK = (4.0, 8.0, 16.0)
+MESHES = (3.0, 4.0, 6.0, 9.0, 13.0, 18.0, 26.0, 34.0, 46.0)
+QUICK = (3.0, 6.0, 10.0)
 FEWEST = 3000  # unknowns from which the exponent is taken: below, the time is not yet that of the arithmetic
 SHARE = 0.4  # of the time left that the next mesh may be expected to take
 

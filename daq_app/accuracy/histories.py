@@ -14,7 +14,7 @@ from solver.march import march, press_and_slide
 from solver.scene import Scene
 
 PRESS, SLIDES, DISTANCE = 40, 160, 8.0  # substeps of the press and of the slide, and how far it goes [mm]
-FINENESS: dict[Kinematics, float] = {"small": 6.0, "finite": 5.0}
+FINENESS: dict[Kinematics, float] = {"small": 4.0, "finite": 3.0}
 
 
 @dataclass(frozen=True, slots=True)

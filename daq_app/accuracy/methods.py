@@ -8,10 +8,11 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from daq_app.accuracy.asked import clock
+from solver.climbing import MARGIN
 from solver.elements import Q2P1
 from solver.existence import steady
 from solver.finger import FingerModel
-from solver.finite_solution import MARGIN, FiniteFinger
+from solver.finite_finger import FiniteFinger
 from solver.mesh import Array
 from solver.mesher import Sizing
 from solver.newton import Pull, Shape

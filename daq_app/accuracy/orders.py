@@ -8,7 +8,8 @@ import numpy as np
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, within
 from daq_app.accuracy.published import contacts, locking
 from solver.finger import FingerModel
-from solver.finite_solution import FiniteFinger
+from solver.finite_finger import FiniteFinger
+from solver.finite_states import settled as finite_settled
 from solver.mesher import Sizing
 from solver.reference import SLIPPERINESS, STICKINESS, scene
 from solver.solution import numbers_on, settled
@@ -115,7 +116,7 @@ def small_finger(quick: bool) -> Iterator[Order]:
             model = FingerModel.of(asked, Sizing(fineness, 2.0, shift))  # noqa: B023  called before the next surface
             return float(numbers_on(model, settled(asked, model))[0])  # noqa: B023
 
-        yield _finger(asked.title, "small", sed, 36.0, (4.0, 6.0, 8.0, 12.0, 16.0), 1.8)
+        yield _finger(asked.title, "small", sed, 20.0, (3.0, 4.0, 5.0, 7.0, 10.0), 1.8)
 
 
 def finite_finger(quick: bool) -> Iterator[Order]:
@@ -124,10 +125,10 @@ def finite_finger(quick: bool) -> Iterator[Order]:
 
     def sed(fineness: float, shift: bool) -> float:
         finger = FiniteFinger.of(asked, Sizing(fineness, asked.loading.depth, shift, margin=3.0))
-        return finger.sed_ending(finger.settled(asked, lambda: False))
+        return finger.sed_ending(finite_settled(finger, asked, lambda: False))
 
-    finenesses = (4.0, 6.0, 8.0) if quick else (4.0, 6.0, 8.0, 12.0)
-    yield _finger(asked.title, "finite", sed, 16.0 if quick else 24.0, finenesses, 1.3)
+    finenesses = (3.0, 4.0, 5.0) if quick else (3.0, 4.0, 5.0, 7.0)
+    yield _finger(asked.title, "finite", sed, 10.0 if quick else 15.0, finenesses, 1.3)
 
 
 def _finger(

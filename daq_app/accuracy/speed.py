@@ -15,10 +15,10 @@ from solver.failures import SolveFailure
 from solver.scene import Scene
 
 MESHES = {
-    "small": (3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0),
-    "finite": (4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 14.0, 16.0, 20.0, 24.0, 28.0),
+    "small": (2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0),
+    "finite": (3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 14.0),
 }
-QUICK = {"small": (4.0, 6.0, 12.0, 24.0), "finite": (4.0, 5.0, 8.0, 12.0)}
+QUICK = {"small": (3.0, 4.0, 8.0, 12.0), "finite": (3.0, 4.0, 6.0, 8.0)}
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,12 +21,12 @@ from solver.solution import answers
 NUMBERS = ("SED of the ending", "normal force", "drag")
 # fineness of the three meshes, and whether moved along the skin by half an element
 OVERKILL: dict[Kinematics, tuple[tuple[float, bool], ...]] = {
-    "small": ((64.0, False), (64.0, True), (56.0, False)),
-    "finite": ((40.0, False), (40.0, True), (36.0, False)),
+    "small": ((26.0, False), (26.0, True), (23.0, False)),
+    "finite": ((20.0, False), (20.0, True), (18.0, False)),
 }
 QUICK: dict[Kinematics, tuple[tuple[float, bool], ...]] = {
-    "small": ((40.0, False), (40.0, True), (36.0, False)),
-    "finite": ((16.0, False), (16.0, True), (14.0, False)),
+    "small": ((18.0, False), (18.0, True), (16.0, False)),
+    "finite": ((11.0, False), (11.0, True), (10.0, False)),
 }
 # "slip 0-100 and stick 0": what speeds are asked at
 JUDGED = ("slipperiness 0", "slipperiness 20", "slipperiness 55", "slipperiness 75", "slipperiness 100", "stickiness 0")

@@ -21,7 +21,7 @@ from solver.stepper import Stepper, stepper
 
 PASSES = 5
 PRESS, SLIDES, DISTANCE = 200, 60, 6.0  # readings of the press and of the slide, and how far it goes [mm]
-FINER: dict[Kinematics, float] = {"small": 16.0, "finite": 12.0}  # fineness of the truth's mesh
+FINER: dict[Kinematics, float] = {"small": 10.0, "finite": 8.0}  # fineness of the truth's mesh
 SURFACES = ("slipperiness 100", "slipperiness 55", "slipperiness 0", "stickiness 0")
 Reading = tuple[float, float, float]  # normal and tangential force [N/mm], SED [MPa]
 

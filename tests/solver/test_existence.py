@@ -29,7 +29,7 @@ def test_a_sound_state_is_the_direct_one():
 
 
 def test_friction_without_measure_is_the_bound_alone():
-    newton, probes, outline = finger(5, margin=3.0)
+    newton, probes, outline = finger(6, margin=3.0)
     sed = [probes.average(newton.body, steady(newton, Pull(1.0, mu, 0.005, 1), outline).u)[0] for mu in (50.0, 1000.0)]
     assert sed[0] == pytest.approx(sed[1], rel=1e-3)
 

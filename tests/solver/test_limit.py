@@ -14,7 +14,7 @@ TOWARDS_TIP = -1  # the bone goes along +x, so the surface pulls the skin along 
 
 @pytest.mark.parametrize(("depth", "largest"), [(1.0, 0.987), (1.5, 0.609), (2.0, 0.373), (2.5, 0.233)])
 def test_friction_has_the_limit_that_several_meshes_and_orders_of_another_code_found(depth, largest):
-    newton, _, outline = finger(12, margin=3.0)
+    newton, _, outline = finger(8, margin=3.0)
     branch = largest_friction(newton, Pull(depth, 0.0, np.inf, TOWARDS_TIP), outline)
     assert branch.limited
     assert branch.value == pytest.approx(largest, rel=0.03)
@@ -26,7 +26,7 @@ def test_friction_has_the_limit_that_several_meshes_and_orders_of_another_code_f
     [(0.44, 0.015478, 1.85), (0.48, 0.019038, 1.75), (0.64, 0.049998, 1.45), (0.67, 0.05255, 1.43)],
 )
 def test_depth_has_the_limit_that_another_code_found(mu, tau, largest):
-    newton, _, outline = finger(12, margin=3.0)
+    newton, _, outline = finger(8, margin=3.0)
     branch = largest_depth(newton, Pull(2.0, mu, tau, TOWARDS_TIP), outline)
     assert branch.limited
     assert branch.value == pytest.approx(largest, rel=0.03)

@@ -9,7 +9,7 @@ import pytest
 
 from solver.contact import CAP, STICK, Course, forced, untouched
 from solver.finger import FingerModel
-from solver.finite_solution import FiniteFinger
+from solver.finite_finger import FiniteFinger
 from solver.finite_stepper import FiniteStepper
 from solver.friction import FrictionLaw
 from solver.march import march, press_and_slide

@@ -8,7 +8,7 @@ from daq_app.accuracy.hard_cases.meshes import jittered, slabs, two_parts
 from daq_app.accuracy.hard_cases.outcome import Outcome, agree, percent, power
 from daq_app.accuracy.hard_cases.small import one_node as one_node_small
 from solver.finite_body import FiniteBody
-from solver.finite_solution import FiniteFinger
+from solver.finite_finger import FiniteFinger
 from solver.hyperelastic import NeoHooke
 from solver.march import march
 from solver.mesh import Mesh

@@ -1,0 +1,95 @@
+"""Settled sliding at finite strain on a mesh whose lines follow the edges of contact, and on a coarser one beside it.
+
+No element can follow a skin that touches with one half and not with the other: where contact ends inside an element,
+the energy below is wrong by some tenths of a per cent, up or down. So the edges are found on a rough mesh, and the
+meshes that count have lines there. From the rough state they are a few iterations away.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+
+from solver.estimate import estimates
+from solver.existence import sound
+from solver.failures import NoSteadyState, SolveFailure
+from solver.finite_finger import FiniteFinger
+from solver.finite_states import roughly, settled
+from solver.mesher import Sizing
+from solver.newton import Shape
+from solver.scene import Scene
+
+ROUGH = 3.0  # fineness of the mesh that finds the edges
+COARSER = 0.6  # fineness of the mesh that the error is estimated from, by that of the answer
+MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Climbed:
+    """A settled state on the mesh made for it."""
+
+    finger: FiniteFinger
+    shape: Shape
+    setup_s: float  # meshes and tables [s]
+
+
+def foot(scene: Scene, expected: float, fineness: float, stop: Callable[[], bool]) -> Climbed:
+    """Return the settled state on a mesh that does not know the edges of contact, from which others can be climbed.
+
+    `expected` is the depth [mm], or about it where forces are given; a given drag is left for the mesh that counts,
+    since the limit of friction lies a little elsewhere on each. A rough mesh will do where its state is sound.
+    Near a limit, only a mesh of `fineness` itself can tell. Raises NoSteadyState, NotConverged, Cancelled.
+    """
+    depth = expected if scene.normal_force is not None else scene.loading.depth
+    scene = scene.undragged() if scene.loading.dragged else scene
+    begun = perf_counter()
+    finger = FiniteFinger.of(scene, Sizing(ROUGH, depth, margin=MARGIN))
+    setup = perf_counter() - begun
+    try:
+        shape = roughly(finger, scene, stop)
+        if sound(finger.newton, shape, finger.geometry.whole):
+            return Climbed(finger, shape, setup)
+        depth = shape.pull.depth
+    except SolveFailure:
+        pass
+    return _on(scene, Sizing(fineness, depth, margin=MARGIN), None, stop)
+
+
+def climbed(scene: Scene, fineness: float, below: Climbed, stop: Callable[[], bool]) -> Climbed:
+    """Return the settled state on a mesh of `fineness` whose lines follow the edges of contact found `below`.
+
+    Raises NoSteadyState, NotConverged, Cancelled.
+    """
+    edges = below.finger.edges(below.shape)
+    return _on(scene, Sizing(fineness, below.shape.pull.depth, margin=MARGIN, edges=edges), below, stop)
+
+
+def _on(scene: Scene, sizing: Sizing, below: Climbed | None, stop: Callable[[], bool]) -> Climbed:
+    begun = perf_counter()
+    finger = FiniteFinger.of(scene, sizing)
+    start = None if below is None else finger.brought(below.shape, below.finger)
+    setup = perf_counter() - begun
+    return Climbed(finger, settled(finger, scene, stop, start), setup)
+
+
+def _nearest(scene: Scene, fineness: float, at: Climbed, stop: Callable[[], bool]) -> Climbed:
+    """Return the settled state on a coarser mesh, whose friction limit may lie just below the drag asked for."""
+    try:
+        return climbed(scene, fineness, at, stop)
+    except NoSteadyState:
+        if not scene.loading.dragged:
+            raise
+        return climbed(scene.undragged(), fineness, at, stop)
+
+
+def error_estimates(scene: Scene, fineness: float, at: Climbed, stop: Callable[[], bool]) -> tuple[float, float, float]:
+    """Return how far SED, normal and tangential force of the settled state `at` may be off, relative.
+
+    The same scene is solved on a coarser mesh with lines at the same edges of contact.
+    """
+    try:
+        coarse = _nearest(scene, COARSER * fineness, at, stop)
+    except SolveFailure:
+        return 1.0, 1.0, 1.0  # so near a limit that a coarser mesh has no state: nothing is known of the error
+    others = coarse.finger.numbers(coarse.shape)[None]
+    found = estimates(scene.driven(at.shape.pull.depth), fineness, at.finger.numbers(at.shape), others)
+    return float(found[0]), float(found[1]), float(found[2])

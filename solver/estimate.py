@@ -1,0 +1,66 @@
+"""How far numbers may be off: estimates from coarser meshes, and which mesh a tolerance asks for.
+
+An estimate is a part of the largest difference between the answer and those of coarser meshes, plus what the mesh alone
+decides: errors fall with fineness squared, and two meshes can agree by chance. At small strain there are two coarser
+meshes of elements twice as long, one of them moved along the skin by half an element, so that the edges of contact fall
+differently between nodes; and under a traction bound the drag is that bound times the length of skin that touches,
+known to a part of an element. At finite strain lines follow the edges, and one coarser mesh will do. The factors were
+chosen and measured with benchmarks/error_estimate.py and finite_error_estimate.py; docs/solver.md has the figures.
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from solver.mesh import Array
+from solver.mesher import ANYWHERE, FINEST, SHORT
+from solver.scene import Scene
+
+FINENESS = {"small": (5, 6, 8, 10, 12, 16, 20, 24), "finite": (6, 10, 12, 16, 20, 24)}  # meshes that can be asked for
+DEFAULT = {"small": 8, "finite": 10}
+FROM_MESHES = {"small": 0.15, "finite": 0.3}
+FROM_FINENESS = {"small": 0.1, "finite": 0.15}
+FROM_BOUND = 0.2  # of an element that touches
+
+
+def estimates(scene: Scene, fineness: float, numbers: Array, others: Array) -> Array:
+    """Return the estimated errors (3,), relative, of SED, normal and tangential force `numbers` (3,).
+
+    `others` (n, 3) are those of the coarser meshes. A number that is 0 on all meshes, as the drag without friction, is
+    exact.
+    """
+    kind = scene.solve.kinematics
+    size = np.abs(numbers)
+    largest = np.abs(others - numbers).max(axis=0)
+    found = FROM_MESHES[kind] * largest / np.maximum(size, np.finfo(float).tiny) + _least(scene, fineness)
+    if kind == "small":
+        found[2] += _of_bound(scene, fineness, float(size[1]), float(size[2]))
+    return np.where((size == 0.0) & (largest == 0.0), 0.0, np.minimum(found, 1.0))
+
+
+def coarsest_for(scene: Scene, tolerance: float) -> float:
+    """Return the fineness of the coarsest mesh whose estimate can meet the tolerance, the finest where none can."""
+    every = FINENESS[scene.solve.kinematics]
+    return next((n for n in every if _least(scene, n) <= 0.9 * tolerance), every[-1])
+
+
+def _least(scene: Scene, fineness: float) -> float:
+    """Return the part of an estimate that the mesh alone decides.
+
+    Where half the contact is shorter than `fineness` of the smallest elements, it is as if it were less.
+    """
+    return FROM_FINENESS[scene.solve.kinematics] / min(fineness, _half(scene) / (ANYWHERE * FINEST)) ** 2
+
+
+def _half(scene: Scene) -> float:
+    """Return half the length of the skin that may touch, by the tip's radius."""
+    return sqrt(2.0 * scene.loading.depth / scene.finger.tip_radius)
+
+
+def _of_bound(scene: Scene, fineness: float, normal: float, drag: float) -> float:
+    """Return what the drag may be off, relative, for not knowing how much of its last element touches."""
+    bound, most = scene.friction.tau_max, scene.friction.mu * normal
+    if bound is None or drag == 0.0 or drag >= most:
+        return 0.0
+    element = ANYWHERE * scene.finger.tip_radius / fineness * min(1.0, _half(scene) / SHORT[0])
+    return FROM_BOUND * (1.0 - drag / most) * bound * element / drag

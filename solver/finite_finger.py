@@ -1,0 +1,87 @@
+"""The finger at finite strain on one mesh, ready for any surface."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.linalg import LinAlgError
+from numpy.typing import NDArray
+
+from solver.carrying import carried
+from solver.finite_body import FiniteBody, FiniteProbes
+from solver.grid import MeshError
+from solver.mesh import Array
+from solver.mesher import FingerMesh, Sizing, finger_mesh, with_middles
+from solver.newton import Newton, Shape
+from solver.receptor import ROW, endings, middle
+from solver.scene import Scene, SceneError
+from solver.stiffness import Elastic
+from solver.tissues import finite_laws, settled_moduli
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FiniteFinger:
+    """A finger on one mesh, ready for any surface."""
+
+    geometry: FingerMesh
+    newton: Newton
+    ending: FiniteProbes
+    point: FiniteProbes
+    row: FiniteProbes
+
+    @staticmethod
+    def of(scene: Scene, sizing: Sizing) -> "FiniteFinger":
+        """Mesh the finger of `scene`. Raises SceneError where its outline cannot be meshed."""
+        try:
+            made = finger_mesh(scene.finger, scene.receptor, sizing)
+            elastic = Elastic.of(made.mesh, settled_moduli(scene.materials))
+            body = FiniteBody.of(made.mesh, finite_laws(scene.materials))
+        except (MeshError, LinAlgError) as bad:
+            raise SceneError("finger", scene.finger, f"no mesh fits it ({bad})") from bad
+        return FiniteFinger(
+            made,
+            Newton(body),
+            FiniteProbes.of(body, endings(made, elastic, scene.receptor, np.zeros(1))),
+            FiniteProbes.of(body, middle(made, elastic, scene.receptor)),
+            FiniteProbes.of(body, endings(made, elastic, scene.receptor, ROW)),
+        )
+
+    def sed_ending(self, shape: Shape) -> float:
+        """Return the SED averaged over the reference ending [MPa]."""
+        return float(self.ending.average(self.newton.body, shape.u)[0])
+
+    def numbers(self, shape: Shape) -> Array:
+        """Return what errors are estimated of: SED of the ending, normal and tangential force along +x (3,)."""
+        return np.array([self.sed_ending(shape), shape.force[1], shape.force[0]])
+
+    def brought(self, shape: Shape, other: "FiniteFinger") -> Shape:
+        """Return `shape`, found on `other`, as a start on this mesh."""
+        return carried(shape, other.geometry, self.geometry, self.newton.body)
+
+    def edges(self, shape: Shape) -> tuple[float, float] | None:
+        """Return the arc positions [mm] where contact ends; None where it is too short to tell.
+
+        Near its edge pressure falls like the square root of the distance. The force beyond a line between elements then
+        has its centre at 2/5 of the way from there to the edge.
+        """
+        mesh = self.geometry.mesh
+        arcs = with_middles(self.geometry.arcs)[np.searchsorted(self.geometry.whole, mesh.skin)]
+        force, touching = shape.reaction[:, 1], shape.touching
+        high = _edge(arcs, force, touching)
+        low = _edge(-arcs[::-1], force[::-1], touching[::-1])
+        return None if high is None or low is None or high <= -low else (-low, high)
+
+
+def _edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float | None:
+    """Return where contact ends towards the last of the nodes at `arcs` (k,)."""
+    on = np.flatnonzero(touching)
+    if len(on) < 5:
+        return None
+    last = int(on[-1])
+    line = last - 2 if last % 2 == 0 else last - 1  # the last line with contact on both sides
+    beyond = np.arange(line, last + 1)
+    pressed = force[beyond].copy()
+    gaps = arcs[line] - arcs[line - 2], arcs[line + 2] - arcs[line]
+    pressed[0] *= gaps[1] / (gaps[0] + gaps[1])  # the part of the line's own force that stems from beyond
+    reach = 2.5 * float(pressed @ (arcs[beyond] - arcs[line])) / float(pressed.sum())
+    least = arcs[last] - 0.35 * (arcs[last] - arcs[last - 1])
+    return float(np.clip(arcs[line] + reach, least, arcs[min(last + 1, len(arcs) - 1)]))

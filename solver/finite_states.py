@@ -1,0 +1,193 @@
+"""Settled states and courses of a scene at finite strain, on one mesh: driven by depth, or under given forces."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from solver import finite_forced, sliding
+from solver.existence import steady
+from solver.failures import NotConverged, SolveFailure, beyond_friction
+from solver.finite_finger import FiniteFinger
+from solver.finite_forced import Given
+from solver.kernels import STICK
+from solver.limit import leapt
+from solver.march import march
+from solver.newton import Pull, Shape
+from solver.scene import Scene
+
+LEADING = 1e-3  # tolerance of states that only lead to others [mm]
+PRESSES = 40  # steps of the pre-indentation, and of a drag that grows
+SEARCHES = 60  # steps of a search for the depth at which a force is met
+MET = 1e-9  # relative difference within which it is
+ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
+STRIDE = 0.1  # of the bone while it slides, by the indentation [-]
+LONGEST = 8.0  # slide after which a course that has not settled is given up, by the indentation [-]
+SETTLED = 1e-10  # relative change of the ending's SED in a step, with every touching point slipping
+
+
+def settled(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], start: Shape | None = None) -> Shape:
+    """Return the settled state of a scene, sought first from `start`, a proven state nearby.
+
+    Raises NoSteadyState, NotConverged, Cancelled.
+    """
+    if scene.normal_force is not None:
+        return _settled_under(finger, scene, scene.normal_force, stop, start)
+    if scene.loading.direction == 0 and scene.friction.mu > 0.0:
+        return course(scene, finger, stop)[-1]
+    return steady(finger.newton, _pull_sliding(scene), finger.geometry.whole, start=start, stop=stop, proven=True)
+
+
+def roughly(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool]) -> Shape:
+    """Return a state near the settled one, from which others may start if it is `sound`. Raises as `settled`."""
+    if scene.normal_force is not None or (scene.loading.direction == 0 and scene.friction.mu > 0.0):
+        return settled(finger, scene, stop)
+    return sliding.settled(finger.newton, _pull_sliding(scene), None, LEADING, stop)
+
+
+def _settled_under(
+    finger: FiniteFinger, scene: Scene, force: float, stop: Callable[[], bool], start: Shape | None
+) -> Shape:
+    """Return the settled state under the forces of a scene, depth and shift found. Raises as `settled`."""
+    direction, drag = scene.loading.direction, scene.tangential_force
+    if direction == 0 and scene.friction.mu > 0.0:
+        return course(scene, finger, stop)[-1]
+    try:
+        slides = _sliding_under(finger, scene, force, stop, start)
+    except SolveFailure:
+        if drag is None:
+            raise
+        return course(scene, finger, stop)[-1]  # the drag may be met before sliding would fold the skin
+    most = abs(float(slides.force[0]))
+    if drag is None or most * (1.0 - ALL_SLIPS) <= drag <= most * (1.0 + ALL_SLIPS):
+        return slides
+    if drag > most:
+        raise beyond_friction(drag, most, force)
+    return course(scene, finger, stop)[-1]
+
+
+def _sliding_under(
+    finger: FiniteFinger, scene: Scene, force: float, stop: Callable[[], bool], start: Shape | None
+) -> Shape:
+    """Return settled sliding under the normal force of a scene, from `start` or reached as the force grows."""
+    newton, outline = finger.newton, finger.geometry.whole
+    sense = -(scene.loading.direction or 1)
+    if start is not None:
+        try:
+            near = replace(start, pull=start.pull._replace(sense=sense))
+            shape = finite_forced.balanced(newton, near, Given(force, None))
+            stays = not leapt(newton, start, shape, outline)
+            return steady(newton, shape.pull, outline, start=shape, stop=stop, proven=stays)
+        except NotConverged:
+            pass
+    begin = finite_forced.untouched(newton, float(scene.friction.mu), scene.friction.cap)
+    shape = begin = replace(begin, pull=begin.pull._replace(sense=sense))
+    grows = [Given(force * part, None) for part in (0.02, 0.1, 0.25, 0.5, 0.75, 1.0)]
+    try:
+        for reached in finite_forced.march(newton, begin, Given(0.0, None), grows, stop):
+            shape = reached
+    except NotConverged:
+        return _deeper(finger, shape, force, stop)
+    return steady(newton, shape.pull, outline, start=shape, stop=stop)
+
+
+def _deeper(finger: FiniteFinger, shape: Shape, force: float, stop: Callable[[], bool]) -> Shape:
+    """Return settled sliding under `force` [N/mm], looked for by depth from `shape` on. Raises as `settled`."""
+    newton, outline = finger.newton, finger.geometry.whole
+    step = 0.1 * max(shape.pull.depth, 0.1)
+    low = shape
+    for _ in range(SEARCHES):  # deeper until it presses as hard
+        begin = low if low.touching.any() else None
+        high = steady(newton, low.pull._replace(depth=low.pull.depth + step), outline, start=begin, stop=stop)
+        if high.force[1] >= force:
+            break
+        low, step = high, 1.5 * step
+    else:
+        raise NotConverged(f"No depth was found at which the finger presses with {force:.4g} N/mm.")
+    for _ in range(SEARCHES):  # regula falsi, held inside by bisection
+        part = (force - low.force[1]) / (high.force[1] - low.force[1])
+        depth = low.pull.depth + float(np.clip(part, 0.05, 0.95)) * (high.pull.depth - low.pull.depth)
+        found = steady(newton, low.pull._replace(depth=depth), outline, start=high, stop=stop)
+        if abs(found.force[1] / force - 1.0) < MET or high.pull.depth - low.pull.depth < 1e-12:
+            return found
+        low, high = (low, found) if found.force[1] > force else (found, high)
+    raise NotConverged(f"No depth was found at which the finger presses with {force:.4g} N/mm.")
+
+
+def _pull_sliding(scene: Scene) -> Pull:
+    return pull_of(scene)._replace(sense=-(scene.loading.direction or 1))
+
+
+def pull_of(scene: Scene) -> Pull:
+    """Return depth, friction and bound of a scene as what the surface does."""
+    return Pull(scene.loading.depth, float(scene.friction.mu), scene.friction.cap)
+
+
+def course(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool]) -> list[Shape]:
+    """Return the states from first touch to the last settled slide, or to the end of the press or drag."""
+    drag = scene.tangential_force
+    if scene.normal_force is None:
+        for direction in set(scene.loading.directions[:-1]):  # a slide that never settles is refused with its limits
+            steady(finger.newton, pull_of(scene)._replace(sense=-direction), finger.geometry.whole, stop=stop)
+        way = _Driven(scene, finger, stop)
+    else:
+        way = _Forced(scene, scene.normal_force, finger, stop)
+        if drag is not None:
+            way.drag(-scene.loading.direction * drag)
+            return way.shapes
+    for direction in scene.loading.directions:
+        _settle(way, scene, direction)
+    return way.shapes
+
+
+def _settle(way: "_Driven | _Forced", scene: Scene, direction: int) -> None:
+    """Slide until the response does not change any more. Raises NotConverged where it still does."""
+    depth = way.shapes[-1].pull.depth
+    sed = way.finger.sed_ending(way.shapes[-1])
+    for _ in range(int(LONGEST / STRIDE)):
+        way.slide(direction * STRIDE * depth)
+        before, sed = sed, way.finger.sed_ending(way.shapes[-1])
+        if not (way.shapes[-1].state == STICK).any() and abs(sed - before) <= SETTLED * sed:
+            return
+    raise NotConverged(
+        f"After {LONGEST * depth:.3g} mm of sliding at {depth:.3g} mm of indentation and mu = {scene.friction.mu:.3g} "
+        "the response still changes: no settled state was reached."
+    )
+
+
+class _Driven:
+    """A course driven by depth and travel, pressed when made."""
+
+    def __init__(self, scene: Scene, finger: FiniteFinger, stop: Callable[[], bool]) -> None:
+        self.finger, self._stop = finger, stop
+        self._pull = pull_of(scene)
+        pulls = [self._pull._replace(depth=self._pull.depth * (i + 1) / PRESSES) for i in range(PRESSES)]
+        self.shapes = list(march(self.finger.newton, pulls, stop=self._stop))
+
+    def slide(self, distance: float) -> None:
+        """Move the bone by `distance` along +x [mm]."""
+        self._pull = self._pull._replace(travel=self._pull.travel - distance)
+        self.shapes += march(self.finger.newton, [self._pull], self.shapes[-1], stop=self._stop)
+
+
+class _Forced:
+    """A course under a given normal force, and a given travel or drag; pressed when made."""
+
+    def __init__(self, scene: Scene, normal: float, finger: FiniteFinger, stop: Callable[[], bool]) -> None:
+        self.finger, self._stop = finger, stop
+        self._given = Given(0.0, 0.0 if scene.loading.dragged else None)
+        self.shapes = [finite_forced.untouched(finger.newton, float(scene.friction.mu), scene.friction.cap)]
+        self._go([self._given._replace(normal=normal * (i + 1) / PRESSES) for i in range(PRESSES)])
+        del self.shapes[0]
+
+    def _go(self, aims: list[Given]) -> None:
+        self.shapes += finite_forced.march(self.finger.newton, self.shapes[-1], self._given, aims, self._stop)
+        self._given = aims[-1]
+
+    def slide(self, distance: float) -> None:
+        """Move the bone by `distance` along +x [mm]."""
+        self._go([self._given._replace(travel=self._given.travel - distance)])
+
+    def drag(self, pull: float) -> None:
+        """Let the surface's pull along +x grow to `pull` [N/mm]."""
+        self._go([self._given._replace(tangential=pull * (i + 1) / PRESSES) for i in range(PRESSES)])
