@@ -43,7 +43,7 @@ KILLS = 6
 STOPS = 3
 CUTS = 20
 PACE = 20.0  # told seconds a real second
-RUNNING = (0.2, 1.2)  # how long a session runs until it is killed [s]
+RUNNING = (0.2, 1.0)  # how long a session runs until it is killed [s]
 DEADLINE = 40.0  # for a recorder that does not answer [s]
 QUOTA = 4 * 2**20  # [bytes]
 RATE = 7000  # of the made-up readings that fill it [Hz]
@@ -117,6 +117,7 @@ class _Watched:
         self.events: list[LoggedEvent] = []
         self.safe = 0  # readings acknowledged
         self.shown_ns = 0  # when the newest reading shown was received [ns, session clock]
+        self._over = False
         self._waiting: list[Report] = []
 
     def until(self, kind: type[AReport]) -> AReport:
@@ -160,8 +161,10 @@ class _Watched:
                 self.events.append(report)
             case Status(safe=safe):
                 self.safe = max(self.safe, safe.readings)
-            case Live(received_ns=received_ns) if len(received_ns):
+            case Live(received_ns=received_ns) if len(received_ns) and not self._over:
                 self.shown_ns = int(received_ns[-1])
+            case SessionEnded():
+                self._over = True  # what is shown from now on is not recorded
             case _:
                 pass
 
@@ -171,7 +174,7 @@ def _killed(room: Path, chance: random.Random, progress: Progress) -> tuple[Kill
     readings = events = 0
     most_lost = 0.0
     copies: list[Path] = []
-    folder = room / "killed"
+    folder = room / "killed-0"
     for number in range(KILLS):
         progress(0.75 * number / KILLS, f"killing the recorder, {number + 1} of {KILLS}")
         watched = _Watched()
@@ -186,6 +189,8 @@ def _killed(room: Path, chance: random.Random, progress: Progress) -> tuple[Kill
         readings, events = readings + watched.safe, events + len(watched.events)
         copies.append(room / f"copy-{number}")
         shutil.copytree(folder, copies[-1])
+        if recording.end is not None:
+            folder = room / f"killed-{number + 1}"  # this session had come to its end before it was killed
     return Kills(KILLS, readings, events, max(most_lost, 0.0)), copies
 
 

@@ -16,6 +16,7 @@ from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import (
     Connect,
     Device,
+    Failed,
     Gone,
     Live,
     People,
@@ -51,7 +52,7 @@ def told_of(message):
             return {"state": message.state, "readings": message.safe.readings}
         case Sealing():
             return {"state": "sealing"}
-        case Sealed() | Gone():
+        case Sealed() | Gone() | Failed():
             return {"state": "done"}
         case _:
             return {}
@@ -179,8 +180,7 @@ class Killing:
 
     def check(self):
         """Check that what was acknowledged is there, that no more than a second is missing, and where it goes on."""
-        if self.victim == "client":
-            self._wait_for_the_recorder()
+        self._wait_for_the_recorder()  # one that was killed while its disk was busy may still be dying
         try:
             recording = Recording.open(self.folder)
         except RecordingError:
