@@ -279,7 +279,8 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Pred
         checks |= course_audits(finger, way)
         if over_time is not None:  # what the balance of work leaves over is what the tissues took by relaxing
             checks["course_viscous_work"] = checks.pop("course_work_balance")
-        checks["course_against_direct"] = abs(finger.sed_ending(finger.displacement(direct)) / sed - 1.0)
+        if over_time is None or not (contact.state == STICK).any():  # stuck and relaxing, the end depends on the way
+            checks["course_against_direct"] = abs(finger.sed_ending(finger.displacement(direct)) / sed - 1.0)
     left = model(scene.driven(depth), finger, contact, displacement)
     history = None if way is None else _history(scene, finger, way, over_time)
     row = Row(ROW, finger.sed_row(displacement))

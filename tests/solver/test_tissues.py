@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from sessions.toml_file import load_toml
 from solver.fields import fields_of
 from solver.reference import SLIPPERINESS, scene
 from solver.scene import Friction, Loading, Material, Materials, Relaxation, Scene, SceneError, Solve
@@ -63,3 +64,17 @@ def test_laws_that_do_not_fit_are_refused_with_their_key(tissue, kinematics, key
             solve=Solve(kinematics),
         )
     assert refused.value.key == key
+
+
+def test_a_scene_file_may_hold_every_option(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        '[finger]\nbone = "meshed"\ncut = "driven"\nnail_length = 10\n'
+        '[materials.dermis]\nE = 0.08\nnu = 0.48\nlaw = "hooke"\nprony = [{ g = 0.2, tau = 0.07 }]\n'
+        '[friction]\nmu = 0.5\n[loading]\nnormal_force = 1.5\nforce_unit = "N"\nslide = ["+x", "-x"]\n'
+        '[solve]\nevidence = "measured"\n'
+    )
+    read = load_toml(path, Scene)
+    assert read.normal_force == pytest.approx(0.1)
+    assert read.loading.directions == (1, -1)
+    assert read.materials.dermis.prony == (Relaxation(0.2, 0.07),)
