@@ -6,6 +6,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from sessions.analysis.analysis import Analysis
+from sessions.analysis.grading import grading
 from sessions.analysis.scores import ScoreTable, reversed_subjects
 from sessions.analysis.settings import AnalysisSettings
 from sessions.plan import PROXIMAL_TO_DISTAL, Block, Origin
@@ -41,6 +42,8 @@ def people(recording: Recording, tables: Sequence[ScoreTable]) -> tuple[Fact, ..
     ]
     if plan.contact_angle_origin == "measured":
         facts.append(Fact("contact angle", f"{plan.contact_angle:g}°", "measured"))
+    graded = grading(recording.trials)
+    facts += [Fact(f"pre-evaluation of {descriptor}", sentence) for descriptor, sentence in graded.items()]
     if plan.masking:
         facts.append(Fact("masking of sounds", plan.masking))
     return tuple(facts)

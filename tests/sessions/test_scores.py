@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from recordings import begun
 
+from sessions.analysis.grading import grading
 from sessions.analysis.scores import (
     Score,
     ScoreTable,
@@ -170,3 +171,29 @@ def test_answers_that_are_no_scores_on_the_line_are_named_and_never_averaged_wit
     assert table.scores == ()
     assert said in table.left_out
     assert mean_scores([table]) == ()
+
+
+@pytest.mark.parametrize(
+    ("answers", "said"),
+    [
+        ({0: 2.0, 20: 30.0, 50: 55.0}, "the grading holds"),
+        ({0: 2.0, 20: 60.0, 50: 55.0}, "does not hold: 50 was judged no higher than 20"),
+        ({0: 5.0, 20: 5.0}, "does not hold: 20 was judged no higher than 0"),
+        ({0: 5.0}, "too few answers"),
+    ],
+)
+def test_a_pre_evaluation_says_whether_the_makers_grading_holds_and_counts_nowhere_else(tmp_path, answers, said):
+    trials = tuple(
+        Trial(n, "b", Stimulus("d", index, f"K{n}"), 1, 1, "pre-evaluation") for n, index in enumerate(answers, 1)
+    )
+    plan = SessionPlan("made", "S01", 0, "none", (Block("b", "Stroke.", 1, 2.0, ("", ""), trials),), False, Frame())
+    writer = begun(tmp_path / "s", info=None, plan=plan)
+    for n, score in enumerate(answers.values(), 1):
+        writer.event("take_started", n, {"take": 1})
+        writer.event("scored", n, {"score": score})
+        writer.event("take_kept", n, {"take": 1})
+    writer.event("ended", data={"reason": "done"})
+    writer.close()
+    recording = Recording.open(tmp_path / "s")
+    assert said in grading(recording.trials)["d"]
+    assert score_table(recording).scores == ()
