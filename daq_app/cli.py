@@ -25,6 +25,7 @@ VERBS = {
     "solve": "run the solver on a scene file",
     "accuracy": "measure how fast the solver is and how true, on this machine, as one page",
     "report": "write a session's report as one page",
+    "study": "pool many sessions: group statistics, a page, a table of all trials",
     "export": "write a session as CSV, BIDS, HDF5 or NWB",
     "selftest": "pull its own plug on this computer and disk, and write a certificate",
     "simulate": "serve the other end of a wire, to try a driver without hardware",
@@ -41,6 +42,7 @@ _WRONG = (
     "solver.scene.SceneError",
 )
 _FAILED = (
+    "daq_app.pooling.SchedulerError",
     "drivers.transducer.DeviceFault",
     "drivers.transducer.LinkLost",
     "drivers.transducer.SetupError",

@@ -10,7 +10,7 @@ from sessions.plan import SessionPlan
 from sessions.recording import SessionWriter, Setting, provenance
 from sessions.recording.archive import seal
 from sessions.resuming import RESUMABLE
-from sessions.runner import Operator, SessionEnd, Status, run_session
+from sessions.runner import Operator, RunnerSettings, SessionEnd, Status, run_session
 
 
 def conduct(
@@ -22,20 +22,24 @@ def conduct(
     console: Console,
     *,
     settings: Sequence[Setting] = (),
+    run: RunnerSettings | None = None,
+    durable: bool = True,
 ) -> SessionEnd:
     """Run the session into `folder` and seal it, however it ended, unless it can be resumed.
+
+    `durable` as for the writer.
 
     Raises RecordingError when the folder cannot be used or the disk takes no more.
     """
     info = None if transducer is None else transducer.info
     came_from = provenance(clock, settings)
-    writer = SessionWriter.create(folder, plan, info, came_from, subject_simulated=True, clock=clock)
+    writer = SessionWriter.create(folder, plan, info, came_from, subject_simulated=True, clock=clock, durable=durable)
 
     def told(status: Status) -> None:
         done = 0.0 if status.trial is None else (status.trial - 1) / status.trials
         console.progress(done, f"{plan.subject}: {status.state}, {status.safe.readings} readings safe")
 
-    end = run_session(plan, writer, operator, transducer, clock, progress=told)
+    end = run_session(plan, writer, operator, transducer, clock, settings=run, progress=told)
     if end.cause not in RESUMABLE:
         seal(writer.folder)
     return end

@@ -1,6 +1,6 @@
 """A simulated subject: a hand that strokes a surface and a judge who scores it, from a seed. It knows no solver."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,9 @@ class SubjectSettings:
     offset_spread: float = 3.0  # and of where they put the middle
     judgement_noise: float = 4.0  # standard deviation between judgements of the same surface
     friction_weight: float = 0.0  # share of a judgement that follows friction instead of the maker's index [-]
+    drift: float = 0.0  # a judgement rises by so much with each trial of its block
+    carry_over: float = 0.0  # and by this share of how far the index judged before lay above the middle [-]
+    moisture: float = 0.0  # standard deviation between fingers of the logarithm of their friction [-]
 
 
 class SimulatedSubject:
@@ -32,6 +35,11 @@ class SimulatedSubject:
         self._stick = float(draw.uniform(0.4, 0.6))
         self._pace = float(draw.uniform(0.9, 1.1))
         self._slant = float(draw.normal(0.0, 1.5))
+        self._moisture = float(np.exp(draw.normal(0.0, self.settings.moisture)))
+
+    def felt(self, surface: Surface) -> Surface:
+        """Return the surface as this subject's finger rubs on it: the same forces press, others drag."""
+        return replace(surface, mu=surface.mu * self._moisture, tau_max=surface.tau_max * self._moisture)
 
     def stroke(self, surface: Surface, repetition: int = 1) -> Stroke:
         """Return how the subject strokes `surface`: force and speed are the surface's own, the course is personal."""
@@ -52,8 +60,11 @@ class SimulatedSubject:
             across=float(draw.normal(0.0, 1.0)),
         )
 
-    def score(self, surface: Surface, repetition: int = 1) -> float:
-        """Return the score on the line from 0 to 100, in tenths: the mark's position in hundredths of the line."""
+    def score(self, surface: Surface, repetition: int = 1, place: int = 0, before: int | None = None) -> float:
+        """Return the score on the line from 0 to 100, in tenths: the mark's position in hundredths of the line.
+
+        `place` counts the trials of the block before this one, `before` is the index judged last; None: the first.
+        """
         draw = self._draw(surface, repetition, 4)
         settings = self.settings
         # Friction between the paper's extremes, as a score: stickier is more, slipperier is less.
@@ -61,6 +72,7 @@ class SimulatedSubject:
         felt = rubbing if surface.descriptor == "stickiness" else 100.0 - rubbing
         judged = (1.0 - settings.friction_weight) * surface.index + settings.friction_weight * felt
         marked = 50.0 + self._gain * (judged - 50.0) + self._offset + float(draw.normal(0.0, settings.judgement_noise))
+        marked += settings.drift * place + (0.0 if before is None else settings.carry_over * (before - 50))
         return round(min(max(marked, 0.0), 100.0), 1)
 
     def number(self, surface: Surface, repetition: int = 1) -> float:

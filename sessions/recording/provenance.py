@@ -32,13 +32,12 @@ class Setting:
 
 def provenance(clock: Clock, settings: Iterable[Setting] = ()) -> dict[str, Any]:
     """Return what is known of program, machine and clock at this moment, and the settings given."""
-    told = clock.factor != 1.0
     return {
         "created_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "software": software_versions(),
         "machine": machine(),
         "clock": {
-            "kind": "told: faster than the machine's clock" if told else "the machine's monotonic clock",
+            "kind": _kind(clock),
             "factor": clock.factor,
             "now_ns": clock.now_ns(),  # the session clock when created_utc was read
         },
@@ -60,6 +59,12 @@ def without_home(address: str) -> str:
         if len(written) > 1:
             address = address.replace(written, "~")
     return address
+
+
+def _kind(clock: Clock) -> str:
+    if clock.factor == 1.0:
+        return "the machine's monotonic clock"
+    return "told: faster than the machine's clock" if clock.factor else "told: moves when it is waited on"
 
 
 def machine() -> dict[str, Any]:

@@ -74,11 +74,13 @@ class SessionWriter:
         subject_simulated: bool = False,
         clock: Clock | None = None,
         reserve: int = 0,
+        durable: bool = True,
     ) -> Self:
         """Begin a recording in `folder`, which is made, or is empty: nothing is ever written over.
 
         `info` is None for a scores-only visit. `clock` times events and commits (the machine's when None). `reserve`
-        bytes are taken in advance, so that the end can be written on a full disk.
+        bytes are taken in advance, so that the end can be written on a full disk. With `durable` False, for invented
+        sessions only, nothing is waited for until it is on the disk: a power cut may lose all of it.
         Raises RecordingError when the folder holds something or cannot be written.
         """
         simulated = simulated_sentence(info, subject_simulated)
@@ -103,7 +105,7 @@ class SessionWriter:
             ) from error
         connection = sqlite3.connect(path, isolation_level=None)
         try:
-            _prepare(connection, head)
+            _prepare(connection, head, durable=durable)
         except sqlite3.Error as error:
             connection.close()
             release_reserve(folder)
@@ -289,7 +291,7 @@ class SessionWriter:
             raise RecordingError(f"{self._path}: {self._failure}")
 
 
-def _prepare(connection: sqlite3.Connection, head: Mapping[str, str]) -> None:
+def _prepare(connection: sqlite3.Connection, head: Mapping[str, str], *, durable: bool) -> None:
     """Lay out the tables and write the head, in one commit."""
     connection.execute(f"PRAGMA application_id={APPLICATION_ID}")
     _make_durable(connection)
@@ -300,6 +302,8 @@ def _prepare(connection: sqlite3.Connection, head: Mapping[str, str]) -> None:
         connection.execute("INSERT INTO head VALUES (?,?,?,?)", (number, name, value, text_crc(value)))
     connection.execute(f"PRAGMA user_version={FORMAT_VERSION}")
     connection.execute("COMMIT")
+    if not durable:
+        connection.execute("PRAGMA synchronous=OFF")
 
 
 def _make_durable(connection: sqlite3.Connection) -> None:

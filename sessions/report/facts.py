@@ -76,8 +76,10 @@ def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
         Fact("filter", analysis.filtered),
         Fact("interval of µ", analysis.settings.interval_kind),
     ]
-    if clock.get("factor", 1.0) != 1.0:
-        facts.append(Fact("clock", f"told time, {clock['factor']:g} times as fast as the wall clock"))
+    factor = clock.get("factor", 1.0)
+    if factor != 1.0:
+        words = f"{factor:g} times as fast as the wall clock" if factor else "which moves when it is waited on"
+        facts.append(Fact("clock", f"told time, {words}"))
     return tuple(fact for fact in facts if fact.value)
 
 

@@ -1,0 +1,195 @@
+"""Many sessions computed at once, on this computer's cores or a Dask cluster, each kept as soon as it is done."""
+
+import hashlib
+import importlib
+import json
+import multiprocessing
+import os
+import signal
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from daq_app.console import Console
+from sessions.blinding import UNBLINDING
+from sessions.pooling.visit import FORM, Visit, visit_of
+from sessions.prediction import PredictionOptions
+from sessions.recording import Recording
+from sessions.recording.provenance import software_versions
+from sessions.recording.schema import LIVE_FILE
+from sessions.recording.whole_file import write_whole
+
+LOOK = 0.1  # between two looks whether something is done [s]
+CONTENT = (LIVE_FILE, f"{LIVE_FILE}-wal", UNBLINDING)  # all that a visit's numbers come from
+
+Answer = tuple[str, dict[str, Any] | str]  # session, and what it brings or why it brings nothing
+
+
+class SchedulerError(Exception):
+    """The cluster cannot be used: why, and what to do."""
+
+
+class Shelf:
+    """Results by the content they were made of: the same recording, options and versions give the same key."""
+
+    def __init__(self, folder: Path, options: PredictionOptions) -> None:
+        """Keep results in `folder`, which is made when the first comes."""
+        self._folder = folder
+        made = {"form": FORM, "options": asdict(options), "versions": software_versions()}
+        self._made = json.dumps(made, sort_keys=True, default=str).encode()
+
+    def key(self, session: Path) -> str:
+        """Return the SHA-256 over all that a session's result comes from. Raises OSError."""
+        digest = hashlib.sha256(self._made)
+        digest.update(session.name.encode())
+        for name, content in content_of(session).items():
+            digest.update(f"\0{name}\0{len(content)}\0".encode() + content)
+        return digest.hexdigest()
+
+    def found(self, key: str) -> Visit | None:
+        """Return what was kept under a key; None where nothing was, or it is damaged."""
+        with suppress(OSError, ValueError):
+            return Visit.from_dict(json.loads((self._folder / f"{key}.json").read_bytes()))
+        return None
+
+    def keep(self, key: str, result: Mapping[str, Any]) -> None:
+        """Keep a result. Raises OSError."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        text = json.dumps(result, ensure_ascii=False, allow_nan=False)
+        write_whole(self._folder / f"{key}.json", text.encode() + b"\n")
+
+
+def content_of(session: Path) -> dict[str, bytes]:
+    """Return the files of a session that its numbers come from. Raises OSError."""
+    return {name: (session / name).read_bytes() for name in CONTENT if (session / name).is_file()}
+
+
+def visits(
+    folders: Sequence[Path],
+    options: PredictionOptions,
+    shelf: Shelf,
+    console: Console,
+    *,
+    scheduler: str | None = None,
+    workers: int | None = None,
+) -> tuple[list[Visit], list[tuple[str, str]]]:
+    """Return what each session brings, and the name of and the reason for each that brings nothing.
+
+    What is on the shelf already is not computed again; what is done stays there whatever comes. Raises SchedulerError,
+    OSError where the shelf cannot be written.
+    """
+    keys = {folder: shelf.key(folder) for folder in folders}
+    done = [visit for visit in (shelf.found(key) for key in keys.values()) if visit is not None]
+    missing = [folder for folder in folders if shelf.found(keys[folder]) is None]
+    if done:
+        console.note(f"{len(done)} of {len(folders)} sessions were computed before and are taken as they are")
+    failed: list[tuple[str, str]] = []
+    named = {folder.name: keys[folder] for folder in missing}
+    begun = time.monotonic()
+    answers = _local(missing, options, workers) if scheduler is None else _dask(missing, options, scheduler)
+    for count, (name, answer) in enumerate(answers, 1):
+        if isinstance(answer, str):
+            failed.append((name, answer))
+            console.note(f"{name}: {answer}")
+        else:
+            shelf.keep(named[name], answer)
+            done.append(Visit.from_dict(answer))
+        left = (time.monotonic() - begun) / count * (len(missing) - count)
+        console.progress(0.95 * count / len(missing), f"{count} of {len(missing)} sessions, {left:.0f} s left")
+    return done, failed
+
+
+def computed(folder: Path, options: PredictionOptions) -> Answer:
+    """Return what the session in a folder brings; for a worker: nothing is raised."""
+    try:
+        return folder.name, visit_of(Recording.open(folder), options, software_versions()).to_dict()
+    except Exception as error:  # noqa: BLE001  one bad session must not stop the rest
+        sentence = " ".join(str(error).split()) or type(error).__name__
+        return folder.name, sentence.replace(str(folder), folder.name)  # the same wherever it was computed
+
+
+def computed_from(name: str, content: Mapping[str, bytes], options: PredictionOptions) -> Answer:
+    """Return what a session brings whose files were sent: a worker needs no disk in common with us."""
+    with tempfile.TemporaryDirectory() as room:
+        folder = Path(room) / name
+        folder.mkdir()
+        for file, data in content.items():
+            (folder / file).write_bytes(data)
+        return computed(folder, options)
+
+
+def _local(folders: Sequence[Path], options: PredictionOptions, workers: int | None) -> Iterator[Answer]:
+    """Yield answers as they come, from processes of this computer."""
+    if not folders:
+        return
+    left = {folder.name: folder for folder in folders}
+    count = workers or min(os.cpu_count() or 1, len(folders))
+    try:
+        for answer in _in_pool(list(left.values()), options, count):
+            del left[answer[0]]
+            yield answer
+    except BrokenProcessPool:  # a worker died, and nobody knows over which session: each gets a worker of its own
+        for folder in list(left.values()):
+            try:
+                yield from _in_pool([folder], options, 1)
+            except BrokenProcessPool:
+                yield folder.name, "the process that computed it died, perhaps for want of memory"
+
+
+def _in_pool(folders: Sequence[Path], options: PredictionOptions, workers: int) -> Iterator[Answer]:
+    # Threads of the linear algebra would change the last bits, and cost more than they bring at these sizes.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    fresh = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(workers, mp_context=fresh, initializer=_quiet)
+    try:
+        waiting: set[Future[Answer]] = {pool.submit(computed, folder, options) for folder in folders}
+        while waiting:
+            ready, waiting = wait(waiting, LOOK, FIRST_COMPLETED)
+            for future in ready:
+                yield future.result()
+        pool.shutdown()
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in multiprocessing.active_children():
+            process.terminate()
+        raise
+
+
+def _quiet() -> None:
+    """Leave Ctrl-C to the process that was asked to stop."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _dask(folders: Sequence[Path], options: PredictionOptions, address: str) -> Iterator[Answer]:
+    """Yield answers as they come, from the workers of a cluster."""
+    try:
+        library: Any = importlib.import_module("distributed")
+    except ImportError as error:
+        raise SchedulerError("a cluster needs the package distributed: pip install 'daq-app[cluster]'") from error
+    try:
+        client: Any = library.Client(address, timeout=10, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise SchedulerError(
+            f"{address}: no Dask scheduler answers there ({error}); start one, or give no address"
+        ) from error
+    futures: list[Any] = []
+    try:
+        names: dict[Any, str] = {}
+        for folder in folders:
+            future = client.submit(computed_from, folder.name, content_of(folder), options, pure=False, retries=1)
+            futures.append(future)
+            names[future.key] = folder.name
+        for future in library.as_completed(futures):
+            if future.status == "finished":
+                yield future.result()
+            else:
+                yield names[future.key], f"no worker could compute it ({future.exception()})"
+    finally:
+        client.cancel(futures)
+        client.close()

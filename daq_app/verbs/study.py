@@ -1,0 +1,112 @@
+"""Pool many sessions: each analysed and predicted, group statistics, a page, and a table of all trials.
+
+Results are kept by the content they were made of, in OUT/results: what was computed once is not computed again, and
+Ctrl-C loses nothing that was done. A session that cannot be read is named and left out. Subjects are left out by
+decisions in FOLDER/exclusions.toml ([[exclude]] subject, why, who, and descriptor for one alone).
+With --synthetic a study of ten simulated subjects is made first, and what was planted is held against what is found.
+"""
+
+import argparse
+import json
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from daq_app.cli import WrongValue
+from daq_app.console import Console
+from daq_app.pooling import Shelf, visits
+from sessions.pooling.exclusions import exclusions_in
+from sessions.pooling.pooled import StudyFindings, pooled
+from sessions.prediction import PredictionOptions
+from sessions.recording import RecordingError
+from sessions.recording.schema import LIVE_FILE
+from sessions.recording.whole_file import write_json
+
+EXAMPLE = "daq-app study recordings --out results"
+PLANTED = "planted.json"
+LARGEST_SEED = 10_000_000
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the folder of sessions, or the seed of a synthetic study."""
+    parser.add_argument("folder", type=Path, nargs="?", metavar="FOLDER", help="holds a folder for each session")
+    parser.add_argument("--synthetic", type=int, metavar="SEED", help="make a study of ten simulated subjects instead")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="page, table and results (FOLDER/pooled); with --synthetic the study too",
+    )
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
+    parser.add_argument("--workers", type=int, metavar="N", help="processes on this computer (as many as cores)")
+    parser.add_argument(
+        "--tau", choices=["computed", "as-printed"], default="computed", help="as for 'daq-app predict'"
+    )
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Pool the study, write page, table and numbers, and print what it says in short."""
+    folder, out = _places(options, console)
+    sessions = sorted(path.parent for path in folder.glob(f"*/{LIVE_FILE}"))
+    if not sessions:
+        raise RecordingError(f"{folder} holds no session: give the folder that holds a folder for each of them")
+    asked = PredictionOptions(tau_reading=options.tau, course="steady")
+    shelf = Shelf(out / "results", asked)
+    done, failed = visits(sessions, asked, shelf, console, scheduler=options.scheduler, workers=options.workers)
+    planted = folder / PLANTED
+    truth: dict[str, Any] | None = json.loads(planted.read_bytes()) if planted.is_file() else None
+    study = pooled(done, failed, exclusions_in(folder), truth)
+    console.progress(0.97, "writing the page")
+    files = _write(study, folder.resolve().name, out)
+    console.result({**files, "study": study.to_dict() | {"visits": [visit.session for visit in study.visits]}})
+    _print(study, files, console)
+    flawed = any(row.flaws for visit in study.visits for row in visit.rows) or any(v.losses for v in study.visits)
+    return 3 if failed or flawed else 0
+
+
+def _places(options: argparse.Namespace, console: Console) -> tuple[Path, Path]:
+    """Return where the sessions lie and where the result goes; makes the synthetic study where one is asked for."""
+    if (options.folder is None) == (options.synthetic is None):
+        raise WrongValue("give a FOLDER of sessions, or --synthetic SEED, and not both")
+    if options.workers is not None and options.workers < 1:
+        raise WrongValue(f"--workers {options.workers} is not allowed: 1 or more")
+    if options.synthetic is None:
+        return options.folder, options.out or options.folder / "pooled"
+    if not 0 <= options.synthetic <= LARGEST_SEED:
+        raise WrongValue(f"--synthetic {options.synthetic} is not allowed: a whole number from 0 to {LARGEST_SEED}")
+    from daq_app.synthetic import synthetic_study  # simulators are loaded only where they are asked for
+
+    folder = options.out or Path("synthetic-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
+    synthetic_study(folder, options.synthetic, console)
+    return folder, folder / "pooled"
+
+
+def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
+    """Write page, table and numbers and return where they are."""
+    # Imported here: drawing is slow to load.
+    from sessions.exports.html import swap_in
+    from sessions.exports.study_page import study_page
+    from sessions.exports.study_tables import trials_csv
+
+    files = {"page": out / "study.html", "table": out / "trials.csv", "numbers": out / "study.json"}
+    swap_in(files["page"], study_page(study, name))
+    swap_in(files["table"], trials_csv(study))
+    write_json(files["numbers"], study.to_dict())
+    return {what: str(path) for what, path in files.items()}
+
+
+def _print(study: StudyFindings, files: dict[str, str], console: Console) -> None:
+    from sessions.exports.study_page import excluded, summary
+
+    if study.simulated:
+        console.say(study.simulated)
+    for sentence in (*summary(study), *excluded(study)):
+        console.say(sentence)
+    for one in study.effects:
+        inside = "inside" if one.covered else "OUTSIDE"
+        console.say(
+            f"planted {one.descriptor}, {one.effect}: {one.planted:g}, found {one.found:.3g} "
+            f"({one.low:.3g} to {one.high:.3g}): {inside}"
+        )
+    for what, path in files.items():
+        console.say(f"{what:8}  {path}")

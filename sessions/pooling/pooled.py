@@ -1,0 +1,242 @@
+"""What the visits of a study say together: means, agreement, and how predictions go with scores. Plain data."""
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from sessions.analysis.mixed import MixedModel, mixed_model
+from sessions.analysis.scores import (
+    MeanScore,
+    Relation,
+    Score,
+    ScoreTable,
+    mean_scores,
+    relation,
+    reversed_subjects,
+    score_matrix,
+)
+from sessions.analysis.within import (
+    Agreement,
+    RepeatedCorrelation,
+    WithinMean,
+    agreement,
+    repeated_correlation,
+    within_means,
+)
+from sessions.pooling.exclusions import Exclusion, decided
+from sessions.pooling.visit import TrialRow, Visit
+
+SED = "SED [kPa]"
+INDEX = "index − 50"
+DRIFT = "trials before in the block"
+CARRY_OVER = "index stroked before − 50"
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceMean:
+    """Means over subjects of one surface; None where there is no subject's."""
+
+    index: int
+    subjects: int  # whose stroke gave an SED
+    mu: float | None
+    sed: float | None  # [MPa]
+    sed_sd: float | None  # between subjects [MPa]
+
+
+@dataclass(frozen=True, slots=True)
+class DescriptorFindings:
+    """All that a study says of one descriptor."""
+
+    descriptor: str
+    indices: tuple[int, ...]
+    scores: tuple[MeanScore, ...]
+    within: tuple[WithinMean, ...]
+    agreement: Agreement | None
+    surfaces: tuple[SurfaceMean, ...]
+    answers: Mapping[str, tuple[float | None, ...]]  # subject -> score of each index
+    points: tuple[tuple[str, int, float, float], ...]  # subject, index, SED [MPa], score: all of its own strokes
+    mean_relation: Relation | None  # mean SED [MPa] against mean score
+    repeated: RepeatedCorrelation | None  # of a subject's scores with the SEDs of its own strokes
+    on_sed: MixedModel | None  # score on SED [kPa], drift and carry-over
+    on_index: MixedModel | None  # score on the maker's index, drift and carry-over
+
+
+@dataclass(frozen=True, slots=True)
+class Recovered:
+    """One planted effect beside what the study found."""
+
+    descriptor: str
+    effect: str
+    planted: float
+    found: float
+    low: float
+    high: float
+
+    @property
+    def covered(self) -> bool:
+        """Say whether the interval holds what was planted."""
+        return self.low <= self.planted <= self.high
+
+
+@dataclass(frozen=True, slots=True)
+class PlantedFriction:
+    """How friction of all strokes was recovered."""
+
+    strokes: int  # with a planted and a found mu
+    median_error: float  # of mu, relative [-]
+    worst_error: float
+    intervals: int  # of mu that are given
+    covered: int  # of them hold what was planted
+
+
+@dataclass(frozen=True, slots=True)
+class StudyFindings:
+    """The result of a study."""
+
+    simulated: str
+    visits: tuple[Visit, ...]  # all that were read, those left out too
+    failed: tuple[tuple[str, str], ...]  # folder, why it could not be read
+    excluded: tuple[Exclusion, ...]
+    reversed: tuple[tuple[str, str, float], ...]  # subject, descriptor, r of score with index: still counted
+    descriptors: tuple[DescriptorFindings, ...]
+    effects: tuple[Recovered, ...]  # planted, where the study is synthetic
+    friction: PlantedFriction | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {**({"simulated": self.simulated} if self.simulated else {}), **asdict(self)}
+
+
+def pooled(
+    visits: Sequence[Visit],
+    failed: Sequence[tuple[str, str]] = (),
+    exclusions: tuple[Exclusion, ...] = (),
+    planted: Mapping[str, Any] | None = None,
+) -> StudyFindings:
+    """Return what the visits say together; they count in the order of their names, whoever read them first.
+
+    `planted` is what a synthetic study tells of itself: handed in, used for nothing but the comparison.
+    """
+    ordered = tuple(sorted(visits, key=lambda visit: visit.session))
+    kept = [(v, row) for v in ordered for row in v.rows if decided(exclusions, v.subject, row.descriptor) is None]
+    tables = [_table(visit, [row for v, row in kept if v is visit]) for visit in ordered]
+    found = tuple(
+        _descriptor(name, tables, [(v, row) for v, row in kept if row.descriptor == name])
+        for name in dict.fromkeys(row.descriptor for _, row in kept)
+    )
+    return StudyFindings(
+        simulated=_simulated(ordered),
+        visits=ordered,
+        failed=tuple(sorted(failed)),
+        excluded=exclusions,
+        reversed=reversed_subjects(tables),
+        descriptors=found,
+        effects=() if planted is None else _recovered(found, planted["score"]),
+        friction=None if planted is None else _friction(ordered, planted["strokes"]),
+    )
+
+
+def _simulated(visits: Sequence[Visit]) -> str:
+    made_up = sum(bool(visit.simulated) for visit in visits)
+    if not made_up:
+        return ""
+    return f"SIMULATED: {made_up} of the {len(visits)} sessions of this study are simulated"
+
+
+def _table(visit: Visit, rows: Sequence[TrialRow]) -> ScoreTable:
+    scores = tuple(Score(visit.subject, row.descriptor, row.index, row.score) for row in rows if row.score is not None)
+    return ScoreTable(visit.session, visit.subject, bool(visit.simulated), scores)
+
+
+def _descriptor(
+    name: str, tables: Sequence[ScoreTable], trials: Sequence[tuple[Visit, TrialRow]]
+) -> DescriptorFindings:
+    indices = tuple(sorted({row.index for _, row in trials}))
+    means = tuple(mean for mean in mean_scores(tables) if mean.descriptor == name)
+    matrix = score_matrix(tables, name)
+    surfaces = tuple(_surface(index, [(v, r) for v, r in trials if r.index == index]) for index in indices)
+    points = [(v.subject, r, r.sed, r.score) for v, r in trials if r.sed is not None and r.score is not None]
+    scored = [(v.subject, r, r.score) for v, r in trials if r.score is not None]
+    score_of = {mean.index: mean.mean for mean in means}
+    both = [s for s in surfaces if s.sed is not None and s.index in score_of]
+    return DescriptorFindings(
+        descriptor=name,
+        indices=indices,
+        scores=means,
+        within=within_means(matrix),
+        agreement=agreement(matrix),
+        surfaces=surfaces,
+        answers={subject: tuple(row.get(index) for index in indices) for subject, row in matrix.items()},
+        points=tuple((subject, row.index, sed, score) for subject, row, sed, score in points),
+        mean_relation=relation([s.sed or 0.0 for s in both], [score_of[s.index] for s in both], [s.index for s in both])
+        if both
+        else None,
+        repeated=repeated_correlation([p[0] for p in points], [p[2] for p in points], [p[3] for p in points]),
+        on_sed=_model([p[0] for p in points], [p[1] for p in points], [p[3] for p in points], SED),
+        on_index=_model([p[0] for p in scored], [p[1] for p in scored], [p[2] for p in scored], INDEX),
+    )
+
+
+def _model(subjects: Sequence[str], rows: Sequence[TrialRow], scores: Sequence[float], what: str) -> MixedModel | None:
+    """Return the mixed model of scores on SED or index, with drift and carry-over; None where they say too little."""
+    if len(set(subjects)) < 3:
+        return None
+    x = [1e3 * (row.sed or 0.0) if what == SED else row.index - 50.0 for row in rows]
+    order = {
+        DRIFT: [float(row.place) for row in rows],
+        CARRY_OVER: [0.0 if row.before is None else row.before - 50.0 for row in rows],
+    }
+    varied = {name: values for name, values in order.items() if np.ptp(values) > 0.0}
+    return mixed_model(subjects, scores, {what: x, **varied}, slopes_differ=True)
+
+
+def _surface(index: int, trials: Sequence[tuple[Visit, TrialRow]]) -> SurfaceMean:
+    """Return means over subjects, each subject's own repeats averaged first."""
+    mus, seds = (
+        _by_subject([(v.subject, getattr(row, name)) for v, row in trials if getattr(row, name) is not None])
+        for name in ("mu", "sed")
+    )
+    return SurfaceMean(
+        index,
+        len(seds),
+        float(np.mean(mus)) if mus else None,
+        float(np.mean(seds)) if seds else None,
+        float(np.std(seds, ddof=1)) if len(seds) > 1 else None,
+    )
+
+
+def _by_subject(values: Sequence[tuple[str, float]]) -> list[float]:
+    own: defaultdict[str, list[float]] = defaultdict(list)
+    for subject, value in values:
+        own[subject].append(value)
+    return [float(np.mean(all_of)) for all_of in own.values()]
+
+
+def _recovered(found: Sequence[DescriptorFindings], score: Mapping[str, float]) -> tuple[Recovered, ...]:
+    """Return the planted effects on scores beside what the mixed model on the index finds."""
+    effects = {INDEX: score["gain"], DRIFT: score["drift"], CARRY_OVER: score["carry_over"]}
+    return tuple(
+        Recovered(one.descriptor, term.name, effects[term.name], term.estimate, term.low, term.high)
+        for one in found
+        if one.on_index is not None
+        for term in one.on_index.terms
+        if term.name in effects
+    )
+
+
+def _friction(visits: Sequence[Visit], strokes: Sequence[Mapping[str, Any]]) -> PlantedFriction | None:
+    truth = {(stroke["subject"], stroke["trial"]): float(stroke["mu"]) for stroke in strokes}
+    found = [
+        (row, truth[visit.subject, row.trial])
+        for visit in visits
+        for row in visit.rows
+        if row.mu is not None and (visit.subject, row.trial) in truth
+    ]
+    if not found:
+        return None
+    errors = [abs((row.mu or 0.0) / mu - 1.0) for row, mu in found]
+    held = [row.mu_low <= mu <= row.mu_high for row, mu in found if row.mu_low is not None and row.mu_high is not None]
+    return PlantedFriction(len(found), float(np.median(errors)), max(errors), len(held), sum(held))

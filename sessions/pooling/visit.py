@@ -1,0 +1,152 @@
+"""One session's contribution to a study: a row a trial, with scores, friction and prediction side by side."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import msgspec
+
+from sessions.analysis import Analysis, analyse
+from sessions.blinding import revealed
+from sessions.plan import Block
+from sessions.prediction import PredictionOptions, SessionPrediction, predict
+from sessions.recording import Recording
+from sessions.recording.log import TrialRecord
+
+FORM = 1  # raised when a row holds something else: what was stored before is then computed anew
+
+
+@dataclass(frozen=True, slots=True)
+class TrialRow:
+    """One trial. None where there is no number; `why` says why no SED."""
+
+    trial: int
+    block: str
+    descriptor: str
+    index: int
+    code: str
+    direction: int  # as planned
+    repetition: int
+    place: int  # trials of the block before this one
+    before: int | None  # index stroked just before, in the same block
+    outcome: str
+    score: float | None
+    rule: str = ""  # which mu the model got
+    mu: float | None = None
+    mu_low: float | None = None
+    mu_high: float | None = None
+    mu_dynamic: float | None = None
+    mu_static: float | None = None
+    tau_max: float | None = None  # [MPa]
+    speed: float | None = None  # [mm/s]
+    normal_force: float | None = None  # [N]
+    sed: float | None = None  # [MPa]
+    error_estimate: float | None = None  # relative, of sed
+    model_normal_force: float | None = None  # [N]
+    matching_depth: float | None = None  # [mm]
+    flaws: tuple[str, ...] = ()
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Visit:
+    """What one session brings."""
+
+    session: str  # its folder's name
+    subject: str
+    protocol: str
+    simulated: str  # the sentence that heads whatever is made of it; "" for a real one
+    forces: bool
+    complete: bool
+    rows: tuple[TrialRow, ...]
+    losses: tuple[str, ...]
+    made_by: Mapping[str, str]  # versions
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return asdict(self)
+
+    @staticmethod
+    def from_dict(data: Mapping[str, Any]) -> "Visit":
+        """Return the visit that `to_dict` gave `data` for. Raises ValueError where it is none."""
+        return msgspec.convert(data, Visit)
+
+
+def visit_of(recording: Recording, options: PredictionOptions, made_by: Mapping[str, str]) -> Visit:
+    """Return what a session brings to a study: analysed, and predicted where it has forces.
+
+    Raises Blinded while the stimuli's key is sealed, RecordingError where the session cannot be read.
+    """
+    known = revealed(recording)
+    analysis = analyse(known)
+    prediction = predict(analysis, known.plan, options) if known.plan.forces else None
+    records = {record.trial.number: record for record in known.trials}
+    rows = tuple(
+        _row(block, place, records[trial.number], analysis, prediction)
+        for block in known.plan.blocks
+        if block.phase == "main"
+        for place, trial in enumerate(block.trials)
+    )
+    end = known.end
+    return Visit(
+        session=known.folder.name,
+        subject=known.plan.subject,
+        protocol=known.plan.protocol,
+        simulated=known.simulated_sentence or "",
+        forces=known.plan.forces,
+        complete=end is not None and bool(end.get("complete")),
+        rows=rows,
+        losses=(*known.losses, *known.flaws),
+        made_by=dict(made_by),
+    )
+
+
+def _row(
+    block: Block, place: int, record: TrialRecord, analysis: Analysis, prediction: SessionPrediction | None
+) -> TrialRow:
+    trial = record.trial
+    row = TrialRow(
+        trial=trial.number,
+        block=block.name,
+        descriptor=trial.stimulus.descriptor,
+        index=trial.stimulus.known_index,
+        code=trial.stimulus.code,
+        direction=trial.direction,
+        repetition=trial.repetition,
+        place=place,
+        before=block.trials[place - 1].stimulus.known_index if place else None,
+        outcome=record.outcome,
+        score=record.score,
+    )
+    told = {flaw.name: None for flaw in analysis.flaws if flaw.trial == trial.number and flaw.grade != "note"}
+    flaws = tuple(str(name) for name in told)
+    friction = next((one for one in analysis.friction if one.trial == trial.number), None)
+    stroke = next((one for one in analysis.strokes if one.trial == trial.number), None)
+    if friction is None or stroke is None:
+        missing = "No stroke was found in this trial." if prediction is not None else "The visit recorded no forces."
+        return replace(row, flaws=flaws, why=missing)
+    low, high = friction.mu_interval or (None, None)
+    row = replace(
+        row,
+        rule=friction.rule,
+        mu=friction.mu,
+        mu_low=low,
+        mu_high=high,
+        mu_dynamic=stroke.mu_dynamic,
+        mu_static=stroke.mu_static,
+        tau_max=friction.tau_max,
+        speed=friction.speed,
+        normal_force=stroke.normal_force,
+        flaws=flaws,
+    )
+    answer = None if prediction is None else next((p for p in prediction.trials if p.trial == trial.number), None)
+    if answer is None:
+        return row
+    return replace(
+        row,
+        sed=answer.sed,
+        error_estimate=answer.error_estimate,
+        model_normal_force=answer.normal_force,
+        matching_depth=answer.matching_depth,
+        why=answer.reasons.get("sed", ""),
+    )

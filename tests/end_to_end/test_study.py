@@ -1,0 +1,131 @@
+"""A synthetic study from its seed to its page: made, computed once, spoilt parts named, the same wherever computed."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from daq_app import pooling
+from daq_app.cli import run
+from daq_app.console import Console
+from daq_app.pooling import Shelf, computed, computed_from, content_of, visits
+from daq_app.synthetic import synthetic_study
+from sessions.pooling.visit import Visit
+from sessions.prediction import PredictionOptions
+
+STEADY = PredictionOptions(course="steady")
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study") / "small"
+    synthetic_study(folder, 1, Console(as_json=True), subjects=2)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def pool(study):
+    """Return the numbers of the study, computed by two processes."""
+    assert run(["study", str(study), "--workers", "2", "--json"]) == 3
+    return json.loads((study / "pooled" / "study.json").read_bytes())
+
+
+def rows(pool, subject):
+    return {row["trial"]: row for v in pool["visits"] if v["subject"] == subject for row in v["rows"]}
+
+
+def test_the_damaged_session_is_named_and_stops_nothing(pool):
+    assert [name for name, _ in pool["failed"]] == ["S11"]
+    assert [visit["session"] for visit in pool["visits"]] == ["S01", "S02"]
+
+
+def test_readings_lost_in_one_stroke_withhold_its_numbers_and_no_others(pool):
+    found = rows(pool, "S02")
+    assert found[3]["flaws"] == ["lost_readings"]
+    assert found[3]["sed"] is None
+    assert all(row["sed"] is not None for trial, row in found.items() if trial != 3)
+
+
+def test_friction_comes_back_as_planted_but_for_the_calibration(pool, study):
+    planted = json.loads((study / "planted.json").read_bytes())["strokes"]
+    truth = {(stroke["subject"], stroke["trial"]): stroke["mu"] for stroke in planted}
+    for visit in pool["visits"]:
+        for row in visit["rows"]:
+            if row["mu"] is not None:  # each axis' gain is planted with a standard deviation of 1 %
+                assert row["mu"] == pytest.approx(truth[visit["subject"], row["trial"]], rel=0.05)
+
+
+def test_what_was_computed_once_is_not_computed_again(pool, study, monkeypatch):
+    def never(*_):
+        raise AssertionError("a session was computed again")
+
+    monkeypatch.setattr(pooling, "_in_pool", never)
+    done, failed = visits(
+        [study / "S01", study / "S02"], STEADY, Shelf(study / "pooled" / "results", STEADY), Console(as_json=True)
+    )
+    assert not failed
+    assert {visit.session for visit in done} == {visit["session"] for visit in pool["visits"]}
+
+
+def test_another_recording_or_other_options_are_another_key(study):
+    shelf = Shelf(study, STEADY)
+    assert shelf.key(study / "S01") != shelf.key(study / "S02")
+    assert shelf.key(study / "S01") != Shelf(study, PredictionOptions(tau_reading="as-printed")).key(study / "S01")
+
+
+def test_a_session_whose_files_are_sent_gives_the_same_bits_as_one_on_the_disk(pool, study):
+    name, here = computed(study / "S01", STEADY)
+    assert computed_from(name, content_of(study / "S01"), STEADY) == (name, here)
+    stored = next(visit for visit in pool["visits"] if visit["session"] == "S01")
+    assert json.loads(json.dumps(here)) == stored  # and the same in this process as in another
+
+
+def test_a_worker_that_dies_costs_its_own_session_alone(study, tmp_path, monkeypatch):
+    def dying(folders, *_):
+        for folder in folders:
+            if folder.name == "S02":
+                raise pooling.BrokenProcessPool
+            yield computed(folder, STEADY)
+
+    monkeypatch.setattr(pooling, "_in_pool", dying)
+    done, failed = visits([study / "S02", study / "S01"], STEADY, Shelf(tmp_path, STEADY), Console(as_json=True))
+    assert [visit.session for visit in done] == ["S01"]
+    assert [name for name, _ in failed] == ["S02"]
+
+
+def test_a_study_is_refused_in_a_sentence_where_there_is_none(tmp_path, capsys):
+    assert run(["study", str(tmp_path)]) == 1
+    assert "holds no session" in capsys.readouterr().err
+    assert run(["study"]) == 2
+    assert run(["study", str(tmp_path), "--synthetic", "1"]) == 2
+
+
+@pytest.mark.slow
+def test_a_dask_cluster_gives_the_same_bits_as_this_computer(study, tmp_path):
+    import distributed
+
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        far, _ = visits(
+            [study / "S01", study / "S02"],
+            STEADY,
+            Shelf(tmp_path, STEADY),
+            Console(as_json=True),
+            scheduler=cluster.scheduler_address,
+        )
+    here = [Visit.from_dict(json.loads(json.dumps(computed(study / name, STEADY)[1]))) for name in ("S01", "S02")]
+    assert sorted(far, key=lambda visit: visit.session) == here
+
+
+@pytest.mark.slow
+def test_the_whole_synthetic_study_names_everything_that_was_spoilt(tmp_path):
+    folder = tmp_path / "study"
+    assert run(["study", "--synthetic", "3", "--out", str(folder), "--json"]) == 3
+    pool = json.loads((folder / "pooled" / "study.json").read_bytes())
+    assert rows(pool, "S02")[3]["flaws"] == ["lost_readings"]
+    assert "frozen_sensor" in rows(pool, "S04")[6]["flaws"]
+    assert "too_little_force" in rows(pool, "S05")[2]["flaws"]
+    assert rows(pool, "S06")[8]["outcome"] == "not answered"
+    assert not next(visit for visit in pool["visits"] if visit["subject"] == "S09")["complete"]
+    assert [name for name, _ in pool["failed"]] == ["S11"]
+    assert "S07" in Path(folder / "pooled" / "study.html").read_text()
+    assert pool["friction"]["strokes"] >= 90

@@ -1,0 +1,134 @@
+"""Visits pooled: who counts, what is compared with what, and the table of trials as others read it."""
+
+import csv
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sessions.exports.study_page import study_page
+from sessions.exports.study_tables import trials_csv
+from sessions.pooling.exclusions import Exclusion, exclusions_in
+from sessions.pooling.pooled import CARRY_OVER, DRIFT, INDEX, pooled
+from sessions.pooling.visit import TrialRow, Visit
+from sessions.toml_file import SettingsError
+
+INDICES = (0, 20, 50, 80, 100)
+
+
+def visit(number, *, gain=0.8, noise=3.0, sed=lambda index: 0.008 + 1e-5 * index, simulated=""):
+    rng = np.random.default_rng(number)
+    level, order = rng.normal(0.0, 5.0), rng.permutation(INDICES).tolist()
+    rows = [
+        TrialRow(
+            trial=place + 1,
+            block="stickiness",
+            descriptor="stickiness",
+            index=index,
+            code=f"K{index}",
+            direction=1,
+            repetition=1,
+            place=place,
+            before=order[place - 1] if place else None,
+            outcome="scored",
+            score=50.0 + level + gain * (index - 50) + 0.4 * place + noise * rng.normal(),
+            mu=0.4,
+            sed=None if sed is None else sed(index) * (1.0 + 0.01 * rng.normal()),
+        )
+        for place, index in enumerate(order)
+    ]
+    return Visit(f"S{number:02d}", f"S{number:02d}", "p", simulated, sed is not None, True, tuple(rows), (), {})
+
+
+VISITS = [visit(number) for number in range(1, 11)]
+
+
+def test_the_order_in_which_visits_come_changes_no_bit():
+    assert pooled(VISITS) == pooled(VISITS[::-1])
+
+
+def test_a_visit_survives_its_way_through_plain_data():
+    assert Visit.from_dict(VISITS[0].to_dict()) == VISITS[0]
+
+
+def test_planted_gain_drift_and_carry_over_stand_beside_what_is_found():
+    planted = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": []}
+    found = {one.effect: one for one in pooled(VISITS, planted=planted).effects}
+    assert set(found) == {INDEX, DRIFT, CARRY_OVER}
+    assert found[INDEX].found == pytest.approx(0.8, abs=0.05)
+    assert found[INDEX].covered
+
+
+def test_a_decision_leaves_a_subject_out_of_every_number_and_is_told():
+    out = (Exclusion("S03", "asked to", "the experimenter"),)
+    with_it, without = pooled(VISITS, exclusions=out), pooled([v for v in VISITS if v.subject != "S03"])
+    assert with_it.descriptors == without.descriptors
+    assert len(with_it.visits) == 10
+    assert "asked to" in study_page(with_it, "x")
+
+
+def test_scores_that_fall_with_the_index_are_doubted_and_kept():
+    found = pooled([*VISITS[:9], visit(10, gain=-0.8)])
+    assert [(subject, descriptor) for subject, descriptor, _ in found.reversed] == [("S10", "stickiness")]
+    assert found.descriptors[0].scores[0].n == 10
+
+
+def test_visits_that_only_scored_give_means_and_no_relation():
+    found = pooled([visit(number, sed=None) for number in range(1, 5)]).descriptors[0]
+    assert found.mean_relation is None
+    assert found.repeated is None
+    assert found.on_sed is None
+    assert [mean.n for mean in found.scores] == [4] * 5
+
+
+def test_repeats_of_one_subject_are_averaged_and_make_no_subjects():
+    again = replace(visit(1), session="S01-again")
+    assert all(mean.n == 1 for mean in pooled([visit(1), again]).descriptors[0].scores)
+
+
+def test_the_table_has_one_line_of_heads_and_numbers_to_the_last_bit():
+    rows = list(csv.DictReader(io.StringIO(trials_csv(pooled(VISITS)))))
+    assert len(rows) == 50
+    assert float(rows[0]["sed_MPa"]) == VISITS[0].rows[0].sed
+    assert rows[0]["speed_mm_per_s"] == ""
+    assert trials_csv(pooled([visit(1, simulated="SIMULATED: s")])).startswith("SIMULATED,")
+
+
+def test_a_simulated_study_says_so_at_the_head_of_its_page():
+    page = study_page(pooled([*VISITS[:2], visit(3, simulated="SIMULATED: s")]), "x")
+    assert page.splitlines()[1].startswith("<!-- SIMULATED: 1 of the 3 sessions")
+
+
+def test_decisions_are_read_from_their_file_and_a_wrong_one_is_named(tmp_path):
+    assert exclusions_in(tmp_path) == ()
+    path = tmp_path / "exclusions.toml"
+    path.write_text('[[exclude]]\nsubject = "S1"\nwhy = "ill"\nwho = "me"\n')
+    assert exclusions_in(tmp_path) == (Exclusion("S1", "ill", "me"),)
+    path.write_text('[[exclude]]\nsubject = "S1"\nwhy = "ill"\n')
+    with pytest.raises(SettingsError, match="who"):
+        exclusions_in(tmp_path)
+
+
+def covering(repeats):
+    """Return how often each interval held what was planted, gains differing between subjects."""
+    held = dict.fromkeys((INDEX, DRIFT, CARRY_OVER, "mean"), 0)
+    planted = {"score": {"gain": 0.75, "drift": 0.4, "carry_over": 0.0}, "strokes": []}
+    for repeat in range(repeats):
+        rng = np.random.default_rng([repeat, 1])
+        gains = rng.normal(0.75, 0.05, 10)
+        found = pooled(
+            [visit(1000 + 10 * repeat + k, gain=gain, noise=4.0, sed=None) for k, gain in enumerate(gains)],
+            planted=planted,
+        )
+        for one in found.effects:
+            held[one.effect] += one.covered
+        middle = found.descriptors[0].scores[2]  # of index 50, whose planted mean is 50 and the drift of 2 trials
+        held["mean"] += middle.low <= 50.8 <= middle.high
+    return held
+
+
+@pytest.mark.slow
+def test_intervals_of_planted_effects_cover_them_90_to_98_times_in_a_hundred():
+    for effect, held in covering(400).items():
+        assert 0.90 <= held / 400 <= 0.985, (effect, held)
