@@ -12,6 +12,7 @@ import json
 import sys
 from argparse import ArgumentParser
 from pathlib import Path
+from time import process_time
 
 from daq_app.accuracy.measuring import measured, restored
 from daq_app.accuracy.page import write
@@ -41,7 +42,7 @@ def main() -> int:
     """Measure, write the page to --out and the tables into the document."""
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("accuracy"), help="folder of page, pictures and data")
-    parser.add_argument("--seconds", type=float, help="more time than daq-app accuracy takes, for a busy machine")
+    parser.add_argument("--seconds", type=float, help="of processor time, however long they take on a busy machine")
     parser.add_argument("--data", type=Path, metavar="accuracy.json", help="tables and pictures of a run made before")
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("subjects", nargs="*", choices=[[], *(subject.name for subject in SUBJECTS)], default=[])
@@ -49,7 +50,7 @@ def main() -> int:
     console = Console(as_json=False)
     if asked.subjects:
         chosen = [subject for subject in SUBJECTS if subject.name in {"truth", "targets", *asked.subjects}]
-        found = measured(asked.quick, console.progress, chosen, asked.seconds)
+        found = measured(asked.quick, console.progress, chosen, asked.seconds, process_time)
         for name, made in tables(found).items():
             if name != "truths" or "truth" in asked.subjects:
                 print(f"\n{made.caption}\n\n{made.markdown()}")
@@ -57,7 +58,7 @@ def main() -> int:
     if asked.data:
         found = restored(json.loads(asked.data.read_text(encoding="utf-8")))
     else:
-        found = measured(asked.quick, console.progress, seconds=asked.seconds)
+        found = measured(asked.quick, console.progress, seconds=asked.seconds, clock=process_time)
     write(found, asked.out)
     made = tables(found)
     text = DOCUMENT.read_text(encoding="utf-8")

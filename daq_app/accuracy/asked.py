@@ -27,15 +27,16 @@ class LeftOut:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """How much may be measured. `until` is an instant of `perf_counter` after which nothing new is begun."""
+    """How much may be measured. `until` is an instant of the clock `now` after which nothing new is begun."""
 
     quick: bool
     until: float
+    now: Callable[[], float] = perf_counter
 
     @property
     def left(self) -> float:
         """Seconds left; below 0 when time is over."""
-        return self.until - perf_counter()
+        return self.until - self.now()
 
     def pick(self, full: Iterable[Kind], quick: Iterable[Kind]) -> list[Kind]:
         """Return what a full or a quick run measures."""

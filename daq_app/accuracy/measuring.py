@@ -89,12 +89,16 @@ def restored(document: dict[str, Any]) -> Measured:
 
 
 def measured(
-    quick: bool, progress: Progress, subjects: Sequence[Subject] = SUBJECTS, seconds: float | None = None
-) -> Measured:
-    """Return what the subjects find. Ctrl-C ends the measuring and keeps what was found until then."""
+    quick: bool, progress: Progress, subjects: Sequence[Subject] = SUBJECTS, seconds: float | None = None,
+    clock: Callable[[], float] = perf_counter,
+) -> Measured:  # fmt: skip
+    """Return what the subjects find. Ctrl-C ends the measuring and keeps what was found until then.
+
+    `seconds` of `clock` are there for all: with one of processor time a busy machine measures as much as a quiet one.
+    """
     begun = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     loaded(progress)  # before the clock starts: the first run ever compiles what later ones load
-    start = perf_counter()
+    start = clock()
     end = start + (seconds or (QUICK_S if quick else FULL_S))
     found = Found()
     rows: dict[str, tuple[DataclassInstance, ...]] = {}
@@ -106,12 +110,12 @@ def measured(
             left_out.append(f"Stopped before: {subject.told}.")
             continue
         part = _share(subject, quick) / max(sum(_share(s, quick) for s in subjects[number:]), 1e-9)
-        now = perf_counter()
-        asked = Asked(quick, now + max(end - now, 0.0) * part)
+        now = clock()
+        asked = Asked(quick, now + max(end - now, 0.0) * part, clock)
         mine: list[DataclassInstance] = []
         try:
             for row in subject.measure(asked, found):
-                progress(min((perf_counter() - start) / (end - start), 0.99), subject.told)
+                progress(min((clock() - start) / (end - start), 0.99), subject.told)
                 if isinstance(row, LeftOut):
                     left_out.append(row.told)
                 else:
@@ -122,7 +126,7 @@ def measured(
             left_out.append(f"Stopped during: {subject.told}.")
         except (SolveFailure, ContactLost, ArithmeticError, ValueError) as failure:
             left_out.append(f"{subject.told.capitalize()} broke off: {failure}")
-        rows[subject.name], took[subject.name] = tuple(mine), perf_counter() - now
+        rows[subject.name], took[subject.name] = tuple(mine), clock() - now
     return Measured(begun, quick, stopped, took, rows, tuple(left_out))
 
 

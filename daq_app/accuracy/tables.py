@@ -188,8 +188,9 @@ def costs(found: Measured) -> Table:
 def starts(found: Measured) -> Table:
     """Return cold starts."""
     rows: list[Cold] = found.of(Cold)
-    cells = [(row.what, str(row.runs), _ms(row.took_s)) for row in rows]
-    return Table("starts", "Processes from start to end.", ("process", "runs", "median [ms]"), tuple(cells))
+    cells = [(row.what, str(row.runs), _ms(row.took_s), _ms(row.passed_s)) for row in rows]
+    header = ("process", "runs", "processor time [ms]", "time that passed [ms]")
+    return Table("starts", "Processes from start to end, medians.", header, tuple(cells))
 
 
 def orders(found: Measured) -> Table:
