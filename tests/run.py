@@ -18,9 +18,11 @@ STATIC = [
     ("imports go one way", ["lint-imports", "--no-cache"]),
     ("types agree (strict)", ["basedpyright", "--level", "error", *PACKAGES]),
 ]
-QUICK = [("every sentence a test proves", ["pytest", "-n", "2", "-m", "not slow and not hardware"])]
+# A file's tests stay together, so that what they share is made once.
+PARALLEL = ["pytest", "-n", "2", "--dist", "loadfile"]
+QUICK = [("every sentence a test proves", [*PARALLEL, "-m", "not slow and not hardware"])]
 LONG = [
-    ("every slow sentence about the solver", ["pytest", "-n", "2", "-m", "slow", "tests/solver", "tests/daq_app"]),
+    ("every slow sentence about the solver", [*PARALLEL, "-m", "slow", "tests/solver", "tests/daq_app"]),
     ("the endurance runs", ["pytest", "-s", "-m", "slow", "tests/endurance"]),
 ]
 

@@ -12,7 +12,7 @@ from simulators.net_ft_box import NetFtBox
 @pytest.fixture
 def box():
     """Return a function that starts a networked box, by default told that time runs ten times as fast."""
-    boxes = []
+    boxes, before = [], set(threading.enumerate())
 
     def started(bench=None, *, clock=None, **settings):
         boxes.append(NetFtBox(bench or Bench(1), clock or PacedClock(10.0), **settings))
@@ -22,5 +22,5 @@ def box():
     yield started
     for one in boxes:
         one.close()
-    left = [t.name for t in threading.enumerate() if t is not threading.main_thread() and "execnet" not in repr(t)]
+    left = [thread.name for thread in set(threading.enumerate()) - before]
     assert not left, f"threads left running: {left}"

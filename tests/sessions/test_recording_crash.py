@@ -33,16 +33,34 @@ def forked(work):
     return process, reading
 
 
-def reported(reading):
-    """Return everything reported in whole lines."""
+def killed(process, reading, events, later):
+    """Kill a process `later` seconds after it said that so many events are safe, or ended; return all it reported."""
+    said = b""
+    while (more := os.read(reading, 65536)) and _safe_events(said := said + more) < events:
+        pass
+    time.sleep(later)
+    kill(process)
     with os.fdopen(reading, "rb") as pipe:
-        lines = pipe.read().split(b"\n")[:-1]
-    return [json.loads(line) for line in lines]
+        return _lines(said + pipe.read())
 
 
 def kill(process):
     os.kill(process, signal.SIGKILL)
     os.waitpid(process, 0)
+
+
+def reported(reading):
+    """Return everything reported in whole lines."""
+    with os.fdopen(reading, "rb") as pipe:
+        return _lines(pipe.read())
+
+
+def _lines(said):
+    return [json.loads(line) for line in said.split(b"\n")[:-1]]
+
+
+def _safe_events(said):
+    return max((line[1] for line in _lines(said) if len(line) == 2), default=-1)
 
 
 def test_nothing_acknowledged_is_lost_when_the_writer_is_killed_and_when_its_log_is_cut_as_well(tmp_path):
@@ -61,9 +79,8 @@ def test_nothing_acknowledged_is_lost_when_the_writer_is_killed_and_when_its_log
                 report(safe.readings, safe.events)
 
         process, reading = forked(write)
-        time.sleep(chance.uniform(0.02, 0.15))
-        kill(process)
-        safe_readings, safe_events = (reported(reading) or [[0, 0]])[-1]
+        said = killed(process, reading, chance.randrange(-1, 60), chance.uniform(0.0, 0.005))
+        safe_readings, safe_events = (said or [[0, 0]])[-1]
         most = max(most, safe_readings)
         if safe_events == 0 and not (folder / "session.sqlite").exists():
             continue
@@ -103,10 +120,8 @@ def test_a_session_killed_at_any_moment_leaves_a_beginning_of_the_whole_session(
             session.run(progress=lambda status: report(status.safe.readings, status.safe.events))
 
         process, reading = forked(work)
-        os.read(reading, 10)
-        time.sleep(chance.uniform(0.0, 0.12))
-        kill(process)
-        safe = [line for line in reported(reading) if len(line) == 2]
+        said = killed(process, reading, chance.randrange(-1, len(whole.events)), chance.uniform(0.0, 0.005))
+        safe = [line for line in said if len(line) == 2]
         recording = Recording.open(folder)
         events = recording.events
         lengths.add(len(events))

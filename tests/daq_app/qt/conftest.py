@@ -83,9 +83,9 @@ def application(tmp_path_factory):
     return QApplication.instance() or QApplication([])
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def one_window(application):
-    """One window for all tests: a session that is over leaves it as it was."""
+    """One window for all tests of a file: a session that is over leaves it as it was."""
     window = opened(application, lambda: Recorder.start(pace=PACE))
     window.resize(1440, 900)
     window.show()
