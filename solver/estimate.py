@@ -19,7 +19,7 @@ from solver.scene import Scene
 FINENESS = {"small": (5, 6, 8, 10, 12, 16, 20, 24), "finite": (6, 10, 12, 16, 20, 24)}  # meshes that can be asked for
 DEFAULT = {"small": 8, "finite": 10}
 FROM_MESHES = {"small": 0.15, "finite": 0.3}
-FROM_FINENESS = {"small": 0.1, "finite": 0.15}
+FROM_FINENESS = {"small": 0.07, "finite": 0.15}
 FROM_BOUND = 0.2  # of an element that touches
 
 
