@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.analysis import AnalysisSettings, FlawName
+from sessions.analysis import AnalysisSettings, FlawName, FrictionParameters
 from sessions.analysis.analysis import analyse_blocks
 from sessions.analysis.flaws import Flaw
 from sessions.analysis.stroke import Stroke
@@ -51,6 +51,8 @@ class Quality:
     interval: tuple[float, float] | None
     speed: float | None  # [mm/s]
     fell: float | None  # by what share N fell from the first to the last quarter of the steady window [-]
+    friction: FrictionParameters | None = None  # that the model is to get
+    normal_force: float | None = None  # mean over the steady window [N]
 
 
 def stroke_quality(
@@ -86,6 +88,8 @@ def stroke_quality(
         stroke.mu_dynamic_interval,
         stroke.speed,
         fell,
+        analysis.friction[0],
+        stroke.normal_force,
     )
 
 

@@ -21,6 +21,9 @@ class Stepper(Protocol):
     (True, True)
     """
 
+    mu: float  # coefficient of friction, taken anew with every reading [-]
+    tau: float  # traction bound, likewise [MPa]
+
     @property
     def depth(self) -> float:
         """Indentation found [mm]."""

@@ -9,12 +9,14 @@ from typing import Protocol
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from daq_app.live_feed import LiveFeed
+from daq_app.live_model import Settle
+from daq_app.live_model_process import LiveModel
 from daq_app.recorder import messages as m
 from daq_app.recorder.messages import REQUESTS, Report, Request
 from daq_app.state import AppState, fold
 from daq_app.take_watch import Judge
 from daq_app.view import View, derive_view
-from daq_app.window_messages import DrawingFailed, Loaded, Message, Tick
+from daq_app.window_messages import DrawingFailed, Judged, Loaded, Message, Tick
 from sessions.plan import Frame
 
 FRAME = 16  # between two looks at the recorder [ms]: 60 a second
@@ -62,6 +64,7 @@ class Bridge(QObject):
         self.state = fold(AppState(), Tick(clock()))
         self.view: View = derive_view(self.state)
         self.feed = LiveFeed()
+        self.model = LiveModel()
         self.session_offset = 0.0  # session clock minus this machine's [s]
         self._timer = QTimer(self)
         self._timer.setInterval(FRAME)
@@ -80,11 +83,13 @@ class Bridge(QObject):
         """Look at the recorder from now on."""
         self._timer.start()
         QTimer.singleShot(AFTER_OPENING, self._judge.prepare)
+        QTimer.singleShot(AFTER_OPENING, self.model.prepare)
 
     def end(self) -> None:
         """Stop looking, and let the recorder end; a session in hand can be resumed."""
         self._timer.stop()
         self._judge.close()
+        self.model.close()
         if self.recording:
             self._client.leave()
         else:
@@ -117,7 +122,9 @@ class Bridge(QObject):
             self._take(report)
         with suppress(Empty):
             while True:
-                self._fold(self._from_threads.get_nowait())
+                self._fold(message := self._from_threads.get_nowait())
+                if isinstance(message, Judged):
+                    self._settle(message)
         self._show()
         self.frame.emit()
 
@@ -131,18 +138,28 @@ class Bridge(QObject):
         match report:
             case m.Live():
                 self._fold(Loaded(self.feed.add(report, self._frame())))
+                self.model.add(report, self._frame())
                 self._judge.look(self.feed, self.state)
                 return
             case m.Device(info):
                 self.feed.device(info)
             case m.NoDevice():
                 self.feed.device(None)
-            case m.SessionBegun(clock_offset_ns=offset):
+            case m.SessionBegun(plan=plan, clock_offset_ns=offset):
                 self.session_offset = offset * 1e-9
+                self.model.follow(plan)
             case _:
                 pass
         self._fold(report)
         self._judge.heard(report, self.feed)
+
+    def _settle(self, judged: Judged) -> None:
+        """Ask for the full solve of a stroke that was looked at."""
+        session, quality = self.state.session, judged.quality
+        if session is None or quality.friction is None or quality.steady is None or quality.normal_force is None:
+            return
+        asked = Settle(judged.trial, session.plan, quality.friction, quality.normal_force, quality.steady)
+        self.model.settle(asked)
 
     def _fold(self, message: Message) -> None:
         self.state = fold(self.state, message)

@@ -9,14 +9,18 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QLabel, QSizePol
 
 from daq_app.course_state import Mark
 from daq_app.live_feed import LiveFeed
+from daq_app.live_model_process import LiveModel
 from daq_app.live_trace import CHANNELS
 from daq_app.plot_scale import PlotScale
 from daq_app.qt.contact_map import ContactMap
 from daq_app.qt.curve import Curve
 from daq_app.qt.parts import button, choice, label, say
-from daq_app.qt.tokens import FX, FY, GRID, MU, N, T, Tokens
+from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, N, T, Tokens
+from daq_app.view_model import CHANNELS as MODEL_CHANNELS
+from daq_app.view_model import ModelTrace, model_words
 
 if TYPE_CHECKING:
+    from daq_app.qt.finger_view import FingerView
     from daq_app.qt.live_plot import LivePlot
 
 LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
@@ -37,18 +41,24 @@ AXES = (
         PlotScale(-50.0, 50.0, 100.0),
     ),
 )
+SED = ("SED [kPa], model", (Curve("SED", MODEL),), PlotScale(0.0, 5.0, 5.0))
+LEAST_FOR_MODEL = 430  # a lower panel shows what is measured alone
 READ = (("N", "N", 2, N), ("T", "N", 2, T), ("mu", "", 2, MU), ("speed", "mm/s", 0, ""))
 
 
 class LivePanel(QFrame):
     """The middle of the experimenter's window."""
 
-    def __init__(self, feed: LiveFeed, tokens: Tokens, scale: float) -> None:
-        """Show what `feed` holds; nothing yet."""
+    def __init__(self, feed: LiveFeed, model: LiveModel, tokens: Tokens, scale: float) -> None:
+        """Show what `feed` holds and what `model` says; nothing yet."""
         super().__init__()
         self.setProperty("role", "panel")
         self.setAccessibleName("live readings")
         self._feed = feed
+        self._model = model
+        self._model_trace = ModelTrace()
+        self._model_plot: LivePlot | None = None
+        self.finger: FingerView | None = None
         self._seconds = 10
         self._held: float | None = None  # device time the picture is held at; readings go on behind it
         self._read_at = 0.0
@@ -72,10 +82,10 @@ class LivePanel(QFrame):
         self._side = QWidget()
         self._side.setLayout(side)
         side.setContentsMargins(0, 0, 0, 0)
-        grid.addWidget(self._side, 0, 1, 3, 1)
+        grid.addWidget(self._side, 0, 1, 4, 1)
         grid.setColumnStretch(0, 5)
         grid.setColumnStretch(1, 3)
-        for row, stretch in enumerate((3, 2, 2)):
+        for row, stretch in enumerate((3, 2, 2, 2)):
             grid.setRowStretch(row, stretch)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(GRID, GRID, GRID, GRID)
@@ -90,10 +100,15 @@ class LivePanel(QFrame):
 
     def build(self) -> None:
         """Make the plots: they take longer to load than all else together, so the window stands before them."""
+        from daq_app.qt.finger_view import FingerView
         from daq_app.qt.live_plot import LivePlot
 
         if self.plots:
             return
+        self._model_plot = LivePlot(*SED, self._tokens, self._scale, MODEL_CHANNELS)
+        self._grid.addWidget(self._model_plot, 3, 0)
+        self.finger = FingerView(self._tokens, self._scale)
+        self._side_layout.insertWidget(0, self.finger, 5)
         self.plots = [LivePlot(*plot, self._tokens, self._scale) for plot in (*PLOTS, *AXES)]
         for row, plot in enumerate(self.plots[:3]):
             self._grid.addWidget(plot, row, 0)
@@ -116,8 +131,9 @@ class LivePanel(QFrame):
         """Follow another theme."""
         self._tokens = tokens
         self.map.set_tokens(tokens)
-        for plot in self.plots:
-            plot.set_tokens(tokens)
+        for part in (*self.plots, self._model_plot, self.finger):
+            if part is not None:
+                part.set_tokens(tokens)
 
     def show_side(self, shown: bool) -> None:
         """Show or fold the six axes and the sample, where there is little room."""
@@ -134,8 +150,9 @@ class LivePanel(QFrame):
     def show_seconds(self, seconds: int) -> None:
         """Show the last so many seconds."""
         self._seconds = seconds
-        for plot in self.plots:
-            plot.show_seconds(seconds)
+        for plot in (*self.plots, self._model_plot):
+            if plot is not None:
+                plot.show_seconds(seconds)
         self.length.setCurrentIndex(LENGTHS.index(seconds))
 
     def change_length(self, by: int) -> None:
@@ -168,9 +185,30 @@ class LivePanel(QFrame):
         if self.map.isVisible():
             _, values = trace.between(now - TRAIL, np.nextafter(now, np.inf))
             self.map.show_trail(values[CHANNELS.index("x") : CHANNELS.index("y") + 1].T)
+        self._draw_model(now, clock)
         if clock - self._read_at >= READ_EVERY:
             self._read_at = clock
             self._read(now)
+
+    def model_says(self) -> None:
+        """Take what the model said since the last call."""
+        for said in self._model.poll():
+            self._model_trace.add(said)
+
+    def _draw_model(self, now: float, clock: float) -> None:
+        """Draw what the model says: of the last stroke once it was solved in full, or else of this moment."""
+        if self._model_plot is not None and self._model_plot.isVisible():
+            columns = self._model_trace.columns(now - self._seconds, now)
+            self._model_plot.show_columns(columns, now, (), clock)
+        if self.finger is None or not self.finger.isVisible() or self.holding:
+            return
+        model = self._model
+        words = model_words(model.said, model.settled, model.problem)
+        shown = model.settled if model.settled is not None and model.settled.picture is not None else model.said
+        if shown is None:
+            self.finger.show_model(None, np.empty(0), words, clock)
+        else:
+            self.finger.show_model(shown.picture, shown.row, words, clock)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802  Qt's name
         """Take the room there is."""
@@ -189,6 +227,11 @@ class LivePanel(QFrame):
         for plot in self.plots[2:3]:
             plot.setVisible(room)
         self._grid.setRowStretch(2, 2 if room else 0)
+        roomy = self.height() >= LEAST_FOR_MODEL
+        for part in (self._model_plot, self.finger):
+            if part is not None:
+                part.setVisible(roomy)
+        self._grid.setRowStretch(3, 2 if roomy else 0)
 
     def _bar(self, scale: float) -> QHBoxLayout:
         """Return the row above the plots: numbers that are read, and what is shown."""

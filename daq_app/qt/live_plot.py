@@ -24,9 +24,18 @@ LEAST_FOR_HALVES = 100  # a lower plot has numbers at its ends alone
 class LivePlot(QWidget):
     """A plot whose time axis stands still: 0 is now."""
 
-    def __init__(self, name: str, curves: Sequence[Curve], scale: PlotScale, tokens: Tokens, type_scale: float) -> None:
-        """Show nothing yet."""
+    def __init__(
+        self,
+        name: str,
+        curves: Sequence[Curve],
+        scale: PlotScale,
+        tokens: Tokens,
+        type_scale: float,
+        channels: Sequence[str] = CHANNELS,
+    ) -> None:
+        """Show nothing yet; `channels` names the rows of what will be shown."""
         super().__init__()
+        self._channels = tuple(channels)
         self._curves = tuple(curves)
         self._scale = scale
         self._tokens = tokens
@@ -86,7 +95,7 @@ class LivePlot(QWidget):
         time = columns.time - now
         least, greatest = np.inf, -np.inf
         for curve, made in zip(self._curves, self._items, strict=True):
-            values = columns.values[CHANNELS.index(curve.channel)]
+            values = columns.values[self._channels.index(curve.channel)]
             known = np.isfinite(values)
             if known.any():
                 least, greatest = min(least, float(values[known].min())), max(greatest, float(values[known].max()))

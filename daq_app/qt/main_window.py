@@ -64,7 +64,7 @@ class MainWindow(QMainWindow):
         self.to_do = ToDo(tokens, self._primary)
         self.page = NewSessionPage(scale, bridge.send)
         self.course = CoursePanel(scale, bridge.send)
-        self.live = LivePanel(bridge.feed, tokens, scale)
+        self.live = LivePanel(bridge.feed, bridge.model, tokens, scale)
         self.bench = BenchPanel(tokens, scale, bridge.send, self._search)
         self.strip = BenchStrip(tokens, scale, self._fold_bench)
         self.stroke = label("No stroke yet.", wrap=True)
@@ -280,6 +280,7 @@ class MainWindow(QMainWindow):
     def _draw(self) -> None:
         session = self.bridge.state.session
         try:
+            self.live.model_says()
             self.live.draw(() if session is None else session.marks, self.bridge.state.now)
         except Exception as error:  # noqa: BLE001  an error while drawing never stops a recording
             self.bridge.drawing_failed(error)

@@ -1,0 +1,136 @@
+"""The live model's words: measured forces to it, and from it the SED at the receptor with a picture. No solver here."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.recorder.messages import Live
+from sessions.analysis import FrictionParameters
+from sessions.analysis.forces import in_face_frame
+from sessions.plan import Frame, SessionPlan
+
+Array = NDArray[np.float64]
+Kinematics = Literal["small", "finite"]
+
+STEP = 0.005  # readings within so long are one step of the model [s]: 200 a second
+
+
+@dataclass(frozen=True, slots=True)
+class Use:
+    """Follow the finger of this plan from now on; without one, the published finger."""
+
+    plan: SessionPlan | None
+    kinematics: Kinematics
+
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """The finger is made; `problem` says why there is none."""
+
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Forces:
+    """Measured forces, n of them, at most 200 a second."""
+
+    time: Array  # (n,) [s, device time]
+    normal: Array  # (n,) [N], positive when pressing
+    pull: Array  # (n,) of the surface on the finger along +x [N]
+    received_ns: int  # when the newest reached the computer [ns, session clock]
+    stream: int  # grows where time begins anew
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """A finger as it is drawn: the surface is y = 0."""
+
+    nodes: Array  # (n, 2) [mm]
+    faces: NDArray[np.int64]  # (f, 3 or 4); none where only the outline is known
+    sed: Array  # (f,) [MPa]
+    outline: Array  # (w, 2) deformed skin [mm]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Provisional:
+    """What the model says now, of one batch of forces."""
+
+    time: Array  # (n,) [s, device time]
+    sed: Array  # (n,) at the receptor [MPa]; 0 where nothing touches, nan beyond the model's reach
+    row: Array  # (r,) along the skin at the receptor's depth, at `solver.receptor.ROW` [MPa]
+    picture: Picture
+    depth: float  # of the bone, below first touch [mm]
+    mu: float  # taken so far [-]
+    kinematics: Kinematics
+    received_ns: int
+    stream: int
+
+    @property
+    def beyond(self) -> bool:
+        """Say whether the newest forces are beyond the model's reach."""
+        return bool(np.isnan(self.sed[-1]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Settle:
+    """Asks for the full solve of a stroke, to replace what was provisional."""
+
+    trial: int
+    plan: SessionPlan
+    friction: FrictionParameters
+    normal_force: float  # mean over the steady window [N]
+    steady: tuple[float, float]  # over which the provisional value is averaged [s, device time]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Settled:
+    """The full solve of a stroke, beside what was shown while it was made."""
+
+    trial: int
+    sed: float | None  # [MPa]; None where `reason` says why
+    error: float | None  # its estimated relative error [-]
+    provisional: float | None  # mean over the steady window of what was shown [MPa]; None where nothing was
+    row: Array  # (r,) [MPa]
+    picture: Picture | None
+    depth: float | None  # [mm]
+    reason: str = ""
+
+    @property
+    def difference(self) -> float | None:
+        """Return by which part of the full solve the provisional value is larger [-]; None where one is missing.
+
+        >>> Settled(1, 0.004, 0.01, 0.005, np.empty(0), None, 2.0).difference
+        0.25
+        """
+        if not self.sed or self.provisional is None:
+            return None
+        return float(f"{self.provisional / self.sed - 1.0:.6g}")
+
+
+def forces_of(live: Live, frame: Frame) -> Forces | None:
+    """Return the forces of a message, means of the healthy readings in each step; None where there is none."""
+    healthy = live.status == 0
+    if not healthy.any():
+        return None
+    wrench = in_face_frame(live.wrench[healthy], frame)
+    time = live.time[healthy]
+    rows = np.column_stack([time, wrench[:, :3]])
+    starts = np.flatnonzero(np.diff(np.floor(time / STEP), prepend=-np.inf) > 0)
+    mean = np.add.reduceat(rows, starts, axis=0) / np.diff(starts, append=len(rows))[:, None]
+    tangential = np.hypot(mean[:, 1], mean[:, 2])
+    # The finger pushes the stimulus along Fx; the stimulus pulls it back.
+    pull = -np.copysign(tangential, mean[:, 1])
+    return Forces(mean[:, 0], -mean[:, 3], pull, int(live.received_ns[-1]), live.stream)
+
+
+def joined(batches: list[Forces]) -> Forces:
+    """Return several batches of one stream as one."""
+    return Forces(
+        np.concatenate([b.time for b in batches]),
+        np.concatenate([b.normal for b in batches]),
+        np.concatenate([b.pull for b in batches]),
+        batches[-1].received_ns,
+        batches[-1].stream,
+    )

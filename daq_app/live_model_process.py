@@ -1,0 +1,154 @@
+"""The live model's own process, and its client in the window: one batch is under way at a time, nothing ever waits."""
+
+import signal
+from contextlib import suppress
+from multiprocessing import get_context
+from multiprocessing.process import BaseProcess
+from typing import Any
+
+from daq_app.live_model import Forces, Kinematics, Provisional, Ready, Settle, Settled, Use, forces_of, joined
+from daq_app.recorder.messages import Live
+from sessions.plan import Frame, SessionPlan
+
+Connection = Any  # one end of a pipe; its type is another one on each system
+WAITING = 2.0  # forces older than so long are dropped, where the model does not keep up [s]
+
+
+def run(connection: Connection) -> None:
+    """Serve the window until it is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the window decides when this ends
+    # Loaded in the process alone: the window has no need of the solver, and opens sooner without it.
+    from daq_app.live_follower import Follower
+    from solver.grid import MeshError
+    from solver.scene import SceneError
+
+    follower: Follower | None = None
+    with suppress(EOFError, OSError):
+        while True:
+            match connection.recv():
+                case Use() as use:
+                    try:
+                        follower, problem = Follower(use), ""
+                    except (SceneError, MeshError) as error:
+                        follower, problem = None, str(error)
+                    connection.send(Ready(problem))
+                case Forces() as forces if follower is not None:
+                    connection.send(follower.take(forces))
+                case Settle() as asked if follower is not None:
+                    connection.send(follower.settle(asked))
+                case _:
+                    connection.send(Ready("no finger to follow"))
+
+
+class LiveModel:
+    """The live model as the window sees it. `add` and `poll` never wait for it."""
+
+    def __init__(self) -> None:
+        """Start nothing yet."""
+        self.said: Provisional | None = None  # the newest
+        self.settled: Settled | None = None  # of the last stroke; None again once another begins
+        self.problem = ""  # why nothing is said; empty where all is well
+        self.predictions = 0  # that came so far
+        self._news: list[Provisional] = []
+        self._process: BaseProcess | None = None
+        self._connection: Connection | None = None
+        self._under_way = 0
+        self._waiting: list[Forces] = []
+        self._asked: list[Use | Settle] = []
+        self._plan: SessionPlan | None = None
+        self._kinematics: Kinematics = "small"
+
+    def prepare(self) -> None:
+        """Start the process; it follows the published finger until a plan tells of another."""
+        if self._process is not None:
+            return
+        context = get_context("spawn")
+        ours, theirs = context.Pipe()
+        self._process = context.Process(target=run, args=(theirs,), daemon=True, name="live model")
+        self._process.start()
+        theirs.close()
+        self._connection, self._under_way, self.problem = ours, 0, ""
+        self._use()
+
+    def close(self) -> None:
+        """Let it end."""
+        if self._connection is not None:
+            self._connection.close()
+        if self._process is not None:
+            self._process.terminate()
+        self._process = self._connection = None
+
+    def follow(self, plan: SessionPlan | None, kinematics: Kinematics | None = None) -> None:
+        """Follow the finger of another plan, or in another kinematics."""
+        self._plan = plan
+        self._kinematics = kinematics or self._kinematics
+        self.settled = None
+        if self._process is None and self.problem:
+            self.prepare()  # one that has ended gets another chance with the next session
+        elif self._process is not None:
+            self._use()
+
+    @property
+    def kinematics(self) -> Kinematics:
+        """Return the kinematics that is asked for."""
+        return self._kinematics
+
+    def add(self, live: Live, frame: Frame) -> None:
+        """Take readings."""
+        if self._connection is None:
+            return
+        forces = forces_of(live, frame)
+        if forces is None:
+            return
+        if self._waiting and self._waiting[-1].stream != forces.stream:
+            self._waiting.clear()
+        self._waiting.append(forces)
+        while forces.time[-1] - self._waiting[0].time[0] > WAITING:
+            self._waiting.pop(0)
+
+    def settle(self, asked: Settle) -> None:
+        """Ask for the full solve of a stroke."""
+        if self._connection is not None:
+            self._asked.append(asked)
+
+    def poll(self) -> tuple[Provisional, ...]:
+        """Take what came, and send what waits; return the predictions that are new."""
+        if self._connection is None:
+            return ()
+        self._news = []
+        try:
+            while self._connection.poll():
+                self._under_way -= 1
+                self._heard(self._connection.recv())
+            if not self._under_way:
+                self._send(self._connection)
+        except (EOFError, OSError):
+            self.close()
+            self.problem = "the live model has stopped; it starts again with the next session"
+        return tuple(self._news)
+
+    def _heard(self, message: Ready | Provisional | Settled) -> None:
+        match message:
+            case Ready(problem):
+                self.problem = problem
+            case Provisional():
+                self.said = message
+                self._news.append(message)
+                self.predictions += 1
+                if message.sed[-1] > 0.0:
+                    self.settled = None
+            case Settled():
+                self.settled = message
+
+    def _send(self, connection: Connection) -> None:
+        if self._asked:
+            connection.send(self._asked.pop(0))
+        elif self._waiting and not self.problem:
+            connection.send(joined(self._waiting))
+            self._waiting = []
+        else:
+            return
+        self._under_way = 1
+
+    def _use(self) -> None:
+        self._asked = [Use(self._plan, self._kinematics)]

@@ -1,0 +1,161 @@
+"""The live model says of measured forces what the full solve says of the settled stroke."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from daq_app.live_follower import Follower, settled_scene
+from daq_app.live_model import Forces, Provisional, Settle, Settled, Use, forces_of, joined
+from daq_app.live_model_process import LiveModel
+from daq_app.recorder.messages import Live
+from daq_app.view_model import ModelTrace, model_words
+from sessions.analysis import FrictionParameters
+from sessions.plan import Frame
+from sessions.protocols import plan, protocol
+from solver.solution import solve
+
+PLAN = plan(protocol("sensotact-friction"), "S01", 3, frame=Frame("-z", "set", 20.0, "set"))
+MU, NORMAL, AREA = 0.6, 2.0, PLAN.contact_area
+FRICTION = FrictionParameters(1, MU, None, MU * NORMAL / AREA, AREA, 20.0, 1, "maximum", ())
+NOTHING = (0.0,) * 6
+FRAME = Frame("-z", "set", 20.0, "set")
+
+
+def stroke(seconds=2.0, rate=200):
+    """Return readings of a press to NORMAL within half a second, a pull within another, then sliding towards +x."""
+    time_ = np.arange(int(seconds * rate)) / rate
+    normal = NORMAL * np.minimum(time_ / 0.5, 1.0)
+    tangential = MU * normal * np.clip((time_ - 0.5) / 0.5, 0.0, 1.0)
+    wrench = np.zeros((len(time_), 6))
+    wrench[:, 0], wrench[:, 2] = tangential, -normal
+    return live(time_, wrench)
+
+
+def live(time_, wrench, status=None, stream=1):
+    number = np.arange(len(time_))
+    status = np.zeros(len(time_), np.int64) if status is None else status
+    return Live(stream, number, time_, number * 5_000_000, wrench, status, NOTHING)
+
+
+@pytest.fixture(scope="module")
+def follower():
+    return Follower(Use(PLAN, "small"))
+
+
+def test_sliding_forces_lead_to_the_sed_of_the_full_solve(follower):
+    said = follower.take(forces_of(stroke(), FRAME))
+    found = solve(settled_scene(PLAN, FRICTION, NORMAL))
+    assert said.sed[-1] == pytest.approx(found.sed_ending, rel=0.02)  # what the stepper's mesh is good to
+    assert said.depth == pytest.approx(found.indentation, rel=0.02)
+    assert said.mu == pytest.approx(MU, rel=1e-9)
+    assert np.nanmax(np.abs(said.row - found.row.sed)) < 0.04 * np.nanmax(found.row.sed)
+
+
+def test_the_picture_holds_the_energy_that_the_row_tells(follower):
+    said = follower.take(forces_of(stroke(), FRAME))
+    middles = said.picture.nodes[said.picture.faces].mean(axis=1)
+    here = np.argmin(np.hypot(*(middles - [0.5, 0.6]).T))
+    assert 0.1 * said.sed[-1] < said.picture.sed[here] < 10 * said.sed[-1]
+    assert said.picture.outline[:, 1].min() == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_lifted_finger_forgets_the_friction_of_the_touch_before(follower):
+    follower.take(forces_of(stroke(), FRAME))
+    lifted = follower.take(Forces(np.array([5.0]), np.array([0.0]), np.array([0.0]), 0, 1))
+    assert lifted.sed[-1] == 0.0
+    assert lifted.mu < MU
+
+
+def test_forces_beyond_its_reach_are_marked_and_the_next_touch_is_followed_again(follower):
+    far = follower.take(Forces(np.array([6.0]), np.array([500.0]), np.array([0.0]), 0, 1))
+    assert far.beyond
+    assert model_words(far, None, "").state == "beyond"
+    assert not follower.take(Forces(np.array([7.0]), np.array([1.0]), np.array([0.0]), 0, 1)).beyond
+
+
+def test_the_full_solve_is_told_beside_the_mean_of_what_was_shown_over_the_steady_window(follower):
+    said = follower.take(forces_of(stroke(), FRAME))
+    settled = follower.settle(Settle(1, PLAN, FRICTION, NORMAL, (1.2, 2.0)))
+    steady = said.sed[(said.time >= 1.2) & (said.time <= 2.0)]
+    assert settled.provisional == pytest.approx(steady.mean())
+    assert abs(settled.difference) < 0.02
+    words = model_words(said, settled, "").words
+    assert f"{1000 * settled.sed:.2f} kPa" in words
+    assert f"{1000 * settled.provisional:.2f} kPa" in words
+
+
+def test_a_full_solve_that_fails_says_why_and_keeps_what_was_shown(follower):
+    follower.take(forces_of(stroke(), FRAME))
+    settled = follower.settle(Settle(1, PLAN, replace(FRICTION, mu=None), NORMAL, (1.2, 2.0)))
+    assert settled.sed is None
+    assert settled.difference is None
+    assert settled.provisional is not None
+    assert settled.reason in model_words(None, settled, "").words
+
+
+def test_readings_become_200_steps_a_second_and_unhealthy_ones_are_left_out():
+    time_ = np.arange(7000) / 7000.0
+    wrench = np.tile([0.3, 0.4, -1.0, 0.0, 0.0, 0.0], (7000, 1))
+    wrench[10, 2] = -1e6
+    status = np.zeros(7000, np.int64)
+    status[10] = 1
+    forces = forces_of(live(time_, wrench, status), FRAME)
+    assert len(forces.time) == 200
+    assert forces.normal == pytest.approx(np.ones(200))
+    assert forces.pull == pytest.approx(np.full(200, -0.5))  # against the push of the finger, all of hypot(Fx, Fy)
+    assert forces_of(live(time_[:3], wrench[:3], np.ones(3, np.int64)), FRAME) is None
+
+
+def test_joined_batches_are_one_batch():
+    first, second = (forces_of(live(t, np.zeros((4, 6))), FRAME) for t in (np.arange(4) / 200, 1 + np.arange(4) / 200))
+    assert joined([first, second]).time.tolist() == [*first.time, *second.time]
+
+
+@pytest.mark.parametrize(
+    ("said", "settled", "problem", "state"),
+    [
+        (None, None, "", "none"),
+        (None, None, "no finger", "none"),
+        (None, Settled(1, 0.004, 0.01, 0.0041, np.empty(0), None, 2.0), "", "settled"),
+        (None, Settled(1, 0.004, None, None, np.empty(0), None, 2.0), "", "settled"),
+    ],
+)
+def test_every_state_of_the_model_has_words(said, settled, problem, state):
+    words = model_words(said, settled, problem)
+    assert words.state == state
+    assert words.words
+
+
+def test_a_gap_in_the_readings_is_a_gap_in_the_curve(follower):
+    trace = ModelTrace()
+    for start in (0.0, 1.0):
+        trace.add(follower.take(forces_of(live(start + np.arange(20) / 200, np.zeros((20, 6))), FRAME)))
+    columns = trace.columns(0.0, 2.0)
+    assert np.isnan(columns.values[0]).sum() == 1
+    assert np.flatnonzero(np.isnan(columns.values[0])).tolist() == [20]
+
+
+def until(condition):
+    end = time.monotonic() + 60.0  # of a machine that hangs, not of a slow one
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+def test_a_process_of_its_own_answers_batches_and_then_the_full_solve():
+    model = LiveModel()
+    model.prepare()
+    news: list[Provisional] = []
+    try:
+        model.add(stroke(1.5), FRAME)
+        until(lambda: news.extend(model.poll()) or news)
+        model.settle(Settle(1, PLAN, FRICTION, NORMAL, (1.2, 1.5)))
+        until(lambda: model.poll() or model.settled is not None)
+        assert abs(model.settled.difference) < 0.02
+        model._process.terminate()
+        until(lambda: model.poll() or model.problem)
+        assert "next session" in model.problem
+    finally:
+        model.close()
