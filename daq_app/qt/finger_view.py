@@ -39,7 +39,7 @@ class FingerView(QWidget):
         shades: Any = pg.colormap.get("magma")
         table = shades.map(np.linspace(1.0, 0.2, SHADES), mode="byte")
         self._shades = [QColor(int(r), int(g), int(b)) for r, g, b, *_ in table]
-        self.setMinimumSize(140, 120)
+        self.setMinimumSize(100, 1)  # it is folded where it is low
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("finger as the model sees it")
 

@@ -106,6 +106,7 @@ class LivePanel(QFrame):
         if self.plots:
             return
         self._model_plot = LivePlot(*SED, self._tokens, self._scale, MODEL_CHANNELS)
+        self._model_plot.setMinimumHeight(1)  # folded where there is little room, it must not keep the window large
         self._grid.addWidget(self._model_plot, 3, 0)
         self.finger = FingerView(self._tokens, self._scale)
         self._side_layout.insertWidget(0, self.finger, 5)

@@ -1,0 +1,96 @@
+"""What the live model costs: steps a second alone, and predictions a second and their age beside a 200 Hz stream.
+
+Run: python -m benchmarks.live_model [--seconds 10] [--repeats 3]. No window: what is timed is from readings handed to
+the model's client, which is asked 60 times a second as the window does, to a prediction in the client's hand.
+"""
+
+import argparse
+import os
+import statistics
+import time
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+RATE, FRAMES = 200, 60  # readings and looks at the model a second
+MU, NORMAL = 0.6, 2.0
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--repeats", type=int, default=3)
+    options = parser.parse_args()
+    print(f"load of this computer: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+    _alone(options.repeats)
+    for _ in range(options.repeats):
+        _beside(options.seconds)
+    print(f"load of this computer: {os.getloadavg()[0]:.1f}")
+
+
+def _forces(seconds: float, rate: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return time and wrench of a press that breathes, and slides towards +x from half a second on."""
+    at = np.arange(int(seconds * rate)) / rate
+    normal = NORMAL * np.minimum(at / 0.3, 1.0) * (1.0 + 0.2 * np.sin(7.0 * at))
+    wrench = np.zeros((len(at), 6))
+    wrench[:, 0], wrench[:, 2] = MU * normal * np.clip((at - 0.3) / 0.3, 0.0, 1.0), -normal
+    return at, wrench
+
+
+def _alone(repeats: int) -> None:
+    from daq_app.live_follower import Follower
+    from daq_app.live_model import Forces, Use
+
+    follower = Follower(Use(None, "small"))
+    at, wrench = _forces(5.0, 200)
+    for size, name in ((1, "one picture a step"), (4, "a picture every four steps")):
+        took = []
+        for _ in range(repeats):
+            began = time.perf_counter()
+            for i in range(0, len(at), size):
+                part = slice(i, i + size)
+                follower.take(Forces(at[part], -wrench[part, 2], -wrench[part, 0], 0, 1))
+            took.append(time.perf_counter() - began)
+        print(f"alone, {name}: {len(at) / statistics.median(took):.0f} steps a second, median of {repeats}")
+
+
+def _beside(seconds: float) -> None:
+    from daq_app.live_model_process import LiveModel
+    from daq_app.recorder.messages import Live
+    from sessions.plan import Frame
+
+    model = LiveModel()
+    model.prepare()
+    while model.said is None and not model.problem:
+        model.add(Live(0, *_block(0, 4), (0.0,) * 6), Frame("-z", "set", 20.0, "set"))
+        model.poll()
+        time.sleep(0.05)
+    ages, done, before = [], 0, model.predictions
+    began = time.monotonic()
+    while (now := time.monotonic() - began) < seconds:
+        last = int(now * RATE)
+        if last > done:
+            number, at, received, wrench, status = _block(done, last)
+            at = at.astype(np.float64)
+            received = (1e9 * (began + at)).astype(np.int64)
+            model.add(Live(1, number, at, received, wrench, status, (0.0,) * 6), Frame("-z", "set", 20.0, "set"))
+            done = last
+        for said in model.poll():
+            if said.stream == 1:
+                ages.append(time.monotonic() - said.received_ns * 1e-9)
+        time.sleep(1.0 / FRAMES)
+    model.close()
+    told = f"{np.median(ages) * 1e3:.0f} ms at the median, {np.percentile(ages, 99) * 1e3:.0f} ms at 99 %"
+    print(f"beside {RATE} Hz: {(model.predictions - before) / seconds:.0f} predictions a second, their age {told}")
+
+
+def _block(first: int, last: int) -> tuple[np.ndarray, ...]:
+    at, wrench = _forces((last + 1) / RATE, RATE)
+    number = np.arange(first, last)
+    return number, at[number], number, wrench[number], np.zeros(last - first, np.int64)
+
+
+if __name__ == "__main__":
+    main()
