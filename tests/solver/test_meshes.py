@@ -59,6 +59,14 @@ def test_lines_between_elements_frame_the_ending_and_lie_on_the_layers():
         assert np.abs(made.arcs - arc).min() < 1e-9
 
 
+def test_lines_lie_where_contact_ends_and_elements_are_shortest_there():
+    made = finger_mesh(Finger(), Receptor(), Sizing(10, 1.5, margin=3.0, edges=(-3.2, 1.4)))
+    for edge in (-3.2, 1.4):
+        assert np.abs(made.arcs - edge).min() < 1e-12
+    inside = np.diff(made.arcs[(made.arcs > -3.2 - 1e-9) & (made.arcs < 1.4 + 1e-9)])
+    assert max(inside[0], inside[-1]) < inside[1:-1].mean()
+
+
 def test_the_lowest_point_of_the_skin_touches_the_surface():
     for angle in (10.0, 45.0, 85.0):
         outline = Outline.of(Finger(contact_angle=angle))

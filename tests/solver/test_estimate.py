@@ -1,0 +1,181 @@
+"""Error estimates lie above the errors and near them, and a tolerance is met."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from solver.estimate import DEFAULT, FINENESS, coarsest_for, estimates
+from solver.reference import STICKINESS, scene
+from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
+from solver.solution import solve
+
+# The first twelve scenes of benchmarks/error_estimate.py: depth, mu, bound, slide, contact angle, Young's moduli of
+# epidermis, dermis and fat, and the mean of three solves on far finer meshes: SED of the ending, normal force, drag
+DRAWN = (
+    (
+        1.05575079066,
+        0.248442134017,
+        None,
+        "-x",
+        65.5733210634,
+        (0.109801080796, 0.0867158319543, 0.0333322753833),
+        (0.003187108, 0.06343484, 0.01575989),
+    ),
+    (
+        1.59892876918,
+        0.584542496617,
+        0.0133030834228,
+        "+x",
+        50.175829731,
+        (0.13520307664, 0.0993225812096, 0.0386619821712),
+        (0.007078073, 0.1549841, 0.07359199),
+    ),
+    (
+        1.4575376274,
+        0.107394741702,
+        None,
+        "+x",
+        54.8374437435,
+        (0.0965549404775, 0.0685836323143, 0.0247762909034),
+        (0.004040314, 0.07518017, 0.008073955),
+    ),
+    (
+        0.720124768031,
+        0.466517306208,
+        0.00547859724711,
+        "+x",
+        60.6975920546,
+        (0.1473104973, 0.0565677281175, 0.0281470699009),
+        (0.001093164, 0.03479186, 0.01593356),
+    ),
+    (
+        1.68697600026,
+        0.357538133713,
+        None,
+        "+x",
+        74.9139504717,
+        (0.172302754859, 0.0580992044652, 0.0425920153939),
+        (0.005208721, 0.1352797, 0.04836766),
+    ),
+    (
+        0.584800162903,
+        0.124189386478,
+        0.00486155801015,
+        "+x",
+        36.5449728395,
+        (0.100212506313, 0.0606093840956, 0.0312569906488),
+        (0.0007478094, 0.02650801, 0.003292014),
+    ),
+    (
+        0.819520916403,
+        0.310017088856,
+        None,
+        "-x",
+        71.5929623582,
+        (0.121660266863, 0.0865291500475, 0.0305913235643),
+        (0.002048308, 0.04524859, 0.01402784),
+    ),
+    (
+        1.35031791461,
+        0.0802970043054,
+        0.0170896550158,
+        "+x",
+        49.7287808922,
+        (0.165940326796, 0.0562831447588, 0.0409655830584),
+        (0.003510166, 0.09301852, 0.007469108),
+    ),
+    (
+        1.31537410353,
+        0.657704792711,
+        None,
+        "-x",
+        46.2502749641,
+        (0.124651599376, 0.102001651223, 0.0332443895744),
+        (0.004998304, 0.08550432, 0.0562366),
+    ),
+    (
+        1.17220635182,
+        0.379869758412,
+        0.00336185232325,
+        "+x",
+        65.387289923,
+        (0.164255376351, 0.0992652459493, 0.0256497345962),
+        (0.003611531, 0.06827412, 0.01355925),
+    ),
+    (
+        0.972066050328,
+        0.685839187235,
+        None,
+        "+x",
+        35.6549154642,
+        (0.101887432706, 0.065955413043, 0.0255734972453),
+        (0.002471774, 0.06714707, 0.04605209),
+    ),
+    (
+        0.987847976377,
+        0.447043614068,
+        0.0416592295643,
+        "+x",
+        41.9319808594,
+        (0.0977279795842, 0.0790515809384, 0.0375358822264),
+        (0.002812285, 0.07387995, 0.03302756),
+    ),
+)
+
+
+def test_estimates_lie_above_the_errors_of_scenes_drawn_at_random_and_mostly_below_ten_times_them():
+    close: list[bool] = []
+    for depth, mu, bound, slide, angle, moduli, truth in DRAWN:
+        asked = Scene(
+            finger=Finger(contact_angle=angle),
+            materials=Materials(*(Material(modulus, 0.48) for modulus in moduli)),
+            friction=Friction(mu, bound),
+            loading=Loading(depth, slide),
+        )
+        found = solve(asked)
+        numbers = np.array([found.sed_ending, found.normal_force, found.tangential_force])
+        estimates = np.array([found.error_estimate, found.normal_force_error, found.tangential_force_error])
+        errors = np.abs(numbers / truth - 1.0)
+        assert np.all(errors <= estimates)
+        close.extend((estimates < 10.0 * np.maximum(errors, 2e-4)).tolist())
+    assert np.mean(close) >= 0.75
+
+
+def test_a_drag_that_cannot_be_is_exactly_none():
+    found = solve(Scene(friction=Friction(0.0), loading=Loading(1.0, "+x")))
+    assert found.tangential_force == 0.0
+    assert found.tangential_force_error == 0.0
+    assert 0.0 < found.normal_force_error < 0.01
+
+
+@pytest.mark.parametrize("tolerance", [0.01, 0.003, 0.001])
+def test_the_tolerance_is_met_with_no_more_work_than_it_needs(tolerance):
+    asked = replace(scene(STICKINESS[4]), solve=Solve(tolerance=tolerance))
+    found = solve(asked)
+    assert found.error_estimate <= tolerance
+    assert abs(found.sed_ending / 0.009553 - 1.0) < max(tolerance, 0.0015)  # the reference is good to 0.1 %
+    assert found.dofs < {0.01: 2500, 0.003: 8000, 0.001: 30000}[tolerance]
+
+
+@pytest.mark.parametrize("kinematics", ["small", "finite"])
+def test_what_no_mesh_changes_is_off_by_what_the_mesh_alone_decides_and_less_on_finer_ones(kinematics):
+    asked = replace(scene(STICKINESS[0]), solve=Solve(kinematics))
+    free = replace(asked, friction=Friction(0.3))
+    numbers = np.array([1.0, 2.0, 0.6])
+    found = [estimates(free, fineness, numbers, numbers[None]) for fineness in FINENESS[kinematics]]
+    assert all((finer < coarser).all() for coarser, finer in pairwise(found))
+    assert found[0][0] < 0.01
+    assert estimates(free, 8.0, numbers * [1, 1, 0], numbers[None] * [1, 1, 0])[2] == 0.0
+    assert coarsest_for(asked, 0.01) == FINENESS[kinematics][0]
+    assert DEFAULT[kinematics] in FINENESS[kinematics]
+
+
+def test_a_drag_below_the_friction_limit_is_known_to_a_part_of_an_element():
+    bounded = replace(scene(STICKINESS[0]), friction=Friction(0.5, 0.01))
+    numbers = np.array([1.0, 0.2, 0.05])
+    free = replace(bounded, friction=Friction(0.5))
+    more = estimates(bounded, 8.0, numbers, numbers[None]) - estimates(free, 8.0, numbers, numbers[None])
+    # a fifth of an element of 0.5 x 5 / 8 mm under 0.01 MPa, by the drag, for a drag of half of mu N
+    assert more == pytest.approx([0.0, 0.0, 0.2 * 0.5 * 0.01 * 0.3125 / 0.05])
