@@ -7,13 +7,14 @@ from typing import Any
 import msgspec
 
 from sessions.analysis import Analysis, analyse
+from sessions.analysis.bootstrap import stroke_intervals
 from sessions.blinding import revealed
 from sessions.plan import Block
 from sessions.prediction import PredictionOptions, SessionPrediction, predict
 from sessions.recording import Recording
 from sessions.recording.log import TrialRecord
 
-FORM = 1  # raised when a row holds something else: what was stored before is then computed anew
+FORM = 2  # raised when a row holds something else: what was stored before is then computed anew
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +34,7 @@ class TrialRow:
     score: float | None
     rule: str = ""  # which mu the model got
     mu: float | None = None
-    mu_low: float | None = None
+    mu_low: float | None = None  # bootstrap interval of mu, see `BootstrapSettings.kind`
     mu_high: float | None = None
     mu_dynamic: float | None = None
     mu_static: float | None = None
@@ -125,7 +126,9 @@ def _row(
     if friction is None or stroke is None:
         missing = "No stroke was found in this trial." if prediction is not None else "The visit recorded no forces."
         return replace(row, flaws=flaws, why=missing)
-    low, high = friction.mu_interval or (None, None)
+    at = analysis.strokes.index(stroke)
+    intervals = stroke_intervals(stroke, at)
+    low, high = (intervals.mu_max if friction.rule == "maximum" else intervals.mu_dynamic) or (None, None)
     row = replace(
         row,
         rule=friction.rule,

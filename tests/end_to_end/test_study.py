@@ -53,6 +53,7 @@ def test_friction_comes_back_as_planted_but_for_the_calibration(pool, study):
         for row in visit["rows"]:
             if row["mu"] is not None:  # each axis' gain is planted with a standard deviation of 1 %
                 assert row["mu"] == pytest.approx(truth[visit["subject"], row["trial"]], rel=0.05)
+                assert row["mu_low"] < row["mu"] < row["mu_high"]
 
 
 def test_what_was_computed_once_is_not_computed_again(pool, study, monkeypatch):

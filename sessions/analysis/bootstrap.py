@@ -1,0 +1,186 @@
+"""Intervals of a stroke's numbers from sensor noise, zero, calibration and choice of window: a seeded block bootstrap.
+
+Readings within a tenth of a second are alike, so blocks of them are drawn again, not readings (Künsch 1989, Ann.
+Statist. 17:1217). Every repeat also draws how wrong calibration and zero may be, and where the window may have begun
+and ended; the interval lies between two quantiles of what the repeats give.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.analysis.stroke import Interval, Stroke, StrokeCurve
+
+Array = NDArray[np.float64]
+
+_FEWEST_BLOCKS = 4
+_FEWEST_QUIET = 10  # readings before onset from which noise is told
+_TOP = 0.97  # of the peak: readings above this share of it may be the peak
+
+
+@dataclass(frozen=True, slots=True)
+class BootstrapSettings:
+    """What every repeat draws from; stored with the intervals."""
+
+    repeats: int = 1000
+    seed: int = 0
+    block: float = 0.1  # [s]
+    inwards: float = 0.2  # the steady window may begin or end so much of its length further inwards [-]
+    gain_error: float = 0.01  # standard uncertainty of each axis' gain [-]
+    gain_error_origin: str = "assumed"  # nobody stated it for this transducer; "set" where somebody did
+    confidence: float = 0.95
+
+    @property
+    def kind(self) -> str:
+        """What an interval is, for people."""
+        return (
+            f"{100 * self.confidence:g} % percentile interval of {self.repeats} block-bootstrap repeats (blocks of "
+            f"{self.block:g} s, seed {self.seed}): sensor noise, zero and its drift, calibration "
+            f"({100 * self.gain_error:g} % of each axis, {self.gain_error_origin}), choice of window (ends up to "
+            f"{100 * self.inwards:g} % inwards)"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class StrokeIntervals:
+    """Intervals of one stroke's numbers, None for each number that is withheld or has too few readings."""
+
+    stroke: int  # position in `Analysis.strokes`
+    trial: int | None
+    mu_static: Interval | None  # [-]
+    mu_dynamic: Interval | None  # [-]
+    mu_max: Interval | None  # [-]
+    tau_max: Interval | None  # [MPa]; the contact area is taken as given
+    speed: Interval | None  # [mm/s]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return asdict(self)
+
+
+def stroke_intervals(stroke: Stroke, number: int, settings: BootstrapSettings | None = None) -> StrokeIntervals:
+    """Return the intervals of the stroke at position `number`; the same stroke and seed give the same bits."""
+    chosen = settings or BootstrapSettings()
+    found: Mapping[str, Array] = {}
+    if stroke.curve is not None and len(stroke.curve.time) > 2:
+        found = _Repeats(stroke, stroke.curve, chosen, np.random.default_rng([chosen.seed, number])).all()
+
+    def interval(name: str) -> Interval | None:
+        if name not in found or getattr(stroke, name) is None:
+            return None
+        low, high = np.quantile(found[name], [(1 - chosen.confidence) / 2, (1 + chosen.confidence) / 2]).tolist()
+        return low, high
+
+    return StrokeIntervals(
+        number,
+        stroke.trial,
+        *(interval(name) for name in ("mu_static", "mu_dynamic", "mu_max", "tau_max", "speed")),
+    )
+
+
+class _Repeats:
+    """What all numbers of one stroke share in each of its repeats."""
+
+    def __init__(
+        self, stroke: Stroke, curve: StrokeCurve, settings: BootstrapSettings, draw: np.random.Generator
+    ) -> None:
+        self._stroke, self._curve, self._settings, self._draw = stroke, curve, settings, draw
+        n = settings.repeats
+        self._step = float(np.median(np.diff(curve.time)))
+        self._gain_t, self._gain_n, self._gain_torque = 1.0 + settings.gain_error * draw.standard_normal((3, n))
+        quiet = curve.time < (curve.time[0] if stroke.onset is None else stroke.onset - 0.02)
+        enough = int(quiet.sum()) >= _FEWEST_QUIET
+        # Before the onset nothing presses: T is the length of two noises, N one.
+        self._noise_n = float(np.nanstd(curve.normal[quiet])) if enough else 0.0
+        self._noise_t = float(np.sqrt(np.nanmean(curve.tangential[quiet] ** 2) / 2.0)) if enough else 0.0
+        # The zero's drift was seen as one length of three axes; within it the zero may lie anywhere.
+        drift = (stroke.zero_drift or 0.0) / np.sqrt(3.0 * 12.0)
+        few = np.sqrt(max(1.0, quiet.sum() * self._step / settings.block)) if enough else 1.0
+        self._zero_t = np.hypot(drift, self._noise_t / few) * draw.standard_normal(n)
+        self._zero_n = np.hypot(drift, self._noise_n / few) * draw.standard_normal(n)
+
+    def all(self) -> dict[str, Array]:
+        """Return the numbers (repeats,) of each repeat, by name."""
+        found: dict[str, Array] = {}
+        if self._stroke.tau_max is not None and self._stroke.peak_tangential:
+            area = self._stroke.peak_tangential / self._stroke.tau_max
+            peak = self._stroke.peak_tangential * self._gain_t + self._zero_t + self._top()
+            found["tau_max"] = peak / area
+        for name in ("mu_static", "mu_max"):
+            value = getattr(self._stroke, name)
+            if value is not None:
+                found[name] = self._single(value)
+        window = self._window()
+        if window is not None:
+            found |= window
+        return found
+
+    def _top(self) -> Array:
+        """Return how far noise moves the greatest tangential force (repeats,) [N], about its mean."""
+        tangential = self._curve.tangential
+        high = tangential[tangential >= _TOP * np.nanmax(tangential)]
+        every = max(1, round(self._settings.block / 4 / self._step))  # filtered readings nearer than this are alike
+        high = high[::every]
+        tops = (high + self._noise_t * self._draw.standard_normal((self._settings.repeats, len(high)))).max(axis=1)
+        return tops - tops.mean()
+
+    def _single(self, value: float) -> Array:
+        """Return a ratio that one short stretch gives (repeats,); the stretch is where T/N is nearest to it."""
+        ratio = self._curve.ratio
+        at = int(np.nanargmin(np.abs(ratio - value)))
+        normal = float(self._curve.normal[at])
+        noise = np.hypot(self._noise_t, value * self._noise_n) / normal
+        from_zero = (self._zero_t - value * self._zero_n) / normal
+        return value * self._gain_t / self._gain_n + from_zero + noise * self._draw.standard_normal(len(self._gain_t))
+
+    def _window(self) -> dict[str, Array] | None:
+        """Return dynamic friction and speed (repeats,) from blocks of the steady window drawn again."""
+        steady, settings = self._stroke.steady, self._settings
+        if steady is None or self._stroke.mu_dynamic is None:
+            return None
+        inside = (self._curve.time >= steady[0]) & (self._curve.time <= steady[1]) & np.isfinite(self._curve.ratio)
+        columns = np.column_stack([self._curve.ratio, 1.0 / self._curve.normal, self._curve.time, self._curve.position])
+        length = max(1, round(settings.block / self._step))
+        held = columns[inside]
+        count = len(held) // length
+        if count < _FEWEST_BLOCKS:
+            return None
+        blocks = held[: count * length].reshape(count, length, 5).mean(axis=1)
+        chosen, weight = self._chosen(count)
+        drawn = blocks[chosen]  # (repeats, blocks, 5)
+        total = weight.sum(axis=1)
+        means = (drawn[:, :, 0] * weight).sum(axis=1) / total
+        spread = np.sqrt(total / np.maximum(total - 1.0, 1.0))  # a mean of few blocks strays further than drawing shows
+        centre = float(blocks[:, 0].mean())
+        lightness = float(blocks[:, 1].mean())
+        mu = self._stroke.mu_dynamic + (means - centre) * spread
+        found = {
+            "mu_dynamic": mu * self._gain_t / self._gain_n
+            + (self._zero_t - self._stroke.mu_dynamic * self._zero_n) * lightness
+        }
+        if self._stroke.speed is not None and np.isfinite(blocks[:, 3:]).all():
+            found["speed"] = self._speeds(drawn, weight) * self._gain_torque / self._gain_n
+        return found
+
+    def _chosen(self, count: int) -> tuple[NDArray[np.int64], Array]:
+        """Return blocks drawn for each repeat (repeats, count), and 1 for those that fit into its window, else 0."""
+        repeats = self._settings.repeats
+        trim = self._settings.inwards * count * self._draw.uniform(size=(2, repeats))
+        first, stop = np.floor(trim[0]), count - np.floor(trim[1])
+        stop = np.maximum(stop, first + min(count, 3))
+        first = np.minimum(first, stop - 3)
+        held = stop - first
+        chosen = first[:, None] + np.floor(self._draw.uniform(size=(repeats, count)) * held[:, None])
+        weight = (np.arange(count) < held[:, None]).astype(np.float64)
+        return np.clip(chosen, 0, count - 1).astype(np.int64), weight
+
+    def _speeds(self, drawn: Array, weight: Array) -> Array:
+        """Return the slope of position on time (repeats,) [mm/s] over the blocks drawn."""
+        total = weight.sum(axis=1)[:, None]
+        time, moved = drawn[:, :, 2], drawn[:, :, 3:]
+        t = time - (time * weight).sum(axis=1)[:, None] / total
+        slope = ((t * weight)[:, :, None] * moved).sum(axis=1) / np.maximum((t**2 * weight).sum(axis=1), 1e-9)[:, None]
+        return np.hypot(slope[:, 0], slope[:, 1])
