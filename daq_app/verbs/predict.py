@@ -10,6 +10,7 @@ from pathlib import Path
 from daq_app.console import Console, number, table
 from daq_app.derived import analysed, predicted, visit
 from sessions.prediction import PredictionOptions
+from sessions.sealing import SEAL, seal_prediction
 from sessions.toml_file import load_toml
 from solver.scene import Scene
 
@@ -35,6 +36,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--scene", type=Path, metavar="FILE", help="scene file with another finger")
     parser.add_argument("--indentation", type=float, metavar="MM", help="instead of each block's own")
+    parser.add_argument(
+        "--seal",
+        action="store_true",
+        help="hash and keep the prediction, so that it is shown to be older than unblinding",
+    )
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -47,7 +53,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     )
     recording = visit(options.session, options.subject)
     prediction = predicted(recording, analysed(recording, console), console, asked)
-    console.result(prediction.to_dict())
+    seal = {"sealed_sha256": seal_prediction(recording, prediction.to_dict())} if options.seal else {}
+    console.result({**prediction.to_dict(), **seal})
     if recording.simulated_sentence:
         console.say(recording.simulated_sentence)
     rows = [
@@ -65,6 +72,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         for row in prediction.trials
     ]
     console.say(table(rows, head=HEAD) if rows else "nothing to predict: no forces were recorded")
+    if seal:
+        console.say(f"sealed: SHA-256 {seal['sealed_sha256']} in {recording.folder / SEAL}")
     for row in prediction.trials:
         for reason in dict.fromkeys(row.reasons.values()):
             missing = ", ".join(name for name, why in row.reasons.items() if why == reason)

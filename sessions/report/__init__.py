@@ -24,6 +24,7 @@ from sessions.report.contents import (
 from sessions.report.experiments import experiments
 from sessions.report.predictions import fields, left_out, modelled, predicted_seds, predictions
 from sessions.report.strokes import course, flaws, strokes
+from sessions.sealing import NUMBERS, sealed_sentence
 
 __all__ = [
     "Answers",
@@ -76,7 +77,7 @@ def findings(
         predictions=predicted,
         fields=fields(prediction),
         planted=tuple(planted or ()),
-        sealed=_sealed(tables, predicted),
+        sealed=_sealed(recording, tables, predicted),
         modelled=modelled(prediction),
         left_out=left_out(prediction),
         again=facts.again(recording, analysis),
@@ -85,10 +86,10 @@ def findings(
     )
 
 
-def _sealed(tables: Sequence[ScoreTable], predicted: Sequence[PredictionFinding]) -> str:
+def _sealed(recording: Recording, tables: Sequence[ScoreTable], predicted: Sequence[PredictionFinding]) -> str:
     if not predicted or not any(table.scores for table in tables):
         return ""
-    return "The predictions were made after the scores had been given, and had not been sealed before."
+    return sealed_sentence(recording, [{name: getattr(row, name) for name in NUMBERS} for row in predicted])
 
 
 def _title(recording: Recording) -> str:

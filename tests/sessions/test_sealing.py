@@ -1,0 +1,86 @@
+"""A sealed prediction says when it was sealed and how blind, and is found where it was changed or came too late."""
+
+import json
+
+import pytest
+from stand_ins import Hands, ToldClock
+
+from daq_app.cli import run
+from sessions.protocols import Body, plan
+from sessions.protocols.protocol import FOLDER
+from sessions.recording import Recording, RecordingError, SessionWriter, provenance
+from sessions.recording.archive import seal
+from sessions.recording.derived import store_derived
+from sessions.runner import run_session
+from sessions.sealing import SEAL, digest, seal_prediction, sealed_sentence
+from sessions.steps import AskScore, Scored
+from sessions.study_file import create_study, enrol, open_study, study_key
+
+TEXT = (FOLDER / "sensotact-friction.toml").read_text()
+ROW = {"trial": 1, "mu": 0.3, "tau_max": 0.01, "indentation": 2.0, "direction": 1, "sed": 0.0085}
+PREDICTION = {"trials": [{**ROW, "wall_s": 0.1}], "options": {}}
+
+
+@pytest.fixture(params=[True])
+def session(request, tmp_path):
+    """Return a recorded session of a study, blinded or not."""
+    folder = tmp_path / "study"
+    create_study(folder, TEXT, 5, blinded=request.param)
+    member = enrol(folder, "P01", Body())
+    study = open_study(folder)
+    place = study.place(member, study_key(folder))
+    planned = plan(study.protocol, "P01", study.session_seed(member.slot), place=place, forces=False)
+    clock = ToldClock()
+    writer = SessionWriter.create(folder / "P01", planned, None, provenance(clock), subject_simulated=True, clock=clock)
+    hands = Hands(clock, None, {AskScore: lambda _: [Scored(50.0)]})
+    run_session(planned, writer, hands, None, clock)
+    seal(folder / "P01")
+    return folder / "P01"
+
+
+def said(session, **changed):
+    return sealed_sentence(Recording.open(session), [{**ROW, **changed}])
+
+
+def test_without_a_seal_the_report_says_so(session):
+    assert "had not been sealed" in said(session)
+
+
+def test_a_prediction_sealed_while_the_key_was_closed_is_shown_to_be(session):
+    sha256 = seal_prediction(Recording.open(session), PREDICTION)
+    assert sha256 == digest([ROW])
+    assert "while the key of the stimuli was sealed, as it still is; the predictions shown are those" in said(session)
+    assert run(["unblind", str(session.parent), "--by", "E01"]) == 0
+    assert "while the key of the stimuli was sealed; it was opened on" in said(session)
+    assert sha256[:16] in said(session)
+
+
+def test_a_seal_made_after_the_key_was_opened_does_not_pass_for_an_earlier_one(session):
+    assert run(["unblind", str(session.parent), "--by", "E01"]) == 0
+    seal_prediction(Recording.open(session), PREDICTION)
+    assert "when nothing hid which score" in said(session)
+    forged = {**json.loads((session / SEAL).read_bytes()), "blinded": True}
+    store_derived(session, SEAL, forged)
+    assert "the record of unblinding does not hold this seal" in said(session)
+
+
+def test_other_numbers_than_the_sealed_ones_are_told(session):
+    seal_prediction(Recording.open(session), PREDICTION)
+    assert "shown are those" in said(session, sed=0.0085 * (1 + 1e-15))
+    assert "others, made since" in said(session, sed=0.0086)
+
+
+def test_a_seal_that_was_changed_is_found_and_none_replaces_another(session):
+    seal_prediction(Recording.open(session), PREDICTION)
+    with pytest.raises(RecordingError, match="none is sealed over it"):
+        seal_prediction(Recording.open(session), PREDICTION)
+    document = json.loads((session / SEAL).read_bytes())
+    document["numbers"][0]["sed"] = 0.01
+    store_derived(session, SEAL, document)
+    assert "was changed" in said(session)
+
+
+@pytest.mark.parametrize("session", [False], indirect=True)
+def test_without_blinding_a_seal_says_that_nothing_hid_the_scores(session):
+    seal_prediction(Recording.open(session), PREDICTION)
+    assert "when nothing hid which score" in said(session)
