@@ -4,7 +4,7 @@ Each trial becomes a scene: its measured friction, its block's indentation, its 
 scenes are solved together on one mesh, so that differences between surfaces are accurate.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Literal
 
@@ -148,6 +148,26 @@ def predict(
     )
 
 
+def seds_with(
+    changed: Sequence[tuple[TrialPrediction, float, float]], progress: Progress | None = None
+) -> tuple[float | None, ...]:
+    """Return the settled SED [MPa] of predicted trials with another mu [-] and tau_max [MPa] as the model gets it.
+
+    All are solved together on one mesh, so that differences are those of friction. None where there is no settled
+    state. Raises Cancelled.
+    """
+    scenes = [
+        replace(
+            row.prediction.scene,
+            friction=replace(row.prediction.scene.friction, mu=max(mu, 0.0), tau_max=tau_max),
+            solve=replace(row.prediction.scene.solve, course="steady"),
+        )
+        for row, mu, tau_max in changed
+        if row.prediction is not None
+    ]
+    return tuple(None if isinstance(one, SolveFailure) else one.sed_ending for one in answers(scenes, progress))
+
+
 @dataclass(frozen=True, slots=True)
 class _Case:
     """One thing to predict: a planned trial, or a stroke of a recording without a plan."""
@@ -243,7 +263,12 @@ def _prepared(case: _Case, options: PredictionOptions) -> _Prepared:
 
 def _bound(tau_max: float | None, options: PredictionOptions) -> float | None:
     """Return the traction bound [MPa] in the reading asked for."""
-    return None if tau_max is None else tau_max * SCALE[options.tau_reading] / SCALE["computed"]
+    return None if tau_max is None else tau_max * tau_scale(options)
+
+
+def tau_scale(options: PredictionOptions) -> float:
+    """Return what tau_max as measured is multiplied by in the reading asked for."""
+    return SCALE[options.tau_reading] / SCALE["computed"]
 
 
 def _missing(row: TrialPrediction, stroke: Stroke | None) -> str | None:

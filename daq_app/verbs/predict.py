@@ -9,13 +9,17 @@ from pathlib import Path
 
 from daq_app.console import Console, number, table
 from daq_app.derived import analysed, predicted, visit
-from sessions.prediction import PredictionOptions
+from sessions.analysis import Analysis
+from sessions.prediction import PredictionOptions, SessionPrediction
 from sessions.sealing import SEAL, seal_prediction
 from sessions.toml_file import load_toml
+from sessions.uncertainty import SedInterval, sed_intervals
 from solver.scene import Scene
 
 EXAMPLE = "daq-app predict recordings/P07 --tau as-printed"
 HEAD = ["trial", "surface", "mu", "tau_max [kPa]", "SED [kPa]", "error", "model N [N]", "measured [N]", "match [mm]"]
+
+INTERVALS = ["trial", "SED [kPa]", "by", "per 0.01 of mu [Pa]", "per kPa of tau_max [Pa]"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,6 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scene", type=Path, metavar="FILE", help="scene file with another finger")
     parser.add_argument("--indentation", type=float, metavar="MM", help="instead of each block's own")
     parser.add_argument(
+        "--intervals", action="store_true", help="also what the uncertainty of friction makes of each SED (more solves)"
+    )
+    parser.add_argument(
         "--seal",
         action="store_true",
         help="hash and keep the prediction, so that it is shown to be older than unblinding",
@@ -52,9 +59,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
         kinematics=options.kinematics,
     )
     recording = visit(options.session, options.subject)
-    prediction = predicted(recording, analysed(recording, console), console, asked)
+    analysis = analysed(recording, console)
+    prediction = predicted(recording, analysis, console, asked)
+    intervals = _intervals(analysis, prediction, console) if options.intervals else ()
     seal = {"sealed_sha256": seal_prediction(recording, prediction.to_dict())} if options.seal else {}
-    console.result({**prediction.to_dict(), **seal})
+    extra = {"sed_intervals": [one.to_dict() for one in intervals]} if options.intervals else {}
+    console.result({**prediction.to_dict(), **seal, **extra})
     if recording.simulated_sentence:
         console.say(recording.simulated_sentence)
     rows = [
@@ -72,6 +82,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
         for row in prediction.trials
     ]
     console.say(table(rows, head=HEAD) if rows else "nothing to predict: no forces were recorded")
+    if intervals:
+        console.say("\n95 % interval of SED from the uncertainty of friction alone, not the model's own error:")
+        console.say(table([_row(one) for one in intervals], head=INTERVALS))
     if seal:
         console.say(f"sealed: SHA-256 {seal['sealed_sha256']} in {recording.folder / SEAL}")
     for row in prediction.trials:
@@ -79,3 +92,22 @@ def run(options: argparse.Namespace, console: Console) -> int:
             missing = ", ".join(name for name, why in row.reasons.items() if why == reason)
             console.say(f"{row.trial or (row.stroke or 0) + 1}: no {missing.replace('_', ' ')}: {reason}")
     return 3 if any(row.sed is None for row in prediction.trials) else 0
+
+
+def _intervals(analysis: Analysis, prediction: SessionPrediction, console: Console) -> tuple[SedInterval, ...]:
+    def shown(part: float) -> bool:
+        console.progress(0.99 * part, "carrying the uncertainty of friction through the solver")
+        return True
+
+    return sed_intervals(analysis, prediction, progress=shown)
+
+
+def _row(one: SedInterval) -> list[str]:
+    known = None if one.low is None or one.high is None else (1e3 * one.low, 1e3 * one.high)
+    return [
+        str(one.trial or (one.stroke or 0) + 1),
+        one.reason if known is None else f"{number(known[0], 4)} to {number(known[1], 4)}",
+        one.method or "–",
+        number(None if one.by_mu is None else 1e4 * one.by_mu),
+        number(None if one.by_tau_max is None else 1e3 * one.by_tau_max),
+    ]

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sessions.analysis.friction import Rule
 from sessions.analysis.stroke import Interval, Stroke, StrokeCurve
 
 Array = NDArray[np.float64]
@@ -79,6 +80,21 @@ def stroke_intervals(stroke: Stroke, number: int, settings: BootstrapSettings | 
         stroke.trial,
         *(interval(name) for name in ("mu_static", "mu_dynamic", "mu_max", "tau_max", "speed")),
     )
+
+
+def friction_draws(
+    stroke: Stroke, number: int, rule: Rule, settings: BootstrapSettings | None = None
+) -> tuple[Array, Array] | None:
+    """Return mu [-] and tau_max [MPa] (repeats,) of each repeat, together as they were drawn; None without either.
+
+    They are the draws that `stroke_intervals` takes its quantiles from; an error of calibration moves both alike.
+    """
+    chosen = settings or BootstrapSettings()
+    if stroke.curve is None or len(stroke.curve.time) < 3:
+        return None
+    found = _Repeats(stroke, stroke.curve, chosen, np.random.default_rng([chosen.seed, number])).all()
+    name = "mu_max" if rule == "maximum" else "mu_dynamic"
+    return None if name not in found or "tau_max" not in found else (found[name], found["tau_max"])
 
 
 class _Repeats:
