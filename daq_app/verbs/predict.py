@@ -6,9 +6,12 @@ the same press slid the other way.
 
 import argparse
 from pathlib import Path
+from typing import Any
 
+from daq_app.cli import WrongValue
 from daq_app.console import Console, number, table
 from daq_app.derived import analysed, predicted, visit
+from sessions.afferent import AfferentSettings, parameters, session_firing
 from sessions.analysis import Analysis
 from sessions.prediction import PredictionOptions, SessionPrediction
 from sessions.sealing import SEAL, seal_prediction
@@ -44,6 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--intervals", action="store_true", help="also what the uncertainty of friction makes of each SED (more solves)"
     )
     parser.add_argument(
+        "--afferent",
+        action="store_true",
+        help="also firing rates and spike times of an SA-II afferent: an illustration",
+    )
+    parser.add_argument("--afferent-seed", type=int, default=0, metavar="SEED", help="of the spike times (0)")
+    parser.add_argument(
         "--seal",
         action="store_true",
         help="hash and keep the prediction, so that it is shown to be older than unblinding",
@@ -52,6 +61,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Predict, keep the result in the session's folder and print it."""
+    if options.afferent_seed < 0:
+        raise WrongValue(f"--afferent-seed {options.afferent_seed} is not allowed: a whole number from 0 on")
     asked = PredictionOptions(
         tau_reading=options.tau,
         scene=None if options.scene is None else load_toml(options.scene, Scene),
@@ -64,7 +75,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     intervals = _intervals(analysis, prediction, console) if options.intervals else ()
     seal = {"sealed_sha256": seal_prediction(recording, prediction.to_dict())} if options.seal else {}
     extra = {"sed_intervals": [one.to_dict() for one in intervals]} if options.intervals else {}
-    console.result({**prediction.to_dict(), **seal, **extra})
+    firing = _firing(prediction, options) if options.afferent else {}
+    console.result({**prediction.to_dict(), **seal, **extra, **firing})
     if recording.simulated_sentence:
         console.say(recording.simulated_sentence)
     rows = [
@@ -85,6 +97,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if intervals:
         console.say("\n95 % interval of SED from the uncertainty of friction alone, not the model's own error:")
         console.say(table([_row(one) for one in intervals], head=INTERVALS))
+    if firing:
+        _print_firing(firing["afferent"], console)
     if seal:
         console.say(f"sealed: SHA-256 {seal['sealed_sha256']} in {recording.folder / SEAL}")
     for row in prediction.trials:
@@ -111,3 +125,25 @@ def _row(one: SedInterval) -> list[str]:
         number(None if one.by_mu is None else 1e4 * one.by_mu),
         number(None if one.by_tau_max is None else 1e3 * one.by_tau_max),
     ]
+
+
+def _firing(prediction: SessionPrediction, options: argparse.Namespace) -> dict[str, Any]:
+    settings = AfferentSettings(seed=options.afferent_seed)
+    reference, found = session_firing(prediction, settings)
+    about = "an illustration with assumed numbers: no fitted map from SED to the rate of an SA-II afferent is known"
+    told = {"about": about, "reference_sed": reference, "parameters": parameters(settings)}
+    return {"afferent": {**told, "trials": [one.to_dict() for one in found]}}
+
+
+def _print_firing(firing: dict[str, Any], console: Console) -> None:
+    head = ["trial", "peak rate [imp/s]", "settled rate [imp/s]", "spikes"]
+    rows = [
+        [str(one["trial"] or "–"), number(one["peak_rate"]), number(one["settled_rate"]), str(len(one["spikes"]))]
+        for one in firing["trials"]
+    ]
+    console.say(f"\nSA-II afferent, {firing['about']}:")
+    console.say(table(rows, head=head))
+    for one in firing["parameters"]:
+        console.say(
+            f"  {one['name'].replace('_', ' ')} = {one['value']:g} {one['unit']} ({one['standing']}; {one['basis']})"
+        )

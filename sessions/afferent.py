@@ -1,0 +1,146 @@
+"""From the predicted SED to the firing of an SA-II afferent: an illustration with declared parameters, no finding.
+
+No fitted map from SED to the rate of a human SA-II afferent was found in the literature. This one is the simplest that
+has what such units show: firing at rest, a static and a dynamic part, slow adaptation, regular intervals. Its order of
+surfaces in the settled state is that of the SED, whatever the parameters: what it adds is the course in time.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.prediction import SessionPrediction
+
+Array = NDArray[np.float64]
+
+STEP = 1e-3  # [s]
+SHOWN = 10  # every so many steps the rate is told
+
+
+@dataclass(frozen=True, slots=True)
+class AfferentSettings:
+    """Drive x = (SED / reference)^exponent; rate r = r0 + static x + dynamic max(0, dx/dt) - adaptation a, in 0..rmax.
+
+    a follows x with the time constant: da/dt = (x - a) / adaptation_time.
+    """
+
+    exponent: float = 1.0
+    background: float = 5.0
+    static_gain: float = 20.0
+    dynamic_gain: float = 4.0
+    adaptation_gain: float = 6.0
+    adaptation_time: float = 1.5
+    greatest_rate: float = 100.0
+    variation: float = 0.2
+    refractory: float = 2e-3
+    seed: int = 0
+
+
+# Unit, standing, and what it rests on. "assumed": no authority is claimed for the number.
+TOLD: Mapping[str, tuple[str, str, str]] = {
+    "exponent": ("-", "assumed", "1: rate follows SED, the hypothesis under test; 0.5: rate follows strain"),
+    "background": ("imp/s", "assumed", "that SA-2s fire at rest: Saal, Birznieks & Johansson 2023, eLife 89616"),
+    "static_gain": ("imp/s", "assumed", "at the reference SED; sweep 5 to 40"),
+    "dynamic_gain": (
+        "imp/s per 1/s",
+        "assumed",
+        "that rate grows with strain rate: Edin 2004, J. Neurophysiol. 92:3233; sweep 0 to 15",
+    ),
+    "adaptation_gain": ("imp/s", "assumed", "below the static gain: these units never fall silent; sweep 0 to 15"),
+    "adaptation_time": ("s", "assumed", "sweep 0.3 to 5"),
+    "greatest_rate": ("imp/s", "assumed", "peaks of 50 to 95 imp/s: Edin 2004, J. Neurophysiol. 92:3233"),
+    "variation": ("-", "assumed", "coefficient of variation of intervals; sweep 0.1 to 0.4"),
+    "refractory": ("s", "assumed", "sweep 1 to 5 ms"),
+    "seed": ("-", "set", "of the spike times"),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Firing:
+    """What the afferent does in one trial."""
+
+    trial: int | None
+    time: Array  # (m,) [s]
+    rate: Array  # (m,) [imp/s]
+    settled_rate: float  # long after: background + (static - adaptation) x, within its bounds [imp/s]
+    spikes: Array  # (k,) [s]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data, the rate every 10 ms."""
+        return {
+            "trial": self.trial,
+            "settled_rate": self.settled_rate,
+            "peak_rate": float(self.rate.max()),
+            "time": self.time[::SHOWN].tolist(),
+            "rate": self.rate[::SHOWN].tolist(),
+            "spikes": self.spikes.tolist(),
+        }
+
+
+def firing_rate(time: Array, sed: Array, reference: float, settings: AfferentSettings) -> tuple[Array, Array]:
+    """Return instants (k,) [s] every millisecond and the rate (k,) [imp/s] there, from SED (m,) [MPa] at `time` (m,).
+
+    SED goes straight between its instants; before the first nothing is adapted. `reference` [MPa] is where x is 1.
+    """
+    grid = np.arange(float(time[0]), float(time[-1]) + STEP / 2, STEP)
+    x = np.maximum(np.interp(grid, time, sed) / reference, 0.0) ** settings.exponent
+    rise = np.diff(x, prepend=x[0]) / STEP
+    kept = float(np.exp(-STEP / settings.adaptation_time))
+    adapted = np.zeros_like(x)
+    for i in range(1, len(x)):
+        adapted[i] = kept * adapted[i - 1] + (1.0 - kept) * (x[i] + x[i - 1]) / 2.0
+    rate = settings.background + settings.static_gain * x + settings.dynamic_gain * np.maximum(rise, 0.0)
+    return grid, np.clip(rate - settings.adaptation_gain * adapted, 0.0, settings.greatest_rate)
+
+
+def spike_times(time: Array, rate: Array, draw: np.random.Generator, settings: AfferentSettings) -> Array:
+    """Return when a perfect integrator of the rate passes thresholds drawn from a gamma distribution of mean 1 [s].
+
+    Its shape is 1 / variation^2, so that a steady rate gives intervals of that coefficient of variation.
+    """
+    passed = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(time))])
+    shape = settings.variation**-2
+    thresholds = np.cumsum(draw.gamma(shape, 1.0 / shape, size=int(2 * passed[-1]) + 20))
+    found = np.interp(thresholds[thresholds < passed[-1]], passed, time)
+    kept: list[float] = []
+    for spike in found.tolist():
+        if not kept or spike - kept[-1] >= settings.refractory:
+            kept.append(spike)
+    return np.array(kept)
+
+
+def session_firing(
+    prediction: SessionPrediction, settings: AfferentSettings | None = None
+) -> tuple[float | None, tuple[Firing, ...]]:
+    """Return the reference SED [MPa], the median of all trials, and the firing in each trial that has a course."""
+    chosen = settings or AfferentSettings()
+    seds = [row.sed for row in prediction.trials if row.sed is not None]
+    if not seds:
+        return None, ()
+    reference = float(np.median(seds))
+    found: list[Firing] = []
+    for number, row in enumerate(prediction.trials):
+        if row.history is None or row.sed is None:
+            continue
+        time, rate = firing_rate(row.history.time, row.history.sed_ending, reference, chosen)
+        x = (row.sed / reference) ** chosen.exponent
+        settled = chosen.background + (chosen.static_gain - chosen.adaptation_gain) * x
+        spikes = spike_times(time, rate, np.random.default_rng([chosen.seed, number]), chosen)
+        found.append(Firing(row.trial, time, rate, float(np.clip(settled, 0.0, chosen.greatest_rate)), spikes))
+    return reference, tuple(found)
+
+
+def parameters(settings: AfferentSettings) -> list[dict[str, Any]]:
+    """Return every parameter with its value, unit, standing and what it rests on."""
+    values = asdict(settings)
+    return [
+        {
+            "name": field.name,
+            "value": values[field.name],
+            **dict(zip(("unit", "standing", "basis"), TOLD[field.name], strict=True)),
+        }
+        for field in fields(settings)
+    ]

@@ -1,0 +1,68 @@
+"""Firing of the afferent, against closed forms of its own equations and the statistics it declares."""
+
+from dataclasses import fields, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from sessions.afferent import TOLD, AfferentSettings, firing_rate, parameters, session_firing, spike_times
+
+USUAL = AfferentSettings()
+
+
+def test_a_constant_sed_adapts_as_the_exponential_does():
+    time, rate = firing_rate(np.array([0.0, 6.0]), np.array([0.01, 0.01]), 0.01, USUAL)
+    expected = 5.0 + 20.0 - 6.0 * (1.0 - np.exp(-time / 1.5))
+    assert rate == pytest.approx(expected, abs=1e-3)
+
+
+def test_a_ramp_adds_the_dynamic_part_and_adapts_late():
+    time, rate = firing_rate(np.array([0.0, 1.0]), np.array([0.0, 0.01]), 0.01, USUAL)
+    # x = t, dx/dt = 1, a = t - tau (1 - exp(-t / tau)).
+    expected = 5.0 + 20.0 * time + 4.0 - 6.0 * (time - 1.5 * (1.0 - np.exp(-time / 1.5)))
+    assert rate[1:] == pytest.approx(expected[1:], abs=1e-3)
+
+
+def test_the_rate_stays_within_its_bounds():
+    _, rate = firing_rate(np.array([0.0, 0.01, 1.0]), np.array([0.0, 0.5, 0.5]), 0.01, USUAL)
+    assert rate.max() == 100.0
+    falling = replace(USUAL, background=0.0, adaptation_gain=60.0)
+    assert firing_rate(np.array([0.0, 9.0]), np.array([0.01, 0.01]), 0.01, falling)[1].min() == 0.0
+
+
+def test_a_steady_rate_gives_its_count_and_the_declared_regularity():
+    time = np.arange(0.0, 400.0, 1e-2)
+    spikes = spike_times(time, np.full_like(time, 25.0), np.random.default_rng(1), USUAL)
+    intervals = np.diff(spikes)
+    assert len(spikes) == pytest.approx(10_000, abs=100)  # five standard deviations of 0.2 sqrt(10000)
+    assert intervals.std() / intervals.mean() == pytest.approx(0.2, abs=0.01)
+    assert intervals.min() >= USUAL.refractory
+
+
+def rows(seds):
+    time = np.array([0.0, 1.0, 3.0])
+    return tuple(
+        SimpleNamespace(trial=i, sed=sed, history=SimpleNamespace(time=time, sed_ending=np.array([0.0, sed, sed])))
+        for i, sed in enumerate(seds, 1)
+    )
+
+
+def test_the_order_of_surfaces_is_that_of_the_sed_whatever_the_exponent():
+    seds = [0.0086, 0.0094, 0.0052, 0.0087, 0.0053]
+    for exponent in (0.5, 1.0):
+        reference, found = session_firing(SimpleNamespace(trials=rows(seds)), replace(USUAL, exponent=exponent))
+        assert reference == 0.0086
+        assert stats.spearmanr(seds, [one.settled_rate for one in found]).statistic == pytest.approx(1.0)
+
+
+def test_the_same_seed_gives_the_same_spikes_and_each_trial_its_own():
+    (_, once), (_, again) = (session_firing(SimpleNamespace(trials=rows([0.008, 0.008]))) for _ in range(2))
+    assert once[0].spikes.tolist() == again[0].spikes.tolist()
+    assert once[0].spikes.tolist() != once[1].spikes.tolist()
+
+
+def test_every_parameter_is_told_with_its_standing():
+    assert set(TOLD) == {field.name for field in fields(AfferentSettings)}
+    assert {one["standing"] for one in parameters(USUAL) if one["name"] != "seed"} == {"assumed"}
