@@ -23,6 +23,7 @@ VERBS = {
     "analyse": "find the strokes of a session and their friction",
     "predict": "predict the receptor's strain-energy density for each trial",
     "solve": "run the solver on a scene file",
+    "sensitivity": "tell which of a scene's numbers moves the SED (Sobol indices)",
     "accuracy": "measure how fast the solver is and how true, on this machine, as one page",
     "report": "write a session's report as one page",
     "study": "pool many sessions: group statistics, a page, a table of all trials",
@@ -43,6 +44,7 @@ _WRONG = (
 )
 _FAILED = (
     "daq_app.pooling.SchedulerError",
+    "daq_app.sensitivity.TooFewAnswers",
     "drivers.transducer.DeviceFault",
     "drivers.transducer.LinkLost",
     "drivers.transducer.SetupError",

@@ -185,7 +185,7 @@ def _dask(folders: Sequence[Path], options: PredictionOptions, address: str) -> 
             future = client.submit(computed_from, folder.name, content_of(folder), options, pure=False, retries=1)
             futures.append(future)
             names[future.key] = folder.name
-        for future in library.as_completed(futures):
+        for future in library.as_completed(futures, loop=client.loop):
             if future.status == "finished":
                 yield future.result()
             else:

@@ -1,0 +1,151 @@
+"""Which of a scene's numbers moves the SED: Sobol indices over a design (Saltelli 2010, by SALib)."""
+
+import importlib
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.toml_file import SettingsError
+from solver.failures import SolveFailure
+from solver.scene import Scene
+from solver.solution import solve
+
+Design = Mapping[str, tuple[float, float]]  # dotted key of the scene file -> least and greatest value
+
+# Least and greatest value as parts of the scene's own. Skin is only thickened and the ending only raised: it must stay
+# within the skin, and the usual one ends at its inner side.
+USUAL: Mapping[str, tuple[float, float]] = {
+    "finger.tip_radius": (0.95, 1.1),
+    "finger.epidermis": (1.0, 1.3),
+    "finger.dermis": (1.0, 1.2),
+    "materials.epidermis.E": (0.7, 1.3),
+    "materials.dermis.E": (0.7, 1.3),
+    "materials.fat.E": (0.7, 1.3),
+    "loading.indentation": (0.9, 1.1),
+    "receptor.depth": (0.9, 1.0),
+    "friction.mu": (0.9, 1.1),
+    "friction.tau_max": (0.7, 1.3),
+}
+ANGLE, ANGLE_SPAN = "finger.contact_angle", 5.0  # [degrees]
+
+
+@dataclass(frozen=True, slots=True)
+class Index:
+    """How far one number moves the SED over its range in the design."""
+
+    name: str
+    low: float
+    high: float
+    first: float  # share of the variance it makes alone
+    first_error: float  # half of its 95 % bootstrap interval
+    total: float  # with all it does together with others
+    total_error: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return asdict(self)
+
+
+class TooFewAnswers(Exception):
+    """Some scenes of the design have no answer: how many, and what to do."""
+
+
+def usual_design(scene: Scene) -> dict[str, tuple[float, float]]:
+    """Return the design around a scene; what the scene leaves out is not varied."""
+    design: dict[str, tuple[float, float]] = {}
+    for name, (low, high) in USUAL.items():
+        value = _value(scene, name)
+        if value:
+            design[name] = (low * value, high * value)
+    angle = scene.finger.contact_angle
+    design[ANGLE] = (max(angle - ANGLE_SPAN, 10.0), min(angle + ANGLE_SPAN, 90.0))
+    return design
+
+
+def checked(design: Mapping[str, Any], scene: Scene, where: str) -> dict[str, tuple[float, float]]:
+    """Return a design read from a file. Raises SettingsError for a key or a range that cannot be varied."""
+    found: dict[str, tuple[float, float]] = {}
+    for name, span in design.items():
+        if _value(scene, name) is None:
+            raise SettingsError(f"{where}: {name} is no number of this scene; a dotted key such as friction.mu is one")
+        pair: list[Any] = cast("list[Any]", span) if isinstance(span, list) else []
+        numbers = [float(end) for end in pair if isinstance(end, int | float) and math.isfinite(end)]
+        if len(pair) != 2 or len(numbers) != 2 or not numbers[0] < numbers[1]:
+            raise SettingsError(f"{where}: {name} = {span!r} is not allowed: [least, greatest], least below greatest")
+        found[name] = (numbers[0], numbers[1])
+    if len(found) < 2:
+        raise SettingsError(f"{where}: a design needs two numbers at least")
+    return found
+
+
+def sensitivity(
+    scene: Scene,
+    design: Design,
+    samples: int,
+    seed: int,
+    progress: Callable[[float], None],
+    sed: Callable[[Scene], float] | None = None,
+) -> tuple[tuple[Index, ...], NDArray[np.float64]]:
+    """Return the index of each number, greatest total first, and the SEDs (samples * (numbers + 2),) [MPa].
+
+    `samples` is a power of two. `sed` answers one scene; the solver does unless told. Raises TooFewAnswers where a
+    scene of the design has no answer, SceneError where a range leaves what a scene may hold.
+    """
+    problem = {"num_vars": len(design), "names": list(design), "bounds": [list(span) for span in design.values()]}
+    draw: Any = importlib.import_module("SALib.sample.sobol")  # slow to load
+    analyse: Any = importlib.import_module("SALib.analyze.sobol")
+    points: NDArray[np.float64] = draw.sample(problem, samples, calc_second_order=False, seed=seed)
+    answer = sed or _settled
+    found = np.empty(len(points))
+    failed: list[str] = []
+    for i, point in enumerate(points.tolist()):
+        try:
+            found[i] = answer(with_values(scene, dict(zip(design, point, strict=True))))
+        except SolveFailure as failure:
+            failed.append(" ".join(str(failure).split()))
+        progress((i + 1) / len(points))
+    if failed:
+        raise TooFewAnswers(
+            f"{len(failed)} of {len(points)} scenes of the design have no settled state; narrow its ranges (the first: "
+            f"{failed[0]})"
+        )
+    result: Any = analyse.analyze(problem, found, calc_second_order=False, seed=seed, num_resamples=200)
+    columns = zip(
+        design, *(np.asarray(result[name]).tolist() for name in ("S1", "S1_conf", "ST", "ST_conf")), strict=True
+    )
+    indices = [Index(name, *design[name], *values) for name, *values in columns]
+    return tuple(sorted(indices, key=lambda index: -index.total)), found
+
+
+def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
+    """Return the scene with the values at dotted keys. Raises SceneError where one is out of its range."""
+    branches: dict[str, dict[str, float]] = {}
+    own: dict[str, Any] = {}
+    for name, value in values.items():
+        first, _, rest = name.partition(".")
+        if rest:
+            branches.setdefault(first, {})[rest] = value
+        else:
+            own[first] = value
+    for name, inside in branches.items():
+        own[name] = with_values(getattr(scene, name), inside)
+    return replace(scene, **own)
+
+
+def _settled(scene: Scene) -> float:
+    return solve(replace(scene, solve=replace(scene.solve, course="steady"))).sed_ending
+
+
+def _value(scene: Any, name: str) -> float | None:  # noqa: ANN401  the scene or a table of it
+    """Return the number at a dotted key, None where there is none."""
+    first, _, rest = name.partition(".")
+    if not is_dataclass(scene) or first not in {field.name for field in fields(scene)}:
+        return None
+    value: Any = getattr(scene, first)
+    if rest:
+        return _value(value, rest)
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None

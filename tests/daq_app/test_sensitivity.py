@@ -1,0 +1,79 @@
+"""Sobol indices of a scene: against closed forms with a stand-in for the solver, and once with the solver itself."""
+
+import json
+
+import pytest
+
+from daq_app.cli import run
+from daq_app.sensitivity import TooFewAnswers, checked, sensitivity, usual_design, with_values
+from sessions.toml_file import SettingsError
+from solver.failures import NotConverged
+from solver.scene import Friction, Loading, Scene
+
+SCENE = Scene(friction=Friction(0.4, 0.02), loading=Loading(1.0))
+DESIGN = {"friction.mu": (0.2, 0.6), "loading.indentation": (0.5, 1.5)}
+
+
+def quiet(_):
+    return None
+
+
+def test_of_a_sum_each_index_is_its_share_of_the_variance():
+    # y = 3 mu + 2 d, uniform over 0.4 and 1: variances 9 * 0.16 / 12 and 4 / 12.
+    indices, _ = sensitivity(
+        SCENE, DESIGN, 1024, 0, quiet, lambda s: 3.0 * s.friction.mu + 2.0 * (s.loading.indentation or 0.0)
+    )
+    found = {one.name: one for one in indices}
+    share = 9 * 0.16 / (9 * 0.16 + 4)
+    assert [one.name for one in indices] == ["loading.indentation", "friction.mu"]
+    assert found["friction.mu"].first == pytest.approx(share, abs=0.02)
+    assert found["friction.mu"].total == pytest.approx(share, abs=0.02)
+
+
+def test_of_a_product_about_zero_nothing_acts_alone():
+    middle = {"friction.mu": 0.4, "loading.indentation": 1.0}
+    indices, _ = sensitivity(
+        SCENE,
+        DESIGN,
+        1024,
+        0,
+        quiet,
+        lambda s: (s.friction.mu - middle["friction.mu"]) * ((s.loading.indentation or 0.0) - 1.0),
+    )
+    assert all(abs(one.first) < 0.05 and one.total == pytest.approx(1.0, abs=0.05) for one in indices)
+
+
+def test_values_reach_their_places_and_no_others():
+    changed = with_values(SCENE, {"friction.mu": 0.3, "materials.fat.E": 0.05})
+    assert (changed.friction.mu, changed.friction.tau_max, changed.materials.fat.E) == (0.3, 0.02, 0.05)
+    assert changed.finger == SCENE.finger
+
+
+def test_a_scene_without_a_bound_varies_none():
+    assert "friction.tau_max" in usual_design(SCENE)
+    assert "friction.tau_max" not in usual_design(Scene(friction=Friction(0.4), loading=Loading(1.0)))
+
+
+def test_what_cannot_be_varied_is_named():
+    for wrong, what in (({"finger.toe": [1, 2]}, "finger.toe"), ({"friction.mu": [0.5, 0.5]}, "friction.mu")):
+        with pytest.raises(SettingsError, match=what):
+            checked(wrong, SCENE, "design.toml")
+
+
+def test_scenes_without_an_answer_are_counted():
+    def none(_):
+        raise NotConverged("no")
+
+    with pytest.raises(TooFewAnswers, match="8 of 8 scenes"):
+        sensitivity(SCENE, DESIGN, 2, 0, quiet, none)
+
+
+def test_the_solver_is_more_moved_by_depth_than_by_a_little_friction(tmp_path, capsys):
+    scene, design = tmp_path / "scene.toml", tmp_path / "design.toml"
+    scene.write_text("[friction]\nmu = 0.3\ntau_max = 0.02\n[loading]\nindentation = 1.0\nslide = '+x'\n")
+    design.write_text("'friction.mu' = [0.29, 0.31]\n'loading.indentation' = [0.8, 1.2]\n")
+    assert run(["sensitivity", str(scene), "--design", str(design), "--samples", "4", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["indices"][0]["name"] == "loading.indentation"
+    assert told["design_origin"] == "set"
+    assert run(["sensitivity", str(scene), "--samples", "5"]) == 2
