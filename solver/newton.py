@@ -25,6 +25,8 @@ ROUNDS = 12  # of changes of contact states within one linear system: dense, of 
 NEAR = 0.1  # step below which the tangent of the state before is tried again [mm]
 FAST = 0.02  # fall of the steps' size, below which a new tangent is kept
 SLOW = 0.5  # the same, above which a kept one is given up
+TURNED = 0.1  # step times bulk over shear stiffness, above which no tangent is kept [mm]
+MARGIN = 0.5  # part of the tolerance that the step still missing, as judged, may take
 EQUILIBRIUM, BY_DEPTH, BY_FRICTION, BY_TRAVEL = 0, 1, 2, 3  # columns of Newton.steps
 
 
@@ -90,6 +92,7 @@ class Newton:
         self.inside = Elimination(body.plan)
         self.steps = np.zeros((2 * skin, 4))  # of the skin
         self.length = np.zeros(skin)
+        self._bulk = float((body.lame / body.shear).max())  # how much stiffer the body is to a change of volume [-]
         self.skin_x, self.skin_y = body.mesh.nodes[body.skin].T.copy()
         self._felt, self._reaction = np.zeros(2 * skin), np.zeros((skin, 2))
         self._state, self._sense = np.zeros(skin, np.int32), np.zeros(skin, np.int32)
@@ -188,12 +191,13 @@ class Newton:
                 raise NotConverged("the displacements grow without bound")
             fall = min(largest / last, 1.0) if last > 0.0 else 1.0
             left = min((2.0 * fall) ** 2, 1.0) if not kept else 1.0 if new else min(2.0 * fall, 1.0)
-            if largest * left < tolerance and not changed and scale == 1.0:
+            if largest * left < MARGIN * tolerance and not changed and scale == 1.0:
                 self._tangent_at = shape
                 return shape
             new = not kept
             still = largest < NEAR if last == 0.0 else fall < SLOW
-            kept = still if kept else fall < FAST and scale == 1.0
+            # A step along a tangent that has turned changes volume to second order, and a stiff body answers strongly.
+            kept = (still if kept else fall < FAST and scale == 1.0) and self._bulk * largest < TURNED
             last = largest
         raise NotConverged(f"no equilibrium within {limit} iterations")
 

@@ -1,0 +1,15 @@
+"""Has the compiled loops made once, so that test workers that start together do not each make them."""
+
+from dataclasses import replace
+
+from solver.reference import SLIPPERINESS, scene
+from solver.solution import solve
+from solver.stepper import stepper
+
+if __name__ == "__main__":
+    for kinematics in ("small", "finite"):
+        published = scene(SLIPPERINESS[-1])
+        asked = replace(published, solve=replace(published.solve, kinematics=kinematics))
+        solve(asked)
+        solve(replace(asked, solve=replace(asked.solve, course="history")))
+        stepper(asked).step(0.05, 0.01)
