@@ -15,6 +15,10 @@ def main() -> None:
         from daq_app.qt.start import main as open_window  # the command line runs where Qt is not installed
 
         sys.exit(open_window())
+    if sys.argv[1] == "window":
+        from daq_app.qt.start import look_at
+
+        sys.exit(look_at(sys.argv[2:]))
     sys.exit(run(sys.argv[1:]))
 
 

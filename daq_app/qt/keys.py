@@ -38,6 +38,7 @@ KEYS = (
     Key("B", "bench", "show or fold the bench"),
     Key("F6", "subject", "show the subject's window and go to it"),
     Key("Ctrl+M", "ruler", "hold the subject's line against a ruler"),
+    Key("Ctrl+O", "open", "look at a recorded session: strokes, predictions, report, exports"),
     Key("F1", "keys", "show or hide these keys"),
     Key("Esc", "leave", "leave what is being typed, or these keys"),
 )

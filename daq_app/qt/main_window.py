@@ -9,6 +9,7 @@ from PySide6.QtCore import QEvent, QObject, QSize, Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
+    QFileDialog,
     QHBoxLayout,
     QMainWindow,
     QSizePolicy,
@@ -158,6 +159,8 @@ class MainWindow(QMainWindow):
             case "ruler":
                 self.show_subject()
                 self.subject.check_ruler()
+            case "open":
+                self._open_session()
             case "keys":
                 self._show_keys()
             case "leave":
@@ -284,6 +287,15 @@ class MainWindow(QMainWindow):
             self.live.draw(() if session is None else session.marks, self.bridge.state.now)
         except Exception as error:  # noqa: BLE001  an error while drawing never stops a recording
             self.bridge.drawing_failed(error)
+
+    def _open_session(self) -> None:
+        """Open the analyst's window on a session that is chosen."""
+        name = QFileDialog.getExistingDirectory(self, "Session folder", self.page.form().folder or ".")
+        if name:
+            from daq_app.qt.analyst_window import AnalystWindow  # loaded when somebody asks for it
+
+            self.analyst = AnalystWindow(Path(name), self._tokens)
+            self.analyst.show()
 
     def _search(self) -> None:
         self.bridge.send(Searching())

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:  # Qt is loaded only once it is known that it can be
 
 SIMULATED_BENCH = "sim:?rate=200"
 FAILED = 1  # exit code: could not be done
+WRONG = 2  # likewise: the command line was wrong
 
 
 def main() -> int:
@@ -28,6 +30,36 @@ def main() -> int:
         return _said(missing_library(error))
     application = QApplication(sys.argv[:1])
     window = opened(application)
+    window.show()
+    return application.exec()
+
+
+def look_at(arguments: list[str]) -> int:
+    """Open the analyst's window on the session named, or the experimenter's without one; return the exit code."""
+    if not arguments:
+        return main()
+    if len(arguments) > 1 or arguments[0].startswith("-"):
+        sys.stderr.write("usage: daq-app window [SESSION]\n\nExample: daq-app window recordings/P07\n")
+        return 0 if "--help" in arguments else WRONG
+    folder = Path(arguments[0])
+    if not folder.is_dir():
+        return _said(f"{folder} is no folder: give a session's folder")
+    if missing := what_is_missing():
+        return _said(missing)
+    try:
+        from PySide6.QtWidgets import QApplication
+    except ImportError as error:
+        return _said(missing_library(error))
+    application = QApplication(sys.argv[:1])
+    from daq_app.qt.analyst_window import AnalystWindow
+    from daq_app.qt.tokens import current_tokens, font_scale, palette, style_sheet
+
+    application.setApplicationName("daq-app")
+    application.setStyle("Fusion")
+    tokens = current_tokens()
+    application.setPalette(palette(tokens))
+    application.setStyleSheet(style_sheet(tokens, font_scale()))
+    window = AnalystWindow(folder, tokens)
     window.show()
     return application.exec()
 

@@ -60,7 +60,10 @@ def write_figures(report: Report, folder: Path) -> tuple[Path, ...]:
     written: list[Path] = []
     for plate in plates(report):
         for panel in plate.panels:
-            for ending, text in ((".svg", panel.svg), (".csv", _csv(panel, report))):
+            for ending, text in (
+                (".svg", panel.svg),
+                (".csv", panel_csv(panel, report.head if report.simulated else "")),
+            ):
                 path = folder / (_file_name(panel.name) + ending)
                 swap_in(path, text)
                 written.append(path)
@@ -97,11 +100,11 @@ def drawn(panel: Panel) -> Markup:
     return Markup(panel.svg[panel.svg.index("<svg") :])
 
 
-def _csv(panel: Panel, report: Report) -> str:
-    """Return the numbers of a picture; empty where there is none."""
+def panel_csv(panel: Panel, head: str) -> str:
+    """Return the numbers of a picture, empty where there is none; `head` is told first where something is simulated."""
     out = io.StringIO()
-    if report.simulated:
-        out.write(f"# {report.head}\n")
+    if head:
+        out.write(f"# {head}\n")
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(panel.header)
     writer.writerows(["" if value is None else value for value in row] for row in panel.rows)

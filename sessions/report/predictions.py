@@ -44,7 +44,7 @@ def fields(found: SessionPrediction | None) -> tuple[Field, ...]:
             before = chosen.get(row.block)
             if before is None or before.stimulus is None or before.stimulus.known_index < row.stimulus.known_index:
                 chosen[row.block] = row
-    made = [_field(name, row) for name, row in chosen.items()]
+    made = [field_of(name, row) for name, row in chosen.items()]
     return tuple(field for field in made if field is not None)
 
 
@@ -121,7 +121,8 @@ def _finding(row: TrialPrediction) -> PredictionFinding:
     )
 
 
-def _field(experiment: str, row: TrialPrediction) -> Field | None:
+def field_of(experiment: str, row: TrialPrediction) -> Field | None:
+    """Return the settled finger of a trial; None where there is no prediction."""
     picture = row.picture()
     if picture is None or row.stimulus is None:
         return None
