@@ -1,6 +1,7 @@
 """What the analyst's window knows of a session folder, and what it shows of it. No Qt, no process."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -27,6 +28,7 @@ class Found:
     stage: Stage
     report: Report
     plates: tuple[Plate, ...]
+    pixels: Mapping[str, bytes] = field(default_factory=dict[str, bytes])  # PNG of each picture, by its name
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +76,7 @@ class AnalystState:
     stage: Stage = "opening"
     report: Report | None = None
     plates: tuple[Plate, ...] = ()
+    pixels: Mapping[str, bytes] = field(default_factory=dict[str, bytes])
     step: Step | None = Step(0.0, "opening")  # None: nothing is being done
     told: str = ""  # how the last work ended
     row: int = 0  # that is chosen
@@ -105,9 +108,9 @@ def fold(state: AnalystState, message: Message) -> AnalystState:
     match message:
         case Step():
             return replace(state, step=message)
-        case Found(stage, report, plates):
+        case Found(stage, report, plates, pixels):
             going_on = None if stage == "predicted" else state.step
-            return replace(state, stage=stage, report=report, plates=plates, step=going_on)
+            return replace(state, stage=stage, report=report, plates=plates, pixels=pixels, step=going_on)
         case Written(path):
             return replace(state, step=None, told=f"Written: {path}")
         case Problem(sentence):

@@ -11,7 +11,7 @@ from sessions.blinding import revealed
 from sessions.exports import ExportError, ExportSource, export, html
 from sessions.exports.figures import plates
 from sessions.exports.figures.finger import common_levels, finger_panels
-from sessions.exports.figures.style import Panel, Plate, look
+from sessions.exports.figures.style import Panel, Plate, in_pixels, look
 from sessions.plan import Blinded
 from sessions.prediction import predict
 from sessions.recording import Recording, RecordingError
@@ -34,12 +34,15 @@ class Work:
         say(Step(0.0, "analysing"))
         self._analysis = analyse(self._recording)
         self._report = findings(self._recording, self._analysis)
-        say(Found("analysed", self._report, plates(self._report)))
+        with in_pixels() as pixels:
+            drawn = plates(self._report)
+        say(Found("analysed", self._report, drawn, pixels))
         self._prediction = predict(self._analysis, self._recording.plan, progress=timed(say, "predicting"))
         self._report = findings(self._recording, self._analysis, self._prediction)
         say(Step(1.0, "drawing"))
-        drawn = plates(self._report)
-        say(Found("drawing", self._report, drawn))
+        with in_pixels() as pixels:
+            drawn = plates(self._report)
+        say(Found("drawing", self._report, drawn, pixels))
         every = tuple(
             field
             for row in self._prediction.trials
@@ -47,14 +50,14 @@ class Work:
         )
         said = timed(say, "drawing every finger")
         fingers: list[Panel] = []
-        with look():
+        with look(), in_pixels() as more:
             levels = common_levels(every) if every else ()
             for number, field in enumerate(every):
                 said(number / len(every))
                 fingers += finger_panels(field, levels, simulated=self._report.simulated)
         others = tuple(plate for plate in drawn if plate.name != FINGERS)
         plate = Plate(FINGERS, "The finger of every trial; one scale of colours for all.", tuple(fingers))
-        say(Found("predicted", replace(self._report, fields=every), (*others, plate)))
+        say(Found("predicted", replace(self._report, fields=every), (*others, plate), {**pixels, **more}))
 
     def write(self, asked: Write) -> str:
         """Write the report or an export, and return where it is."""

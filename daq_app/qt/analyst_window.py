@@ -26,6 +26,7 @@ from daq_app.qt.picture_view import PictureView
 from daq_app.qt.stroke_view import StrokeView
 from daq_app.qt.tokens import GRID, MODEL, Tokens
 from sessions.exports import FORMATS
+from sessions.exports.figures.style import Panel
 
 pg: Any = pyqtgraph  # it has no types
 LOOK = 50  # between two looks at the work [ms]
@@ -179,12 +180,16 @@ class AnalystWindow(QMainWindow):
         head = "" if state.report is None else state.report.head
         pictures = a.finger_pictures(state)
         for view, picture in zip(self.fingers, (*pictures, None, None), strict=False):
-            view.show_panel(picture, head)
+            view.show_panel(picture, self._pixels(picture), head)
 
     def _show_picture(self) -> None:
         pictures, at = a.pictures(self.state), self.which.currentIndex()
         head = "" if self.state.report is None else self.state.report.head
-        self.picture.show_panel(pictures[at] if 0 <= at < len(pictures) else None, head)
+        picture = pictures[at] if 0 <= at < len(pictures) else None
+        self.picture.show_panel(picture, self._pixels(picture), head)
+
+    def _pixels(self, picture: Panel | None) -> bytes:
+        return b"" if picture is None else self.state.pixels.get(picture.name, b"")
 
     def _relation(self) -> tuple[Any, Any]:
         plot = pg.PlotWidget(background=self._tokens.surface)

@@ -5,8 +5,9 @@
 
 import io
 import re
-from collections.abc import Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Generator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from html import escape
 from typing import Any
@@ -25,6 +26,8 @@ GREY = "#767676"
 PALE = "#d9d9d9"
 
 TEXT = 8.5  # [pt]
+DOTS = 220  # of a picture in pixels, in an inch
+_PIXELS: ContextVar[dict[str, bytes] | None] = ContextVar("pixels", default=None)  # see `in_pixels`
 _LOOK: dict[Any, Any] = {
     "font.family": "sans-serif",
     # Text stays text, so that it can be searched, copied and read aloud. The layout is made for the first font, which
@@ -128,6 +131,17 @@ def _mixed(colour: str, towards: float) -> str:
     return to_hex((red, green, blue))
 
 
+@contextmanager
+def in_pixels() -> Generator[dict[str, bytes]]:
+    """Also draw every picture made meanwhile in pixels: yields PNGs by the pictures' names."""
+    found: dict[str, bytes] = {}
+    before = _PIXELS.set(found)
+    try:
+        yield found
+    finally:
+        _PIXELS.reset(before)
+
+
 def svg(drawn: Sheet, name: str, title: str, *, simulated: bool) -> str:
     """Return the picture as an SVG document, inside `look`; the same drawing gives the same bytes."""
     if simulated:
@@ -135,6 +149,10 @@ def svg(drawn: Sheet, name: str, title: str, *, simulated: bool) -> str:
     buffer = io.StringIO()
     with mpl.rc_context({"svg.hashsalt": name}):
         drawn.figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
+    if (found := _PIXELS.get()) is not None:
+        pixels = io.BytesIO()
+        drawn.figure.savefig(pixels, format="png", dpi=DOTS, facecolor="white", metadata={"Software": None})
+        found[name] = pixels.getvalue()
     return _finished(buffer.getvalue(), name, title, drawn.hover, simulated=simulated)
 
 

@@ -9,6 +9,7 @@ from daq_app import analyst as a
 from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.tokens import LIGHT
 from sessions.exports.figures import plates
+from sessions.exports.figures.style import in_pixels
 from tests.sessions.report_example import example
 
 SESSION = Path(__file__).parents[2] / "data" / "sessions" / "version-1" / "sealed"
@@ -26,7 +27,9 @@ def window(application):
 @pytest.fixture(scope="module")
 def found():
     report = example()
-    return a.Found("predicted", report, plates(report))
+    with in_pixels() as pixels:
+        drawn = plates(report)
+    return a.Found("predicted", report, drawn, pixels)
 
 
 def until(application, condition):
