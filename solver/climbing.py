@@ -23,6 +23,9 @@ COARSER = 0.6  # fineness of the mesh that the error is estimated from, by that 
 MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
 
 
+Maker = Callable[[Scene, Sizing], FiniteFinger]  # of meshes; whoever wants may keep what it makes
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Climbed:
     """A settled state on the mesh made for it."""
@@ -32,7 +35,9 @@ class Climbed:
     setup_s: float  # meshes and tables [s]
 
 
-def foot(scene: Scene, expected: float, fineness: float, stop: Callable[[], bool]) -> Climbed:
+def foot(
+    scene: Scene, expected: float, fineness: float, stop: Callable[[], bool], make: Maker = FiniteFinger.of
+) -> Climbed:
     """Return the settled state on a mesh that does not know the edges of contact, from which others can be climbed.
 
     `expected` is the depth [mm], or about it where forces are given; a given drag is left for the mesh that counts,
@@ -42,7 +47,7 @@ def foot(scene: Scene, expected: float, fineness: float, stop: Callable[[], bool
     depth = expected if scene.normal_force is not None else scene.loading.depth
     scene = scene.undragged() if scene.loading.dragged else scene
     begun = perf_counter()
-    finger = FiniteFinger.of(scene, Sizing(ROUGH, depth, margin=MARGIN))
+    finger = make(scene, Sizing(ROUGH, depth, margin=MARGIN))
     setup = perf_counter() - begun
     try:
         shape = roughly(finger, scene, stop)
@@ -51,21 +56,23 @@ def foot(scene: Scene, expected: float, fineness: float, stop: Callable[[], bool
         depth = shape.pull.depth
     except SolveFailure:
         pass
-    return _on(scene, Sizing(fineness, depth, margin=MARGIN), None, stop)
+    return _on(scene, Sizing(fineness, depth, margin=MARGIN), None, stop, make)
 
 
-def climbed(scene: Scene, fineness: float, below: Climbed, stop: Callable[[], bool]) -> Climbed:
+def climbed(
+    scene: Scene, fineness: float, below: Climbed, stop: Callable[[], bool], make: Maker = FiniteFinger.of
+) -> Climbed:
     """Return the settled state on a mesh of `fineness` whose lines follow the edges of contact found `below`.
 
     Raises NoSteadyState, NotConverged, Cancelled.
     """
     edges = below.finger.edges(below.shape)
-    return _on(scene, Sizing(fineness, below.shape.pull.depth, margin=MARGIN, edges=edges), below, stop)
+    return _on(scene, Sizing(fineness, below.shape.pull.depth, margin=MARGIN, edges=edges), below, stop, make)
 
 
-def _on(scene: Scene, sizing: Sizing, below: Climbed | None, stop: Callable[[], bool]) -> Climbed:
+def _on(scene: Scene, sizing: Sizing, below: Climbed | None, stop: Callable[[], bool], make: Maker) -> Climbed:
     begun = perf_counter()
-    finger = FiniteFinger.of(scene, sizing)
+    finger = make(scene, sizing)
     start = None if below is None else finger.brought(below.shape, below.finger)
     setup = perf_counter() - begun
     return Climbed(finger, settled(finger, scene, stop, start), setup)

@@ -13,15 +13,15 @@ from pathlib import Path
 from typing import cast
 
 from daq_app.accuracy.asked import Asked, Found, LeftOut, timed, within
-from daq_app.accuracy.methods import MAIN, Kinematics
-from daq_app.accuracy.truth import cases
+from daq_app.accuracy.methods import Kinematics
+from daq_app.accuracy.truth import KINEMATICS, cases
 from solver.scene import Solve
 from solver.solution import solve
 
 # What a file of the solver does, and what a compiled loop does whose file does more than one thing.
 FILES = {
     "mesher": "mesh and tables", "grid": "mesh and tables", "outline": "mesh and tables", "mesh": "mesh and tables",
-    "finite_body": "mesh and tables", "elements": "assembly", "stiffness": "assembly",
+    "finite_body": "mesh and tables", "carrying": "carrying states", "elements": "assembly", "stiffness": "assembly",
     "dissection": "factorisation", "elimination": "factorisation", "fronts": "factorisation", "body": "factorisation",
     "contact": "contact", "friction": "contact", "skin": "contact", "receptor": "receptor", "newton": "iteration",
     "sliding": "iteration", "existence": "proof of existence", "crossing": "proof of existence",
@@ -57,7 +57,7 @@ def measure(asked: Asked, found: Found) -> Iterator[Cost | LeftOut]:
     """Yield a row a kinematics and tolerance."""
     del found
     works: list[tuple[Kinematics, float]] = [
-        (kinematics, tolerance) for tolerance in asked.pick((0.01, 0.003), (0.01,)) for kinematics in MAIN
+        (kinematics, tolerance) for tolerance in asked.pick((0.01, 0.003), (0.01,)) for kinematics in KINEMATICS
     ]
     for work in within(asked, works, "solves whose cost is broken down"):
         if isinstance(work, LeftOut):

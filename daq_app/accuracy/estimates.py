@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, within
-from daq_app.accuracy.methods import MAIN, Kinematics
+from daq_app.accuracy.methods import Kinematics
 from daq_app.accuracy.random_scenes import random_scene
-from daq_app.accuracy.truth import NUMBERS, QUICK, cases, known
+from daq_app.accuracy.truth import KINEMATICS, NUMBERS, cases, judged, known, overkill
 from solver.contact import ContactLost
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
@@ -73,9 +73,9 @@ class Guaranteed:
 
 def measure(asked: Asked, found: Found) -> Iterator[Estimate | Guaranteed | LeftOut]:
     """Yield the published surfaces at each tolerance, then random scenes until time is over."""
-    for kinematics in MAIN:
+    for kinematics in KINEMATICS:
         yield from _published(asked, found, kinematics)
-    for kinematics in MAIN:
+    for kinematics in KINEMATICS:
         yield from _random(asked, kinematics)
 
 
@@ -112,7 +112,7 @@ def _random(asked: Asked, kinematics: Kinematics) -> Iterator[Estimate | LeftOut
             break
         scene = random_scene(number, kinematics)
         (answer,) = answers([replace(scene, solve=Solve(kinematics, tolerance=TOLERANCES[0]))])
-        truth = overkill(scene)
+        truth = _truth(scene)
         if isinstance(answer, SolveFailure) or truth is None:
             refused += 1
             continue
@@ -121,17 +121,13 @@ def _random(asked: Asked, kinematics: Kinematics) -> Iterator[Estimate | LeftOut
         yield LeftOut(f"{refused} of {wanted} random scenes at {kinematics} strain have no settled state to compare.")
 
 
-def overkill(scene: Scene) -> tuple[np.ndarray, np.ndarray] | None:
+def _truth(scene: Scene) -> tuple[np.ndarray, np.ndarray] | None:
     """Return the true numbers (3,) of a scene and their doubts (3,), relative; None where a mesh has no state."""
-    kinematics = scene.solve.kinematics
-    method = MAIN[kinematics]
     try:
-        meshes = [method.meshed(scene, *mesh) for mesh in QUICK[kinematics]]
-        solves = np.array([mesh.numbers(mesh.solve(scene)) for mesh in meshes])
+        solves, _ = overkill(scene, quick=True)(scene)
     except (SolveFailure, ContactLost):
         return None
-    mean = solves.mean(axis=0)
-    return mean, np.abs(solves / np.where(mean > 0.0, mean, 1.0) - 1.0).max(axis=0)
+    return judged(solves)
 
 
 def _compared(

@@ -13,6 +13,7 @@ from daq_app.accuracy.costs import Cost
 from daq_app.accuracy.estimates import Estimate
 from daq_app.accuracy.growth import FEWEST, Growth, exponent
 from daq_app.accuracy.measuring import Measured
+from daq_app.accuracy.methods import PLAIN
 from daq_app.accuracy.orders import Order
 from daq_app.accuracy.speed import Speed
 from daq_app.accuracy.truth import JUDGED, NUMBERS, Truth
@@ -59,7 +60,8 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
         known = [(error, 1e3 * span, r) for error, span, r in points if error is not None and span is not None]
         if not known:
             continue
-        colour, mark = COLOURS[known[0][2].kinematics], MARKS[known[0][2].kinematics]
+        kinematics = known[0][2].kinematics
+        colour, mark = GREY if method == PLAIN.name else COLOURS[kinematics], MARKS[kinematics]
         axes.plot([100 * e for e, _, _ in known], [s for _, s, _ in known], color=colour, linewidth=0.8)
         for error, span, row in known:
             words = f"{row.method}: {row.dofs} unknowns, {100 * error:.2g} %, {span:.3g} ms"

@@ -1,26 +1,26 @@
 """Every way of solving a scene that the project keeps, behind one face, so that all are measured alike."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any, Literal, Protocol
 
 import numpy as np
 
 from daq_app.accuracy.asked import clock
-from solver.climbing import MARGIN
+from solver.climbing import MARGIN, Climbed, climbed, foot
 from solver.elements import Q2P1
 from solver.existence import steady
 from solver.finger import FingerModel
 from solver.finite_finger import FiniteFinger
 from solver.mesh import Array
 from solver.mesher import Sizing
-from solver.newton import Pull, Shape
-from solver.scene import Scene
+from solver.newton import Newton, Pull, Shape
+from solver.scene import Friction, Scene
 from solver.solution import numbers_on, settled
 
 Kinematics = Literal["small", "finite"]
-State = Any  # of contact at small strain, of the whole body at finite strain; only handed back
+State = Any  # of contact at small strain, of the body, with its mesh or not, at finite strain; only handed back
 
 
 class Meshed(Protocol):
@@ -88,15 +88,55 @@ class SmallMeshed:
         return self.prepared_s + clock() - begun
 
 
+class ClimbingMeshed:
+    """Finite strain as answers are made: a rough mesh finds the edges of contact, a mesh with lines there counts.
+
+    Every surface has meshes of its own. They are kept, so that solving the same surface again makes none.
+    """
+
+    prepared_s = 0.0
+
+    def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
+        """Make the meshes of the finger of `scene` without friction, which stand for those of all surfaces."""
+        self._fineness, self._shift = fineness, shift
+        self._made: dict[Sizing, FiniteFinger] = {}
+        self.setup_s = 0.0
+        finger = self.solve(replace(scene, friction=Friction(0.0))).finger
+        self._newton = finger.newton
+        self.dofs = finger.newton.body.dofs
+
+    def _make(self, scene: Scene, sizing: Sizing) -> FiniteFinger:
+        sizing = replace(sizing, shift=self._shift)
+        if sizing not in self._made:
+            begun = clock()
+            self._made[sizing] = FiniteFinger.of(scene, sizing)
+            self.setup_s += clock() - begun
+        return self._made[sizing]
+
+    def solve(self, scene: Scene, before: State | None = None) -> Climbed:
+        """Return the settled state; every surface begins at the undeformed finger, so `before` is not used."""
+        del before
+        below = foot(scene, scene.loading.depth, self._fineness, _going_on, self._make)
+        return climbed(scene, self._fineness, below, _going_on, self._make)
+
+    def numbers(self, state: State) -> Array:
+        """Return SED, normal force and drag."""
+        return np.abs(state.finger.numbers(state.shape))
+
+    def floor(self) -> float:
+        """Return what one assembly, factorisation and solve takes."""
+        return _system(self._newton)
+
+
 class FiniteMeshed:
-    """Finite strain: Newton on the whole body, contact and displacements together."""
+    """Finite strain on one plain mesh, that does not know where contact ends: what climbing is compared with."""
 
     prepared_s = 0.0
 
     def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
         """Mesh the finger of `scene`."""
         begun = clock()
-        self.finger = _finite(scene, fineness, shift)
+        self.finger = FiniteFinger.of(scene, Sizing(fineness, scene.loading.depth, shift, margin=MARGIN))
         self.setup_s = clock() - begun
         self.dofs = self.finger.newton.body.dofs
 
@@ -111,15 +151,30 @@ class FiniteMeshed:
 
     def floor(self) -> float:
         """Return what one assembly, factorisation and solve takes."""
-        newton = self.finger.newton
-        shape = Shape.undeformed(newton.body)
-        begun = clock()
-        newton.linearise(shape, Pull(0.1, 0.0), newton.skin_x)
-        return clock() - begun
+        return _system(self.finger.newton)
 
 
-def _finite(scene: Scene, fineness: float, shift: bool) -> FiniteFinger:
-    return FiniteFinger.of(scene, Sizing(fineness, scene.loading.depth, shift, margin=MARGIN))
+def climbed_twice(scene: Scene, finenesses: tuple[float, float, float]) -> tuple[Array, tuple[int, ...]]:
+    """Return numbers (3, 3) and unknowns of a plain mesh, and of two meshes with lines at the edges that it finds.
+
+    Raises NoSteadyState, NotConverged.
+    """
+    plain = FiniteMeshed(scene, finenesses[0], shift=False)
+    below = Climbed(plain.finger, plain.solve(scene), plain.setup_s)
+    found = [below, *(climbed(scene, fineness, below, _going_on) for fineness in finenesses[1:])]
+    numbers = np.abs([at.finger.numbers(at.shape) for at in found])
+    return numbers, tuple(at.finger.newton.body.dofs for at in found)
+
+
+def _system(newton: Newton) -> float:
+    shape = Shape.undeformed(newton.body)
+    begun = clock()
+    newton.linearise(shape, Pull(0.1, 0.0), newton.skin_x)
+    return clock() - begun
+
+
+def _going_on() -> bool:
+    return False
 
 
 def pull_of(scene: Scene) -> Pull:
@@ -132,7 +187,8 @@ _FRONTS = "nested dissection in compiled loops"
 SMALL = Method(
     "small strain", "small", Q2P1.name, Q2P1.order, "nested dissection, dense contact", "one guess", SmallMeshed
 )
-FINITE = Method("finite strain", "finite", Q2P1.name, Q2P1.order, _FRONTS, "undeformed", FiniteMeshed)
+FINITE = Method("finite strain", "finite", Q2P1.name, Q2P1.order, _FRONTS, "rough state", ClimbingMeshed)
+PLAIN = Method("finite strain, plain mesh", "finite", Q2P1.name, Q2P1.order, _FRONTS, "undeformed", FiniteMeshed)
 
-METHODS = (SMALL, FINITE)
+METHODS = (SMALL, FINITE, PLAIN)
 MAIN: dict[Kinematics, Method] = {"small": SMALL, "finite": FINITE}  # the one an answer comes from

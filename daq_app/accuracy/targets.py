@@ -1,8 +1,8 @@
 """What was asked of the solver's speed, row by row: reach and aim, what was measured, met or missed.
 
-Speeds are at a true error: the time is that of the cheapest way and mesh whose error on slipperiness 0 to 100 and
-stickiness 0 stays below it, without the cost of the estimate, mesh and tables apart. The floor is one assembly,
-factorisation and solve of the same system, timed in the same run.
+Speeds are at a true error, of the way that answers come from: the time is that of the cheapest mesh whose error on
+slipperiness 0 to 100 and stickiness 0 stays below it, without the cost of the estimate, mesh and tables apart. The
+floor is one assembly, factorisation and solve of the same system, timed in the same run.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,6 +13,7 @@ from daq_app.accuracy.asked import Asked, Found
 from daq_app.accuracy.estimates import Guaranteed
 from daq_app.accuracy.growth import Growth, exponent
 from daq_app.accuracy.histories import Marched
+from daq_app.accuracy.methods import MAIN, Kinematics
 from daq_app.accuracy.processes import Cold, Memory
 from daq_app.accuracy.speed import Speed
 from daq_app.accuracy.warm import Warm
@@ -78,13 +79,13 @@ def measure(asked: Asked, found: Found) -> Iterator[Target]:
 def _at_error(
     found: Found,
     work: str,
-    kinematics: str,
+    kinematics: Kinematics,
     error: float,
     reach: float,
     aim: float,
     time: Callable[[Speed], float | None],
 ) -> Target:
-    rows = [row for row in found.of(Speed) if row.kinematics == kinematics]
+    rows = [row for row in found.of(Speed) if row.method == MAIN[kinematics].name]
     good = [
         (took, r)
         for r in rows

@@ -1,33 +1,32 @@
 """The reference cases and their truth: overkill solves on meshes whose nodes lie elsewhere, made in the same run.
 
-The ten published surfaces, at small and at finite strain. The truth of a number is the mean of three solves far finer
-than any that is judged; how far they lie from it is its doubt. Nothing is shipped and nothing comes from elsewhere, so
+The ten published surfaces, at small and at finite strain. The truth of a number is the mean of three solves on fine
+meshes: at finite strain one without lines at the edges of contact, which finds them, and two with lines there. How far
+they lie from their mean is its doubt. Nothing is shipped and nothing comes from elsewhere, so
 the truth is never older than the solver. Where a surface has no settled sliding the solver's refusal stands instead.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock
-from daq_app.accuracy.methods import FINITE, SMALL, Kinematics, Meshed, Method
+from daq_app.accuracy.methods import Kinematics, SmallMeshed, climbed_twice
 from solver.contact import ContactLost
 from solver.failures import SolveFailure
 from solver.reference import scenes
 from solver.scene import Scene, Solve
 from solver.solution import answers
 
+KINEMATICS: tuple[Kinematics, ...] = ("small", "finite")
 NUMBERS = ("SED of the ending", "normal force", "drag")
-# fineness of the three meshes, and whether moved along the skin by half an element
-OVERKILL: dict[Kinematics, tuple[tuple[float, bool], ...]] = {
-    "small": ((26.0, False), (26.0, True), (23.0, False)),
-    "finite": ((20.0, False), (20.0, True), (18.0, False)),
-}
-QUICK: dict[Kinematics, tuple[tuple[float, bool], ...]] = {
-    "small": ((18.0, False), (18.0, True), (16.0, False)),
-    "finite": ((11.0, False), (11.0, True), (10.0, False)),
-}
+# small strain: fineness of three meshes, and whether moved along the skin by half an element
+SHIFTED, SHIFTED_QUICK = ((26.0, False), (26.0, True), (23.0, False)), ((18.0, False), (18.0, True), (16.0, False))
+# finite strain: fineness of the plain mesh, and of two with lines at the edges of contact that it finds
+CLIMBED, CLIMBED_QUICK = (17.0, 23.0, 20.0), (14.0, 20.0, 17.0)
+Solves = Callable[[Scene], tuple[np.ndarray, tuple[int, ...]]]  # numbers (3 meshes, 3), and unknowns of the meshes
 # "slip 0-100 and stick 0": what speeds are asked at
 JUDGED = ("slipperiness 0", "slipperiness 20", "slipperiness 55", "slipperiness 75", "slipperiness 100", "stickiness 0")
 
@@ -53,40 +52,53 @@ def cases(kinematics: Kinematics) -> list[Scene]:
 def measure(asked: Asked, found: Found) -> Iterator[Truth | LeftOut]:
     """Yield the truth of every case; a quick run takes coarser overkill and only the cases speeds are asked at."""
     del found
-    overkill = QUICK if asked.quick else OVERKILL
-    for method in (SMALL, FINITE):
-        chosen = [s for s in cases(method.kinematics) if s.title in JUDGED or not asked.quick]
-        yield from _truths(asked, method, chosen, overkill[method.kinematics])
+    for kinematics in KINEMATICS:
+        chosen = [s for s in cases(kinematics) if s.title in JUDGED or not asked.quick]
+        yield from _truths(asked, kinematics, chosen)
 
 
-def _truths(
-    asked: Asked, method: Method, chosen: list[Scene], overkill: tuple[tuple[float, bool], ...]
-) -> Iterator[Truth | LeftOut]:
-    refused, todo = _sorted_out(method.kinematics, chosen)
+def overkill(deepest: Scene, *, quick: bool) -> Solves:
+    """Return what solves scenes of one finger, none deeper than `deepest`, on the three meshes of a truth."""
+    if deepest.solve.kinematics == "finite":
+        return partial(climbed_twice, finenesses=CLIMBED_QUICK if quick else CLIMBED)
+    meshes = [SmallMeshed(deepest, *mesh) for mesh in (SHIFTED_QUICK if quick else SHIFTED)]
+
+    def solves(scene: Scene) -> tuple[np.ndarray, tuple[int, ...]]:
+        return np.array([mesh.numbers(mesh.solve(scene)) for mesh in meshes]), tuple(mesh.dofs for mesh in meshes)
+
+    return solves
+
+
+def judged(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return mean and doubt (3,) of the numbers found on three meshes (3, 3)."""
+    mean = solves.mean(axis=0)
+    return mean, np.abs(solves / np.where(mean > 0.0, mean, 1.0) - 1.0).max(axis=0)
+
+
+def _truths(asked: Asked, kinematics: Kinematics, chosen: list[Scene]) -> Iterator[Truth | LeftOut]:
+    refused, todo = _sorted_out(kinematics, chosen)
     yield from refused
-    deepest = max(chosen, key=lambda scene: scene.loading.depth)
     begun = clock()
-    meshes = [method.meshed(deepest, fineness, shift) for fineness, shift in overkill]
+    solves = overkill(max(chosen, key=lambda scene: scene.loading.depth), quick=asked.quick)
     shared = (clock() - begun) / max(len(todo), 1)
     for number, scene in enumerate(sorted(todo, key=lambda scene: scene.title not in JUDGED)):
         if asked.left <= 0.0 and scene.title not in JUDGED:  # without those, nothing else can be told
-            yield LeftOut(f"Time was over before the truth of {len(todo) - number} cases at {method.name} was known.")
+            yield LeftOut(
+                f"Time was over before the truth of {len(todo) - number} cases at {kinematics} strain was known."
+            )
             return
-        yield _truth(method.kinematics, scene, meshes, shared)
+        yield _truth(kinematics, scene, solves, shared)
 
 
-def _truth(kinematics: Kinematics, scene: Scene, meshes: list[Meshed], shared: float) -> Truth:
+def _truth(kinematics: Kinematics, scene: Scene, overkill: Solves, shared: float) -> Truth:
     begun = clock()
     try:
-        solves = np.array([mesh.numbers(mesh.solve(scene)) for mesh in meshes])
+        solves, dofs = overkill(scene)
     except (SolveFailure, ContactLost) as failure:
         return Truth(kinematics, scene.title, (), (), (), clock() - begun, f"On an overkill mesh: {failure}")
-    mean = solves.mean(axis=0)
-    doubt = np.abs(solves / np.where(mean > 0.0, mean, 1.0) - 1.0).max(axis=0)
+    mean, doubt = judged(solves)
     took = clock() - begun + shared
-    return Truth(
-        kinematics, scene.title, tuple(mean.tolist()), tuple(doubt.tolist()), tuple(m.dofs for m in meshes), took, ""
-    )
+    return Truth(kinematics, scene.title, tuple(mean.tolist()), tuple(doubt.tolist()), dofs, took, "")
 
 
 def _sorted_out(kinematics: Kinematics, chosen: list[Scene]) -> tuple[list[Truth], list[Scene]]:

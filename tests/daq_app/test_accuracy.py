@@ -3,6 +3,7 @@
 import json
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from time import perf_counter
 
 import pytest
@@ -15,6 +16,7 @@ from daq_app.accuracy.growth import Growth, exponent
 from daq_app.accuracy.hard_cases import HardCase
 from daq_app.accuracy.machine import Machine
 from daq_app.accuracy.measuring import Measured, measured, restored
+from daq_app.accuracy.methods import FINITE, PLAIN
 from daq_app.accuracy.orders import Order
 from daq_app.accuracy.page import page, write
 from daq_app.accuracy.published.problems import Problem
@@ -22,8 +24,10 @@ from daq_app.accuracy.random_scenes import random_scene
 from daq_app.accuracy.speed import Speed
 from daq_app.accuracy.subjects import Subject
 from daq_app.accuracy.tables import tables
-from daq_app.accuracy.truth import JUDGED, Truth
+from daq_app.accuracy.truth import JUDGED, Truth, cases
 from daq_app.accuracy.warm import Warm
+from solver.estimate import DEFAULT
+from solver.solution import solve
 
 FOREVER = Asked(quick=True, until=perf_counter() + 1e6)
 OVER = Asked(quick=True, until=perf_counter() - 1.0)
@@ -109,6 +113,20 @@ def test_pictures_are_files_of_their_own_and_the_data_is_json(written):
     data = json.loads((written[0].parent / "accuracy.json").read_text(encoding="utf-8"))
     assert data["truth"][0]["numbers"] == [5e-3, 0.1, 0.06]
     assert data["speed"][0]["kind"] == "Speed"
+
+
+def test_what_is_timed_at_finite_strain_is_what_the_program_answers():
+    scene = next(s for s in cases("finite") if s.title == "slipperiness 100")
+    timed_way = FINITE.meshed(scene, DEFAULT["finite"], False)
+    found = timed_way.numbers(timed_way.solve(scene))
+    answer = solve(scene)
+    assert found == pytest.approx([answer.sed_ending, answer.normal_force, answer.tangential_force], rel=1e-9)
+
+
+def test_a_mesh_that_is_only_compared_with_meets_no_aim():
+    quick = replace(speed("finite", 900, 0.001, 1e-3), method=PLAIN.name)
+    rows = targets.measure(FOREVER, Found([quick]))
+    assert all(row.measured is None for row in rows)
 
 
 def test_pictures_and_tables_can_be_made_again_from_the_data_alone(example, written):
