@@ -1,7 +1,7 @@
 """The analyst's window: trials, the stroke of the chosen one, and what the model says of it."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
 from PySide6.QtCore import QSize, Qt, QTimer
@@ -32,17 +32,33 @@ pg: Any = pyqtgraph  # it has no types
 LOOK = 50  # between two looks at the work [ms]
 
 
+class Work(Protocol):
+    """What is done for the window, as `daq_app.analyst_process.Analyst` does it."""
+
+    def poll(self) -> tuple[a.Message, ...]:
+        """Return what came since the last call."""
+        ...
+
+    def write(self, asked: a.Write) -> None:
+        """Begin to write a file."""
+        ...
+
+    def cancel(self) -> a.Cancelled:
+        """Stop what is being done, at once."""
+        ...
+
+
 class AnalystWindow(QMainWindow):
     """A session folder, followed from its trials to the model. It knows nothing but the last `AnalystState`."""
 
-    def __init__(self, folder: Path, tokens: Tokens) -> None:
-        """Open `folder`; the work is done by another process."""
+    def __init__(self, folder: Path, tokens: Tokens, work: Work | None = None) -> None:
+        """Open `folder`; `work` is done by another process, begun here where none is given."""
         super().__init__()
         self.setWindowTitle(f"{folder.name} – daq-app")
         self.setAccessibleName("analyst's window")
         self.state = a.AnalystState(folder)
         self._shown: a.AnalystState | None = None
-        self._work = Analyst(folder)
+        self._work: Work = work or Analyst(folder)
         self._tokens = tokens
         self._head = label("", "simulated")
         self._way = label("", "quiet", wrap=True)
@@ -88,7 +104,7 @@ class AnalystWindow(QMainWindow):
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802  Qt's name
         """End the work with the window."""
         self._timer.stop()
-        self._work.close()
+        self._work.cancel()
         super().closeEvent(event)
 
     def _look(self) -> None:

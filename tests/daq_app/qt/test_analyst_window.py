@@ -8,16 +8,29 @@ import pytest
 from daq_app import analyst as a
 from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.tokens import LIGHT
-from sessions.exports.figures import plates
-from sessions.exports.figures.style import in_pixels
+from sessions.exports.figures.course import course_panel
+from sessions.exports.figures.style import Plate, in_pixels, look
 from tests.sessions.report_example import example
 
 SESSION = Path(__file__).parents[2] / "data" / "sessions" / "version-1" / "sealed"
 
 
+class Nobody:
+    """Work that never ends by itself."""
+
+    def poll(self):
+        return ()
+
+    def write(self, asked):
+        """Do nothing."""
+
+    def cancel(self):
+        return a.Cancelled()
+
+
 @pytest.fixture
 def window(application):
-    made = AnalystWindow(SESSION, LIGHT)
+    made = AnalystWindow(SESSION, LIGHT, Nobody())
     made.show()
     yield made
     made.close()
@@ -27,9 +40,9 @@ def window(application):
 @pytest.fixture(scope="module")
 def found():
     report = example()
-    with in_pixels() as pixels:
-        drawn = plates(report)
-    return a.Found("predicted", report, drawn, pixels)
+    with look(), in_pixels() as pixels:
+        panel = course_panel(report.course, report.strokes, simulated=True)
+    return a.Found("predicted", report, (Plate("course", "", (panel,)),), pixels)
 
 
 def until(application, condition):
@@ -41,7 +54,6 @@ def until(application, condition):
 
 
 def test_a_point_of_prediction_against_score_chooses_its_trial_in_every_column(window, found):
-    window._work.close()
     window.take(found)
     point = a.points(window.state)[-1]
     spot = next(s for s in window._points.points() if s.data() == point.row)
@@ -69,7 +81,9 @@ def test_every_picture_is_saved_as_svg_png_and_csv(window, found, tmp_path):
     assert (tmp_path / "picture.csv").read_text().count("\n") >= len(panel.rows)
 
 
-def test_a_recorded_session_is_opened_and_analysed_while_the_window_stays_alive(application, window):
+def test_a_recorded_session_is_opened_and_analysed_while_the_window_stays_alive(application):
+    window = AnalystWindow(SESSION, LIGHT)
     until(application, lambda: window.state.step is None or window.state.stage != "opening")
     assert window.state.report is not None, window.state.told
     assert window.state.report.session == SESSION.name
+    window.close()
