@@ -85,8 +85,8 @@ def logged(kind: str, trial: int | None = None, **data: object) -> LoggedEvent:
 
 
 def status(safe_ns: int) -> Status:
-    """Return a status whose acknowledgement has come so far."""
-    return Status("mounting", 1, 10, 1000, 0, 2.0, Acknowledged(1000, 3, safe_ns))
+    """Return a status whose acknowledgement has come so far; the course is told by commands alone."""
+    return Status("", 1, 10, 1000, 0, 2.0, Acknowledged(1000, 3, safe_ns))
 
 
 def scored(trial: int, score: float) -> tuple[m.Report, ...]:

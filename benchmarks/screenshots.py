@@ -59,8 +59,9 @@ def _take(setting: str, out: Path) -> None:
     QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, str(out / "settings"))
     application = QApplication([])
     chosen = DARK if theme == "dark" else LIGHT
-    _Places(application, (width, height), chosen, lambda name: out / f"{name}-{setting}.png").all()
-    os._exit(0)
+    places = _Places(application, (width, height), chosen, lambda name: out / f"{name}-{setting}.png")
+    places.all()
+    places.window.bridge.end()
 
 
 class _Places:
@@ -140,21 +141,28 @@ class _Places:
         from benchmarks import played_recorder as p
 
         self.recorder.play(*reports)
-        if self.window.bridge.recording:
-            self.recorder.play(p.status(int(until * 1e9)))
         self.recorder.readings(until)
-        self.wait(lambda: not self.recorder._waiting)
+        self.wait(lambda: not any(isinstance(said, p.m.Live) for said in self.recorder._waiting))
 
     def wait(self, condition) -> None:  # noqa: ANN001
         """Let the window work until something holds."""
-        end = time.monotonic() + 20.0
+        end = time.monotonic() + 60.0
         while not condition() and time.monotonic() < end:
+            self._safe()
             self.application.processEvents()
             time.sleep(0.002)
+
+    def _safe(self) -> None:
+        """Have the disk acknowledge, as it does all the time."""
+        from benchmarks import played_recorder as p
+
+        if self.window.bridge.recording:
+            self.recorder.play(p.status(time.monotonic_ns()))
 
     def picture(self, name: str, widget=None) -> None:  # noqa: ANN001
         """Take a picture."""
         for _ in range(5):
+            self._safe()
             self.application.processEvents()
             time.sleep(0.02)
         (widget or self.window).grab().save(str(self.path(name)))

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from sessions.recording.manifest import is_sealed
 from sessions.resuming import check_resumable
 from sessions.toml_file import SettingsError
 
+HIGHEST = 500.0  # a face above the transducer's origin [mm]
 SHOWN = 20  # sessions that were cut short, at most
 
 
@@ -31,6 +32,7 @@ class SessionForm:
     stroking_hand: Hand | None = None
     answering_hand: Hand | None = None
     forces: bool = True
+    height: str = ""  # of the stimulus's face above the transducer's origin [mm]; empty: as bench or protocol state it
     practice: bool = False  # before the trials that count
     simulated: bool = False  # the subject's judgement too, where the bench is simulated
 
@@ -87,6 +89,9 @@ def checked(
         )
     except SettingsError as error:
         return Refused({"subject": _told(error)})
+    if form.forces and form.height.strip():
+        face = replace(planned.frame, height=_number(form.height) or 0.0, height_origin="measured")
+        planned = replace(planned, frame=face)
     folder = session_folder(form, planned.protocol, now)
     people = People(_kind(form, bench), seed)
     own = [Setting("seed", seed, "", "set" if form.seed.strip() else "default")]
@@ -144,6 +149,9 @@ def _refusals(form: SessionForm, bench: Bench) -> dict[str, str]:
     seed = form.seed.strip()
     if seed and not (seed.isascii() and seed.isdigit() and int(seed) <= LARGEST_SEED):
         wrong["seed"] = f"A seed is a whole number from 0 to {LARGEST_SEED}; leave it empty for a new one."
+    height = _number(form.height)
+    if form.height.strip() and (height is None or not abs(height) <= HIGHEST):
+        wrong["height"] = f"A height is a number of millimetres from −{HIGHEST:.0f} to {HIGHEST:.0f}, or left empty."
     place = Path(form.folder.strip() or ".").expanduser()
     existing = next((p for p in (place, *place.parents) if p.exists()), place)
     if not existing.is_dir():
@@ -153,6 +161,14 @@ def _refusals(form: SessionForm, bench: Bench) -> dict[str, str]:
     if form.simulated and form.forces and bench.connected and not bench.simulated:
         wrong["simulated"] = "Only the simulated bench can be stroked by a simulated subject."
     return wrong
+
+
+def _number(text: str) -> float | None:
+    """Return a number as it was typed, a comma for a point too; None where it is none."""
+    try:
+        return float(text.strip().replace(",", "."))
+    except ValueError:
+        return None
 
 
 def _kind(form: SessionForm, bench: Bench) -> Kind:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 STEPS = (1.0, 2.0, 5.0)
+MARGIN = 0.05  # data may go beyond the scale by this share of it: so much is drawn [-]
 SHRINK = 0.25  # a scale of which no more than this share is used ...
 PATIENCE = 20.0  # ... for so long is taken back [s]
 
@@ -20,15 +21,20 @@ class PlotScale:
         """Return the scale after data from `least` to `greatest` were shown at `now` [s].
 
         >>> scale = PlotScale(0.0, 5.0, 5.0)
-        >>> scale.following(0.0, 4.9, 0.0).high, scale.following(0.0, 5.1, 0.0).high
+        >>> scale.following(0.0, 4.9, 0.0).high, scale.following(0.0, 5.3, 0.0).high
         (5.0, 10.0)
+        >>> scale.following(-0.01, 4.0, 0.0).low, scale.following(-0.4, 4.0, 0.0).low
+        (0.0, -0.5)
         >>> PlotScale(0.0, 20.0, 5.0).following(0.0, 1.0, 30.0).high
         5.0
         """
         if not (least <= greatest):  # nothing is known
             return self
-        if greatest > self.high or least < self.low:
-            return PlotScale(min(self.low, -_step(-least)), max(self.high, _step(greatest)), self.least, now)
+        margin = MARGIN * (self.high - self.low)
+        if greatest > self.high + margin or least < self.low - margin:
+            low = self.low if least >= self.low - margin else -_step(-least)
+            high = self.high if greatest <= self.high + margin else _step(greatest)
+            return PlotScale(low, high, self.least, now)
         wide = self.high - self.low > self.least
         if not wide or greatest > SHRINK * self.high or least < SHRINK * self.low:
             return PlotScale(self.low, self.high, self.least, now)

@@ -87,7 +87,7 @@ def course_view(session: SessionState, bench: BenchState, now: float, *, alone: 
         pause=_pause(session),
         note=Button("Note", "N", not over),
         no_answer=Button("No answer", "0", session.phase == "scoring", _no_answer(session.asked)),
-        end=Button("New session", "Ctrl+N", sends=NewSession()) if over else Button("End", "Ctrl+E"),
+        end=Button("New", "Ctrl+N", sends=NewSession()) if over else Button("End", "Ctrl+E"),
         forces_shown="forces" in session.plan.shown.experimenter,
     )
 

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 
 from daq_app.bench_load import AXES
 from daq_app.qt.indicators import Lamp, LoadBar
-from daq_app.qt.parts import button, choice, label, regrade, say
+from daq_app.qt.parts import Shortened, button, choice, label, regrade, say
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.view_bench import BenchView
@@ -39,7 +39,7 @@ class BenchPanel(QFrame):
         self._lamp = Lamp(tokens, "transducer")
         self._lamp_words = label("not connected", wrap=True)
         self._fields = {name: label("–", wrap=True) for name in ("serial", "calibration", "rate", "tare", "drift")}
-        self._name = label("no transducer", "title", wrap=True)
+        self._name = Shortened("title")
         self._counters = {name: label("0") for name in SHOWN_COUNTERS}
         self._bars = {name: LoadBar(tokens, name, scale) for name in (*AXES, "combined")}
         self._choice = choice("transducer to connect: choose one, or type its address")
@@ -63,7 +63,7 @@ class BenchPanel(QFrame):
         self._lamp.show_grade(view.lamp, view.lamp_words)
         say(self._lamp_words, view.lamp_words)
         regrade(self._lamp_words, view.lamp if view.lamp in ("wrong", "look") else "")
-        say(self._name, view.name)
+        self._name.show_whole(view.name)
         for name, text in (
             ("serial", view.serial),
             ("calibration", view.calibration),
@@ -143,7 +143,6 @@ class BenchPanel(QFrame):
         layout.addWidget(label("Readings since the stream began", "section", wrap=True))
         layout.addLayout(_counters([(name, self._counters[name]) for name in SHOWN_COUNTERS]))
         layout.addStretch(1)
-        layout.addWidget(label("Transducer", "section"))
         layout.addWidget(self._choice)
         row = QHBoxLayout()
         row.addWidget(self.connect_button, 1)

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 
 from daq_app.course_state import Mark
 from daq_app.live_trace import CHANNELS, Columns
-from daq_app.plot_scale import PlotScale
+from daq_app.plot_scale import MARGIN, PlotScale
 from daq_app.qt.curve import Curve
 from daq_app.qt.tokens import SMALL, Tokens, font
 
@@ -58,7 +58,10 @@ class LivePlot(QWidget):
             axis = item.getAxis(side)
             # Painted once and copied from then on: the axes stand still while the curves move.
             axis.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
-            axis.setStyle(tickFont=font(SMALL, type_scale), tickLength=-4, autoExpandTextSpace=False)
+            axis.setStyle(
+                tickFont=font(SMALL, type_scale), tickLength=-4, autoExpandTextSpace=False, hideOverlappingLabels=False
+            )
+        item.getAxis("left").setStyle(hideOverlappingLabels=False)
         item.getAxis("left").setWidth(round(AXIS_WIDTH * type_scale))
         item.getAxis("bottom").setHeight(round(22 * type_scale))
         self._label = pg.TextItem(name, anchor=(0, 0))
@@ -109,7 +112,7 @@ class LivePlot(QWidget):
 
     def _show_scale(self) -> None:
         low, high = self._scale.low, self._scale.high
-        self._item.getViewBox().setYRange(low, high, padding=0.03)
+        self._item.getViewBox().setYRange(low, high, padding=MARGIN)
         ends = [value for value in (low, 0.0, high) if value == 0.0 or abs(value) >= 0.2 * (high - low)]
         halves = [low / 2, high / 2] if self.height() >= LEAST_FOR_HALVES else []
         ticks = sorted({value for value in (*ends, *halves) if low <= value <= high})

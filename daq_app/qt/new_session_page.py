@@ -56,6 +56,8 @@ class NewSessionPage(QFrame):
         self.folder.setText("recordings")
         self.seed = _line("seed of the stimulus order; empty for a new one")
         self.seed.setPlaceholderText("a new one")
+        self.height_above = _line("height of the face above the transducer's origin in millimetres; may be empty")
+        self.height_above.setPlaceholderText("as the protocol states it")
         self.stroking, self.answering = _hands("stroking hand"), _hands("answering hand")
         self.practice = QCheckBox("Practice first")
         self.practice.setAccessibleName("practice before the trials that count")
@@ -75,9 +77,9 @@ class NewSessionPage(QFrame):
         self._line_words = label("", "quiet", wrap=True)
         self._resume = choice("sessions that were cut short")
         self._go_on = button("Go on with it", "go on with the session that was cut short", self._resumed)
-        self._unfinished = QWidget()
+        self._unfinished, self._height = QWidget(), QWidget()
         self._build(scale)
-        for line in (self.subject, self.study, self.folder, self.seed):
+        for line in (self.subject, self.study, self.folder, self.seed, self.height_above):
             line.textChanged.connect(self.changed)
         for made in (self.with_forces, self.scores_only, self.people_score, self.simulated):
             made.toggled.connect(self.changed)
@@ -95,11 +97,14 @@ class NewSessionPage(QFrame):
             answering_hand=HANDS[self.answering.currentIndex()][1],
             practice=self.practice.isChecked(),
             forces=self.with_forces.isChecked(),
+            height=self.height_above.text() if self._height.isVisibleTo(self) else "",
             simulated=self.simulated.isChecked(),
         )
 
     def show_bench(self, bench: Bench) -> None:
         """Offer what the bench allows."""
+        # A simulated bench knows where its face lies.
+        self._height.setVisible(self.with_forces.isChecked() and bench.frame is None)
         words = "The subject strokes the transducer and scores."
         if self.simulated.isChecked():
             words = "Nobody is needed: strokes and scores are simulated, and marked so."
@@ -129,6 +134,7 @@ class NewSessionPage(QFrame):
             "study": self.study,
             "folder": self.folder,
             "seed": self.seed,
+            "height": self.height_above,
         }
         first = next((fields[name] for name in fields if name in sentences), None)
         if first is not None:
@@ -193,6 +199,10 @@ class NewSessionPage(QFrame):
         layout.addWidget(self.with_forces)
         layout.addWidget(self.scores_only)
         self._refusal(layout, "forces")
+        of_height = QVBoxLayout(self._height)
+        of_height.setContentsMargins(0, 0, 0, 0)
+        self._field(of_height, "height", "Height of the face above the transducer's origin [mm]", self.height_above)
+        layout.addWidget(self._height)
         layout.addWidget(label("Who strokes and scores", "section"))
         row = QHBoxLayout()
         row.addWidget(self.people_score)

@@ -127,8 +127,7 @@ def style_sheet(t: Tokens, scale: float) -> str:
 
     return f"""
 * {{ font-size: {px(TEXT)}; color: {t.text}; }}
-QWidget#window, QDialog, QMainWindow, QStackedWidget, QScrollArea, QScrollArea > QWidget > QWidget {{
-  background: {t.ground}; border: none; }}
+QWidget#window, QMainWindow {{ background: {t.ground}; border: none; }}
 QFrame[role="panel"] {{ background: {t.surface}; border: 1px solid {t.line}; border-radius: 6px; }}
 QFrame[role="strip"] {{ background: {t.surface}; border: 1px solid {t.line}; border-radius: 6px; }}
 QLabel {{ background: transparent; }}

@@ -53,6 +53,8 @@ def test_who_strokes_and_scores_follows_from_bench_and_choice(form, bench, kind)
         (replace(FORM, study="../x"), REAL, "study", "slash"),
         (replace(FORM, protocol="nowhere"), REAL, "protocol", "nowhere"),
         (replace(FORM, protocol="nowhere.toml"), REAL, "protocol", "nowhere.toml"),
+        (replace(FORM, height="high"), REAL, "height", "millimetres"),
+        (replace(FORM, height="900"), REAL, "height", "millimetres"),
         (FORM, Bench(), "forces", "No transducer is connected"),
         (replace(FORM, simulated=True), REAL, "simulated", "Only the simulated bench"),
     ],
@@ -69,3 +71,8 @@ def test_a_folder_that_is_a_file_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
     made = checked(replace(FORM, folder=str(tmp_path / "file")), REAL, NOW, 0)
     assert "is a file" in made.sentences["folder"]
+
+
+def test_a_height_that_was_measured_is_recorded_as_measured_and_one_that_nobody_stated_as_a_default():
+    assert checked(replace(FORM, height="12,5"), REAL, NOW, 0).plan.frame == Frame("-z", "default", 12.5, "measured")
+    assert checked(FORM, REAL, NOW, 0).plan.frame.height_origin == "default"
