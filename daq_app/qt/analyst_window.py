@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QListWidget,
     QMainWindow,
     QProgressBar,
+    QScrollArea,
     QSizePolicy,
     QTabWidget,
     QVBoxLayout,
@@ -231,8 +232,16 @@ class AnalystWindow(QMainWindow):
         left_layout.addWidget(label("Prediction against score", "section"))
         left_layout.addWidget(self.relation, 2)
         middle, middle_layout = panel("stroke")
-        middle_layout.addWidget(self.stroke, 1)
-        middle_layout.addLayout(self._numbers)
+        middle_layout.addWidget(self.stroke, 3)
+        told = QWidget()
+        told.setLayout(self._numbers)
+        self._numbers.setColumnStretch(1, 1)
+        self._numbers.setContentsMargins(0, 0, 0, 0)
+        scrolled = QScrollArea()  # where there is little room the numbers are scrolled, never cut
+        scrolled.setWidget(told)
+        scrolled.setWidgetResizable(True)
+        scrolled.setAccessibleName("numbers of the stroke and its prediction")
+        middle_layout.addWidget(scrolled, 2)
         tabs = QTabWidget()
         tabs.setAccessibleName("pictures")
         for name, view in (("Finger", self.fingers[0]), ("Contact", self.fingers[1]), ("Session", self._session())):
