@@ -90,7 +90,7 @@ def truths(found: Measured) -> Table:
         else:
             cells.append((row.kinematics, row.case, "–", "–", "–", "–", row.refused))
     caption = (
-        "The reference cases and their truth: mean of three overkill solves on meshes whose nodes lie elsewhere, made "
+        "The reference cases and their truth: mean of three overkill solves on meshes that differ, made "
         "in this run. Doubt: how far they lie from it at most."
     )
     header = ("strain", "case", "SED [MPa]", "N [N/mm]", "drag [N/mm]", "doubt", "unknowns, or why there is none")
