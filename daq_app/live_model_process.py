@@ -103,7 +103,7 @@ class LiveModel:
         if self._waiting and self._waiting[-1].stream != forces.stream:
             self._waiting.clear()
         self._waiting.append(forces)
-        while forces.time[-1] - self._waiting[0].time[0] > WAITING:
+        while len(self._waiting) > 1 and forces.time[-1] - self._waiting[0].time[0] > WAITING:
             self._waiting.pop(0)
 
     def settle(self, asked: Settle) -> None:

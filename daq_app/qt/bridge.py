@@ -119,7 +119,10 @@ class Bridge(QObject):
             self._ticked = now
             self._fold(Tick(now))
         for report in self._client.poll():
-            self._take(report)
+            try:
+                self._take(report)
+            except Exception as error:  # noqa: BLE001  what one report cannot be used for must not cost the others
+                self.drawing_failed(error)
         with suppress(Empty):
             while True:
                 self._fold(message := self._from_threads.get_nowait())
@@ -138,8 +141,8 @@ class Bridge(QObject):
         match report:
             case m.Live():
                 self._fold(Loaded(self.feed.add(report, self._frame())))
-                self.model.add(report, self._frame())
                 self._judge.look(self.feed, self.state)
+                self.model.add(report, self._frame())
                 return
             case m.Device(info):
                 self.feed.device(info)

@@ -119,6 +119,7 @@ def test_an_error_while_drawing_is_said_and_the_session_goes_on(driver, monkeypa
         raise ValueError("no such picture")
 
     monkeypatch.setattr(driver.window.live, "draw", fails)
+    monkeypatch.setattr(driver.window.bridge.model, "add", fails)
     driver.until(lambda: driver.view.banner is not None, "the banner")
     assert "the recording goes on" in driver.view.banner.sentence
     one_trial(driver)
