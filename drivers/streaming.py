@@ -15,6 +15,7 @@ from drivers.links import Link
 from drivers.pacing import Paced
 from drivers.readings import ReadingBlock
 from drivers.records import RecordDecoder, Records
+from drivers.threaded import ThreadedTransducer
 from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, TransducerInfo
 
 # All in real seconds.
@@ -136,34 +137,26 @@ class _Arrived:
     received_ns: int
 
 
-class StreamingTransducer:
+class StreamingTransducer(ThreadedTransducer):
     """One device at the end of a line that is opened at each start. A thread takes and decodes what comes.
 
     Number and time of each record come from the conversation's numbering. `counter` is the number. A loss is named by
     missing numbers; so is the time in which the line was pulled or the device was off.
     """
 
+    _tick = _TICK
+
     def __init__(
         self, info: TransducerInfo, connect: Callable[[], Link], conversation: Conversation, clock: Clock
     ) -> None:
         """Take an identified device whose `info.rate` [Hz] is known within a few per cent."""
-        self._info = info
+        super().__init__(info, clock)
         self._connect = connect
         self._conversation = conversation
-        self._clock = clock
         self._period = 1.0 / info.rate / clock.factor  # between two records [real s]
         self._gather = _GATHER if self._period < _GATHER else 0.0
-        self._lock = threading.Lock()  # over all that _digest touches
-        self._arrived = threading.Event()  # something is pending, or the stream has ended
-        self._stopping = threading.Event()
         self._pending: deque[_Arrived] = deque()
-        self._thread: threading.Thread | None = None
         self._reset()
-
-    @property
-    def info(self) -> TransducerInfo:
-        """Identity, calibration and settings, as found at opening."""
-        return self._info
 
     @property
     def health(self) -> Health:
@@ -194,46 +187,15 @@ class StreamingTransducer:
             self.stop()
             raise ended
 
-    def read(self, timeout: float) -> ReadingBlock:
-        """Return all readings not yet handed over, waiting up to `timeout` session seconds for the first."""
-        deadline = time.monotonic() + timeout / self._clock.factor
-        while True:
-            self._arrived.clear()
-            streaming = self._thread is not None and self._thread.is_alive()
-            with self._lock:
-                self._digest(end=not streaming)
-                blocks, self._ready = self._ready, []
-            if blocks:
-                block = ReadingBlock.joined(blocks)
-                self._lag_ms = (self._clock.now_ns() - int(block.received_ns[-1])) * 1e-6
-                return block
-            if not streaming and self._ended is not None:
-                raise LinkLost(str(self._ended))
-            remaining = deadline - time.monotonic()
-            if not streaming or remaining <= 0.0:
-                return ReadingBlock.empty()
-            self._arrived.wait(min(remaining, _TICK))
-
-    def stop(self) -> None:
-        """End streaming; what had arrived can still be read. Harmless when repeated."""
-        self._stopping.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
-
-    def close(self) -> None:
-        """Stop; port and thread are given back. Harmless when repeated."""
-        self.stop()
-
     def _reset(self) -> None:
         """Forget what an earlier stream left."""
         self._pending.clear()
         self._arrived.clear()
         self._stopping.clear()
-        self._ended: LinkLost | SetupError | DeviceFault | None = None
+        self._ended = None
         self._pacing = self._conversation.numbering(self._info.rate, self._clock.factor)
         self._unpaced: list[_Arrived] = []  # arrivals that pacing keeps back
-        self._ready: list[ReadingBlock] = []
+        self._ready = []
         self._received = self._restarted = self._saturated = 0
         self._malformed_before = 0  # by decoders that have had their day
         self._decoder = self._conversation.decoder()

@@ -12,6 +12,7 @@ from drivers.links import Link
 from drivers.net_ft.wire import AXIA, NET_FT, START, STOP, decode
 from drivers.readings import ReadingBlock
 from drivers.sequence import SequenceAccount
+from drivers.threaded import ThreadedTransducer
 from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, TransducerInfo
 
 # All in real seconds, since networks know no other.
@@ -24,7 +25,7 @@ _THEFTS = 3  # so many returns within _THEFT_SPAN mean that somebody else keeps 
 _THEFT_SPAN = 3.0
 
 
-class NetFtTransducer:
+class NetFtTransducer(ThreadedTransducer):
     """One box, through a link that is opened at each start. A thread drains the link; readings are decoded when read.
 
     Time is (counter - first counter) / counter rate, by the box's own oscillator (good to 0.5 %). After a reboot of the
@@ -45,24 +46,13 @@ class NetFtTransducer:
         """
         self._request = request
         self._invalid = (AXIA if "axia" in info.model.lower() else NET_FT).invalid
-        self._info = info
+        super().__init__(info, clock)
         self._connect = connect
         self._still_there = still_there
-        self._clock = clock
         self._step = round(info.counter_rate / info.rate) if info.rate > 0.0 else None  # nan: learn it
         self._period = 1.0 / info.rate / clock.factor if info.rate > 0.0 else 0.0  # between two readings [real s]
-        self._lock = threading.Lock()  # over all that _digest touches
         self._pending: deque[tuple[bytes, int]] = deque()  # datagrams with their arrival [ns], from the thread
-        self._arrived = threading.Event()  # something is pending, or the stream has ended
-        self._stopping = threading.Event()
-        self._thread: threading.Thread | None = None
-        self._ended: str | None = None  # why the stream ended, when nobody had stopped it
         self._reset()
-
-    @property
-    def info(self) -> TransducerInfo:
-        """Identity, calibration and settings, as read from the box at opening."""
-        return self._info
 
     @property
     def health(self) -> Health:
@@ -97,44 +87,13 @@ class NetFtTransducer:
             self._arrived.clear()
             if self._ended is not None or waited > patience:
                 self.stop()
-                raise LinkLost(self._ended or self._never_came(patience))
+                raise self._ended or LinkLost(self._never_came(patience))
         if self._step is not None and self._account.step not in (None, self._step):
             self.stop()
             raise DeviceFault(
                 f"{self._info.uri} is set to {self._info.rate:g} Hz but sends "
                 f"{self._info.counter_rate / (self._account.step or 1):g} Hz; switch it off and on, then open it again"
             )
-
-    def read(self, timeout: float) -> ReadingBlock:
-        """Return all readings not yet handed over, waiting up to `timeout` session seconds for the first."""
-        deadline = time.monotonic() + timeout / self._clock.factor
-        while True:
-            self._arrived.clear()
-            streaming = self._thread is not None and self._thread.is_alive()
-            with self._lock:
-                self._digest(end=not streaming)
-                blocks, self._ready = self._ready, []
-            if blocks:
-                block = ReadingBlock.joined(blocks)
-                self._lag_ms = (self._clock.now_ns() - int(block.received_ns[-1])) * 1e-6
-                return block
-            if not streaming and self._ended is not None:
-                raise LinkLost(self._ended)
-            remaining = deadline - time.monotonic()
-            if not streaming or remaining <= 0.0:
-                return ReadingBlock.empty()
-            self._arrived.wait(min(remaining, _TICK))
-
-    def stop(self) -> None:
-        """End streaming; what had arrived can still be read. Harmless when repeated."""
-        self._stopping.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
-
-    def close(self) -> None:
-        """Stop; port and thread are given back. Harmless when repeated."""
-        self.stop()
 
     def _reset(self) -> None:
         """Forget what an earlier stream left."""
@@ -144,7 +103,7 @@ class NetFtTransducer:
         self._ended = None
         self._account = SequenceAccount(self._step, self._info.counter_rate)
         self._held: list[tuple[bytes, int]] = []
-        self._ready: list[ReadingBlock] = []
+        self._ready = []
         self._zero: int | None = None  # counter of the first reading
         self._received = self._wrong_length = self._saturated = 0
         self._lag_ms = 0.0
@@ -154,7 +113,7 @@ class NetFtTransducer:
         try:
             self._listen(link)
         except LinkLost as error:
-            self._ended = str(error)
+            self._ended = error
         finally:
             try:
                 link.send(STOP)
