@@ -13,6 +13,7 @@ import numpy as np
 
 from daq_app.conduct import conduct
 from daq_app.console import Console
+from daq_app.due_events import DueEvents
 from daq_app.wiring import planted_surface
 from drivers.clock import Clock, ToldClock
 from sessions.plan import Frame, SessionPlan, Trial
@@ -170,36 +171,33 @@ class SyntheticPeople:
         """Let the subject stroke and judge as planned, but for what is to be spoilt."""
         self._subject, self._bench, self._transducer = subject, bench, transducer
         self._clock, self._plan, self._spoilt = clock, planned, spoilt
-        self._due: list[tuple[int, Event]] = []
+        self._due = DueEvents(clock)
         self.stroked: list[Trial] = []
 
     def show(self, command: Command) -> None:
         """Do what the command asks for."""
         match command:
             case AskBegin():
-                self._answer(Begin())
+                self._due.put(Begin())
             case AskMount(trial) if trial.number == self._spoilt.aborted:
-                self._answer(Abort("the subject had to leave"))
+                self._due.put(Abort("the subject had to leave"))
             case AskMount(trial):
                 self._bench.mount(self._felt(trial))
-                self._answer(StimulusMounted(trial.stimulus.code))
+                self._due.put(StimulusMounted(trial.stimulus.code))
             case AskStroke(trial):
                 stroke = self._subject.stroke(self._felt(trial))
                 self._bench.begin_stroke(stroke, self._transducer.now())
                 self.stroked.append(trial)
             case AskScore(trial):
-                self._answer(self._scored(trial), JUDGING)
+                self._due.put(self._scored(trial), JUDGING)
             case AskFinish():
-                self._answer(Finish())
+                self._due.put(Finish())
             case _:
                 pass
 
     def poll(self) -> tuple[Event, ...]:
         """Return what has been done by now."""
-        now_ns = self._clock.now_ns()
-        done = tuple(event for due, event in self._due if due <= now_ns)
-        self._due = [(due, event) for due, event in self._due if due > now_ns]
-        return done
+        return self._due.taken()
 
     def _felt(self, trial: Trial) -> Surface:
         surface = self._subject.felt(planted_surface(trial))
@@ -215,6 +213,3 @@ class SyntheticPeople:
             return Scored(None, (), None, 0, None, "simulated")
         score = self._subject.score(planted_surface(trial), 1, place, before)
         return Scored(score, ((at, score),), at, 0, None, "simulated")
-
-    def _answer(self, event: Event, after: float = 0.0) -> None:
-        self._due.append((self._clock.now_ns() + int(after * 1e9), event))

@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from daq_app.due_events import DueEvents
 from drivers.address import check_options, parse_address
 from drivers.catalog import open_transducer
 from drivers.clock import Clock
@@ -161,7 +162,7 @@ class SimulatedPeople:
         self._hand = None if bench is None or bench.bench is None else SimulatedHand(subject_seed, bench, known)
         self._known = known
         self._takes: dict[int, int] = {}  # by trial number
-        self._due: list[tuple[int, Event]] = []  # session clock [ns]
+        self._due = DueEvents(clock)
 
     def show(self, command: Command) -> None:
         """Do what the command asks for."""
@@ -169,28 +170,25 @@ class SimulatedPeople:
             self._hand.show(command)
         match command:
             case AskBegin():
-                self._answer(Begin())
+                self._due.put(Begin())
             case AskMount(trial):
-                self._answer(StimulusMounted(trial.stimulus.code))
+                self._due.put(StimulusMounted(trial.stimulus.code))
             case AskStroke(trial):
                 self._takes[trial.number] = self._takes.get(trial.number, 0) + 1
                 if self._hand is None:
-                    self._answer(StrokeDone())
+                    self._due.put(StrokeDone())
             case AskScore() | AskNumber() | AskChoice():
-                self._answer(self._judgement(command), after=self._judging)
+                self._due.put(self._judgement(command), after=self._judging)
             case AskRest(None):
-                self._answer(Resume())
+                self._due.put(Resume())
             case AskFinish():
-                self._answer(Finish())
+                self._due.put(Finish())
             case _:
                 pass
 
     def poll(self) -> tuple[Event, ...]:
         """Return what has been done by now."""
-        now_ns = self._clock.now_ns()
-        done = tuple(event for due, event in self._due if due <= now_ns)
-        self._due = [(due, event) for due, event in self._due if due > now_ns]
-        return done
+        return self._due.taken()
 
     def _judgement(self, command: AskScore | AskNumber | AskChoice) -> Event:
         """Return what the subject answers."""
@@ -212,9 +210,6 @@ class SimulatedPeople:
 
     def _judged(self, trial: Trial) -> float:
         return self._subject.score(planted_surface(self._known(trial)), self._takes[trial.number])
-
-    def _answer(self, event: Event, after: float = 0.0) -> None:
-        self._due.append((self._clock.now_ns() + int(after * 1e9), event))
 
 
 def planted_surface(trial: Trial) -> Surface:
