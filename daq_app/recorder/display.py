@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from daq_app.life import remember_overload
 from daq_app.recorder.messages import HealthReport, Live, Report, Six
-from drivers.loads import ALARM, level, loads
+from drivers.loads import level, loads
 from drivers.readings import ReadingBlock
 from drivers.transducer import Health, TransducerInfo
 
@@ -123,7 +123,6 @@ class Display:
                 count / span / self._factor if span > 0.2 * RATE_OVER else 0.0,
                 six(load[:6]),
                 six(peak[:6]),
-                tuple(bool(one > ALARM) for one in self._peak[:6]),
                 self._saturated_now - self._saturated_before,
                 float(load[6]),
                 float(peak[6]),

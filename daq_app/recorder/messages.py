@@ -119,7 +119,6 @@ class HealthReport:
     rate: float  # readings a second over the last second of the machine's clock [Hz]; told seconds count as told
     load: Six  # greatest |Fx .. Tz| since the last report, nothing subtracted, over the rated range [-]; nan: no range
     peak: Six  # the same since somebody acknowledged overloads
-    overloaded: tuple[bool, ...]  # (6,): the peak exceeded 1; latched until acknowledged
     saturated: int  # readings the device called invalid since somebody acknowledged
     combined: float = math.nan  # load of the axes together (`drivers.loads`) since the last report [-]
     combined_peak: float = math.nan  # the same since somebody acknowledged

@@ -254,7 +254,7 @@ def test_a_recorder_that_is_silent_in_a_session_is_said_to_be_silent():
 
 
 def test_the_health_lamp_names_what_was_lost():
-    report = m.HealthReport(Health(received=7000, lost=3), 6998.0, (0.0,) * 6, (0.0,) * 6, (False,) * 6, 0)
+    report = m.HealthReport(Health(received=7000, lost=3), 6998.0, (0.0,) * 6, (0.0,) * 6, 0)
     bench = derive_view(after(m.Device(INFO, None), report)).bench
     assert (bench.lamp, bench.lamp_words) == ("look", "3 lost")
     assert bench.rate == "6998 Hz (set 7000)"
