@@ -9,14 +9,18 @@ from pathlib import Path
 from daq_app.recorder.messages import Kind, People, StartSession
 from daq_app.sentences import sentence
 from sessions.plan import Frame, Hand
-from sessions.protocols import plan, protocol
+from sessions.protocols import Body, Protocol, StudyPlace, plan, protocol
 from sessions.protocols.protocol import LARGEST_SEED
 from sessions.recording import Recording, RecordingError, Setting
 from sessions.recording.manifest import is_sealed
 from sessions.resuming import check_resumable
+from sessions.study import StudyError
+from sessions.study_file import enrol, is_study, open_study, study_key
 from sessions.toml_file import SettingsError
 
 HIGHEST = 500.0  # a face above the transducer's origin [mm]
+AREAS = (1.0, 2000.0)  # of a contact [mm2]
+AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 SHOWN = 20  # sessions that were cut short, at most
 
 
@@ -33,6 +37,8 @@ class SessionForm:
     answering_hand: Hand | None = None
     forces: bool = True
     height: str = ""  # of the stimulus's face above the transducer's origin [mm]; empty: as bench or protocol state it
+    normal: str = ""  # axis along which pressing is positive, one of AXES; empty: likewise
+    area: str = ""  # of finger and surface [mm2], for tau_max; empty: likewise
     practice: bool = False  # before the trials that count
     simulated: bool = False  # the subject's judgement too, where the bench is simulated
 
@@ -54,6 +60,15 @@ class Bench:
 
 
 @dataclass(frozen=True, slots=True)
+class Enrolment:
+    """What the study that a form names says of its subject."""
+
+    protocol: str  # the study's own, which holds for all its sessions
+    words: str
+    may_enrol: bool = False  # the subject is a code that nobody in the study has borne
+
+
+@dataclass(frozen=True, slots=True)
 class Unfinished:
     """A session that was cut short and can go on."""
 
@@ -66,16 +81,18 @@ def checked(
 ) -> StartSession | Refused:
     """Return the request that begins the session, or what is wrong with the form.
 
-    `new_seed` is used where the form names none; `settings` are kept with the session beside the page's own.
+    `new_seed` is used where the form names none; `settings` are kept with the session beside the page's own. In a
+    study, protocol, seed and the subject's own finger are those that were decided at its enrolment.
     """
     wrong = _refusals(form, bench)
-    try:
-        chosen = protocol(form.protocol)
-    except (SettingsError, OSError) as error:
-        return Refused({**wrong, "protocol": _told(error)})
     if wrong:
         return Refused(wrong)
-    seed = int(form.seed) if form.seed.strip() else new_seed
+    try:
+        chosen, seed, body, place = _decided(form, new_seed)
+    except StudyError as error:
+        return Refused({"subject": _told(error)})
+    except (SettingsError, OSError) as error:
+        return Refused({"protocol": _told(error)})
     try:
         planned = plan(
             chosen,
@@ -83,18 +100,25 @@ def checked(
             seed,
             forces=form.forces,
             frame=bench.frame if form.forces else None,
+            contact_area=_number(form.area) if form.forces else None,
             stroking_hand=form.stroking_hand,
             answering_hand=form.answering_hand,
             phases=("practice", "main") if form.practice else None,
+            body=body,
+            place=place,
         )
     except SettingsError as error:
         return Refused({"subject": _told(error)})
     if form.forces and form.height.strip():
         face = replace(planned.frame, height=_number(form.height) or 0.0, height_origin="measured")
         planned = replace(planned, frame=face)
-    folder = session_folder(form, planned.protocol, now)
+    if form.forces and form.normal in AXES:
+        planned = replace(planned, frame=replace(planned.frame, normal=form.normal, normal_origin="set"))
+    # In a study the folder's name tells what the visit is for: the protocol is the same in all.
+    what = planned.protocol if place is None else "forces" if planned.forces else "scores"
+    folder = session_folder(form, what, now)
     people = People(_kind(form, bench), seed)
-    own = [Setting("seed", seed, "", "set" if form.seed.strip() else "default")]
+    own = [Setting("seed", seed, "", "set" if form.seed.strip() and place is None else "default")]
     if form.study.strip():
         own.append(Setting("study", form.study.strip(), "", "set"))
     return StartSession(planned, str(folder), people, (*own, *settings))
@@ -109,10 +133,55 @@ def is_code(subject: str) -> bool:
     return re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", subject.strip()) is not None
 
 
-def session_folder(form: SessionForm, protocol_name: str, now: datetime) -> Path:
+def enrolment(form: SessionForm) -> Enrolment | None:
+    """Return what the study that the form names says of the subject; None where it names none that was made."""
+    folder = _place(form)
+    if not form.study.strip() or not is_study(folder):
+        return None
+    try:
+        study = open_study(folder)
+    except (StudyError, SettingsError) as error:
+        return Enrolment("", _told(error))
+    subject, name = form.subject.strip(), study.protocol.name
+    if not is_code(subject):
+        return Enrolment(name, f"A study of protocol {name}: give the code of one of its subjects.")
+    if subject not in study.members:
+        return Enrolment(name, f"{subject} is not enrolled in this study ({name}) yet.", may_enrol=True)
+    try:
+        member = study.member(subject)
+    except StudyError as error:
+        return Enrolment(name, _told(error))
+    blinded = "" if study.key_sha256 is None or study.unblinded else "; blinded: codes alone are shown"
+    return Enrolment(name, f"{subject} is enrolled: protocol {name}, row {study.row(member.slot)}{blinded}.")
+
+
+def enrolled(form: SessionForm) -> str:
+    """Enrol the form's subject in its study, nothing of its finger being known; return why not, empty where done."""
+    try:
+        enrol(_place(form), form.subject.strip(), Body())
+    except (StudyError, SettingsError) as error:
+        return _told(error)
+    return ""
+
+
+def session_folder(form: SessionForm, what: str, now: datetime) -> Path:
     """Return the folder the session will be in: a new one for every visit."""
-    name = f"{form.subject.strip()}_{protocol_name}_{now.strftime('%Y%m%dT%H%M%S')}"
-    return Path(form.folder.strip() or ".").expanduser() / form.study.strip() / name
+    return _place(form) / f"{form.subject.strip()}_{what}_{now.strftime('%Y%m%dT%H%M%S')}"
+
+
+def _place(form: SessionForm) -> Path:
+    """Return the folder in which the session gets its own."""
+    return Path(form.folder.strip() or ".").expanduser() / form.study.strip()
+
+
+def _decided(form: SessionForm, new_seed: int) -> tuple[Protocol, int, Body | None, StudyPlace | None]:
+    """Return protocol, seed, the subject's own and its place, as a study or the form decides them."""
+    folder = _place(form)
+    if not form.study.strip() or not is_study(folder):
+        return protocol(form.protocol), int(form.seed) if form.seed.strip() else new_seed, None, None
+    study = open_study(folder)
+    member = study.member(form.subject.strip())
+    return study.protocol, study.session_seed(member.slot), member.body, study.place(member, study_key(folder))
 
 
 def unfinished(folder: Path) -> tuple[Unfinished, ...]:
@@ -152,6 +221,9 @@ def _refusals(form: SessionForm, bench: Bench) -> dict[str, str]:
     height = _number(form.height)
     if form.height.strip() and (height is None or not abs(height) <= HIGHEST):
         wrong["height"] = f"A height is a number of millimetres from −{HIGHEST:.0f} to {HIGHEST:.0f}, or left empty."
+    area = _number(form.area)
+    if form.area.strip() and (area is None or not AREAS[0] <= area <= AREAS[1]):
+        wrong["area"] = f"An area is a number of mm² from {AREAS[0]:.0f} to {AREAS[1]:.0f}, or left empty."
     place = Path(form.folder.strip() or ".").expanduser()
     existing = next((p for p in (place, *place.parents) if p.exists()), place)
     if not existing.is_dir():

@@ -133,7 +133,7 @@ class Bridge(QObject):
 
     def drawing_failed(self, error: Exception) -> None:
         """Say that a picture could not be drawn; nothing else is touched by it."""
-        sentence = f"{type(error).__name__}: {error}"
+        sentence = f"{type(error).__name__}: {str(error).strip().partition(chr(10))[0]}"
         if self.state.drawing != sentence:
             self._fold(DrawingFailed(sentence))
 

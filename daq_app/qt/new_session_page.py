@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.new_session import Bench, SessionForm, Unfinished
+from daq_app.new_session import AXES, Bench, SessionForm, Unfinished, enrolled, enrolment
 from daq_app.qt.parts import button, choice, label, regrade, say
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import Millimetres
@@ -57,7 +57,11 @@ class NewSessionPage(QFrame):
         self.seed = _line("seed of the stimulus order; empty for a new one")
         self.seed.setPlaceholderText("a new one")
         self.height_above = _line("height of the face above the transducer's origin in millimetres; may be empty")
-        self.height_above.setPlaceholderText("as the protocol states it")
+        self.height_above.setPlaceholderText("as stated")
+        self.normal = choice("axis of the transducer along which pressing is positive")
+        self.normal.addItems(["as stated", *AXES])
+        self.area = _line("contact area of finger and surface in square millimetres; may be empty")
+        self.area.setPlaceholderText("as stated")
         self.stroking, self.answering = _hands("stroking hand"), _hands("answering hand")
         self.practice = QCheckBox("Practice first")
         self.practice.setAccessibleName("practice before the trials that count")
@@ -75,14 +79,19 @@ class NewSessionPage(QFrame):
             pair[chosen].setChecked(True)
         self._people_words = label("", "quiet", wrap=True)
         self._line_words = label("", "quiet", wrap=True)
+        self._study_words = label("", "quiet", wrap=True)
+        self._enrol = button("Enrol", "enrol the subject in the study", self._enrolled)
         self._resume = choice("sessions that were cut short")
         self._go_on = button("Go on with it", "go on with the session that was cut short", self._resumed)
-        self._unfinished, self._height = QWidget(), QWidget()
+        self._unfinished, self._height, self._area = QWidget(), QWidget(), QWidget()
         self._build(scale)
-        for line in (self.subject, self.study, self.folder, self.seed, self.height_above):
+        for line in (self.subject, self.study, self.folder, self.seed, self.height_above, self.area):
             line.textChanged.connect(self.changed)
         for made in (self.with_forces, self.scores_only, self.people_score, self.simulated):
             made.toggled.connect(self.changed)
+        for line in (self.subject, self.study, self.folder):
+            line.textChanged.connect(self._show_study)
+        self._show_study()
         self.show_unfinished(())
 
     def form(self) -> SessionForm:
@@ -98,6 +107,8 @@ class NewSessionPage(QFrame):
             practice=self.practice.isChecked(),
             forces=self.with_forces.isChecked(),
             height=self.height_above.text() if self._height.isVisibleTo(self) else "",
+            normal=self.normal.currentText() if self._height.isVisibleTo(self) else "",
+            area=self.area.text() if self.with_forces.isChecked() else "",
             simulated=self.simulated.isChecked(),
         )
 
@@ -105,6 +116,7 @@ class NewSessionPage(QFrame):
         """Offer what the bench allows."""
         # A simulated bench knows where its face lies.
         self._height.setVisible(self.with_forces.isChecked() and bench.frame is None)
+        self._area.setVisible(self.with_forces.isChecked())
         words = "The subject strokes the transducer and scores."
         if self.simulated.isChecked():
             words = "Nobody is needed: strokes and scores are simulated, and marked so."
@@ -135,6 +147,7 @@ class NewSessionPage(QFrame):
             "folder": self.folder,
             "seed": self.seed,
             "height": self.height_above,
+            "area": self.area,
         }
         first = next((fields[name] for name in fields if name in sentences), None)
         if first is not None:
@@ -149,6 +162,24 @@ class NewSessionPage(QFrame):
                 self._resume.addItem(session.words, str(session.folder))
                 self._resume.setItemData(self._resume.count() - 1, str(session.folder), Qt.ItemDataRole.ToolTipRole)
         self._unfinished.setVisible(bool(found))
+
+    def _show_study(self) -> None:
+        """Show what the study says of the subject: its protocol and its orders were decided when it was made."""
+        found = enrolment(self.form())
+        say(self._study_words, "" if found is None else found.words)
+        self._study_words.setVisible(found is not None)
+        self._enrol.setVisible(found is not None and found.may_enrol)
+        for made in (self.protocol, self.seed):
+            made.setEnabled(found is None)
+            made.setToolTip("" if found is None else f"the study's own: {found.protocol}")
+
+    def _enrolled(self) -> None:
+        if refused := enrolled(self.form()):
+            self.show_refusals({"study": refused})
+        else:
+            self.show_refusals({})
+            self._show_study()
+            self.changed.emit()
 
     def _resumed(self) -> None:
         folder = self._resume.currentData()
@@ -184,6 +215,9 @@ class NewSessionPage(QFrame):
         layout.setSpacing(4)
         layout.addWidget(label("New session", "title"))
         self._field(layout, "subject", "Subject code", self.subject)
+        self._field(layout, "study", "Study, may be empty", self.study)
+        layout.addWidget(self._study_words)
+        layout.addWidget(self._enrol)
         self._field(layout, "protocol", "Protocol", self.protocol)
         layout.addWidget(self.practice)
         hands = QHBoxLayout()
@@ -202,7 +236,12 @@ class NewSessionPage(QFrame):
         of_height = QVBoxLayout(self._height)
         of_height.setContentsMargins(0, 0, 0, 0)
         self._field(of_height, "height", "Height of the face above the transducer's origin [mm]", self.height_above)
+        self._field(of_height, "normal", "Axis along which pressing is positive", self.normal)
         layout.addWidget(self._height)
+        of_area = QVBoxLayout(self._area)
+        of_area.setContentsMargins(0, 0, 0, 0)
+        self._field(of_area, "area", "Contact area, for tau_max [mm²]", self.area)
+        layout.addWidget(self._area)
         layout.addWidget(label("Who strokes and scores", "section"))
         row = QHBoxLayout()
         row.addWidget(self.people_score)
@@ -213,7 +252,6 @@ class NewSessionPage(QFrame):
         layout.addWidget(self._line_words)
         self._refusal(layout, "simulated")
         layout.addSpacing(GRID)
-        self._field(layout, "study", "Study", self.study)
         folder = QHBoxLayout()
         folder.addWidget(self.folder, 1)
         folder.addWidget(button("…", "choose the folder of sessions", self._choose_folder))

@@ -147,6 +147,8 @@ QPushButton {{ background: {t.raised}; border: 1px solid {t.line}; border-radius
   padding: 4px 14px; }}
 QPushButton:hover {{ border-color: {t.quiet}; }}
 QPushButton:pressed {{ background: {t.line}; }}
+QComboBox:disabled {{ color: {t.quiet}; }}
+QLineEdit:disabled {{ color: {t.quiet}; background: {t.ground}; border-style: dashed; }}
 QPushButton:disabled {{ color: {t.quiet}; background: {t.ground}; border-style: dashed; }}
 QPushButton:focus, QLineEdit:focus, QPlainTextEdit:focus, QListWidget:focus, QTreeWidget:focus {{
   border: 2px solid {t.act}; }}

@@ -3,9 +3,11 @@ from datetime import datetime
 
 import pytest
 
-from daq_app.new_session import Bench, Refused, SessionForm, checked
+from daq_app.new_session import Bench, Refused, SessionForm, checked, enrolled, enrolment
 from daq_app.recorder.messages import People, StartSession
 from sessions.plan import Frame
+from sessions.protocols import Body, protocol_file
+from sessions.study_file import create_study, enrol, study_key, withdraw
 
 NOW = datetime(2026, 3, 1, 14, 30, 5)
 SIMULATED = Bench(connected=True, simulated=True, frame=Frame("-z", "set", 20.0, "set"))
@@ -55,6 +57,8 @@ def test_who_strokes_and_scores_follows_from_bench_and_choice(form, bench, kind)
         (replace(FORM, protocol="nowhere.toml"), REAL, "protocol", "nowhere.toml"),
         (replace(FORM, height="high"), REAL, "height", "millimetres"),
         (replace(FORM, height="900"), REAL, "height", "millimetres"),
+        (replace(FORM, area="0"), REAL, "area", "mm²"),
+        (replace(FORM, area="much"), REAL, "area", "mm²"),
         (FORM, Bench(), "forces", "No transducer is connected"),
         (replace(FORM, simulated=True), REAL, "simulated", "Only the simulated bench"),
     ],
@@ -76,3 +80,58 @@ def test_a_folder_that_is_a_file_is_refused(tmp_path):
 def test_a_height_that_was_measured_is_recorded_as_measured_and_one_that_nobody_stated_as_a_default():
     assert checked(replace(FORM, height="12,5"), REAL, NOW, 0).plan.frame == Frame("-z", "default", 12.5, "measured")
     assert checked(FORM, REAL, NOW, 0).plan.frame.height_origin == "default"
+
+
+def test_the_axis_of_pressing_and_the_contact_area_are_recorded_as_they_were_set():
+    made = checked(replace(FORM, normal="+x", area="85"), REAL, NOW, 0).plan
+    assert (made.frame.normal, made.frame.normal_origin) == ("+x", "set")
+    assert (made.contact_area, made.contact_area_origin) == (85.0, "set")
+    assert checked(FORM, REAL, NOW, 0).plan.frame.normal_origin == "default"
+
+
+@pytest.fixture
+def study(tmp_path):
+    text = protocol_file("sensotact-friction").read_text(encoding="utf-8")
+    create_study(tmp_path / "pilot", text, 11, blinded=True)
+    return tmp_path / "pilot"
+
+
+def in_study(study, subject):
+    return SessionForm(subject=subject, folder=str(study.parent), study="pilot", protocol="nowhere", seed="7")
+
+
+def test_a_session_of_a_study_is_the_one_decided_at_enrolment_whatever_the_page_says(study):
+    member = enrol(study, "P07", Body(contact_angle=40.0))
+    made = checked(in_study(study, "P07"), SIMULATED, NOW, 99)
+    again = checked(replace(in_study(study, "P07"), forces=False), SIMULATED, NOW, 98)
+    assert made.plan.protocol == "sensotact-friction"
+    assert made.plan.contact_angle == 40.0
+    assert made.plan.seed == again.plan.seed not in (7, 98, 99)
+    assert {s.name: s.origin for s in made.settings}["seed"] == "default"
+    codes = {trial.stimulus.code for block in made.plan.blocks for trial in block.trials}
+    assert codes == set(study_key(study).stimuli)
+    assert (member.slot, made.folder) == (0, str(study / "P07_forces_20260301T143005"))
+
+
+def test_who_is_not_enrolled_is_enrolled_at_a_button_and_who_was_withdrawn_is_refused(study):
+    form = in_study(study, "P08")
+    assert enrolment(form).may_enrol
+    assert "not enrolled" in checked(form, SIMULATED, NOW, 0).sentences["subject"]
+    assert enrolled(form) == ""
+    assert "P08 is enrolled" in enrolment(form).words
+    assert "blinded" in enrolment(form).words
+    assert "enrolled in pilot before" in enrolled(form)
+    withdraw(study, "P08", "moved away")
+    assert not enrolment(form).may_enrol
+    assert "moved away" in enrolment(form).words
+    assert "moved away" in checked(form, SIMULATED, NOW, 0).sentences["subject"]
+
+
+def test_a_folder_that_is_no_study_leaves_protocol_and_seed_to_the_page(tmp_path):
+    assert enrolment(SessionForm(subject="P07", folder=str(tmp_path), study="pilot")) is None
+
+
+def test_a_study_that_cannot_be_read_says_so(study):
+    (study / "study.sqlite").write_bytes(b"not a database")
+    assert "cannot be read" in enrolment(in_study(study, "P07")).words
+    assert isinstance(checked(in_study(study, "P07"), SIMULATED, NOW, 0), Refused)

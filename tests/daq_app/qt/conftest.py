@@ -107,6 +107,7 @@ def driver(application, one_window, tmp_path):
     one_window.page.with_forces.setChecked(True)
     one_window.page.people_score.setChecked(True)
     one_window.page.subject.clear()
+    one_window.page.study.clear()
     one_window.page.subject.setFocus()
     yield driver
     if driver.session is not None:

@@ -9,7 +9,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from sessions import steps
+from sessions.protocols import protocol_file
 from sessions.recording import Recording
+from sessions.study_file import create_study
 
 pytestmark = pytest.mark.qt
 
@@ -100,12 +102,22 @@ def test_a_recorder_that_is_killed_is_one_banner_and_the_session_goes_on_at_the_
     assert [event.kind for event in recording.events].count("resumed") == 1
 
 
-def test_a_session_that_nobody_sits_at_runs_by_itself_and_says_it_is_simulated(driver):
-    driver.window.page.protocol.setCurrentText("sensotact-friction")
-    driver.window.page.simulated.setChecked(True)
-    QTest.keyClicks(driver.window.page.subject, "S01")
-    QTest.keyClick(driver.window.page.subject, ENTER)
+def test_a_subject_is_enrolled_by_key_and_a_session_of_its_study_runs_by_itself_and_says_it_is_simulated(driver):
+    page = driver.window.page
+    text = protocol_file("sensotact-friction").read_text(encoding="utf-8")
+    study = Path(page.folder.text()) / "pilot"
+    create_study(study, text, 11, blinded=True)
+    page.simulated.setChecked(True)
+    QTest.keyClicks(page.subject, "S01")
+    QTest.keyClicks(page.study, "pilot")
+    assert "not enrolled" in page._study_words.text()
+    assert not page.protocol.isEnabled()
+    QTest.keyClick(page._enrol, SPACE)
+    assert "S01 is enrolled" in page._study_words.text()
+    assert not page._enrol.isVisible()
+    QTest.keyClick(page.subject, ENTER)
     driver.until(lambda: driver.session is not None and driver.session.sealing == "sealed", "the sealed session")
+    assert Path(driver.session.folder).parent == study
     assert driver.session.end.complete
     assert [trial.outcome for trial in driver.session.trials] == ["done"] * 10
     assert "SIMULATED" in driver.view.simulated

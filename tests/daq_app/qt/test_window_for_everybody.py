@@ -45,8 +45,8 @@ def test_the_tab_key_goes_through_the_page_from_top_to_bottom_and_reaches_every_
         seen.add(focused)
         order.append(focused)
         QTest.keyClick(focused, Qt.Key.Key_Tab)
-    asked = [page.subject, page.protocol, page.stroking, page.answering, page.with_forces, page.people_score]
-    asked += [page.study, page.folder, page.seed]
+    asked = [page.subject, page.study, page.protocol, page.stroking, page.answering, page.with_forces]
+    asked += [page.area, page.people_score, page.folder, page.seed]
     places = [order.index(widget) for widget in asked]
     assert places == sorted(places)
     visible = [
