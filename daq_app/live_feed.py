@@ -56,7 +56,7 @@ class LiveFeed:
         self._keep(live)
         self.trace.add(live.time, self._channels(live, frame))
         felt = live.wrench + info.calibration.wrench(np.array([live.zero]), np.zeros(6))
-        return load_of(felt, info.calibration.rated)
+        return load_of(info.calibration.own(felt), info.calibration.rated)
 
     def take(self) -> ReadingBlock:
         """Return the readings of the take in hand, as a wrench: N, N mm."""

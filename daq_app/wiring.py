@@ -57,7 +57,7 @@ SIMULATED = "sim"
 REPLAY = "replay:"  # and the path of a session folder
 JUDGING = 0.8  # from lift to score [s]; an unloaded stretch in which drift shows
 INPUT = "simulated"
-_OPTIONS = frozenset({"seed", "rate"})
+_OPTIONS = frozenset({"seed", "rate", "tool"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,8 @@ def connected(uri: str, clock: Clock) -> Generator[Connected]:
     box = NetFtBox(bench, clock, rate=address.number("rate", 200, 1, 7000))
     box.start()
     try:
-        with connected(box.uri, clock) as inner:
+        tool = f"&tool={address.options['tool']}" if "tool" in address.options else ""
+        with connected(box.uri + tool, clock) as inner:
             yield Connected(inner.transducer, bench, box.now)
     finally:
         box.close()

@@ -1,6 +1,6 @@
 """From raw readings to the wrench the finger exerts on the stimulus."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,10 @@ class Calibration:
 
     serial: str  # the transducer's serial number, as the device or its file states it
     raw_unit: str  # "counts", "V", or "N, N mm" for readings that came as a wrench
-    matrix: Array  # (6, 6): wrench [N, N mm] = matrix @ (raw - bias)
-    rated: Array  # (6,) rated range of each axis [N, N mm]; nan where nobody stated it
+    matrix: Array  # (6, 6): wrench [N, N mm] = matrix @ (raw - bias), the tool transform included
+    rated: Array  # (6,) rated range of each axis of the transducer's own frame [N, N mm]; nan where nobody stated it
     source: str  # where the numbers came from, for people
+    tool: tuple[float, ...] = ()  # (6,) the user's tool transform: dx dy dz [mm], rx ry rz [degrees]; empty: none
 
     def wrench(self, raw: Array, bias: Array) -> Array:
         """Return the wrench (n, 6) [N, N mm] of raw readings (n, 6), with bias (6,) in raw units.
@@ -26,3 +27,50 @@ class Calibration:
         array([[ 1. ,  0. , -1. ,  0. ,  0.5,  0. ]])
         """
         return (raw - bias) @ self.matrix.T
+
+    def own(self, wrench: Array) -> Array:
+        """Return a wrench (n, 6) [N, N mm] about the transducer's own origin and axes, for which `rated` holds."""
+        if not self.tool:
+            return wrench
+        back = np.linalg.inv(_tool_matrix(self.tool)).astype(np.float64)
+        return wrench @ back.T
+
+    def with_tool(self, tool: tuple[float, ...]) -> "Calibration":
+        """Return the calibration with a tool transform (6,) [mm, degrees] behind the transducer's own.
+
+        A force couple moved 5 mm towards the transducer: 1 N along y is felt there as -5 N mm about x more.
+
+        >>> cal = Calibration("FT1", "N, N mm", np.eye(6), np.full(6, np.nan), "by hand")
+        >>> cal.with_tool((0.0, 0.0, -5.0, 0.0, 0.0, 0.0)).matrix[3].tolist()
+        [0.0, -5.0, 0.0, 1.0, 0.0, 0.0]
+        """
+        words = "tool transform {:g} {:g} {:g} mm, {:g} {:g} {:g} degrees".format(*tool)
+        matrix = _tool_matrix(tool) @ self.matrix
+        return replace(self, matrix=matrix, tool=tool, source=f"{self.source}; {words}, as the address says")
+
+
+def wrench_transform(d: Array, r: Array) -> Array:
+    """Return the matrix (6, 6) that takes a wrench [N, N mm] to a frame displaced by `d` (3,) [mm], turned by `r` (3,).
+
+    The turn [rad] is about x, then y, then z, as in the maker's DAQ F/T C library (ftrt.c, version 1.0.2).
+
+    >>> wrench_transform(np.array([0.0, 0.0, 4.0]), np.zeros(3))[3:, :3] + 0.0
+    array([[ 0.,  4.,  0.],
+           [-4.,  0.,  0.],
+           [ 0.,  0.,  0.]])
+    """
+    (sx, sy, sz), (cx, cy, cz) = np.sin(r), np.cos(r)
+    turn = np.array(
+        [
+            [cy * cz, sx * sy * cz + cx * sz, sx * sz - cx * sy * cz],
+            [-cy * sz, -sx * sy * sz + cx * cz, sx * cz + cx * sy * sz],
+            [sy, -sx * cy, cx * cy],
+        ]
+    )
+    dx, dy, dz = d
+    lever = np.array([[0.0, dz, -dy], [-dz, 0.0, dx], [dy, -dx, 0.0]])
+    return np.block([[turn, np.zeros((3, 3))], [turn @ lever, turn]])
+
+
+def _tool_matrix(tool: tuple[float, ...]) -> Array:
+    return wrench_transform(np.array(tool[:3]), np.radians(tool[3:]))

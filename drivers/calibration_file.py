@@ -17,7 +17,7 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.calibration import Calibration
+from drivers.calibration import Calibration, wrench_transform
 from drivers.transducer import SetupError
 
 Array = NDArray[np.float64]
@@ -213,29 +213,6 @@ def _transform(found: list[tuple[tuple[str, ...], _Attributes]], body: _Attribut
     d = np.array([values["Dx"], values["Dy"], values["Dz"]]) * distance
     r = np.array([values["Rx"], values["Ry"], values["Rz"]]) * angle
     return wrench_transform(d, r)
-
-
-def wrench_transform(d: Array, r: Array) -> Array:
-    """Return the matrix (6, 6) that takes a wrench [N, N mm] to a frame displaced by `d` (3,) [mm], turned by `r` (3,).
-
-    The turn [rad] is about x, then y, then z, as in the maker's DAQ F/T C library (ftrt.c, version 1.0.2).
-
-    >>> wrench_transform(np.array([0.0, 0.0, 4.0]), np.zeros(3))[3:, :3] + 0.0
-    array([[ 0.,  4.,  0.],
-           [-4.,  0.,  0.],
-           [ 0.,  0.,  0.]])
-    """
-    (sx, sy, sz), (cx, cy, cz) = np.sin(r), np.cos(r)
-    turn = np.array(
-        [
-            [cy * cz, sx * sy * cz + cx * sz, sx * sz - cx * sy * cz],
-            [-cy * sz, -sx * sy * sz + cx * cz, sx * cz + cx * sy * sz],
-            [sy, -sx * cy, cx * cy],
-        ]
-    )
-    dx, dy, dz = d
-    lever = np.array([[0.0, dz, -dy], [-dz, 0.0, dx], [dy, -dx, 0.0]])
-    return np.block([[turn, np.zeros((3, 3))], [turn @ lever, turn]])
 
 
 def _check(matrix: Array, printed: Array, rounding: Array) -> None:

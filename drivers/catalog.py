@@ -12,6 +12,7 @@ from drivers.net_ft import handshake
 from drivers.net_ft.device import NetFtTransducer
 from drivers.nidaq.handshake import identify_nidaq, open_nidaq
 from drivers.serial_ft.handshake import identify_serial_ft, open_serial_ft
+from drivers.tool import TransducerWithTool, with_tool, without_tool
 from drivers.transducer import DeviceFault, LinkLost, SetupError, Transducer, TransducerInfo
 
 
@@ -63,8 +64,9 @@ def open_transducer(uri: str, clock: Clock) -> Transducer:
 
     Raises SetupError when the address or a setting cannot be met, LinkLost when nothing answers.
     """
-    address = parse_address(uri)
-    return _driver(address).open(address, clock)
+    address, tool = without_tool(parse_address(uri))
+    transducer = _driver(address).open(address, clock)
+    return TransducerWithTool(transducer, tool) if tool else transducer
 
 
 def reachable(named: Iterable[str] = (), patience: float = 0.5) -> tuple[Found, ...]:
@@ -78,8 +80,8 @@ def reachable(named: Iterable[str] = (), patience: float = 0.5) -> tuple[Found, 
 
 def _found(uri: str, patience: float) -> Found:
     try:
-        address = parse_address(uri)
-        return Found(uri, _driver(address).identify(address, patience), None)
+        address, tool = without_tool(parse_address(uri))
+        return Found(uri, with_tool(_driver(address).identify(address, patience), tool), None)
     except (SetupError, LinkLost, DeviceFault) as error:
         return Found(uri, None, str(error))
 

@@ -90,7 +90,7 @@ class Display:
             return
         calibration = info.calibration
         felt = calibration.wrench(block.raw, np.zeros(6))
-        load = loads(felt, calibration.rated).max(axis=0)
+        load = loads(calibration.own(felt), calibration.rated).max(axis=0)
         self._load, self._peak = np.fmax(self._load, load), np.fmax(self._peak, load)
         if level(self._peak) == "alarm" and not self._overload_told:
             self._overload_told = True

@@ -62,6 +62,7 @@ def info_to_dict(info: TransducerInfo) -> dict[str, Any]:
             "matrix": calibration.matrix.tolist(),
             "rated": [_known(value) for value in calibration.rated.tolist()],
             "source": calibration.source,
+            "tool": list(calibration.tool),
             "sha256": calibration_hash(calibration),
         },
     }
@@ -79,6 +80,7 @@ def info_from_dict(data: Mapping[str, Any]) -> TransducerInfo:
         matrix=np.array(told["matrix"], np.float64),
         rated=np.array([_number(value) for value in told["rated"]]),
         source=told["source"],
+        tool=tuple(told.get("tool", ())),
     )
     if calibration_hash(calibration) != told["sha256"]:
         raise ValueError("the calibration matrix is not the one its SHA-256 was taken of")

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.calibration_file import LONGEST, parse_calibration_file, read_calibration_file, wrench_transform
+from drivers.calibration import wrench_transform
+from drivers.calibration_file import LONGEST, parse_calibration_file, read_calibration_file
 from drivers.transducer import SetupError
 
 SAMPLES = Path(__file__).parents[3] / "shared" / "reference" / "samples"

@@ -1,0 +1,107 @@
+"""The user's tool transform: against closed forms, and against the products the maker prints in its own files."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_calibration_file import GAMMA, NANO43, parsed
+
+from daq_app.wiring import connected
+from drivers.address import parse_address
+from drivers.clock import PacedClock
+from drivers.loads import loads
+from drivers.readings import ReadingBlock
+from drivers.tool import with_tool, without_tool
+from drivers.transducer import SetupError, TransducerInfo
+from sessions.recording.head import info_from_dict, info_to_dict
+
+CALIBRATION = parsed(NANO43).calibration
+
+
+def info_with(uri):
+    address, tool = without_tool(parse_address(uri))
+    assert "tool" not in address.options
+    plain = TransducerInfo(uri, "net-ft", "Net F/T", "FT32831", False, 200.0, 7000.0, CALIBRATION, {"filter": "off"})
+    return with_tool(plain, tool)
+
+
+def test_a_finger_that_presses_on_the_new_origin_exerts_no_torque_about_it():
+    point, force = np.array([3.0, -4.0, 20.0]), np.array([0.5, -0.25, -2.0])
+    wrench = np.concatenate([force, np.cross(point, force)])  # a force at a point, about the transducer's origin
+    raw = np.linalg.solve(CALIBRATION.matrix, wrench)[None]
+    moved = info_with("net-ft://box?tool=3,-4,20,0,0,0").calibration.wrench(raw, np.zeros(6))[0]
+    np.testing.assert_allclose(moved, [*force, 0, 0, 0], atol=1e-9)
+
+
+def test_a_couple_moved_5_mm_away_changes_by_force_times_lever():
+    calibration = info_with("net-ft://box?tool=0,0,-5,0,0,0").calibration
+    raw = np.linalg.solve(CALIBRATION.matrix, [1.0, 2.0, 3.0, 10.0, 20.0, 30.0])[None]
+    # The maker's library: Tx' = Tx + Dz Fy, Ty' = Ty - Dz Fx.
+    np.testing.assert_allclose(
+        calibration.wrench(raw, np.zeros(6))[0], [1, 2, 3, 10 - 5 * 2, 20 + 5 * 1, 30], atol=1e-9
+    )
+
+
+def test_turns_follow_each_other_about_x_then_y_then_z():
+    calibration = info_with("net-ft://box?tool=0,0,0,90,0,90").calibration
+    raw = np.linalg.solve(CALIBRATION.matrix, [1.0, 2.0, 3.0, 10.0, 20.0, 30.0])[None]
+    # About x by 90 degrees: new y is old z, new z is old -y. Then about the new z: newest x is new y, newest y new -x.
+    np.testing.assert_allclose(calibration.wrench(raw, np.zeros(6))[0], [3, -1, -2, 30, -10, -20], atol=1e-9)
+
+
+def test_the_makers_own_transform_given_as_a_tool_gives_the_makers_own_product():
+    printed = parsed(GAMMA).calibration.matrix  # agrees with the file's UserAxis
+    bare = parsed(re.sub(r"<UserAxis[^>]*>", "", GAMMA).replace("0.0120142", "0")).calibration
+    assert not np.allclose(bare.matrix, printed)
+    np.testing.assert_allclose(bare.with_tool((0.0, 0.0, 12.0142, 0.0, 0.0, 0.0)).matrix, printed, rtol=1e-12)
+
+
+def test_it_comes_after_the_files_own_transform():
+    # Displacements add where nothing is turned.
+    more = parsed(NANO43.replace("4.3434", "9.3434")).calibration.matrix
+    np.testing.assert_allclose(info_with("net-ft://box?tool=0,0,5,0,0,0").calibration.matrix, more, rtol=1e-12)
+
+
+def test_a_range_is_that_of_the_transducers_own_axes():
+    calibration = info_with("net-ft://box?tool=0,0,100,0,0,90").calibration
+    raw = np.linalg.solve(CALIBRATION.matrix, [18.0, 0.0, 0.0, 0.0, 0.0, 0.0])[None]
+    felt = calibration.own(calibration.wrench(raw, np.zeros(6)))
+    np.testing.assert_allclose(loads(felt, calibration.rated)[0], [0.5, 0, 0, 0, 0, 0, 0.5], atol=1e-12)
+
+
+def test_it_is_recorded_with_its_origin_and_comes_back():
+    told = info_with("net-ft://box?tool=0,0,-5,0,0,45")
+    assert told.settings["user's tool transform"] == "0 0 -5 mm, 0 0 45 degrees, as the address says"
+    assert "tool transform" in told.calibration.source
+    back = info_from_dict(info_to_dict(told))
+    assert back.calibration.tool == (0.0, 0.0, -5.0, 0.0, 0.0, 45.0)
+    np.testing.assert_array_equal(back.calibration.matrix, told.calibration.matrix)
+    assert info_from_dict(info_to_dict(replace(told, calibration=CALIBRATION))).calibration.tool == ()
+
+
+def test_zeros_are_no_transform():
+    assert info_with("net-ft://box?tool=0,0,0,0,0,0").calibration is CALIBRATION
+
+
+@pytest.mark.parametrize(
+    "tool",
+    ["", "1,2,3", "1,2,3,4,5,6,7", "0,0,x,0,0,0", "0,0,nan,0,0,0", "0,0,1e9,0,0,0", "0,0,0,0,0,361", "1_0,0,0,0,0,0"],
+)
+def test_anything_but_six_plausible_numbers_is_refused(tool):
+    with pytest.raises(SetupError, match=r"tool=.* must be six numbers, dx,dy,dz in mm"):
+        without_tool(parse_address(f"net-ft://box?tool={tool}"))
+
+
+def test_a_box_that_combines_its_gauges_itself_is_moved_too_and_its_raw_readings_stay():
+    clock = PacedClock(10.0)
+    with connected("sim:?tool=0,0,20,0,0,0", clock) as bench:
+        transducer = bench.transducer
+        transducer.start()
+        blocks = [transducer.read(1.0) for _ in range(3)]
+        transducer.stop()
+    block, calibration = ReadingBlock.joined(blocks), transducer.info.calibration
+    assert transducer.health.received >= len(block) > 0
+    own, moved = block.raw * np.repeat([1e-6, 1e-3], 3), calibration.wrench(block.raw, np.zeros(6))
+    np.testing.assert_allclose(moved[:, 3], own[:, 3] + 20.0 * own[:, 1])
+    np.testing.assert_allclose(moved[:, 4], own[:, 4] - 20.0 * own[:, 0])
