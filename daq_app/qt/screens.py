@@ -25,7 +25,8 @@ class Millimetres:
 
 def settings() -> QSettings:
     """Return what the window remembers on this computer: the screens' sizes, nothing of any session."""
-    return QSettings("daq-app", "window")
+    # A file on every system: the format that follows the system cannot be led elsewhere by a test.
+    return QSettings(QSettings.Format.IniFormat, QSettings.Scope.UserScope, "daq-app", "window")
 
 
 def millimetres(screen: QScreen) -> Millimetres:

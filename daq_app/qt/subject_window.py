@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import QEvent, Qt, Signal
-from PySide6.QtGui import QCloseEvent, QKeyEvent, QMoveEvent, QResizeEvent
+from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedWidget, QVBoxLayout, QWidget
 
 from daq_app.qt.free_answers import ChoiceOfTwo, NumberField
@@ -131,9 +131,14 @@ class SubjectWindow(QWidget):
         else:
             super().keyPressEvent(event)
 
-    def moveEvent(self, event: QMoveEvent) -> None:  # noqa: N802  Qt's name
-        """Follow to a screen of another size."""
-        super().moveEvent(event)
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802  Qt's name
+        """Follow the window to screens of another size from now on."""
+        super().showEvent(event)
+        # Not on a move: that is told before the screen is the other one.
+        self.windowHandle().screenChanged.connect(self._screen_changed, Qt.ConnectionType.UniqueConnection)
+        self._screen_changed()
+
+    def _screen_changed(self) -> None:
         self.fit_screen()
         self.screen_changed.emit()
 
