@@ -8,9 +8,9 @@ from pathlib import Path
 
 from daq_app.recorder.messages import Kind, People, StartSession
 from daq_app.sentences import sentence
-from sessions.plan import Frame, Hand
+from sessions.plan import Frame, Hand, Phase
 from sessions.protocols import Body, Protocol, StudyPlace, plan, protocol
-from sessions.protocols.protocol import LARGEST_SEED
+from sessions.protocols.protocol import LARGEST_SEED, phases_before
 from sessions.recording import Recording, RecordingError, Setting
 from sessions.recording.manifest import is_sealed
 from sessions.resuming import check_resumable
@@ -39,6 +39,7 @@ class SessionForm:
     height: str = ""  # of the stimulus's face above the transducer's origin [mm]; empty: as bench or protocol state it
     normal: str = ""  # axis along which pressing is positive, one of AXES; empty: likewise
     area: str = ""  # of finger and surface [mm2], for tau_max; empty: likewise
+    pre_evaluation: bool = False  # every stimulus judged once before all else
     practice: bool = False  # before the trials that count
     simulated: bool = False  # the subject's judgement too, where the bench is simulated
 
@@ -93,6 +94,8 @@ def checked(
         return Refused({"subject": _told(error)})
     except (SettingsError, OSError) as error:
         return Refused({"protocol": _told(error)})
+    asked: dict[Phase, bool] = {"pre-evaluation": form.pre_evaluation, "practice": form.practice, "main": True}
+    phases = [phase for phase, wanted in asked.items() if wanted]
     try:
         planned = plan(
             chosen,
@@ -103,12 +106,12 @@ def checked(
             contact_area=_number(form.area) if form.forces else None,
             stroking_hand=form.stroking_hand,
             answering_hand=form.answering_hand,
-            phases=("practice", "main") if form.practice else None,
+            phases=phases if len(phases) > 1 else None,
             body=body,
             place=place,
         )
     except SettingsError as error:
-        return Refused({"subject": _told(error)})
+        return Refused({"protocol": _told(error)})
     if form.forces and form.height.strip():
         face = replace(planned.frame, height=_number(form.height) or 0.0, height_origin="measured")
         planned = replace(planned, frame=face)
@@ -131,6 +134,16 @@ def is_code(subject: str) -> bool:
     (True, False, False)
     """
     return re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", subject.strip()) is not None
+
+
+def offered(form: SessionForm) -> tuple[Phase, ...]:
+    """Return what may come before the trials that count, as the study's protocol or the form's has it."""
+    folder = _place(form)
+    try:
+        in_study = form.study.strip() and is_study(folder)
+        return phases_before(open_study(folder).protocol if in_study else protocol(form.protocol))
+    except (StudyError, SettingsError, OSError):
+        return ()
 
 
 def enrolment(form: SessionForm) -> Enrolment | None:

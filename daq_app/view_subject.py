@@ -21,6 +21,7 @@ class SubjectView:
     ticks: int = 0  # on the line, between its ends
     key: tuple[int, int] = (0, 0)  # trial and take: another one begins with an empty answer
     hand: Hand = "right"  # that answers: where Next stands
+    force: bool = False  # how hard the finger presses is shown; never how hard it drags, which tells the surface
 
     @property
     def asks(self) -> bool:
@@ -42,7 +43,8 @@ def subject_view(session: SessionState | None) -> SubjectView:
         case "mounting" | "taring":
             return SubjectView("read", "Please wait", _told(session), hand=hand)
         case "ready" | "stroking":
-            return SubjectView("read", _stroke(session), _told(session), hand=hand)
+            force = session.plan.forces and "forces" in session.plan.shown.subject
+            return SubjectView("read", _stroke(session), _told(session), hand=hand, force=force)
         case "scoring":
             return _question(session, hand)
         case "settling":

@@ -284,6 +284,8 @@ class MainWindow(QMainWindow):
         session = self.bridge.state.session
         try:
             self.live.model_says()
+            if self.subject.press.isVisible():
+                self.subject.press.show_force(self.bridge.feed.trace)
             self.live.draw(() if session is None else session.marks, self.bridge.state.now)
         except Exception as error:  # noqa: BLE001  an error while drawing never stops a recording
             self.bridge.drawing_failed(error)

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.new_session import AXES, Bench, SessionForm, Unfinished, enrolled, enrolment
+from daq_app.new_session import AXES, Bench, SessionForm, Unfinished, enrolled, enrolment, offered
 from daq_app.qt.parts import button, choice, label, regrade, say
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import Millimetres
@@ -63,9 +63,8 @@ class NewSessionPage(QFrame):
         self.area = _line("contact area of finger and surface in square millimetres; may be empty")
         self.area.setPlaceholderText("as stated")
         self.stroking, self.answering = _hands("stroking hand"), _hands("answering hand")
-        self.practice = QCheckBox("Practice first")
-        self.practice.setAccessibleName("practice before the trials that count")
-        self.practice.setMinimumHeight(TARGET - GRID)
+        self.pre_evaluation = _tick("Pre-evaluation first", "every stimulus judged once before all else")
+        self.practice = _tick("Practice first", "practice before the trials that count")
         self.with_forces = QRadioButton("Forces, with the transducer")
         self.scores_only = QRadioButton("Scores only")
         self.people_score = QRadioButton("People")
@@ -91,6 +90,7 @@ class NewSessionPage(QFrame):
             made.toggled.connect(self.changed)
         for line in (self.subject, self.study, self.folder):
             line.textChanged.connect(self._show_study)
+        self.protocol.currentTextChanged.connect(self._show_study)
         self._show_study()
         self.show_unfinished(())
 
@@ -104,7 +104,8 @@ class NewSessionPage(QFrame):
             seed=self.seed.text(),
             stroking_hand=HANDS[self.stroking.currentIndex()][1],
             answering_hand=HANDS[self.answering.currentIndex()][1],
-            practice=self.practice.isChecked(),
+            pre_evaluation=self.pre_evaluation.isVisibleTo(self) and self.pre_evaluation.isChecked(),
+            practice=self.practice.isVisibleTo(self) and self.practice.isChecked(),
             forces=self.with_forces.isChecked(),
             height=self.height_above.text() if self._height.isVisibleTo(self) else "",
             normal=self.normal.currentText() if self._height.isVisibleTo(self) else "",
@@ -165,7 +166,9 @@ class NewSessionPage(QFrame):
 
     def _show_study(self) -> None:
         """Show what the study says of the subject: its protocol and its orders were decided when it was made."""
-        found = enrolment(self.form())
+        found, before = enrolment(self.form()), offered(self.form())
+        self.pre_evaluation.setVisible("pre-evaluation" in before)
+        self.practice.setVisible("practice" in before)
         say(self._study_words, "" if found is None else found.words)
         self._study_words.setVisible(found is not None)
         self._enrol.setVisible(found is not None and found.may_enrol)
@@ -219,6 +222,7 @@ class NewSessionPage(QFrame):
         layout.addWidget(self._study_words)
         layout.addWidget(self._enrol)
         self._field(layout, "protocol", "Protocol", self.protocol)
+        layout.addWidget(self.pre_evaluation)
         layout.addWidget(self.practice)
         hands = QHBoxLayout()
         for name, box in (("Stroking hand", self.stroking), ("Answering hand", self.answering)):
@@ -288,6 +292,13 @@ class NewSessionPage(QFrame):
         made.setVisible(False)
         self._wrong[name] = made
         layout.addWidget(made)
+
+
+def _tick(words: str, name: str) -> QCheckBox:
+    made = QCheckBox(words)
+    made.setAccessibleName(name)
+    made.setMinimumHeight(TARGET - GRID)
+    return made
 
 
 def _line(name: str) -> QLineEdit:

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedWidget, QVBoxLayout, 
 
 from daq_app.qt.free_answers import ChoiceOfTwo, NumberField
 from daq_app.qt.parts import button, label, say
+from daq_app.qt.press_bar import PressBar
 from daq_app.qt.ruler_check import RulerCheck
 from daq_app.qt.score_line import ScoreLine
 from daq_app.qt.screens import Millimetres, millimetres
@@ -37,6 +38,8 @@ class SubjectWindow(QWidget):
         self._stated_hand: Hand | None = None
         self._title = _large(label(role="title", wrap=True), LARGER, scale, bold=True)
         self._text = _large(label(wrap=True), LARGE, scale)
+        self.press = PressBar(tokens, scale)
+        self.press.hide()
         self._question = _large(label(role="title", wrap=True), LARGER, scale, bold=True)
         self._hint = _large(label(wrap=True), LARGE, scale)
         self.line = ScoreLine(tokens, now)
@@ -80,6 +83,7 @@ class SubjectWindow(QWidget):
         if before == view:
             return
         self._place_next(view.hand)
+        self.press.setVisible(view.force)
         if view.asks:
             if before is None or (before.kind, before.key) != (view.kind, view.key):
                 self._begin(view)
@@ -120,6 +124,7 @@ class SubjectWindow(QWidget):
     def set_tokens(self, tokens: Tokens) -> None:
         """Follow another theme."""
         self.line.set_tokens(tokens)
+        self.press.set_tokens(tokens)
         self.ruler.set_tokens(tokens)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
@@ -158,11 +163,11 @@ class SubjectWindow(QWidget):
         layout = QVBoxLayout(page)
         layout.setContentsMargins(6 * GRID, 6 * GRID, 6 * GRID, 6 * GRID)
         layout.addStretch(1)
-        for words in (self._title, self._text):
-            words.setMaximumWidth(TEXT_WIDTH)
+        for shown in (self._title, self._text, self.press):
+            shown.setMaximumWidth(TEXT_WIDTH)
             row = QHBoxLayout()
             row.addStretch(1)
-            row.addWidget(words, 100)
+            row.addWidget(shown, 100)
             row.addStretch(1)
             layout.addLayout(row)
             layout.addSpacing(3 * GRID)

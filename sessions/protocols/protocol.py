@@ -236,6 +236,14 @@ def check_phases(protocol: Protocol, phases: Sequence[Phase]) -> None:
         raise NotAllowed("phases", shown, "a practice needs blocks that list their stimuli under practice")
 
 
+def phases_before(protocol: Protocol) -> tuple[Phase, ...]:
+    """Return the phases that may come before the trials of the experiment."""
+    judged = protocol.pre_evaluation is not None and protocol.scale.answer != "choice"
+    practised = any(block.practice for block in protocol.blocks)
+    has: dict[Phase, bool] = {"pre-evaluation": judged, "practice": practised}
+    return tuple(phase for phase, there in has.items() if there)
+
+
 def protocol_names() -> tuple[str, ...]:
     """Return the names of the protocols that come with the program: the files of this folder."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))

@@ -3,7 +3,7 @@ from datetime import datetime
 
 import pytest
 
-from daq_app.new_session import Bench, Refused, SessionForm, checked, enrolled, enrolment
+from daq_app.new_session import Bench, Refused, SessionForm, checked, enrolled, enrolment, offered
 from daq_app.recorder.messages import People, StartSession
 from sessions.plan import Frame
 from sessions.protocols import Body, protocol_file
@@ -135,3 +135,16 @@ def test_a_study_that_cannot_be_read_says_so(study):
     (study / "study.sqlite").write_bytes(b"not a database")
     assert "cannot be read" in enrolment(in_study(study, "P07")).words
     assert isinstance(checked(in_study(study, "P07"), SIMULATED, NOW, 0), Refused)
+
+
+def test_pre_evaluation_and_practice_are_offered_where_the_protocol_has_them_and_come_before_what_counts(tmp_path):
+    assert offered(FORM) == ("pre-evaluation", "practice")
+    made = checked(replace(FORM, pre_evaluation=True, practice=True), REAL, NOW, 0).plan
+    phases = list(dict.fromkeys(trial.phase for trial in made.trials))
+    assert phases == ["pre-evaluation", "practice", "main"]
+    bare = tmp_path / "bare.toml"
+    lines = protocol_file("sensotact-friction").read_text(encoding="utf-8").splitlines()
+    bare.write_text("\n".join(line for line in lines if not line.startswith("practice")), encoding="utf-8")
+    assert offered(replace(FORM, protocol=str(bare))) == ("pre-evaluation",)
+    assert "practice" in checked(replace(FORM, protocol=str(bare), practice=True), REAL, NOW, 0).sentences["protocol"]
+    assert offered(replace(FORM, protocol="nowhere")) == ()

@@ -14,7 +14,7 @@ from daq_app.window_messages import Dismissed, DrawingFailed, Judged, Loaded, Ne
 from drivers.calibration import Calibration
 from drivers.transducer import Health, TransducerInfo
 from sessions import steps
-from sessions.plan import Frame
+from sessions.plan import Frame, Shown
 from sessions.protocols import plan, protocol
 from sessions.recording import Acknowledged, LoggedEvent
 from sessions.runner import SessionEnd, Status
@@ -317,6 +317,13 @@ def test_the_subject_gets_the_line_with_its_ends_when_it_is_time_to_score():
     assert subject.ends == ("low end", "high end")
     assert "stickiness" in subject.title
     assert derive_view(after(*READY)).subject.text == PLAN.blocks[0].instruction
+
+
+def test_the_subject_sees_how_hard_it_presses_only_where_the_protocol_says_so():
+    assert not derive_view(after(*READY)).subject.force
+    plan = replace(PLAN, shown=Shown(subject=("instruction", "forces")))
+    told = [replace(said, plan=plan) if isinstance(said, m.SessionBegun) else said for said in READY]
+    assert derive_view(after(*told)).subject.force
 
 
 def test_a_session_that_goes_on_shows_what_was_done_before():

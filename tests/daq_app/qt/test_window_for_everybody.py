@@ -2,14 +2,17 @@
 
 import re
 
+import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QLocale, QPointF, Qt
 from PySide6.QtGui import QColor, QKeyEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLineEdit, QListWidget, QWidget
 
+from daq_app.live_trace import CHANNELS, LiveTrace
 from daq_app.qt import score_line, screens, tokens
 from daq_app.qt.keys import KEYS, act_of
+from daq_app.qt.press_bar import FULL, PressBar
 
 pytestmark = pytest.mark.qt
 
@@ -229,3 +232,20 @@ def test_no_widget_of_the_subject_shows_a_number_or_a_tick(driver):
     assert line in shown
     texts = [w.text() for w in shown if hasattr(w, "text")]
     assert not any(re.search(r"\d", text) for text in texts)
+
+
+def test_the_bar_of_how_hard_the_finger_presses_shows_the_mean_of_the_last_moment(application):
+    bar, trace = PressBar(tokens.LIGHT, 1.0), LiveTrace(100.0)
+    values = np.full((len(CHANNELS), 200), np.nan)
+    values[CHANNELS.index("N"), :180], values[CHANNELS.index("N"), 180:] = 4.0, 2.5
+    bar.resize(400, 40)
+    bar.show_force(trace)
+    assert _filled(bar) == 0
+    trace.add(np.arange(200) / 100.0, values)
+    bar.show_force(trace)
+    assert _filled(bar) == pytest.approx(400 * 2.5 / FULL, abs=3)
+
+
+def _filled(bar):
+    image, colour = bar.grab().toImage(), QColor(bar._tokens.act)
+    return sum(image.pixelColor(x, image.height() // 2) == colour for x in range(image.width()))

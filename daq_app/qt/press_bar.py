@@ -1,0 +1,52 @@
+"""How hard the subject's finger presses, where the protocol lets the subject see it."""
+
+import numpy as np
+from PySide6.QtCore import QRectF
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QWidget
+
+from daq_app.live_trace import CHANNELS, LiveTrace
+from daq_app.qt.tokens import GRID, Tokens
+
+FULL = 5.0  # of the bar [N]
+OVER = 0.1  # the mean of so long is shown: an eye follows it, and noise does not move it [s]
+
+
+class PressBar(QWidget):
+    """A bar from no force to `FULL`; no number, so that nobody aims at one."""
+
+    def __init__(self, tokens: Tokens, scale: float) -> None:
+        """Start empty."""
+        super().__init__()
+        self._tokens = tokens
+        self._force = 0.0
+        self.setAccessibleName("how hard you press")
+        self.setFixedHeight(round(6 * GRID * scale))
+
+    def show_force(self, trace: LiveTrace) -> None:
+        """Show the normal force of the last moment; an empty bar where nothing is known."""
+        newest = trace.newest
+        force = 0.0
+        if newest is not None:
+            _, values = trace.between(newest - OVER, np.nextafter(newest, np.inf))
+            normal = values[CHANNELS.index("N")]
+            known = normal[np.isfinite(normal)]
+            force = float(known.mean()) if len(known) else 0.0
+        if abs(force - self._force) * self.width() > FULL:  # a pixel
+            self._force = force
+            self.update()
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        self._tokens = tokens
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
+        """Paint the bar."""
+        painter = QPainter(self)
+        box = QRectF(self.rect()).adjusted(1, 1, -1, -1)
+        filled = QRectF(box)
+        filled.setWidth(box.width() * min(max(self._force / FULL, 0.0), 1.0))
+        painter.fillRect(filled, QColor(self._tokens.act))
+        painter.setPen(QPen(QColor(self._tokens.quiet), 2))
+        painter.drawRect(box)
