@@ -234,7 +234,8 @@ def test_no_widget_of_the_subject_shows_a_number_or_a_tick(driver):
     assert not any(re.search(r"\d", text) for text in texts)
 
 
-def test_the_bar_of_how_hard_the_finger_presses_shows_the_mean_of_the_last_moment(application):
+@pytest.mark.usefixtures("application")
+def test_the_bar_of_how_hard_the_finger_presses_shows_the_mean_of_the_last_moment():
     bar, trace = PressBar(tokens.LIGHT, 1.0), LiveTrace(100.0)
     values = np.full((len(CHANNELS), 200), np.nan)
     values[CHANNELS.index("N"), :180], values[CHANNELS.index("N"), 180:] = 4.0, 2.5
