@@ -95,7 +95,7 @@ def checked(
     except (SettingsError, OSError) as error:
         return Refused({"protocol": _told(error)})
     asked: dict[Phase, bool] = {"pre-evaluation": form.pre_evaluation, "practice": form.practice, "main": True}
-    phases = [phase for phase, wanted in asked.items() if wanted]
+    phases: list[Phase] = [phase for phase, wanted in asked.items() if wanted]
     try:
         planned = plan(
             chosen,
