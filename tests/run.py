@@ -22,7 +22,7 @@ STATIC = [
 PARALLEL = ["pytest", "-n", "2", "--dist", "loadfile"]
 QUICK = [("every sentence a test proves", [*PARALLEL, "-m", "not slow and not hardware"])]
 LONG = [
-    ("every slow sentence about the solver", [*PARALLEL, "-m", "slow", "tests/solver", "tests/daq_app"]),
+    ("every slow sentence", [*PARALLEL, "-m", "slow", "--ignore", "tests/endurance", "tests"]),
     ("the endurance runs", ["pytest", "-s", "-m", "slow", "tests/endurance"]),
 ]
 
