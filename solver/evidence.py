@@ -103,7 +103,7 @@ def warnings(scene: Scene, left_out: Mapping[str, Any]) -> tuple[str, ...]:
         "history": 'ask for solve.course = "history"',
         "inertia": "nothing here models it",
     }
-    if scene.solve.course == "history" and scene.solve.kinematics == "small":
+    if scene.solve.course == "history":
         needs["viscosity"] = "give the tissues a Prony series"
     for name, cure in needs.items():
         change = left_out[name]["estimate"] if name in left_out else None

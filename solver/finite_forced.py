@@ -109,7 +109,7 @@ def march(
                 raise Cancelled
             try:
                 there = min(done + part, 1.0)
-                shape = balanced(newton, _touching(newton, shape), begin.towards(aim, there))
+                shape = balanced(newton, lowered(newton, shape), begin.towards(aim, there))
             except NotConverged as reason:
                 part /= 2.0
                 if part < 0.5**HALVINGS:
@@ -128,7 +128,7 @@ def untouched(newton: Newton, mu: float, tau: float) -> Shape:
     return replace(Shape.undeformed(newton.body), pull=Pull(0.0, mu, tau))
 
 
-def _touching(newton: Newton, shape: Shape) -> Shape:
+def lowered(newton: Newton, shape: Shape) -> Shape:
     """Return the shape with its lowest node on the surface, where nothing touches yet."""
     if shape.touching.any():
         return shape

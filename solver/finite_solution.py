@@ -1,7 +1,7 @@
 """From scenes at finite strain to predictions, each on a mesh made for its contact, and an error estimate with each.
 
-The law is neo-Hookean (`solver.hyperelastic.NeoHooke`). Settled sliding is found directly and refused where it does not
-exist (`solver.existence`); the course is marched.
+Settled sliding is found directly and refused where it does not exist (`solver.existence`); the course is marched, and
+where tissues relax, in time (`solver.finite_relaxing`).
 """
 
 from collections.abc import Callable, Sequence
@@ -13,8 +13,10 @@ from solver import evidence, kernels_numpy
 from solver.climbing import climbed, error_estimates, foot
 from solver.failures import Cancelled, SolveFailure
 from solver.finite_finger import FiniteFinger
+from solver.finite_relaxing import RelaxingCourse
 from solver.finite_states import PRESSES, course
 from solver.kernels import CAP, OPEN, SLIP, STICK
+from solver.mesh import Array
 from solver.newton import Shape
 from solver.prediction import History, Prediction, Row, Skin
 from solver.receptor import ROW
@@ -56,15 +58,17 @@ def _predicted(scene: Scene, expected: float, fineness: float, stop: Callable[[]
     at = climbed(scene, fineness, rough, stop)
     finger, shape, setup = at.finger, at.shape, rough.setup_s + at.setup_s
     way: list[Shape] = []
+    relaxing: RelaxingCourse | None = None
     if scene.solve.course == "history":
-        way = course(scene, finger, stop)
+        relaxing = RelaxingCourse(scene, finger, stop) if scene.materials.relax else None
+        way = course(scene, finger, stop) if relaxing is None else relaxing.shapes
         shape = way[-1]
     sed, normal, tangential = (float(number) for number in finger.numbers(shape))
     driven = scene.driven(shape.pull.depth)
     body = finger.newton.body
     skin = _skin(finger, shape)
-    checks = _audits(driven, finger, shape)
-    if way:
+    checks = _audits(driven, finger, shape, None if relaxing is None else relaxing.newton.excess(shape))
+    if way and (relaxing is None or _sticking(shape) == 0.0):  # stuck and relaxing, the end depends on the way
         checks["course_against_direct"] = abs(finger.sed_ending(at.shape) / sed - 1.0)
     solved = perf_counter()
     errors = error_estimates(scene, fineness, at, stop)
@@ -96,7 +100,7 @@ def _predicted(scene: Scene, expected: float, fineness: float, stop: Callable[[]
         skin=skin,
         mesh=finger.geometry.mesh,
         displacement=shape.u,
-        history=_history(scene, finger, way) if way else None,
+        history=_history(scene, finger, way, relaxing) if way else None,
         warnings=evidence.warnings(driven, model["left_out"]),
     )
 
@@ -140,8 +144,10 @@ def _contact_width(skin: Skin) -> float:
     return float(high - low)
 
 
-def _audits(scene: Scene, finger: FiniteFinger, shape: Shape) -> dict[str, float]:
+def _audits(scene: Scene, finger: FiniteFinger, shape: Shape, excess: Array | None) -> dict[str, float]:
     """Return the checks of one state. Perfect is 0, save for `smallest_det_F` (of displacement at quadrature points).
+
+    `excess` (e, 18) are the forces that tissue holds beyond its relaxed law.
 
     `equilibrium_x`, `equilibrium_y`: bone reaction plus contact force, by the contact force. `inner_forces`: largest
     unbalanced force on a node that is neither held nor touching. `penetration`, `tension`, `cone_violation`: as at
@@ -149,6 +155,8 @@ def _audits(scene: Scene, finger: FiniteFinger, shape: Shape) -> dict[str, float
     """
     body, mesh = finger.newton.body, finger.geometry.mesh
     element_forces, _ = kernels_numpy.forces_and_tangents(body, shape.u, np.zeros((len(body.nodes), 3)))
+    if excess is not None:
+        element_forces = element_forces + excess
     inner = np.zeros(mesh.nodes.shape)
     np.add.at(inner, body.nodes, element_forces.reshape(-1, 9, 2))
     total = max(float(shape.force[1]), np.finfo(float).tiny)
@@ -174,23 +182,35 @@ def _audits(scene: Scene, finger: FiniteFinger, shape: Shape) -> dict[str, float
     }
 
 
-def _history(scene: Scene, finger: FiniteFinger, way: Sequence[Shape]) -> History:
-    body, speed = finger.newton.body, scene.loading.speed
+def _history(scene: Scene, finger: FiniteFinger, way: Sequence[Shape], relaxing: RelaxingCourse | None) -> History:
     travel = np.array([-shape.pull.travel for shape in way])
     depth = np.array([shape.pull.depth for shape in way])
-    gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(travel)))])
-    drags = scene.loading.dragged
-    after = np.arange(1, len(way) - PRESSES + 1) / PRESSES if drags else gone[PRESSES:] / speed
     skins = [_skin(finger, shape) for shape in way]
     slipping = np.array([1.0 - _sticking(shape) if shape.touching.any() else 0.0 for shape in way])
+    if relaxing is None:
+        time = _times(scene, travel)
+        point = [float(finger.point.average(finger.newton.body, shape.u)[0]) for shape in way]
+        sed = np.stack([[finger.sed_ending(shape) for shape in way], point], axis=1)
+    else:
+        time, sed = np.array(relaxing.times), np.array(relaxing.sed)
     return History(
-        time=np.concatenate([np.arange(1, PRESSES + 1) / PRESSES, 1.0 + after]),
+        time=time,
         bone_x=travel,
         bone_y=-depth,
-        sed_ending=np.array([finger.sed_ending(shape) for shape in way]),
-        sed_point=np.array([float(finger.point.average(body, shape.u)[0]) for shape in way]),
+        sed_ending=sed[:, 0],
+        sed_point=sed[:, 1],
         normal_force=np.array([float(shape.force[1]) for shape in way]),
         tangential_force=np.array([_drag(scene, float(shape.force[0])) for shape in way]),
         contact_width=np.array([_contact_width(skin) for skin in skins]),
         slipping=slipping,
     )
+
+
+def _times(scene: Scene, travel: Array) -> Array:
+    """Return when a finger that does not relax was where its bone has gone to by `travel` (m,) [mm]."""
+    if scene.loading.dragged:
+        after = np.arange(1, len(travel) - PRESSES + 1) / PRESSES
+    else:
+        gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(travel)))])
+        after = gone[PRESSES:] / scene.loading.speed
+    return np.concatenate([np.arange(1, PRESSES + 1) / PRESSES, 1.0 + after])

@@ -59,6 +59,16 @@ class Moduli:
     shear: float  # [MPa]
     lame: float  # Lamé's first constant [MPa]
 
+    @property
+    def engineering(self) -> tuple[float, float]:
+        """Young's modulus [MPa] and Poisson's ratio.
+
+        >>> [round(number, 6) for number in Moduli(Hooke(0.08, 0.48).shear, Hooke(0.08, 0.48).lame).engineering]
+        [0.08, 0.48]
+        """
+        nu = self.lame / (2.0 * (self.lame + self.shear))
+        return 2.0 * self.shear * (1.0 + nu), nu
+
 
 @dataclass(frozen=True, slots=True)
 class Prony:

@@ -55,8 +55,7 @@ def _differences(scene: Scene, base: Prediction, answers: Answers) -> dict[str, 
     if scene.loading.directions and not scene.loading.dragged and not scene.materials.relax:
         marched = replace(scene, solve=replace(scene.solve, course="history"))
         out["history"] = _difference(base, answers((marched,))[0], "when the whole course is marched")
-        if scene.solve.kinematics == "small":
-            out |= _viscosity(scene, base, answers)
+        out |= _viscosity(scene, base, answers)
     return out
 
 

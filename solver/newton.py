@@ -106,25 +106,31 @@ class Newton:
         `anchor` (k,) are the positions along x where nodes stick [mm]. The states of contact are changed up to `rounds`
         times until none contradicts the linearised body.
         """
-        body = self.body
         self._tangent_at = None
-        least = kernels.assemble(
-            shape.u, shape.pressure, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening,
-            body.lame, body.nodes, body.unknown, self.tangent, self.force, self.fold, self.core, self.dilate,
-            self.volume,
-        )  # fmt: skip
-        if not least > 0.0 or not self.inside.factorise(self.tangent):
+        if not self._assembled(shape) > 0.0 or not self.inside.factorise(self.tangent):
             return False
         return self._touch(shape, pull, anchor, rounds)
 
     def relinearise(self, shape: Shape, pull: Pull, anchor: Array, rounds: int) -> bool:
         """Do the same with the forces at `shape`, but the tangent and its factors that are there already."""
+        return self._resisted(shape) > 0.0 and self._touch(shape, pull, anchor, rounds)
+
+    def _assembled(self, shape: Shape) -> float:
+        """Fill tangents and forces at `shape` and return the least det F."""
         body = self.body
-        least = kernels.forces(
+        return kernels.assemble(
+            shape.u, shape.pressure, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening,
+            body.lame, body.nodes, body.unknown, self.tangent, self.force, self.fold, self.core, self.dilate,
+            self.volume,
+        )  # fmt: skip
+
+    def _resisted(self, shape: Shape) -> float:
+        """Fill the forces at `shape` for the tangent that is there and return the least det F."""
+        body = self.body
+        return kernels.forces(
             shape.u, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening, body.lame,
             body.nodes, body.unknown, self.force, self.fold, self.core, self.volume,
         )  # fmt: skip
-        return least > 0.0 and self._touch(shape, pull, anchor, rounds)
 
     def _touch(self, shape: Shape, pull: Pull, anchor: Array, rounds: int) -> bool:
         body = self.body

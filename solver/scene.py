@@ -334,9 +334,6 @@ class Scene:
                 has = " or ".join(f'"{law}"' for law in LAWS_OF[kinematics])
                 allowed = f'with solve.kinematics = "{kinematics}" it must be {has}'
                 raise SceneError(f"materials.{name}.law", tissue.law, allowed)
-            if tissue.prony and kinematics == "finite":
-                allowed = 'tissues relax at small strain only: leave it out, or ask for solve.kinematics = "small"'
-                raise SceneError(f"materials.{name}.prony", len(tissue.prony), allowed)
 
     @property
     def normal_force(self) -> float | None:

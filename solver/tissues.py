@@ -16,11 +16,13 @@ def relaxing_laws(materials: Materials) -> list[Prony]:
 
 
 def finite_laws(materials: Materials) -> list[Law]:
-    """Return the laws at finite strain."""
-    return [_finite(tissue) for tissue in materials.by_region]
+    """Return the laws at finite strain of a settled response: the shear modulus relaxed, the bulk modulus as it was."""
+    both = zip(materials.by_region, relaxing_laws(materials), strict=True)
+    return [_finite(tissue, law.relaxed) for tissue, law in both]
 
 
-def _finite(tissue: Material) -> Law:
+def _finite(tissue: Material, moduli: Moduli) -> Law:
+    young, nu = moduli.engineering if tissue.prony else (tissue.E, tissue.nu)
     if tissue.stiffening is not None:
-        return Demiray(tissue.E, tissue.nu, tissue.stiffening)
-    return NeoHooke(tissue.E, tissue.nu)
+        return Demiray(young, nu, tissue.stiffening)
+    return NeoHooke(young, nu)

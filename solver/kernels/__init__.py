@@ -6,6 +6,7 @@
 from solver.kernels.compiling import CAP, OPEN, SLIP, STICK
 from solver.kernels.elements import advance, assemble, energies, forces
 from solver.kernels.fronts import condense, eliminate, unfold
+from solver.kernels.overstress import add_overstress
 from solver.kernels.skin import impose, restate, settle, solve, tributary
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "OPEN",
     "SLIP",
     "STICK",
+    "add_overstress",
     "advance",
     "assemble",
     "condense",

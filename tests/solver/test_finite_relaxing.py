@@ -1,0 +1,275 @@
+# ruff: noqa: N803, N806 - the letters of the literature
+"""Tissues that relax at finite strain: closed forms, derivatives, what is never gained, limits, and the whole finger."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from solver import kernels_numpy, overstress
+from solver.finite_body import FiniteBody
+from solver.finite_relaxing import RelaxingNewton
+from solver.hyperelastic import NeoHooke
+from solver.hyperelastic import stress as relaxed_stress
+from solver.hyperelastic import tangent as relaxed_tangent
+from solver.materials import Hooke, Prony
+from solver.newton import Pull, Shape
+from solver.overstress import Past
+from solver.reference import SLIPPERINESS, scene
+from solver.scene import Materials, Relaxation, Solve
+from solver.solution import solve
+from tests.solver.finite_examples import block
+from tests.solver.test_relaxing import TABLE, TIMES
+
+entries = st.floats(-0.4, 0.4)
+gradients = st.tuples(entries, entries, entries, entries).map(lambda g: np.eye(2) + np.reshape(g, (2, 2)))
+tensors = st.tuples(*[st.floats(0.5, 2.0)] * 2, st.floats(-0.4, 0.4), st.floats(0.5, 2.0)).map(np.array)
+G = 0.027
+
+
+def one_term(tau, g=0.3):
+    return Past.at_rest(np.array([[g * G]]), np.array([[tau]]))
+
+
+def sheared(gamma):
+    return np.array([[1.0, gamma], [0.0, 1.0]])
+
+
+@given(T=tensors, F=gradients, direction=gradients)
+def test_within_a_step_the_stress_is_the_derivative_of_an_energy_and_the_tangent_that_of_the_stress(T, F, direction):
+    if np.linalg.det(F) < 0.2:
+        return
+    small = 1e-30
+    stepped = F + 1j * small * direction
+    slope = overstress.energy(T, stepped).imag / small
+    np.testing.assert_allclose(np.sum(overstress.stress(T, F) * direction), slope, rtol=1e-10, atol=1e-12)
+    bend = overstress.stress(T, stepped).imag / small
+    turned = np.einsum("aAbB,bB->aA", overstress.tangent(T, F), direction)
+    np.testing.assert_allclose(turned, bend, rtol=1e-9, atol=1e-11)
+
+
+@given(path=st.lists(gradients, min_size=1, max_size=4), angle=st.floats(-4.0, 4.0))
+def test_turning_the_body_turns_the_stress_and_nothing_else(path, angle):
+    if min(np.linalg.det(F) for F in path) < 0.2:
+        return
+    R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    still, turned = one_term(0.7), one_term(0.7)
+    for F in path:
+        T, other = still.over(0.5)[0], turned.over(0.5)[0]
+        still, turned = still.after(F[None], 0.5), turned.after((R @ F)[None], 0.5)
+    np.testing.assert_allclose(turned.energy(), still.energy(), rtol=1e-9, atol=1e-14)
+    stress = overstress.stress(T, path[-1])
+    np.testing.assert_allclose(overstress.stress(other, R @ path[-1]), R @ stress, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("tau", sorted(TABLE))
+def test_a_block_sheared_by_half_relaxes_as_the_standard_linear_solid_does_whatever_the_steps(tau):
+    """In simple shear the network's stress is linear in the shear at any size (Green and Tobolsky 1946)."""
+    law, past, before, found = NeoHooke(G, 0.0), one_term(tau), 0.0, []
+    for time in sorted({0.25, 0.75, *TIMES}):
+        F = sheared(0.5 * min(time, 1.0))
+        T = past.over(time - before)[0]
+        past, before = past.after(F[None], time - before), time
+        if time in TIMES:
+            true = overstress.stress(T, F) @ F.T
+            found.append(0.7 * min(time, 1.0) + true[0, 1] / (G * 0.5))
+    assert law.shear == pytest.approx(G / 2.0)
+    np.testing.assert_allclose(found, TABLE[tau], atol=6e-7)
+
+
+def test_the_normal_stress_of_a_steadily_growing_shear_converges_at_second_order_to_its_closed_form():
+    """N1 = 2 G (rate tau)^2 (1 - (1 + t/tau) exp(-t/tau)) (Bird, Armstrong and Hassager 1987, start of shear)."""
+    tau, rate, errors = 0.6, 0.8, []
+    expected = 2.0 * 0.3 * G * (rate * tau) ** 2 * (1.0 - (1.0 + 1.0 / tau) * np.exp(-1.0 / tau))
+    for steps in (8, 16, 32):
+        past = one_term(tau)
+        for number in range(1, steps + 1):
+            F = sheared(rate * number / steps)
+            T = past.over(1.0 / steps)[0]
+            past = past.after(F[None], 1.0 / steps)
+        true = overstress.stress(T, F) @ F.T
+        errors.append(abs(true[0, 0] - true[1, 1] - expected) / expected)
+    assert errors[-1] < 1e-3
+    assert np.log2(errors[0] / errors[1]) > 1.9
+    assert np.log2(errors[1] / errors[2]) > 1.9
+
+
+@given(path=st.lists(gradients, min_size=1, max_size=6))
+def test_held_still_energy_only_falls_and_the_networks_stay_positive(path):
+    if min(np.linalg.det(F) for F in path) < 0.2:
+        return
+    past = one_term(0.7)
+    for F in path:
+        past = past.after(F[None], 0.3)
+        metric = past.metric[0, 0]
+        assert metric[0] * metric[1] > metric[2] ** 2
+        assert metric[3] > 0.0
+        assert past.energy()[0] >= -1e-16
+    energies = [past.energy()[0]]
+    for _ in range(6):
+        past = past.after(path[-1][None], 0.4)
+        energies.append(past.energy()[0])
+    assert (np.diff(energies) <= 1e-16).all()
+
+
+def test_the_work_done_on_a_cycle_is_what_is_lost_and_fine_steps_balance_it():
+    """Lost: g G/(2 tau) times the sum of a + 1/a - 2, integrated in time; the cycle returns the body, not its energy."""
+    steps, tau = 2000, 0.5
+    past, work, lost, before = one_term(tau), 0.0, 0.0, sheared(0.0)
+    P = np.zeros((2, 2))
+    for number in range(1, steps + 1):
+        F = sheared(0.6 * np.sin(2.0 * np.pi * number / steps))
+        last, T = P, past.over(1.0 / steps)[0]
+        P = overstress.stress(T, F)
+        work += np.sum((P + last) / 2.0 * (F - before))
+        past, before = past.after(F[None], 1.0 / steps), F
+        A, B = (_whole(t) for t in (past.metric[0, 0], past.before[0]))
+        eigen = np.linalg.eigvals(A @ np.linalg.inv(B)).real
+        lost += 0.3 * G / (2.0 * tau) * np.sum(eigen + 1.0 / eigen - 2.0) / steps
+    assert lost > 0.0
+    assert work == pytest.approx(lost + past.energy()[0], rel=1e-4)
+
+
+def _whole(t):
+    return np.array([[t[0], t[2], 0.0], [t[2], t[1], 0.0], [0.0, 0.0, t[3]]])
+
+
+def test_at_once_the_tissue_has_its_own_moduli_and_in_the_end_the_relaxed_ones():
+    law = Prony(0.08, 0.48, ((0.2, 0.07), (0.4, 1.4)))
+    past = Past.at_rest(np.array([[g * law.shear for g, _ in law.terms]]), np.array([[tau for _, tau in law.terms]]))
+    end = NeoHooke(*law.relaxed.engineering)
+    A = relaxed_tangent(end, np.eye(2)) + overstress.tangent(past.over(1e-9)[0], np.eye(2))
+    hooke = Hooke(0.08, 0.48)
+    np.testing.assert_allclose([A[0, 0, 0, 0], A[0, 0, 1, 1], A[0, 1, 0, 1]],
+                               [hooke.lame + 2 * hooke.shear, hooke.lame, hooke.shear], rtol=1e-7)  # fmt: skip
+    F = np.array([[1.3, 0.4], [-0.1, 0.8]])
+    past = past.after(F[None], 1e-9)
+    for _ in range(3):
+        left = overstress.stress(past.over(20.0)[0], F)
+        past = past.after(F[None], 20.0)
+    assert np.abs(left).max() < 1e-6 * np.abs(relaxed_stress(end, F)).max()
+
+
+def test_after_a_sudden_strain_the_stress_of_the_shape_falls_as_the_exponential():
+    F, past = np.array([[1.3, 0.4], [-0.1, 0.8]]), one_term(0.5)
+    at_once = overstress.stress(past.over(1e-9)[0], F)
+    past = past.after(F[None], 1e-9)
+    for time in (0.2, 0.5, 1.5):
+        np.testing.assert_allclose(overstress.stress(past.over(time)[0], F), np.exp(-time / 0.5) * at_once, rtol=1e-7)
+
+
+def relaxing_block(distortion=0.06):
+    law = Prony(0.08, 0.48, ((0.3, 0.5),))
+    body = FiniteBody.of(block(distortion=distortion, seed=1), [NeoHooke(*law.relaxed.engineering)])
+    newton = RelaxingNewton(body, [law])
+    rng = np.random.default_rng(3)
+    u = rng.uniform(-0.015, 0.015, body.mesh.nodes.shape)
+    u[body.mesh.held] = 0.0
+    start = replace(Shape.undeformed(body), u=u)
+    newton.ready(0.2)
+    newton.took(start, 0.2)
+    newton.ready(0.3)
+    return newton, start, rng
+
+
+def whole(newton, u, pressure):
+    """Forces (e, 18) and tangents (e, 18, 18) in plain NumPy."""
+    body, T = newton.body, newton._tensor
+    force, tangent = kernels_numpy.forces_and_tangents(body, u, pressure)
+    gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
+    bend = overstress.tangent(T, kernels_numpy.deformation(body, u))
+    count = len(body.nodes)
+    more = np.einsum("eq,eqaAbB,eqiA,eqjB->eiajb", body.weight, bend, gradient, gradient)
+    shape = replace(Shape.undeformed(body), u=u)
+    return force + newton.excess(shape), tangent + more.reshape(count, 18, 18)
+
+
+def test_compiled_forces_and_tangents_agree_with_the_plain_ones_and_with_differences():
+    newton, start, rng = relaxing_block()
+    body, pressure = newton.body, np.zeros((len(newton.body.nodes), 3))
+    u = start.u + 0.3 * start.u[::-1]
+    u[body.mesh.held] = 0.0
+    assert newton._assembled(replace(start, u=u, pressure=pressure)) > 0.0
+    force, tangent = whole(newton, u, pressure)
+    inside = np.linalg.inv(tangent[:, 16:, 16:])
+    across = tangent[:, :16, 16:] @ inside
+    outer = tangent[:, :16, :16] - across @ tangent[:, 16:, :16]
+    expected = np.zeros(body.size + 1)
+    np.add.at(expected, body.unknown.reshape(-1, 16), force[:, :16] - (across @ force[:, 16:, None])[:, :, 0])
+    scale = np.abs(tangent).max()
+    np.testing.assert_allclose(np.tril(newton.tangent), np.tril(outer), atol=1e-12 * scale)
+    np.testing.assert_allclose(newton.force, expected[:-1], atol=1e-13 * scale)
+    # the same forces for a tangent kept from there
+    other = 0.7 * u
+    assert newton._resisted(replace(start, u=other)) > 0.0
+    force, _ = whole(newton, other, pressure)
+    expected[:] = 0.0
+    np.add.at(expected, body.unknown.reshape(-1, 16), force[:, :16] - (across @ force[:, 16:, None])[:, :, 0])
+    np.testing.assert_allclose(newton.force, expected[:-1], atol=1e-13 * scale)
+    way, h = rng.normal(size=u.shape), 1e-6
+    local = way[body.nodes].reshape(len(body.nodes), 18)
+    ahead, behind = (newton.excess(replace(start, u=u + sign * h * way)) for sign in (1.0, -1.0))
+    plain = kernels_numpy.forces_and_tangents(body, u, pressure)[1]
+    change = np.einsum("eij,ej->ei", tangent - plain, local)
+    np.testing.assert_allclose((ahead - behind) / (2 * h), change, atol=1e-7 * np.abs(change).max())
+
+
+def test_a_pressed_block_is_in_equilibrium_with_what_it_holds_of_the_past():
+    newton, _, _ = relaxing_block(distortion=0.0)
+    body = newton.body
+    shape = Shape.undeformed(body)
+    newton.past = Past.at_rest(newton.past.shear, newton.past.tau)
+    pushes = []
+    for depth, step in ((0.1, 0.1), (0.2, 0.1), (0.2, 0.5), (0.2, 5.0)):
+        newton.ready(step)
+        shape = newton.settle(shape, Pull(depth, 0.3), 1e-9)
+        force, _ = kernels_numpy.forces_and_tangents(body, shape.u, np.zeros((len(body.nodes), 3)))
+        total = np.zeros(body.mesh.nodes.shape)
+        np.add.at(total, body.nodes, (force + newton.excess(shape)).reshape(-1, 9, 2))
+        total[body.skin] -= shape.reaction
+        total[body.mesh.held] = 0.0
+        assert np.abs(total).max() < 1e-9 * shape.force[1]
+        newton.took(shape, step)
+        pushes.append(shape.force[1])
+    assert pushes[1] > pushes[2] > pushes[3]
+
+
+def of_layers(*terms):
+    usual = Materials()
+    return replace(usual, **{name: replace(usual.of(name), prony=terms) for name in ("epidermis", "dermis", "fat")})
+
+
+def published(materials, course="history", kinematics="finite", **loading):
+    given = scene(SLIPPERINESS[4])
+    driven = replace(given.loading, **loading)
+    return replace(given, materials=materials, loading=driven, solve=Solve(kinematics, course, 0.5))
+
+
+def test_pressed_lightly_the_finger_relaxes_as_at_small_strain():
+    tissues = of_layers(Relaxation(0.3, 0.07), Relaxation(0.2, 0.3))
+    found = [solve(published(tissues, kinematics=k, indentation=0.02)) for k in ("small", "finite")]
+    small, finite = (f.history for f in found)
+    assert finite.time[24] == small.time[25] == 1.0
+    for name in ("sed_ending", "normal_force"):
+        first, second = getattr(small, name), getattr(finite, name)
+        np.testing.assert_allclose(second[11:25] / second[-1], first[12:26] / first[-1], rtol=0.01)
+    assert finite.normal_force.max() > 1.2 * finite.normal_force[-1]
+
+
+def test_in_the_end_a_sliding_finger_has_its_relaxed_moduli_and_overshoots_on_the_way():
+    tissues = of_layers(Relaxation(0.3, 0.07), Relaxation(0.2, 1.4))
+    found = solve(published(tissues))
+    assert found.audits["course_against_direct"] < 1e-6
+    assert found.audits["inner_forces"] < 1e-9
+    assert found.history.normal_force.max() > 1.2 * found.normal_force
+    assert found.history.sed_ending[-1] == pytest.approx(found.sed_ending, rel=1e-6)
+
+
+def test_a_given_force_presses_a_relaxing_finger_deeper_with_time():
+    found = solve(published(of_layers(Relaxation(0.5, 0.5)), indentation=None, normal_force=0.05, slide="none"))
+    depth, time = -found.history.bone_y, found.history.time
+    np.testing.assert_allclose(found.history.normal_force[time >= 1.0], 0.05, rtol=1e-7)
+    assert (np.diff(depth[time >= 1.0]) > -1e-9).all()
+    assert depth[-1] > 1.1 * depth[np.argmin(np.abs(time - 1.0))]
