@@ -1,5 +1,5 @@
 # ruff: noqa: N803, N806 - the letters of the literature
-"""Tissues that relax at finite strain: closed forms, derivatives, what is never gained, limits, and the whole finger."""
+"""Tissues that relax at finite strain: closed forms, derivatives, what is never gained, limits, the whole finger."""
 
 from dataclasses import replace
 
@@ -115,7 +115,7 @@ def test_held_still_energy_only_falls_and_the_networks_stay_positive(path):
 
 
 def test_the_work_done_on_a_cycle_is_what_is_lost_and_fine_steps_balance_it():
-    """Lost: g G/(2 tau) times the sum of a + 1/a - 2, integrated in time; the cycle returns the body, not its energy."""
+    """Lost: g G/(2 tau) times the sum of a + 1/a - 2, in time; the cycle returns the body alone."""
     steps, tau = 2000, 0.5
     past, work, lost, before = one_term(tau), 0.0, 0.0, sheared(0.0)
     P = np.zeros((2, 2))
