@@ -13,9 +13,9 @@ from pathlib import Path
 from daq_app.console import Console
 from daq_app.pooling import Shelf, visits
 from daq_app.synthetic import synthetic_study
-from sessions.prediction import PredictionOptions
+from sessions.pooling.visit import VisitOptions
 
-OPTIONS = PredictionOptions(course="steady")
+OPTIONS = VisitOptions()
 
 
 def timed(folders: list[Path], shelf: Path, workers: int) -> float:

@@ -18,8 +18,7 @@ from typing import Any
 
 from daq_app.console import Console
 from sessions.blinding import UNBLINDING
-from sessions.pooling.visit import FORM, Visit, visit_of
-from sessions.prediction import PredictionOptions
+from sessions.pooling.visit import FORM, Visit, VisitOptions, visit_of
 from sessions.recording import Recording
 from sessions.recording.provenance import software_versions
 from sessions.recording.schema import LIVE_FILE
@@ -38,7 +37,7 @@ class SchedulerError(Exception):
 class Shelf:
     """Results by the content they were made of: the same recording, options and versions give the same key."""
 
-    def __init__(self, folder: Path, options: PredictionOptions) -> None:
+    def __init__(self, folder: Path, options: VisitOptions) -> None:
         """Keep results in `folder`, which is made when the first comes."""
         self._folder = folder
         made = {"form": FORM, "options": asdict(options), "versions": software_versions()}
@@ -72,7 +71,7 @@ def content_of(session: Path) -> dict[str, bytes]:
 
 def visits(
     folders: Sequence[Path],
-    options: PredictionOptions,
+    options: VisitOptions,
     shelf: Shelf,
     console: Console,
     *,
@@ -105,7 +104,7 @@ def visits(
     return done, failed
 
 
-def computed(folder: Path, options: PredictionOptions) -> Answer:
+def computed(folder: Path, options: VisitOptions) -> Answer:
     """Return what the session in a folder brings; for a worker: nothing is raised."""
     try:
         return folder.name, visit_of(Recording.open(folder), options, software_versions()).to_dict()
@@ -114,7 +113,7 @@ def computed(folder: Path, options: PredictionOptions) -> Answer:
         return folder.name, sentence.replace(str(folder), folder.name)  # the same wherever it was computed
 
 
-def computed_from(name: str, content: Mapping[str, bytes], options: PredictionOptions) -> Answer:
+def computed_from(name: str, content: Mapping[str, bytes], options: VisitOptions) -> Answer:
     """Return what a session brings whose files were sent: a worker needs no disk in common with us."""
     with tempfile.TemporaryDirectory() as room:
         folder = Path(room) / name
@@ -124,7 +123,7 @@ def computed_from(name: str, content: Mapping[str, bytes], options: PredictionOp
         return computed(folder, options)
 
 
-def _local(folders: Sequence[Path], options: PredictionOptions, workers: int | None) -> Iterator[Answer]:
+def _local(folders: Sequence[Path], options: VisitOptions, workers: int | None) -> Iterator[Answer]:
     """Yield answers as they come, from processes of this computer."""
     if not folders:
         return
@@ -142,7 +141,7 @@ def _local(folders: Sequence[Path], options: PredictionOptions, workers: int | N
                 yield folder.name, "the process that computed it died, perhaps for want of memory"
 
 
-def _in_pool(folders: Sequence[Path], options: PredictionOptions, workers: int) -> Iterator[Answer]:
+def _in_pool(folders: Sequence[Path], options: VisitOptions, workers: int) -> Iterator[Answer]:
     # Threads of the linear algebra would change the last bits, and cost more than they bring at these sizes.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     fresh = multiprocessing.get_context("spawn")
@@ -166,7 +165,7 @@ def _quiet() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _dask(folders: Sequence[Path], options: PredictionOptions, address: str) -> Iterator[Answer]:
+def _dask(folders: Sequence[Path], options: VisitOptions, address: str) -> Iterator[Answer]:
     """Yield answers as they come, from the workers of a cluster."""
     try:
         library: Any = importlib.import_module("distributed")

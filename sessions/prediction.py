@@ -165,7 +165,19 @@ def seds_with(
         for row, mu, tau_max in changed
         if row.prediction is not None
     ]
-    return tuple(None if isinstance(one, SolveFailure) else one.sed_ending for one in answers(scenes, progress))
+    return tuple(None if one is None else one.sed_ending for one in settled(scenes, progress))
+
+
+def settled(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | None, ...]:
+    """Return what the solver finds of each scene, None where it finds no settled state. Raises Cancelled."""
+    return tuple(None if isinstance(one, SolveFailure) else one for one in answers(scenes, progress))
+
+
+def scenes_of(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> Mapping[int, Scene]:
+    """Return the scene of each trial that `predict` would solve, by the trial's number."""
+    asked = with_own_finger(options, plan)
+    prepared = [_prepared(case, asked) for case in _cases(analysis, plan)]
+    return {one.row.trial: one.scene for one in prepared if one.scene is not None and one.row.trial is not None}
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from daq_app.console import Console
 from daq_app.pooling import Shelf, visits
 from sessions.pooling.exclusions import exclusions_in
 from sessions.pooling.pooled import StudyFindings, pooled
+from sessions.pooling.visit import VisitOptions
 from sessions.prediction import PredictionOptions
 from sessions.recording import RecordingError
 from sessions.recording.schema import LIVE_FILE
@@ -40,6 +41,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
     parser.add_argument("--workers", type=int, metavar="N", help="processes on this computer (as many as cores)")
     parser.add_argument(
+        "--kinematics",
+        choices=["small", "finite"],
+        default="small",
+        help="as for 'daq-app predict'; finite strain takes ten times as long",
+    )
+    parser.add_argument(
+        "--paths",
+        nargs="?",
+        const="small",
+        choices=["small", "finite"],
+        default="none",
+        metavar="finite",
+        help="also along every other reasonable choice of the analysis: about twice the time; with 'finite' at finite "
+        "strain too, about a minute more a session",
+    )
+    parser.add_argument(
         "--tau", choices=["computed", "as-printed"], default="computed", help="as for 'daq-app predict'"
     )
 
@@ -50,12 +67,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
     sessions = sorted(path.parent for path in folder.glob(f"*/{LIVE_FILE}"))
     if not sessions:
         raise RecordingError(f"{folder} holds no session: give the folder that holds a folder for each of them")
-    asked = PredictionOptions(tau_reading=options.tau, course="steady")
+    model = PredictionOptions(tau_reading=options.tau, course="steady", kinematics=options.kinematics)
+    asked = VisitOptions(model, options.paths)
     shelf = Shelf(out / "results", asked)
     done, failed = visits(sessions, asked, shelf, console, scheduler=options.scheduler, workers=options.workers)
     planted = folder / PLANTED
     truth: dict[str, Any] | None = json.loads(planted.read_bytes()) if planted.is_file() else None
-    study = pooled(done, failed, exclusions_in(folder), truth)
+    study = pooled(done, failed, exclusions_in(folder), truth, asked)
     console.progress(0.97, "writing the page")
     files = _write(study, folder.resolve().name, out)
     console.result({**files, "study": study.to_dict() | {"visits": [visit.session for visit in study.visits]}})
@@ -86,12 +104,15 @@ def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
     # Imported here: drawing is slow to load.
     from sessions.exports.html import swap_in
     from sessions.exports.study_page import study_page
-    from sessions.exports.study_tables import trials_csv
+    from sessions.exports.study_tables import paths_csv, trials_csv
 
     files = {"page": out / "study.html", "table": out / "trials.csv", "numbers": out / "study.json"}
     swap_in(files["page"], study_page(study, name))
     swap_in(files["table"], trials_csv(study))
     write_json(files["numbers"], study.to_dict())
+    if study.options.paths != "none":
+        files["paths"] = out / "paths.csv"
+        swap_in(files["paths"], paths_csv(study))
     return {what: str(path) for what, path in files.items()}
 
 

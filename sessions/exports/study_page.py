@@ -6,6 +6,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 
 from sessions.exports.figures.study import study_plates
 from sessions.exports.html import drawn
+from sessions.exports.report_tables.paths import paths_sentence
 from sessions.exports.study_tables import study_tables
 from sessions.exports.wording import correlation, digits, plural
 from sessions.pooling.pooled import DescriptorFindings, StudyFindings
@@ -52,6 +53,7 @@ def summary(study: StudyFindings) -> list[str]:
     said = [f"{plural(len(study.visits), 'session')} of {plural(len(subjects), 'subject')} were read."]
     for one in study.descriptors:
         said += _related(one)
+        said += [paths_sentence(one.descriptor, one.paths)] if one.paths else []
     if study.friction is not None:
         f = study.friction
         said.append(

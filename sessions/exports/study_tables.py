@@ -7,7 +7,9 @@ from dataclasses import fields
 
 from sessions.analysis.mixed import MixedModel
 from sessions.exports.report_tables.cells import Cell, Column, Group, Notes, Table
+from sessions.exports.report_tables.paths import paths_table
 from sessions.exports.wording import NONE, correlation, digits, significant
+from sessions.paths import Path
 from sessions.pooling.exclusions import decided
 from sessions.pooling.pooled import DescriptorFindings, StudyFindings
 from sessions.pooling.visit import TrialRow, Visit
@@ -30,9 +32,28 @@ def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
         "scores": (_scores(study), _agreement(study)),
         "surfaces": (_surfaces(study),),
         "relation": (_relation(study), _models(study)),
+        "paths": (paths_table((one.descriptor, one.paths) for one in study.descriptors),),
         "planted": (_planted(study),),
     }
-    return {name: tuple(table for table in made if table.groups) for name, made in sections.items()}
+    return {
+        name: tuple(table for table in made if table is not None and table.groups) for name, made in sections.items()
+    }
+
+
+def paths_csv(study: StudyFindings) -> str:
+    """Return a row for each path and descriptor, for R and pandas as `trials_csv`."""
+    mark = [SIMULATED] if study.simulated else []
+    names = [field.name for field in fields(Path)]
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    heads = ("usual", "surfaces", "trials", "r_of_means", "r_within_subjects", "low", "high")
+    writer.writerow([*mark, "descriptor", *names, *heads])
+    for one in study.descriptors:
+        for found in one.paths:
+            numbers = (found.surfaces, found.trials, found.r, found.within, found.low, found.high)
+            told = [*(["yes"] if mark else []), one.descriptor, *(getattr(found.path, name) for name in names)]
+            writer.writerow([*told, "yes" if found.usual else "no", *(_plain(number) for number in numbers)])
+    return out.getvalue()
 
 
 def trials_csv(study: StudyFindings) -> str:
@@ -40,7 +61,7 @@ def trials_csv(study: StudyFindings) -> str:
 
     R's read.csv and pandas' read_csv open it as it is. Of a simulated study the first column is called SIMULATED.
     """
-    names = [field.name for field in fields(TrialRow)]
+    names = [field.name for field in fields(TrialRow) if field.name != "paths"]  # these have a table of their own
     heads = [f"{name}_{_UNITS[name]}" if name in _UNITS else name for name in names]
     mark = [SIMULATED] if study.simulated else []
     out = io.StringIO()

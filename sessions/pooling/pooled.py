@@ -26,8 +26,9 @@ from sessions.analysis.within import (
     repeated_correlation,
     within_means,
 )
+from sessions.paths import PathFinding, PathTrial, path_findings
 from sessions.pooling.exclusions import Exclusion, decided
-from sessions.pooling.visit import TrialRow, Visit
+from sessions.pooling.visit import TrialRow, Visit, VisitOptions
 
 SED = "SED [kPa]"
 INDEX = "index − 50"
@@ -62,6 +63,7 @@ class DescriptorFindings:
     repeated: RepeatedCorrelation | None  # of a subject's scores with the SEDs of its own strokes
     on_sed: MixedModel | None  # score on SED [kPa], drift and carry-over
     on_index: MixedModel | None  # score on the maker's index, drift and carry-over
+    paths: tuple[PathFinding, ...]  # () where they were not asked for
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +99,7 @@ class StudyFindings:
     """The result of a study."""
 
     simulated: str
+    options: VisitOptions
     visits: tuple[Visit, ...]  # all that were read, those left out too
     failed: tuple[tuple[str, str], ...]  # folder, why it could not be read
     excluded: tuple[Exclusion, ...]
@@ -115,20 +118,24 @@ def pooled(
     failed: Sequence[tuple[str, str]] = (),
     exclusions: tuple[Exclusion, ...] = (),
     planted: Mapping[str, Any] | None = None,
+    options: VisitOptions | None = None,
 ) -> StudyFindings:
     """Return what the visits say together; they count in the order of their names, whoever read them first.
 
-    `planted` is what a synthetic study tells of itself: handed in, used for nothing but the comparison.
+    `options` is what was asked of each visit. `planted` is what a synthetic study tells of itself: handed in, used for
+    nothing but the comparison.
     """
     ordered = tuple(sorted(visits, key=lambda visit: visit.session))
     kept = [(v, row) for v in ordered for row in v.rows if decided(exclusions, v.subject, row.descriptor) is None]
     tables = [_table(visit, [row for v, row in kept if v is visit]) for visit in ordered]
+    asked = options or VisitOptions()
     found = tuple(
-        _descriptor(name, tables, [(v, row) for v, row in kept if row.descriptor == name])
+        _descriptor(name, asked, tables, [(v, row) for v, row in kept if row.descriptor == name])
         for name in dict.fromkeys(row.descriptor for _, row in kept)
     )
     return StudyFindings(
         simulated=_simulated(ordered),
+        options=asked,
         visits=ordered,
         failed=tuple(sorted(failed)),
         excluded=exclusions,
@@ -152,7 +159,7 @@ def _table(visit: Visit, rows: Sequence[TrialRow]) -> ScoreTable:
 
 
 def _descriptor(
-    name: str, tables: Sequence[ScoreTable], trials: Sequence[tuple[Visit, TrialRow]]
+    name: str, options: VisitOptions, tables: Sequence[ScoreTable], trials: Sequence[tuple[Visit, TrialRow]]
 ) -> DescriptorFindings:
     indices = tuple(sorted({row.index for _, row in trials}))
     means = tuple(mean for mean in mean_scores(tables) if mean.descriptor == name)
@@ -177,6 +184,12 @@ def _descriptor(
         repeated=repeated_correlation([p[0] for p in points], [p[2] for p in points], [p[3] for p in points]),
         on_sed=_model([p[0] for p in points], [p[1] for p in points], [p[3] for p in points], SED),
         on_index=_model([p[0] for p in scored], [p[1] for p in scored], [p[2] for p in scored], INDEX),
+        paths=path_findings(
+            [PathTrial(v.subject, row.index, row.score, row.rule, row.paths) for v, row in trials],
+            score_of,
+            options.prediction.kinematics,
+            within=True,
+        ),
     )
 
 

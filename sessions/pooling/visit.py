@@ -1,20 +1,29 @@
 """One session's contribution to a study: a row a trial, with scores, friction and prediction side by side."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Literal
 
 import msgspec
 
 from sessions.analysis import Analysis, analyse
 from sessions.analysis.bootstrap import stroke_intervals
 from sessions.blinding import revealed
+from sessions.paths import Seds, trial_paths
 from sessions.plan import Block
 from sessions.prediction import PredictionOptions, SessionPrediction, predict
 from sessions.recording import Recording
 from sessions.recording.log import TrialRecord
 
-FORM = 2  # raised when a row holds something else: what was stored before is then computed anew
+FORM = 3  # raised when a row holds something else: what was stored before is then computed anew
+
+
+@dataclass(frozen=True, slots=True)
+class VisitOptions:
+    """What is asked of each session of a study."""
+
+    prediction: PredictionOptions = field(default_factory=lambda: PredictionOptions(course="steady"))
+    paths: Literal["none", "small", "finite"] = "none"  # many paths too, and at which strain; see `sessions.paths`
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +56,7 @@ class TrialRow:
     matching_depth: float | None = None  # [mm]
     flaws: tuple[str, ...] = ()
     why: str = ""
+    paths: Seds = ()  # SED along each of `sessions.paths.PATHS` [MPa], where they were asked for
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,17 +83,20 @@ class Visit:
         return msgspec.convert(data, Visit)
 
 
-def visit_of(recording: Recording, options: PredictionOptions, made_by: Mapping[str, str]) -> Visit:
+def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, str]) -> Visit:
     """Return what a session brings to a study: analysed, and predicted where it has forces.
 
     Raises Blinded while the stimuli's key is sealed, RecordingError where the session cannot be read.
     """
     known = revealed(recording)
     analysis = analyse(known)
-    prediction = predict(analysis, known.plan, options) if known.plan.forces else None
+    prediction = predict(analysis, known.plan, options.prediction) if known.plan.forces else None
+    along: Mapping[int, Seds] = {}
+    if options.paths != "none" and known.plan.forces:
+        along = trial_paths(known, options.prediction, finite=options.paths == "finite")
     records = {record.trial.number: record for record in known.trials}
     rows = tuple(
-        _row(block, place, records[trial.number], analysis, prediction)
+        replace(_row(block, place, records[trial.number], analysis, prediction), paths=along.get(trial.number, ()))
         for block in known.plan.blocks
         if block.phase == "main"
         for place, trial in enumerate(block.trials)

@@ -10,10 +10,10 @@ from daq_app.cli import run
 from daq_app.console import Console
 from daq_app.pooling import Shelf, computed, computed_from, content_of, visits
 from daq_app.synthetic import synthetic_study
-from sessions.pooling.visit import Visit
+from sessions.pooling.visit import Visit, VisitOptions
 from sessions.prediction import PredictionOptions
 
-STEADY = PredictionOptions(course="steady")
+STEADY = VisitOptions()
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +71,9 @@ def test_what_was_computed_once_is_not_computed_again(pool, study, monkeypatch):
 def test_another_recording_or_other_options_are_another_key(study):
     shelf = Shelf(study, STEADY)
     assert shelf.key(study / "S01") != shelf.key(study / "S02")
-    assert shelf.key(study / "S01") != Shelf(study, PredictionOptions(tau_reading="as-printed")).key(study / "S01")
+    printed = VisitOptions(PredictionOptions(tau_reading="as-printed"))
+    assert shelf.key(study / "S01") != Shelf(study, printed).key(study / "S01")
+    assert shelf.key(study / "S01") != Shelf(study, VisitOptions(paths="small")).key(study / "S01")
 
 
 def test_a_session_whose_files_are_sent_gives_the_same_bits_as_one_on_the_disk(pool, study):

@@ -3,6 +3,7 @@
 # pyright: reportUnknownMemberType=false
 # matplotlib does not type the keyword arguments it passes on.
 
+from sessions.exports.figures.paths import CAPTION, paths_panel
 from sessions.exports.figures.scores import score_panel
 from sessions.exports.figures.style import GREEN, GREY, Panel, Plate, look, sheet, svg
 from sessions.exports.wording import correlation
@@ -16,7 +17,9 @@ def study_plates(study: StudyFindings) -> tuple[Plate, ...]:
     with look():
         scores = tuple(score_panel(_experiment(one), simulated=simulated) for one in study.descriptors if one.scores)
         relations = tuple(_relation(one, simulated=simulated) for one in study.descriptors if one.points)
-    plates = (Plate("scores", SCORES, scores), Plate("relation", RELATION, relations))
+    along = (paths_panel(one.descriptor, one.paths, simulated=simulated) for one in study.descriptors if one.paths)
+    paths = tuple(panel for panel in along if panel is not None)
+    plates = (Plate("scores", SCORES, scores), Plate("relation", RELATION, relations), Plate("paths", CAPTION, paths))
     return tuple(plate for plate in plates if plate.panels)
 
 

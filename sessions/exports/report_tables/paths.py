@@ -1,0 +1,55 @@
+"""Table of the correlation along many paths of the analysis."""
+
+from collections.abc import Iterable, Sequence
+
+from sessions.exports.report_tables.cells import Cell, Column, Group, Table
+from sessions.exports.wording import NONE, correlation
+from sessions.paths import TOLD, PathFinding, Spread, by_choice, correlations, spread
+
+Named = tuple[str, Sequence[PathFinding]]
+
+
+def paths_table(named: Iterable[Named]) -> Table | None:
+    """Return the distribution of the correlation over all paths and over those with each choice, by descriptor."""
+    groups = [Group(name, _rows(findings)) for name, findings in named if findings]
+    if not groups:
+        return None
+    columns = ("choice", "", "usual", "paths with r", "least", "lower quartile", "median", "upper quartile", "greatest")
+    caption = (
+        "The correlation of predicted SED with scores as a distribution over paths of the analysis: every choice below "
+        "crossed with every other at small strain; finite strain, where it was tried, with the other choices as usual. "
+        "Every friction that was met is solved; paths share a solve only where they come to the same friction, or to "
+        "bounds of traction that the skin nowhere reaches. All of them are reasonable and none is a sample of others: "
+        "quartiles describe, and are no intervals. A path of which fewer than three surfaces have an SED gives no r."
+    )
+    return Table("table-paths", caption, tuple(Column(name) for name in columns), tuple(groups), ())
+
+
+def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
+    """Return the distribution in a sentence."""
+    whole = spread(correlations(findings))
+    start = f"{name[:1].upper()}{name[1:]}: of {len(findings)} paths of the analysis"
+    if whole is None:
+        return f"{start} none gives a correlation."
+    return (
+        f"{start} {whole.told} give a correlation, from {correlation(whole.least)} to {correlation(whole.greatest)}, "
+        f"median {correlation(whole.median)}."
+    )
+
+
+def _rows(findings: Sequence[PathFinding]) -> tuple[tuple[Cell, ...], ...]:
+    rows = [(Cell("all"), Cell(""), Cell(""), *_spread(spread(correlations(findings)), len(findings)))]
+    before = ""
+    for choice, name, of, usual in by_choice(findings):
+        held = sum(getattr(one.path, choice) == name for one in findings)
+        told = TOLD[choice] if choice != before else ""
+        rows.append((Cell(told), Cell(name), Cell("usual" if usual else ""), *_spread(of, held)))
+        before = choice
+    return tuple(rows)
+
+
+def _spread(of: Spread | None, paths: int) -> tuple[Cell, ...]:
+    if of is None:
+        return (Cell(f"0 of {paths}"), *(Cell(NONE) for _ in range(5)))
+    numbers = (of.least, of.lower, of.median, of.upper, of.greatest)
+    return (Cell(f"{of.told} of {paths}"), *(Cell(correlation(value)) for value in numbers))

@@ -1,0 +1,295 @@
+"""One recording along many paths: every reasonable choice of the analysis crossed with every other (a multiverse).
+
+What a study concludes should not hang on a choice that somebody else would have made differently (Steegen, Tuerlinckx,
+Gelman and Vanpaemel 2016, Perspect. Psychol. Sci. 11:702). Friction is found along each path, and every friction that
+is met is solved: nothing is interpolated. Two paths share a solve where they come to the same friction, or differ only
+in traction bounds that the skin nowhere reaches.
+"""
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Literal
+
+import numpy as np
+
+from sessions.analysis import Analysis, FrictionParameters, Stroke, analyse
+from sessions.analysis.friction import Rule
+from sessions.analysis.scores import relation
+from sessions.analysis.settings import AnalysisSettings
+from sessions.analysis.within import repeated_correlation
+from sessions.prediction import PredictionOptions, Progress, Scene, scenes_of, settled
+from sessions.recording import Recording
+
+Kinematics = Literal["small", "finite"]
+Seds = tuple[float | None, ...]  # along each of `PATHS`, or only those at small strain [MPa]
+
+PLANNED_AT = 2.0  # normal force at which an area that grows with it is the planned one [N]
+
+# Of each choice the usual one comes first.
+FILTERS: Mapping[str, float] = {"20 Hz": 20.0, "10 Hz": 10.0, "50 Hz": 50.0}
+WINDOWS: Mapping[str, tuple[float, float]] = {  # spread of T/N, and of the means of its quarters [-]
+    "within 10 %, quarters 5 %": (0.10, 0.05),
+    "within 5 %, quarters 2.5 %": (0.05, 0.025),
+    "within 20 %, quarters 10 %": (0.20, 0.10),
+}
+MUS: tuple[Rule, ...] = ("mean over steady window", "maximum")  # the usual one is the paper's for the descriptor
+AREAS: Mapping[str, Callable[[Stroke], float | None]] = {  # contact area over the planned one [-]
+    "planned": lambda _: 1.0,
+    "half": lambda _: 0.5,
+    "twice": lambda _: 2.0,
+    "grows with √N": lambda s: None if s.normal_force is None else (max(s.normal_force, 0.0) / PLANNED_AT) ** 0.5,
+}
+RECEPTORS = ("ending", "its middle")
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """One choice of everything."""
+
+    filter: str
+    window: str
+    mu: Rule
+    area: str
+    receptor: str
+    kinematics: Kinematics
+
+    def usual(self, rule: str, kinematics: str) -> bool:
+        """Say whether it is the way that every other number of a study went, mu being told by `rule`."""
+        first = (next(iter(FILTERS)), next(iter(WINDOWS)), next(iter(AREAS)), RECEPTORS[0])
+        own = (self.filter, self.window, self.area, self.receptor)
+        return own == first and self.mu == rule and self.kinematics == kinematics
+
+
+CHOICES = ("filter", "window", "mu", "area", "receptor", "kinematics")
+TOLD: Mapping[str, str] = {
+    "filter": "cut-off of the forces' filter",
+    "window": "steady window: spread of T/N allowed",
+    "mu": "µ of the model",
+    "area": "contact area",
+    "receptor": "SED at the receptor",
+    "kinematics": "strain of the model",
+}
+
+
+def _paths() -> tuple[Path, ...]:
+    small = tuple(Path(*choice, "small") for choice in product(FILTERS, WINDOWS, MUS, AREAS, RECEPTORS))
+    first = (next(iter(FILTERS)), next(iter(WINDOWS)))
+    # Finite strain takes many times as long: filter, window and area are the usual ones there.
+    finite = tuple(Path(*first, mu, next(iter(AREAS)), receptor, "finite") for mu, receptor in product(MUS, RECEPTORS))
+    return (*small, *finite)
+
+
+PATHS = _paths()
+
+
+def trial_paths(
+    recording: Recording,
+    options: PredictionOptions | None = None,
+    progress: Progress | None = None,
+    *,
+    finite: bool = False,
+) -> Mapping[int, Seds]:
+    """Return the settled SED of each predicted trial along each of `PATHS`; None where a path gives none.
+
+    Without `finite` only those at small strain, which come first. Direction and speed are those of the usual path:
+    neither is a matter of choice. Raises as `predict` does.
+    """
+    paths = [path for path in PATHS if finite or path.kinematics == "small"]
+    asked = replace(options or PredictionOptions(), course="steady")
+    analyses = {(f, w): analyse(recording, _settings(f, w)) for f, w in product(FILTERS, WINDOWS)}
+    usual = {one.trial: one for one in next(iter(analyses.values())).friction}
+    scenes: dict[tuple[str, ...], Mapping[int, Scene]] = {}
+    for path in paths:
+        if path.receptor == RECEPTORS[0]:
+            varied = _varied(analyses[path.filter, path.window], path, usual)
+            kind = replace(asked, kinematics=path.kinematics)
+            scenes[_without_receptor(path)] = scenes_of(varied, recording.plan, kind)
+    wanted = dict.fromkeys(scene for of_path in scenes.values() for scene in of_path.values())
+    found = _solved(tuple(wanted), progress)
+    trials = sorted({trial for of_path in scenes.values() for trial in of_path})
+    return {trial: tuple(_sed(found, scenes[_without_receptor(p)].get(trial), p) for p in paths) for trial in trials}
+
+
+def _without_receptor(path: Path) -> tuple[str, ...]:
+    return (path.filter, path.window, path.mu, path.area, path.kinematics)
+
+
+def _settings(cut_off: str, window: str) -> AnalysisSettings:
+    spread, trend = WINDOWS[window]
+    return AnalysisSettings(cut_off=FILTERS[cut_off], steady_spread=spread, steady_trend=trend)
+
+
+def _varied(analysis: Analysis, path: Path, usual: Mapping[int | None, FrictionParameters]) -> Analysis:
+    """Return the analysis with the friction that a path gives each trial."""
+    first = {stroke.trial: stroke for stroke in reversed(analysis.strokes)}
+    friction: list[FrictionParameters] = []
+    for one in analysis.friction:
+        stroke = first[one.trial]
+        area = AREAS[path.area](stroke)
+        mu = stroke.mu_max if path.mu == "maximum" else stroke.mu_dynamic
+        tau_max = None if stroke.tau_max is None or not area else stroke.tau_max / area
+        same = usual.get(one.trial, one)
+        friction.append(replace(one, mu=mu, tau_max=tau_max, direction=same.direction, speed=same.speed))
+    return replace(analysis, friction=tuple(friction))
+
+
+def _sed(found: Mapping[Scene, tuple[float, float] | None], scene: Scene | None, path: Path) -> float | None:
+    answer = None if scene is None else found[scene]
+    return None if answer is None else answer[RECEPTORS.index(path.receptor)]
+
+
+def _solved(scenes: Sequence[Scene], progress: Progress | None) -> Mapping[Scene, tuple[float, float] | None]:
+    """Return SED over the ending and at its middle [MPa] of each scene, None where it has no settled state.
+
+    Of scenes that differ in tau_max alone the one with the greatest is solved first. Where the traction it finds stays
+    below another's tau_max, that one has the same solution.
+    """
+    alike: defaultdict[Scene, list[Scene]] = defaultdict(list)
+    for scene in scenes:
+        alike[replace(scene, friction=replace(scene.friction, tau_max=None))].append(scene)
+    greatest = [max(group, key=_bound) for group in alike.values()]
+    found: dict[Scene, tuple[float, float] | None] = {}
+    rest: list[Scene] = []
+    for first, group, answer in zip(
+        greatest, alike.values(), settled(greatest, _part(progress, 0.0, 0.6)), strict=True
+    ):
+        reached = np.inf if answer is None else float(np.abs(answer.skin.traction).max())
+        for scene in group:
+            if scene == first or _bound(scene) > reached:
+                found[scene] = None if answer is None else (answer.sed_ending, answer.sed_point)
+            else:
+                rest.append(scene)
+    for scene, answer in zip(rest, settled(rest, _part(progress, 0.6, 1.0)), strict=True):
+        found[scene] = None if answer is None else (answer.sed_ending, answer.sed_point)
+    return found
+
+
+def _bound(scene: Scene) -> float:
+    return np.inf if scene.friction.tau_max is None else scene.friction.tau_max
+
+
+def _part(progress: Progress | None, low: float, high: float) -> Progress | None:
+    return None if progress is None else lambda done: progress(low + (high - low) * done)
+
+
+@dataclass(frozen=True, slots=True)
+class PathFinding:
+    """How predicted SED and scores go together along one path. None where too few numbers are left."""
+
+    path: Path
+    usual: bool
+    surfaces: int  # with an SED on this path
+    trials: int
+    r: float | None  # Pearson's, of the mean SED of each surface against its mean score
+    within: float | None  # repeated-measures correlation of each subject's own scores and SEDs
+    low: float | None  # 95 % interval of `within`
+    high: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class PathTrial:
+    """One trial as the paths need it."""
+
+    subject: str
+    index: int
+    score: float | None
+    rule: str  # which mu is the usual one
+    seds: Seds
+
+
+def path_findings(
+    trials: Sequence[PathTrial], means: Mapping[int, float], kinematics: str, *, within: bool
+) -> tuple[PathFinding, ...]:
+    """Return how predictions go with scores along each path, `means` being the mean score of each index.
+
+    Correlations within subjects are taken where `within` says so. Empty where no trial went along the paths.
+    """
+    held = [trial for trial in trials if trial.seds]
+    if not held:
+        return ()
+    rule, gone = held[0].rule, min(len(trial.seds) for trial in held)
+    return tuple(
+        _finding(n, path, held, means, usual=path.usual(rule, kinematics), within=within)
+        for n, path in enumerate(PATHS[:gone])
+    )
+
+
+def _finding(
+    number: int, path: Path, trials: Sequence[PathTrial], means: Mapping[int, float], *, usual: bool, within: bool
+) -> PathFinding:
+    own: defaultdict[int, defaultdict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    pairs: list[tuple[str, float, float]] = []
+    count = 0
+    for trial in trials:
+        sed = trial.seds[number]
+        if sed is None:
+            continue
+        count += 1
+        own[trial.index][trial.subject].append(sed)
+        if trial.score is not None:
+            pairs.append((trial.subject, sed, trial.score))
+    seds = {index: float(np.mean([np.mean(all_of) for all_of in own[index].values()])) for index in sorted(own)}
+    both = [index for index in seds if index in means]
+    related = relation([seds[i] for i in both], [means[i] for i in both], both) if both else None
+    inner = repeated_correlation(*zip(*pairs, strict=True)) if within and pairs else None
+    return PathFinding(
+        path=path,
+        usual=usual,
+        surfaces=len(seds),
+        trials=count,
+        r=None if related is None else related.pearson,
+        within=None if inner is None else inner.r,
+        low=None if inner is None else inner.low,
+        high=None if inner is None else inner.high,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """The correlations of some paths as a distribution."""
+
+    paths: int
+    told: int  # of them with a correlation; the numbers below are theirs
+    least: float
+    lower: float  # quartile
+    median: float
+    upper: float  # quartile
+    greatest: float
+
+
+def correlations(findings: Iterable[PathFinding]) -> list[float | None]:
+    """Return the correlation of each path: within subjects where any path has that, else of the means."""
+    listed = list(findings)
+    inner = any(one.within is not None for one in listed)
+    return [one.within if inner else one.r for one in listed]
+
+
+def spread(values: Sequence[float | None]) -> Spread | None:
+    """Return the distribution of correlations; None where there is none.
+
+    >>> spread([0.5, None, 0.7]).median
+    0.6
+    """
+    held = [value for value in values if value is not None]
+    if not held:
+        return None
+    least, lower, median, upper, greatest = np.quantile(held, [0.0, 0.25, 0.5, 0.75, 1.0]).tolist()
+    return Spread(len(values), len(held), least, lower, median, upper, greatest)
+
+
+def by_choice(findings: Sequence[PathFinding]) -> tuple[tuple[str, str, Spread | None, bool], ...]:
+    """Return for each choice and each of its values the distribution over all paths with it, and whether it is usual.
+
+    Medians that lie far apart within a choice say that it matters.
+    """
+    values = correlations(findings)
+    told: list[tuple[str, str, Spread | None, bool]] = []
+    for choice in CHOICES:
+        names = dict.fromkeys(getattr(one.path, choice) for one in findings)
+        usual = {getattr(one.path, choice) for one in findings if one.usual}
+        for name in names:
+            held = [r for one, r in zip(findings, values, strict=True) if getattr(one.path, choice) == name]
+            told.append((choice, name, spread(held), name in usual))
+    return tuple(told)

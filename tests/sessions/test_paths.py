@@ -1,0 +1,111 @@
+"""Many paths of the analysis: each is what it says, solves are shared without a change, the distribution is counted."""
+
+from dataclasses import replace
+
+import pytest
+from report_session import record
+
+from sessions.analysis import analyse
+from sessions.paths import (
+    AREAS,
+    PATHS,
+    RECEPTORS,
+    PathTrial,
+    by_choice,
+    correlations,
+    path_findings,
+    spread,
+    trial_paths,
+)
+from sessions.prediction import PredictionOptions, predict, scenes_of, settled
+from sessions.recording import Recording
+
+STEADY = PredictionOptions(course="steady")
+SMALL = [path for path in PATHS if path.kinematics == "small"]
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    folder, _ = record(tmp_path_factory.mktemp("paths") / "P01", per_block=1)
+    return Recording.open(folder)
+
+
+@pytest.fixture(scope="module")
+def analysis(recording):
+    return analyse(recording)
+
+
+@pytest.fixture(scope="module")
+def along(recording):
+    return trial_paths(recording, STEADY)
+
+
+def test_the_usual_path_comes_to_what_is_predicted_without_any_others(recording, analysis, along):
+    for row in predict(analysis, recording.plan, STEADY).trials:
+        (usual,) = [n for n, path in enumerate(SMALL) if path.usual(row.mu_rule, "small")]
+        assert along[row.trial][usual] == pytest.approx(row.sed, rel=1e-9)
+
+
+def test_a_path_that_shared_its_solve_comes_to_what_its_own_solve_gives(recording, analysis, along):
+    trial = 1
+    scene = scenes_of(analysis, recording.plan, STEADY)[trial]
+    mu = scene.friction.mu
+    areas = {"planned": 1.0, "half": 0.5, "twice": 2.0}
+    alone = settled([replace(scene, friction=replace(scene.friction, tau_max=scene.friction.tau_max / a))
+                     for a in areas.values()])  # fmt: skip
+    (first,) = {path.filter for path in SMALL[:1]}
+    for area, answer in zip(areas, alone, strict=True):
+        for receptor, value in zip(RECEPTORS, (answer.sed_ending, answer.sed_point), strict=True):
+            (n,) = [
+                n
+                for n, path in enumerate(SMALL)
+                if (path.filter, path.window, path.mu) == (first, SMALL[0].window, "maximum")
+                and (path.area, path.receptor) == (area, receptor)
+            ]
+            assert along[trial][n] == pytest.approx(value, rel=1e-9), (mu, area)
+
+
+def test_finite_strain_is_left_out_unless_it_is_asked_for(along):
+    assert {len(seds) for seds in along.values()} == {len(SMALL)}
+    assert len(PATHS) > len(SMALL)
+
+
+def test_an_area_that_grows_is_the_planned_one_at_two_newton_and_twice_at_eight(analysis):
+    stroke = analysis.strokes[0]
+    areas = [AREAS["grows with √N"](replace(stroke, normal_force=force)) for force in (2.0, 8.0, None)]
+    assert areas == [1.0, 2.0, None]
+
+
+def planted():
+    """Three subjects, four surfaces: SED goes with the score, but at the ending's middle it goes against it."""
+    trials = []
+    for subject in ("A", "B", "C"):
+        for index in (0, 20, 50, 100):
+            ending, middle = 8.0 + 0.01 * index, 9.0 - 0.01 * index
+            seds = tuple(ending if path.receptor == "ending" else middle for path in SMALL)
+            trials.append(PathTrial(subject, index, float(index), "maximum", seds))
+    return path_findings(trials, {i: float(i) for i in (0, 20, 50, 100)}, "small", within=True)
+
+
+def test_the_choice_that_turns_the_correlation_is_seen_and_the_others_are_not():
+    medians = {(choice, name): of.median for choice, name, of, _ in by_choice(planted())}
+    assert medians["receptor", "ending"] == pytest.approx(1.0)
+    assert medians["receptor", "its middle"] == pytest.approx(-1.0)
+    assert all(abs(m) < 1e-9 for (choice, _), m in medians.items() if choice not in ("receptor",))
+
+
+def test_one_path_is_the_usual_one_and_the_distribution_counts_them_all():
+    found = planted()
+    (usual,) = [one for one in found if one.usual]
+    assert usual.path.mu == "maximum"
+    assert usual.r == pytest.approx(1.0)
+    whole = spread(correlations(found))
+    assert (whole.paths, whole.told, whole.least, whole.greatest) == (len(SMALL), len(SMALL), -1.0, 1.0)
+
+
+def test_a_path_that_leaves_too_few_surfaces_gives_no_correlation_and_is_counted():
+    trials = [PathTrial("A", i, float(i), "maximum", (8.0 + i, *(None for _ in SMALL[1:]))) for i in (0, 20, 50)]
+    found = path_findings(trials, {0: 1.0, 20: 2.0, 50: 4.0}, "small", within=False)
+    assert [one.surfaces for one in found[:2]] == [3, 0]
+    whole = spread(correlations(found))
+    assert (whole.paths, whole.told) == (len(SMALL), 1)
