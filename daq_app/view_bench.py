@@ -99,9 +99,10 @@ def _lamp(bench: BenchState) -> tuple[Literal["off", "well", "look", "wrong"], s
     if near := bench.peak.near:
         return "look", f"near the rated load: {', '.join(near)}"
     counts = asdict(bench.health)
-    troubles = [name for name in COUNTED if counts[name]]
+    troubles = [f"{counts[name]} {name}" for name in COUNTED if counts[name]]
+    troubles += [bench.health.rate_words] if bench.health.off_rate else []
     if troubles:
-        return "look", ", ".join(f"{counts[name]} {name}" for name in troubles)
+        return "look", ", ".join(troubles)
     if bench.health.lag_ms > LAGGING:
         return "look", f"{bench.health.lag_ms:.0f} ms late"
     return "well", "nothing lost"

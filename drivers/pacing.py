@@ -4,13 +4,16 @@ Records follow each other at a steady rate that is known within a few per cent. 
 are led by the session's clock: slowly, so that the system's handing over of bytes in lumps does not shake them. A
 loss that left broken bytes behind is counted from those. A loss that left nothing behind shows as a pause that no
 lump of records makes up for; one shorter than GAP cannot be told from a lump and stays unnoticed in the numbers,
-while the times recover within seconds.
+while the times recover within seconds. A device that changes its rate by more than a few per cent is found out within
+seconds too (`drivers.rate`), and followed; what was taken for lost until then stays named as lost.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from drivers.rate import RateWatch
 
 GAP = 0.1  # shortest loss without a trace that is noticed [real s]
 _SETTLE = 0.05  # how long after a pause its lump may still be arriving [real s]
@@ -32,9 +35,12 @@ class Pacing:
     def __init__(self, rate: float, factor: float = 1.0) -> None:
         """Expect `rate` records in a second [Hz] of a session clock that runs `factor` times real time."""
         self.lost = 0  # numbers that no record has
-        self._period = self._told = 1.0 / rate
+        self._period: float = 1.0 / rate
+        self._told = self._period
         self._limit = GAP * factor + 3.0 * self._period
         self._settle = _SETTLE * factor + self._period
+        self.watch = RateWatch(rate, factor, self._limit)
+        self._count = 0  # records that came, broken ones too
         self._sequence = 0
         self._time = 0.0
         self._zero_ns: int | None = None  # when the session clock stood at time 0
@@ -46,6 +52,9 @@ class Pacing:
         """Place n records that arrived together, broken ones counted before each (n,), and any kept back before."""
         if len(damaged) == 0:
             return _NONE
+        self._count += len(damaged) + int(damaged.sum())
+        if self.watch.take(self._count, received_ns):
+            self._told = self._period = 1.0 / self.watch.rate
         if self._zero_ns is None:
             damaged = np.concatenate([[0], damaged[1:]])  # what was before the first record is not of this stream
             self._time = -self._period
@@ -78,6 +87,7 @@ class Pacing:
         """Let the stream, begun anew, go on at `received_ns` behind a gap of at least one record."""
         if self._zero_ns is None:
             return
+        self.watch.begin_anew()
         away = (received_ns - self._zero_ns) * 1e-9 - self._time
         missing = max(round(away / self._period) - 1, 1)
         self._sequence += missing

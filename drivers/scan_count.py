@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.pacing import Paced
+from drivers.pacing import GAP, Paced
+from drivers.rate import RateWatch
 
 
 class ScanCount:
@@ -13,9 +14,13 @@ class ScanCount:
     unseen.
     """
 
-    def __init__(self, rate: float, wrap: int = 0) -> None:
-        """Expect `rate` scans in a second [Hz] of the session's clock; losses are told up to multiples of `wrap`."""
+    def __init__(self, rate: float, factor: float = 1.0, *, wrap: int = 0) -> None:
+        """Expect `rate` scans in a second [Hz] of the session's clock; losses are told up to multiples of `wrap`.
+
+        The session's clock runs `factor` times real time.
+        """
         self.lost = 0
+        self.watch = RateWatch(rate, factor, GAP * factor + 10.0 / rate)
         self._rate = rate
         self._wrap = wrap
         self._sequence = 0
@@ -34,6 +39,7 @@ class ScanCount:
         self._behind = behind
         self.lost += int(sequence[-1]) - self._sequence - len(damaged)
         self._sequence = int(sequence[-1])
+        self.watch.take(self._sequence, received_ns)
         return Paced(sequence, (sequence - 1) / self._rate)
 
     def release(self) -> Paced:
@@ -42,6 +48,7 @@ class ScanCount:
 
     def bridge(self, received_ns: int) -> None:
         """Let the stream, begun anew, go on at `received_ns` behind a gap of at least one scan."""
+        self.watch.begin_anew()
         if self._behind is not None:
             away = self._arrival_minus_time(self._sequence, received_ns) - self._behind
             missing = max(round(away * self._rate) - 1, 1)

@@ -53,6 +53,7 @@ class SequenceAccount:
         self.garbage = 0
         self.frozen = 0
         self.restarted = 0
+        self.changed = 0  # times the records' distance in ticks became another
         self._counter_rate = counter_rate
         self._first = first
         self._last: _Record | None = None
@@ -163,6 +164,7 @@ class SequenceAccount:
         assert self._last is not None
         ticks = _signed(record.counter - self._last.counter)
         if _signed(record.number - self._last.number) == 1 and ticks > 0:
+            self.changed += self.step not in (None, ticks)
             self.step = ticks
 
     def _adopt(self, record: _Record) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from drivers.clock import Clock
 from drivers.links import Link
 from drivers.pacing import Paced
+from drivers.rate import RateWatch, rate_words
 from drivers.readings import ReadingBlock
 from drivers.records import RecordDecoder, Records
 from drivers.threaded import ThreadedTransducer
@@ -33,6 +34,11 @@ class Numbering(Protocol):
     @property
     def lost(self) -> int:
         """Numbers that no record has."""
+        ...
+
+    @property
+    def watch(self) -> RateWatch:
+        """What has been found of the stream's rate."""
         ...
 
     def take(self, damaged: NDArray[np.int64], received_ns: int) -> Paced:
@@ -71,7 +77,7 @@ class Conversation(Protocol):
         """Return a decoder for a stream about to begin."""
         ...
 
-    def numbering(self, rate: float, factor: float, /) -> Numbering:
+    def numbering(self, rate: float, factor: float) -> Numbering:
         """Return what numbers a stream of `rate` [Hz] by a session clock that runs `factor` times real time."""
         ...
 
@@ -163,12 +169,15 @@ class StreamingTransducer(ThreadedTransducer):
         """Totals since start. `restarted` counts how often the stream was lost and came back."""
         with self._lock:
             self._digest()
+            watch = self._pacing.watch
             return Health(
                 received=self._received,
                 lost=self._pacing.lost,
                 malformed=self._malformed_before + self._decoder.malformed,
                 restarted=self._restarted,
                 saturated=self._saturated,
+                off_rate=watch.found,
+                rate_words=rate_words("readings come", watch.rate, self._info.rate) if watch.found else "",
                 lag_ms=self._lag_ms,
             )
 

@@ -47,6 +47,8 @@ class Health:
     stalled: int = 0  # records whose device counter did not move (they are kept, and counted here too)
     restarted: int = 0  # times the device began to count anew
     saturated: int = 0  # records whose status says the six values are invalid
+    off_rate: int = 0  # times the rate was found to be another than the one set, or than before
+    rate_words: str = ""  # what was found of it last
     lag_ms: float = 0.0  # age of the newest reading when it was handed over [ms of the session's clock]
 
 

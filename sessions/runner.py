@@ -36,7 +36,7 @@ from sessions.steps import (
 Cause = Literal["finished", "aborted", "stopped", "device", "client", "disk", "program"]
 STOPPED = "stopped by the user"
 Ending = tuple[Cause, str]  # why a session ends, for programs and for people
-LOSSES = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated")  # counts of Health
+LOSSES = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated", "off_rate")  # counts of Health
 
 
 class Operator(Protocol):
@@ -304,7 +304,9 @@ class _Run:
         counts = {name: getattr(health, name) - getattr(self._reported, name) for name in LOSSES}
         if any(counts.values()) and (now or self._due("losses", self._settings.losses_every)):
             told = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-            self._writer.event("losses", trial_in_hand(self._state), {**counts, "sentence": f"readings: {told}"})
+            data = {**counts, "rate_words": health.rate_words} if counts["off_rate"] else counts
+            sentence = f"readings: {told}" + (f" ({health.rate_words})" if counts["off_rate"] else "")
+            self._writer.event("losses", trial_in_hand(self._state), {**data, "sentence": sentence})
             self._reported = health
 
     def _due(self, what: str, every: float) -> bool:

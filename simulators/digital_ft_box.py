@@ -144,11 +144,12 @@ class DigitalFtBox:
         """Send the packets that are due, and whatever was delayed until now."""
         if self._streaming_since is None:
             return
-        due = int((now - self._streaming_since) * self._rate)
+        since, age = self._faults.aged(np.array([self._streaming_since, now])).tolist()
+        due = int((age - since) * self._rate)
         if due - self._sent > _BURST:  # the computer was busy for long: a line would have carried on meanwhile
             self._sent = due - _BURST
         numbers = np.arange(self._sent, due, dtype=np.float64)
-        times: Array = self._streaming_since + numbers / self._rate
+        times = self._faults.instants(since + numbers / self._rate)
         self._sent = due
         port.say(b"".join(self._faults.route(now, zip(times.tolist(), self._packets(times), strict=True))))
 

@@ -21,11 +21,13 @@ Kind = Literal[
     "saturate",
     "drift",
     "miscalibrate",
+    "slow",
     "steal",
     "reboot",
     "unplug",
 ]
 KINDS: tuple[Kind, ...] = get_args(Kind)
+FOREVER = 1e7  # [s]
 _ON_THE_WAY: tuple[Kind, ...] = ("lose", "repeat", "reorder", "corrupt", "shorten", "delay")
 
 
@@ -37,8 +39,9 @@ class Fault:
     `corrupt` (other bytes, same length), `shorten` (fewer bytes), `delay` (sent later). In the box: `stall` (the same
     reading again and again), `saturate` (status says the values are invalid), `drift` (the zero of every axis walks off
     by `share` of its range, and stays there), `miscalibrate` (it feels the wrench `1 + share` times as large as its
-    calibration says), `steal` (another client takes the stream each time it is asked for; networked box only),
-    `reboot` (switched off, then on), `unplug` (nothing comes through, and the box does not notice).
+    calibration says), `slow` (its own clock runs only `1 - share` as fast), `steal` (another client takes the stream
+    each time it is asked for; networked box only), `reboot` (switched off, then on), `unplug` (nothing comes through,
+    and the box does not notice).
     """
 
     kind: Kind
@@ -53,6 +56,8 @@ class Fault:
             raise ValueError(f"fault kind {self.kind!r} is unknown; there are {', '.join(KINDS)}")
         if not (0.0 <= self.start < self.stop and 0.0 < self.share <= 1.0 and self.delay > 0.0):
             raise ValueError(f"fault {self.kind!r} needs 0 <= start < stop, 0 < share <= 1 and a delay above 0")
+        if self.kind == "slow" and self.share > 0.9:
+            raise ValueError("fault 'slow' needs share <= 0.9; a clock that stands still is a 'stall'")
 
 
 class Faults:
@@ -65,6 +70,7 @@ class Faults:
         self._timetable = tuple(timetable)
         self._seed = seed
         self._repeat = repeat
+        self._clock = _device_clock([fault for fault in self._timetable if fault.kind == "slow"], repeat)
         self._swapped: bytes | None = None
         self._delayed: list[tuple[float, bytes]] = []  # when each leaves
         self.made: list[bytes] | None = [] if remember else None  # every datagram the box made
@@ -73,6 +79,14 @@ class Faults:
     def active(self, kind: Kind, time: float) -> bool:
         """Tell whether a fault of the box itself is on at `time` [s]."""
         return self._at(kind, time) is not None
+
+    def aged(self, times: Array) -> Array:
+        """Return how far the device's own clock has come (n,) [s] at `times` (n,) [s]."""
+        return times if self._clock is None else _through(times, *self._clock)
+
+    def instants(self, ages: Array) -> Array:
+        """Return when (n,) [s] the device's own clock has come as far as `ages` (n,) [s]."""
+        return ages if self._clock is None else _through(ages, *reversed(self._clock))
 
     def felt(self, wrench: Array, times: Array, rated: Sequence[float]) -> Array:
         """Return what a device that drifts or is wrongly calibrated feels of a wrench (n, 6) at `times` (n,) [s]."""
@@ -148,3 +162,23 @@ class Faults:
     def _at(self, kind: Kind, time: float) -> Fault | None:
         local = time % self._repeat if self._repeat > 0.0 else time
         return next((f for f in self._timetable if f.kind == kind and f.start <= local < f.stop), None)
+
+
+def _device_clock(slow: Sequence[Fault], repeat: float) -> tuple[Array, Array] | None:
+    """Return knots of time and of the device's own clock [s] over a round of the timetable; None where they agree."""
+    if not slow:
+        return None
+    last = repeat or FOREVER
+    times = np.unique([0.0, last, *(edge for fault in slow for edge in (fault.start, fault.stop) if edge < last)])
+    middles = (times[:-1] + times[1:]) / 2.0
+    speed = np.ones(len(middles))
+    for fault in slow:
+        speed[(middles >= fault.start) & (middles < fault.stop)] = 1.0 - fault.share
+    return times, np.concatenate([[0.0], np.cumsum(speed * np.diff(times))])
+
+
+def _through(values: Array, given: Array, sought: Array) -> Array:
+    """Return where (n,) the line through the knots lies, which is begun anew at its end as often as needed."""
+    rounds = np.floor(values / given[-1])
+    within = np.array(np.interp(values - rounds * given[-1], given, sought), np.float64)
+    return within + rounds * float(sought[-1])

@@ -155,8 +155,9 @@ class LabJackU6Box:
         if not self._streams or self._scan is None:
             return
         gauges, _, rate = self._scan
-        due = int((self.now() - self._begun) * rate)
-        times = self._begun + np.arange(self._done, due) / rate
+        since, age = self._faults.aged(np.array([self._begun, self.now()])).tolist()
+        due = int((age - since) * rate)
+        times = self._faults.instants(since + np.arange(self._done, due) / rate)
         self._done = max(due, self._done)
         room = (ROOM - len(self._buffer)) // len(gauges)
         if self._missed and self._report is None and room > ROOM // len(gauges) // 2:

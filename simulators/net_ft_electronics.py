@@ -48,17 +48,23 @@ class Electronics:
 
     def tick(self, time: float) -> int:
         """Return the counter at `time`."""
-        return self._first_tick + int((time - self._powered) * self._ticks_a_second)
+        return self._first_tick + int((self._age(time) - self._age(self._powered)) * self._ticks_a_second)
 
     def time(self, tick: int) -> float:
         """Return when the counter reaches `tick`."""
-        return self._powered + (tick - self._first_tick) / self._ticks_a_second
+        age = self._age(self._powered) + (tick - self._first_tick) / self._ticks_a_second
+        return float(self._faults.instants(np.array([age]))[0])
+
+    def _age(self, time: float) -> float:
+        """Return how far the box's own clock has come at `time`."""
+        return float(self._faults.aged(np.array([time]))[0])
 
     def readings(self, ticks: list[int]) -> list[bytes]:
         """Return counter, status and six counts, packed, at each of `ticks`."""
         if not ticks:
             return []
-        times = np.array([self.time(tick) for tick in ticks])
+        ages = self._age(self._powered) + (np.array(ticks) - self._first_tick) / self._ticks_a_second
+        times = self._faults.instants(ages)
         status, counts = self._felt(times)
         packed: list[bytes] = []
         for tick, time, word, six in zip(ticks, times.tolist(), status, counts.tolist(), strict=True):

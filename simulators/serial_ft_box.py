@@ -132,22 +132,32 @@ class SerialFtBox:
         """Return how long nothing has to be sent [real s]."""
         if self._streaming_since is None:
             return _NAP
-        due = self._streaming_since + (self._sent + 1) * self._period
+        due = self._ended(self._sent + 1)
         return min(max((due - self.now()) / self._clock.factor, _SHORTEST_NAP), _NAP)
 
     def _send_due(self, port: PseudoTerminal, now: float) -> None:
         """Send the records whose last byte would be through by now, and whatever was delayed until now."""
         if self._streaming_since is None:
             return
-        count = int((now - self._streaming_since) / self._period) - self._sent
+        since = self._age(self._streaming_since)
+        count = int((self._age(now) - since) / self._period) - self._sent
         if count > _BURST:  # the computer was busy for long: a line would have carried on meanwhile
             self._sent += count - _BURST
             count = _BURST
-        first = self._streaming_since + self._sent * self._period
-        times: Array = first + np.arange(max(count, 0), dtype=np.float64) * self._period
+        numbers = self._sent + np.arange(max(count, 0), dtype=np.float64)
+        times = self._faults.instants(since + numbers * self._period)
         self._sent += len(times)
         for record in self._faults.route(now, zip(times.tolist(), self._records(times), strict=True)):
             self._say(port, record)
+
+    def _age(self, time: float) -> float:
+        """Return how far the box's own clock has come at `time`."""
+        return float(self._faults.aged(np.array([time]))[0])
+
+    def _ended(self, record: int) -> float:
+        """Return when the last byte of a record of this stream is through."""
+        since = 0.0 if self._streaming_since is None else self._age(self._streaming_since)
+        return float(self._faults.instants(np.array([since + record * self._period]))[0])
 
     def _on_byte(self, port: PseudoTerminal, byte: int) -> None:
         """Take one byte from the line."""

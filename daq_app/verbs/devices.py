@@ -109,14 +109,18 @@ def _probe(uri: str, console: Console) -> int:
     )
     console.say(f"{info.model}, serial {info.serial}, {number(info.rate, 4)} Hz set")
     console.say(f"measured {number(_measured_rate(readings), 5)} Hz on the session's clock")
-    counts = {name: value for name, value in asdict(health).items() if name != "lag_ms"}
+    counts = {name: value for name, value in asdict(health).items() if name not in ("lag_ms", "rate_words")}
     console.say(", ".join(f"{name} {value}" for name, value in counts.items()) + f", lag {health.lag_ms:.1f} ms")
+    if health.rate_words:
+        console.say(health.rate_words)
     if mean is not None and noise is not None:
         rows = [
             [a, number(float(m)), number(float(s), 2), u] for a, m, s, u in zip(AXES, mean, noise, units, strict=True)
         ]
         console.say(table(rows, head=["axis", "mean", "noise (sd)", "unit"]))
-    flawed = health.lost or health.malformed or health.stalled or health.saturated or not len(readings)
+    flawed = (
+        health.lost or health.malformed or health.stalled or health.saturated or health.off_rate or not len(readings)
+    )
     return 3 if flawed else 0
 
 

@@ -27,9 +27,9 @@ class GaugeConversation:
         """Return a decoder for a stream about to begin."""
         return wire.StreamDecoder(self._constants)
 
-    def numbering(self, rate: float, _factor: float, /) -> ScanCount:
+    def numbering(self, rate: float, factor: float) -> ScanCount:
         """Return what numbers the scans: the converter's own clock."""
-        return ScanCount(rate, _WRAP)
+        return ScanCount(rate, factor, wrap=_WRAP)
 
     def begin(self, link: Link) -> bytes:
         """End whatever streams, set the scans and let them come. Raises LinkLost or DeviceFault with the reason."""

@@ -6,10 +6,12 @@ from collections import deque
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.clock import Clock
 from drivers.links import Link
 from drivers.net_ft.wire import AXIA, NET_FT, START, STOP, decode
+from drivers.rate import RateWatch, rate_words
 from drivers.readings import ReadingBlock
 from drivers.sequence import SequenceAccount
 from drivers.threaded import ThreadedTransducer
@@ -23,6 +25,8 @@ _SILENCE = 3.0  # until a box that has fallen silent is given up
 _QUIET = 0.3  # silence after which the box is asked to start again
 _THEFTS = 3  # so many returns within _THEFT_SPAN mean that somebody else keeps taking the stream
 _THEFT_SPAN = 3.0
+_SILENT_TICKS = 2.0  # across a longer silence the box's counter is not held against the computer's clock
+_TOGETHER = 50_000_000  # of records that arrived within, one is looked at for that [ns]
 
 
 class NetFtTransducer(ThreadedTransducer):
@@ -60,6 +64,10 @@ class NetFtTransducer(ThreadedTransducer):
         with self._lock:
             self._digest()
             account = self._account
+            found = [self._rate_found()] if account.changed else []
+            found += (
+                [rate_words("its clock runs", self._watch.rate, self._info.counter_rate)] if self._watch.found else []
+            )
             return Health(
                 received=self._received,
                 lost=account.lost,
@@ -69,6 +77,8 @@ class NetFtTransducer(ThreadedTransducer):
                 stalled=account.frozen,
                 restarted=account.restarted,
                 saturated=self._saturated,
+                off_rate=account.changed + self._watch.found,
+                rate_words="; ".join(found),
                 lag_ms=self._lag_ms,
             )
 
@@ -102,6 +112,8 @@ class NetFtTransducer(ThreadedTransducer):
         self._stopping.clear()
         self._ended = None
         self._account = SequenceAccount(self._step, self._info.counter_rate)
+        self._watch = RateWatch(self._info.counter_rate, self._clock.factor, _SILENT_TICKS * self._clock.factor)
+        self._breaks = 0  # in the device's counter, so far
         self._held: list[tuple[bytes, int]] = []
         self._ready = []
         self._zero: int | None = None  # counter of the first reading
@@ -178,6 +190,8 @@ class NetFtTransducer(ThreadedTransducer):
         kept = records[verdict.kept]
         status = kept["status"].astype(np.int64)
         self._received += len(kept)
+        arrived_ns = np.array(received_ns, np.int64)[verdict.kept]
+        self._compare_clocks(verdict.counter, arrived_ns)
         self._saturated += int(np.count_nonzero(status & self._invalid))
         self._ready.append(
             ReadingBlock(
@@ -185,10 +199,25 @@ class NetFtTransducer(ThreadedTransducer):
                 counter=verdict.counter,
                 status=status,
                 time=(verdict.counter - self._zero) / self._info.counter_rate,
-                received_ns=np.array(received_ns, np.int64)[verdict.kept],
+                received_ns=arrived_ns,
                 raw=kept["counts"].astype(np.float64),
             )
         )
+
+    def _compare_clocks(self, counter: NDArray[np.int64], received_ns: NDArray[np.int64]) -> None:
+        """Hold the box's counter against the session's clock."""
+        breaks = self._account.restarted + self._account.frozen
+        if breaks != self._breaks:  # it stood still, or began anew
+            self._breaks = breaks
+            self._watch.begin_anew()
+            return
+        apart = max(len(counter) // 16, 1) if int(received_ns[-1] - received_ns[0]) > _TOGETHER else len(counter)
+        for i in range((len(counter) - 1) % apart, len(counter), apart):
+            self._watch.take(int(counter[i]), int(received_ns[i]))
+
+    def _rate_found(self) -> str:
+        """Return at which rate the box sends now."""
+        return rate_words("it sends", self._info.counter_rate / (self._account.step or 1), self._info.rate)
 
     def _never_came(self, patience: float) -> str:
         """Return why a start failed."""

@@ -97,9 +97,9 @@ class TaskConversation:
         """Return a decoder for a stream about to begin."""
         return VoltsDecoder()
 
-    def numbering(self, rate: float, _factor: float, /) -> ScanCount:
+    def numbering(self, rate: float, factor: float) -> ScanCount:
         """Return what numbers the readings: the device's own clock."""
-        return ScanCount(rate)
+        return ScanCount(rate, factor)
 
     def begin(self, link: Link) -> bytes:
         """Let readings come."""

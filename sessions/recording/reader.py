@@ -42,6 +42,7 @@ LOSS_SENTENCES = {
     "stalled": "{} readings came while the device's counter stood still",
     "restarted": "the device began to count anew {} times",
     "saturated": "the device called {} readings invalid, as when it is saturated",
+    "off_rate": "the device's rate was found to be another than set, or than before, {} times",
 }
 
 
@@ -113,6 +114,8 @@ class Recording:
             count = sum(event.data.get(name, 0) for event in self.events if event.kind == "losses")
             if count:
                 trouble.append(sentence.format(count))
+        found = [event.data["rate_words"] for event in self.events if "rate_words" in event.data]
+        trouble += [f"of the rate was found: {words}" for words in dict.fromkeys(found)]
         for record in self.trials:
             allowed = self.plan.strokes_allowed(record.trial)
             if record.take and record.take.strokes > allowed:

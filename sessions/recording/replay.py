@@ -11,7 +11,8 @@ from drivers.transducer import Health, LinkLost, SetupError, TransducerInfo
 from sessions.recording.log import LoggedEvent
 from sessions.recording.reader import Recording
 
-COUNTED = frozenset(field.name for field in fields(Health)) - {"received", "lag_ms"}  # what a "losses" event may count
+# What a "losses" event may count.
+COUNTED = frozenset(field.name for field in fields(Health)) - {"received", "lag_ms", "rate_words"}
 
 
 class RecordedReadings:
@@ -136,4 +137,6 @@ class ReplayTransducer:
 def health_of(told: Iterable[LoggedEvent]) -> Health:
     """Return the totals of what "losses" events tell."""
     events = list(told)
-    return Health(**{name: sum(int(event.data.get(name, 0)) for event in events) for name in COUNTED})
+    counts = {name: sum(int(event.data.get(name, 0)) for event in events) for name in COUNTED}
+    words = [str(event.data["rate_words"]) for event in events if "rate_words" in event.data]
+    return Health(**counts, rate_words=words[-1] if words else "")

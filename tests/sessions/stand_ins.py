@@ -53,13 +53,14 @@ class ToldClock:
 class StandIn:
     """A transducer at 200 Hz on a told clock, pressed where `touches` say: (from, to, newtons), session clock [ns]."""
 
-    def __init__(self, clock, *, seed=0, lost=(), link_lost_after=None):
+    def __init__(self, clock, *, seed=0, lost=(), link_lost_after=None, rate_words=""):
         self.clock = clock
         self.info = INFO
         self.touches = []
         self.sent = 0
         self.lost = set(lost)  # sequence numbers that never arrive
         self.link_lost_after = link_lost_after  # readings
+        self.rate_words = rate_words  # from the 400th reading on
         self.streaming = False
         self.began_ns = None
         self._noise = np.random.default_rng(seed)
@@ -67,7 +68,9 @@ class StandIn:
 
     @property
     def health(self):
-        return Health(received=self.sent - self._lost_so_far, lost=self._lost_so_far)
+        off = int(bool(self.rate_words) and self.sent > 400)
+        words = self.rate_words if off else ""
+        return Health(self.sent - self._lost_so_far, self._lost_so_far, off_rate=off, rate_words=words)
 
     def start(self):
         self.began_ns = self.clock.now_ns()

@@ -7,6 +7,7 @@ from stand_ins import INFO, RATE, Hands, StandIn, ToldClock
 
 from sessions.protocols import plan, protocol
 from sessions.recording import Recording, SessionWriter, provenance
+from sessions.recording.replay import health_of
 from sessions.runner import RunnerSettings, run_session
 from sessions.steps import (
     Abort,
@@ -375,10 +376,19 @@ def test_an_interrupted_take_is_kept_as_one_that_does_not_count(tmp_path):
 # ---- losses and status
 
 
-def test_lost_readings_are_logged_with_their_number_and_named_as_a_flaw(tmp_path):
-    recording = Session(tmp_path / "s", lost=range(300, 307)).run()
-    assert sum(event.data["lost"] for event in recording.events if event.kind == "losses") == 7
-    assert recording.flaws == ("7 readings never arrived",)
+def test_lost_readings_and_a_rate_not_as_set_are_logged_and_named_as_flaws(tmp_path):
+    words = "readings come at 100 Hz, not at 200 Hz"
+    recording = Session(tmp_path / "s", lost=range(300, 307), rate_words=words).run()
+    told = [event.data for event in recording.events if event.kind == "losses"]
+    assert sum(data["lost"] for data in told) == 7
+    assert [data["rate_words"] for data in told if data["off_rate"]] == [words]
+    assert words in next(data["sentence"] for data in told if data["off_rate"])
+    assert recording.flaws == (
+        "7 readings never arrived",
+        "the device's rate was found to be another than set, or than before, 1 times",
+        f"of the rate was found: {words}",
+    )
+    assert health_of(event for event in recording.events if event.kind == "losses").rate_words == words
     assert not np.isin(np.arange(300, 307), recording.readings().sequence).any()
 
 

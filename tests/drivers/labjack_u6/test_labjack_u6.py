@@ -167,7 +167,7 @@ def test_a_lost_packet_is_four_lost_scans_and_the_gauges_stay_in_place():
 
 
 def test_losses_that_let_the_packet_counter_go_round_are_found_by_the_clock():
-    count, period_ns = ScanCount(1000.0, 256 * wire.SCANS), 1_000_000
+    count, period_ns = ScanCount(1000.0, wrap=256 * wire.SCANS), 1_000_000
     count.take(np.zeros(4, np.int64), 4 * period_ns)
     gone = 2 * 1024 + 40  # two rounds of 256 packets of four scans, and ten packets
     paced = count.take(np.array([40, 0, 0, 0]), (4 + gone + 4) * period_ns)

@@ -1,0 +1,85 @@
+"""Whether a device keeps to its rate: what it has counted, held against the computer's clock."""
+
+from collections import deque
+
+WINDOW = 1.0  # of the records that arrive within, the one that waited least is taken [real s]
+COARSE, FINE = (1, 0.1), (3, 0.02)  # over so many windows, twice running, the rate is off by more than this [-]
+
+
+class RateWatch:
+    """Watches one stream. Records reach the computer late, and never early: so of each window one is looked at."""
+
+    def __init__(self, rate: float, factor: float, silence: float) -> None:
+        """Expect `rate` counts a second [Hz] of a session clock that runs `factor` times real time.
+
+        Across more than `silence` [s] without a record nothing is compared: something may have been lost in it.
+        """
+        self.rate = rate  # as found last [Hz]
+        self.found = 0  # how often it was found to be another than before
+        self._set = rate
+        self._window = WINDOW * factor
+        self._silence = silence
+        self._points: deque[tuple[int, float]] = deque(maxlen=2 * FINE[0] + 1)  # count and arrival, one a window
+        self._best: tuple[float, int, float] | None = None  # in this window: lateness, count, arrival
+        self._ends = 0.0  # of this window
+        self._last = 0.0  # arrival
+
+    @property
+    def is_off(self) -> bool:
+        """Tell whether the rate is another than the one set."""
+        return self.rate != self._set
+
+    def take(self, count: int, received_ns: int) -> bool:
+        """Take how far the device has counted by something that arrived; tell whether its rate is found to be another.
+
+        `count` rises with what was lost on the way, where that is known.
+        """
+        now = received_ns * 1e-9
+        if self._best is None or now - self._last > self._silence:
+            self._begin(count, now)
+            return False
+        self._last = now
+        late = now - count / self.rate
+        if now < self._ends:
+            if late < self._best[0]:
+                self._best = late, count, now
+            return False
+        self._points.append(self._best[1:])
+        self._best, self._ends = (late, count, now), now + self._window
+        return self._judged()
+
+    def begin_anew(self) -> None:
+        """Forget what has come: what comes next does not go on from it."""
+        self._best = None
+
+    def _begin(self, count: int, now: float) -> None:
+        self._points.clear()
+        self._best, self._ends, self._last = (now - count / self.rate, count, now), now + self._window, now
+
+    def _judged(self) -> bool:
+        """Compare two stretches, one after the other, with the rate believed."""
+        for windows, most in (COARSE, FINE):
+            if len(self._points) <= 2 * windows:
+                continue
+            first, middle, last = (self._points[i] for i in (-1 - 2 * windows, -1 - windows, -1))
+            before, after = (_rate(*pair) / self.rate - 1.0 for pair in ((first, middle), (middle, last)))
+            if min(abs(before), abs(after)) > most and before * after > 0.0 and abs(after - before) < 0.5 * abs(after):
+                found = _rate(first, last)
+                self.rate = self._set if abs(found / self._set - 1.0) < most else found
+                self.found += 1
+                self._points.clear()
+                return True
+        return False
+
+
+def rate_words(what: str, found: float, asked: float) -> str:
+    """Return what is the matter with a rate, or that it no longer is.
+
+    >>> rate_words("readings come", 147.5, 295.0), rate_words("readings come", 295.0, 295.0)
+    ('readings come at 147.5 Hz, not at 295 Hz', 'readings come at 295 Hz again')
+    """
+    return f"{what} at {asked:.6g} Hz again" if found == asked else f"{what} at {found:.4g} Hz, not at {asked:.6g} Hz"
+
+
+def _rate(first: tuple[int, float], last: tuple[int, float]) -> float:
+    return (last[0] - first[0]) / (last[1] - first[1])

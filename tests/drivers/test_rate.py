@@ -1,0 +1,85 @@
+"""A rate that is not as set is found, from counts and arrivals alone, and nothing else is taken for it."""
+
+import numpy as np
+import pytest
+
+from drivers.pacing import Pacing
+from drivers.rate import RateWatch, rate_words
+
+START = 7.0  # [s]
+
+
+def watched(watch, counted, arrival):
+    """Feed counts and arrivals [s]; return when, and at which rate, the watch found another one."""
+    found = []
+    for count, at in zip(counted.tolist(), arrival.tolist(), strict=True):
+        if watch.take(count, round((START + at) * 1e9)):
+            found.append((at, watch.rate))
+    return found
+
+
+def late(made, seed=1, jitter=0.02, stalls=5):
+    """Arrivals of what was made at some times [s]: a few ms late, now and then up to 0.4 s, never out of order."""
+    draw = np.random.default_rng(seed)
+    arrival = made + draw.exponential(jitter, len(made))
+    for at in draw.uniform(made[0], made[-1], stalls):
+        arrival = np.where((made > at) & (made < at + 0.4), at + 0.4, arrival)
+    return np.maximum.accumulate(arrival)
+
+
+@pytest.mark.parametrize("rate", [21.0, 200.0, 7000.0])
+@pytest.mark.parametrize("error", [-0.005, 0.0, 0.005])
+def test_a_clock_within_its_half_percent_is_as_set_however_late_records_come(rate, error):
+    counted = np.arange(round(60 * rate))
+    watch = RateWatch(rate, 1.0, 0.5)
+    assert watched(watch, counted, late(counted / (rate * (1.0 + error)))) == []
+    assert not watch.is_off
+
+
+@pytest.mark.parametrize("to", [0.5, 0.9, 0.95, 1.05, 1.3, 2.0])
+def test_a_rate_that_becomes_another_is_found_within_seconds_and_so_is_its_return(to):
+    rate = 200.0
+    made = np.cumsum(np.repeat([1.0, 1.0 / to, 1.0], [2000, round(2000 * to), 4000]) / rate)  # 10 s, 10 s, 20 s
+    watch = RateWatch(rate, 1.0, 1.0)
+    (first, found), (back, again) = watched(watch, np.arange(len(made)), late(made, jitter=0.004, stalls=0))
+    assert 10.0 < first < (14.0 if abs(to - 1) > 0.15 else 18.5)
+    assert found == pytest.approx(rate * to, rel=0.02)
+    assert 20.0 < back < (24.0 if abs(to - 1) > 0.15 else 28.5)
+    assert again == rate
+    assert watch.found == 2
+
+
+def test_time_that_runs_faster_is_allowed_for():
+    counted = np.arange(8000)
+    watch = RateWatch(200.0, 10.0, 5.0)
+    (found,) = watched(watch, counted, late(counted / 100.0, jitter=0.04, stalls=0))
+    assert found[1] == pytest.approx(100.0, rel=0.02)
+
+
+def test_a_stretch_without_records_is_a_loss_and_no_slower_rate():
+    made = np.arange(6000) / 200.0
+    made += np.where(made > 10.0, 0.9, 0.0) + np.where(made > 20.0, 0.6, 0.0)
+    watch = RateWatch(200.0, 1.0, 0.1)
+    assert watched(watch, np.arange(6000), made) == []
+
+
+@pytest.mark.parametrize("to", [0.5, 1.5])
+def test_a_line_without_numbers_is_followed_at_its_new_rate(to):
+    rate = 295.0
+    made = np.cumsum(np.repeat([1.0, 1.0 / to], [round(5 * rate), round(30 * rate * to)]) / rate)
+    pacing, blocks = Pacing(rate), []
+    for at in made:
+        blocks.append(pacing.take(np.zeros(1, np.int64), round((START + at) * 1e9)))
+    time = np.concatenate([block.time for block in [*blocks, pacing.release()]])
+    assert pacing.watch.found == 1
+    assert pacing.watch.rate == pytest.approx(rate * to, rel=0.02)
+    assert len(time) == len(made)
+    assert np.all(np.diff(time) > 0.0)
+    settled = made > 25.0
+    np.testing.assert_allclose((time - made)[settled], made[0] * -1.0, atol=0.02)
+    lost_before = pacing.lost
+    assert lost_before <= (4.0 * rate if to < 1 else 0)
+
+
+def test_words_name_both_rates():
+    assert rate_words("its clock runs", 6510.44, 7000.0) == "its clock runs at 6510 Hz, not at 7000 Hz"
