@@ -21,6 +21,7 @@ VERBS = {
     "import": "make a session folder of a foreign recording",
     "replay": "run a recorded session once more and compare what comes out",
     "analyse": "find the strokes of a session and their friction",
+    "decide": "record what a person decides about a stroke, or undo it",
     "predict": "predict the receptor's strain-energy density for each trial",
     "solve": "run the solver on a scene file",
     "sensitivity": "tell which of a scene's numbers moves the SED (Sobol indices)",
@@ -38,6 +39,7 @@ VERBS = {
 # Where each failure a person can act on is defined.
 _WRONG = (
     "drivers.address.AddressError",
+    "sessions.decisions.DecisionError",
     "sessions.toml_file.SettingsError",
     "simulators.timetable.TimetableError",
     "solver.scene.SceneError",

@@ -1,5 +1,6 @@
 """Numbers made from a session: made, kept in its folder, and made once more to verify them."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ from daq_app.cli import WrongValue
 from daq_app.console import Console
 from sessions.analysis import Analysis, analyse
 from sessions.blinding import revealed
+from sessions.decisions import Decisions
 from sessions.prediction import PredictionOptions, SessionPrediction, predict
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import store_derived
@@ -49,6 +51,12 @@ def predicted_again(recording: Recording, analysis: Analysis, stored: Mapping[st
     stimuli: list[Mapping[str, Any]] = [row.get("stimulus") or {} for row in stored.get("trials", ())]
     blind = all(stimulus.get("index") is None for stimulus in stimuli)
     return predict(analysis, (recording if blind else revealed(recording)).plan, options).to_dict()
+
+
+def made_under(stored: Mapping[str, Any], decisions: Decisions) -> bool:
+    """Say whether a stored document was made with the decisions that are in force now."""
+    now = json.loads(json.dumps([decision.to_dict() for decision in decisions.in_force]))
+    return stored.get("decisions", []) == now
 
 
 def visit(path: Path, subject: str | None) -> Recording:

@@ -18,6 +18,7 @@ from typing import Any
 
 from daq_app.console import Console
 from sessions.blinding import UNBLINDING
+from sessions.decisions import DECISIONS
 from sessions.pooling.visit import FORM, Visit, VisitOptions, visit_of
 from sessions.recording import Recording
 from sessions.recording.provenance import software_versions
@@ -25,7 +26,7 @@ from sessions.recording.schema import LIVE_FILE
 from sessions.recording.whole_file import write_whole
 
 LOOK = 0.1  # between two looks whether something is done [s]
-CONTENT = (LIVE_FILE, f"{LIVE_FILE}-wal", UNBLINDING)  # all that a visit's numbers come from
+CONTENT = (LIVE_FILE, f"{LIVE_FILE}-wal", UNBLINDING, DECISIONS)  # all that a visit's numbers come from
 
 Answer = tuple[str, dict[str, Any] | str]  # session, and what it brings or why it brings nothing
 

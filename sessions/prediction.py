@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Literal
 
 from sessions.analysis import Analysis, FrictionParameters, Stroke
+from sessions.decisions import Decision
 from sessions.plan import DISTAL_TO_PROXIMAL, PROXIMAL_TO_DISTAL, Block, SessionPlan, Stimulus, Trial
 from solver.failures import SolveFailure
 from solver.fields import Fields, fields_of
@@ -94,12 +95,14 @@ class SessionPrediction:
     width: float  # of the finger [mm]
     width_origin: str  # "set" or "assumed"
     options: PredictionOptions
+    decisions: tuple[Decision, ...] = ()  # of people about the strokes, in force
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, None where honesty allows no number."""
         return {
             **({"simulated": "SIMULATED"} if self.simulated else {}),
             "trials": [trial.to_dict() for trial in self.trials],
+            "decisions": [decision.to_dict() for decision in self.decisions],
             "width": self.width,
             "width_origin": self.width_origin,
             "options": asdict(self.options),
@@ -145,6 +148,7 @@ def predict(
         width=_template(asked).width,
         width_origin="assumed" if base is None or base.width == _template(PredictionOptions()).width else "set",
         options=asked,
+        decisions=analysis.decisions,
     )
 
 
@@ -193,20 +197,22 @@ class _Case:
 
 def _cases(analysis: Analysis, plan: SessionPlan) -> Iterator[_Case]:
     if not plan.blocks:
-        for number, (stroke, friction) in enumerate(zip(analysis.strokes, analysis.friction, strict=True)):
-            yield _Case(None, None, friction, number, stroke)
+        given = {friction.stroke: friction for friction in analysis.friction}
+        for number, stroke in enumerate(analysis.strokes):
+            yield _Case(None, None, given.get(number), number, stroke)
         return
     if not plan.forces:
         return
-    given = {friction.trial: friction for friction in analysis.friction}
+    of_trial = {friction.trial: friction for friction in analysis.friction}
     first: dict[int | None, int] = {}
     for number, stroke in enumerate(analysis.strokes):
         first.setdefault(stroke.trial, number)
     for block in plan.blocks:
         for trial in block.trials if block.phase == "main" else ():
-            number = first.get(trial.number)
+            friction = of_trial.get(trial.number)
+            number = first.get(trial.number) if friction is None else friction.stroke
             stroke = None if number is None else analysis.strokes[number]
-            yield _Case(trial, block, given.get(trial.number), number, stroke)
+            yield _Case(trial, block, friction, number, stroke)
 
 
 def with_own_finger(options: PredictionOptions, plan: SessionPlan) -> PredictionOptions:
@@ -287,6 +293,8 @@ def _missing(row: TrialPrediction, stroke: Stroke | None) -> str | None:
     """Return why there is nothing to solve; None where all is there."""
     if stroke is None:
         return "No stroke was found in this trial."
+    if not stroke.kept:
+        return f"The stroke was left out: {stroke.decided['kept']}."
     if row.mu is None or row.tau_max is None:
         what = "coefficient of friction" if row.mu is None else "traction bound"
         flaws = ", ".join(stroke.flaws) or "no steady sliding"

@@ -44,7 +44,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.say(recording.simulated_sentence)
     rows = [
         [
-            "–" if stroke.trial is None else str(stroke.trial),
+            ("–" if stroke.trial is None else str(stroke.trial)) + ("*" if stroke.decided else ""),
             number(stroke.onset, 5),
             "–" if stroke.steady is None else f"{stroke.steady[0]:.2f} to {stroke.steady[1]:.2f}",
             number(stroke.mu_static),
@@ -57,6 +57,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         for stroke in analysis.strokes
     ]
     console.say(table(rows, head=HEAD) if rows else "no stroke")
+    for decision in analysis.decisions:
+        console.say(f"* {decision.sentence}")
     if rows:
         console.say(f"\n{chosen.kind}:")
         console.say(table([_row(found) for found in intervals], head=INTERVALS))

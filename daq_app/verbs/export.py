@@ -9,9 +9,10 @@ from pathlib import Path
 
 from daq_app.cli import FLAWED
 from daq_app.console import Console
-from daq_app.derived import ANALYSIS, PREDICTION
+from daq_app.derived import ANALYSIS, PREDICTION, made_under, predicted_again
 from sessions.analysis import analyse
 from sessions.blinding import revealed
+from sessions.decisions import read
 from sessions.exports import FORMATS, ExportSource, export
 from sessions.recording import Recording
 from sessions.recording.derived import load_derived
@@ -31,10 +32,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     """Export, and name what the session had lost."""
     recording = revealed(Recording.open(options.session))
     folder = options.out or Path("exports") / f"{options.session.resolve().name}-{options.format}"
-    analysis = load_derived(options.session, ANALYSIS)
-    if analysis is None:
-        analysis = {"made_by": software_versions(), **analyse(recording).to_dict()}
-    source = ExportSource(recording, analysis, load_derived(options.session, PREDICTION))
+    source = _source(recording, console)
     export(source, options.format, folder, lambda part: console.progress(part, f"writing {options.format}"))
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     losses = list(recording.losses)
@@ -45,3 +43,17 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.say(sentence)
     console.say(f"{folder}: {len(files)} files, {sum(path.stat().st_size for path in files) / 1e6:.1f} MB")
     return FLAWED if losses else 0
+
+
+def _source(recording: Recording, console: Console) -> ExportSource:
+    """Return the session with the numbers kept in it; those made under other decisions are made anew."""
+    decided = read(recording.folder)
+    found = analyse(recording, decisions=decided)
+    made_by = {"made_by": software_versions()}
+    analysis, prediction = load_derived(recording.folder, ANALYSIS), load_derived(recording.folder, PREDICTION)
+    if analysis is None or not made_under(analysis, decided):
+        analysis = made_by | found.to_dict()
+    if prediction is not None and not made_under(prediction, decided):
+        console.note(f"{PREDICTION} was made under other decisions than those in force, and is made anew")
+        prediction = made_by | predicted_again(recording, found, prediction)
+    return ExportSource(recording, analysis, prediction)

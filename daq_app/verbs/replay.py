@@ -17,6 +17,7 @@ from daq_app.cli import WrongValue
 from daq_app.console import Console
 from daq_app.derived import ANALYSIS, PREDICTION, predicted_again
 from sessions.analysis import analyse
+from sessions.decisions import read
 from sessions.recording import Recording
 from sessions.recording.derived import load_derived
 from sessions.recording.provenance import software_versions
@@ -51,7 +52,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
         taken = time.perf_counter() - began
         found = [*different_readings(recording, replayed), *told(list(different_events(recording, replayed)))]
         compared = ["readings", "events", ANALYSIS]
-        fresh = _plain(analyse(replayed).to_dict())
+        decided = read(recording.folder)  # people decided about the recording, not about its replay
+        analysis = analyse(replayed, decisions=decided)
+        fresh = _plain(analysis.to_dict())
         stored = load_derived(options.session, ANALYSIS)
         expected = _plain(analyse(recording).to_dict()) if stored is None else stored
         found += _changed(ANALYSIS, expected, fresh)
@@ -59,7 +62,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             predicted = load_derived(options.session, PREDICTION)
             if predicted is not None:
                 console.progress(0.9, f"making {PREDICTION} again")
-                again = _plain(predicted_again(recording, analyse(replayed), predicted))
+                again = _plain(predicted_again(recording, analysis, predicted))
                 found += _changed(PREDICTION, predicted, again)
                 compared.append(PREDICTION)
     lasted = _duration(recording)

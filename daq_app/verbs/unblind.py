@@ -82,5 +82,5 @@ def _ready(sessions: tuple[Recording, ...], key: Key) -> tuple[list[Recording], 
 def _made(recording: Recording) -> Iterator[tuple[str, str]]:
     """Yield name and SHA-256 of each number and page that was made of a session while it was blinded."""
     for path in sorted(recording.folder.iterdir()):
-        if path.is_file() and path.name not in RECORDED and path.suffix in (".json", ".html"):
+        if path.is_file() and path.name not in RECORDED and path.suffix in (".json", ".jsonl", ".html"):
             yield path.name, hashlib.sha256(path.read_bytes()).hexdigest()

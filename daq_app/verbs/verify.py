@@ -8,8 +8,9 @@ import json
 from pathlib import Path
 
 from daq_app.console import Console
-from daq_app.derived import ANALYSIS, PREDICTION, predicted_again
+from daq_app.derived import ANALYSIS, PREDICTION, made_under, predicted_again
 from sessions.analysis import analyse
+from sessions.decisions import DECISIONS, read
 from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems
 from sessions.recording.derived import load_derived
@@ -31,6 +32,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     found = list(problems(folder))
     recording = Recording.open(folder)
     checked = ["files"]
+    decided = read(folder)
+    found += decided.problems
+    checked += [DECISIONS] if decided.lines or decided.problems else []
     analysis = None
     for name in (ANALYSIS, PREDICTION):
         console.progress(0.5, f"making {name} again")
@@ -38,7 +42,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
             stored = load_derived(folder, name)
             if stored is None:
                 continue
-            analysis = analysis or analyse(recording)
+            analysis = analysis or analyse(recording, decisions=decided)
+            if not made_under(stored, decided):
+                found.append(f"{name} was made under other decisions than those in force: make it anew")
             fresh = analysis.to_dict() if name == ANALYSIS else predicted_again(recording, analysis, stored)
         except (RecordingError, SettingsError) as damaged:
             found.append(" ".join(str(damaged).split()))

@@ -37,6 +37,7 @@ class FlawName(StrEnum):
     DIRECTION_TURNS = "direction_turns"
     DIRECTION_DISAGREES = "direction_disagrees"
     WRONG_DIRECTION = "wrong_direction"
+    DECISION = "decision"  # what a person decided cannot be done, or cannot be read
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ class FrictionParameters:
     """What the model gets of one stroke. None where honesty allows no number."""
 
     trial: int | None
+    stroke: int  # position in `Analysis.strokes`
     mu: float | None  # [-]
     mu_interval: tuple[float, float] | None  # of the mean; None for a maximum, of which none is told
     tau_max: float | None  # [MPa]
@@ -37,11 +38,12 @@ def rule_for(trial: Trial | None) -> Rule:
     return "mean over steady window"
 
 
-def friction_parameters(stroke: Stroke, trial: Trial | None, contact_area: float) -> FrictionParameters:
-    """Return what the model gets of a stroke."""
+def friction_parameters(stroke: Stroke, at: int, trial: Trial | None, contact_area: float) -> FrictionParameters:
+    """Return what the model gets of the stroke at a position of `Analysis.strokes`."""
     rule = rule_for(trial)
     return FrictionParameters(
         trial=stroke.trial,
+        stroke=at,
         mu=stroke.mu_max if rule == "maximum" else stroke.mu_dynamic,
         mu_interval=None if rule == "maximum" else stroke.mu_dynamic_interval,
         tau_max=stroke.tau_max,

@@ -12,12 +12,15 @@ from sessions.analysis.span import Span, ZeroInForce
 from sessions.analysis.steady import mean_of
 from sessions.analysis.stroke import Stroke
 from sessions.analysis.track import Track, curve_of, mean_vector, track_of
+from sessions.decisions import Decided
 from sessions.plan import PROXIMAL_TO_DISTAL, Frame, Trial
 
 Array = NDArray[np.float64]
 
 _AFTER_PEAK = 0.2  # what a static peak is held against [s]
 _LATE_PEAK = 0.1  # a static peak may come so long after break-away began [s]
+_NO_PEAK = "no static peak stands out"
+_STICK_WITHOUT = (_NO_PEAK, FlawName.NO_STEADY_SLIDING, FlawName.RATIO_ABOVE_ONE)  # a stick phase needs none of these
 
 
 def measured(
@@ -28,20 +31,27 @@ def measured(
     contact_area: float,
     settings: AnalysisSettings,
     trial: Trial | None = None,
+    number: int = 1,
+    decided: Decided | None = None,
 ) -> tuple[Stroke, tuple[Flaw, ...]]:
-    """Return a contact's stroke and its flaws. `contact_area` [mm2] is what tau_max is told for."""
+    """Return a contact's stroke and its flaws. `contact_area` [mm2] is what tau_max is told for.
+
+    `number` is that of the stroke within its trial; what was `decided` of it goes before what is found.
+    """
     found = Findings()
+    decided = decided or Decided({})
     track = track_of(span, contact, zero, frame.height, settings)
     _judge_ends(found, contact, track, settings)
     _judge_zero(found, zero)
     if zero.flaw is not FlawName.NO_UNLOADED_STRETCH:
         _judge_gaps(found, span, contact, settings)
         _judge_loads(found, track, contact_area, settings)
-        window = slide(found, span, track, frame, settings)
+        window = slide(found, span, track, frame, settings, decided.span("steady"))
         if window is not None:
             _friction(found, track, window, zero, settings)
             _static_peak(found, track, window, zero, settings)
             _judge_way(found, track, window, settings)
+        _take_decided(found, track, decided)
         _judge_drift(found, zero, settings)
     if trial is not None:
         _judge_task(found, trial)
@@ -55,6 +65,9 @@ def measured(
         zero_drift=None if zero.drift is None else float(np.linalg.norm(zero.drift[:3])),
         flaws=tuple(dict.fromkeys(str(flaw.name) for flaw in found.flaws)),
         reasons=dict(found.reasons),
+        number=number,
+        kept=decided.kept,
+        decided=decided.sentences,
         curve=curve_of(span, contact, zero, frame.height, settings),
         **numbers,
     )
@@ -201,7 +214,7 @@ def _static_peak(found: Findings, track: Track, window: slice, zero: ZeroInForce
     broken = found.numbers.get("break_away", track.time[window.start])
     last = int(np.searchsorted(track.time, float(broken + _LATE_PEAK)))
     before = track.ratio[:last]
-    found.reasons.setdefault("mu_static", "no static peak stands out")
+    found.reasons.setdefault("mu_static", _NO_PEAK)
     if not np.isfinite(before).any():
         return
     top = int(np.nanargmax(before))
@@ -212,8 +225,27 @@ def _static_peak(found: Findings, track: Track, window: slice, zero: ZeroInForce
     sd = np.hypot(noise, level * float(zero.noise[2])) / float(track.normal[top])
     if before[top] - level > max(settings.static_noise * sd, settings.static_share * level):
         found.numbers["mu_static"] = float(before[top])
-        if found.reasons["mu_static"] == "no static peak stands out":
+        if found.reasons["mu_static"] == _NO_PEAK:
             del found.reasons["mu_static"]
+
+
+def _take_decided(found: Findings, track: Track, decided: Decided) -> None:
+    """Give the stick phase and the direction that a person decided."""
+    stick = decided.span("stick")
+    if stick is not None:
+        inside = track.ratio[(track.time >= stick[0]) & (track.time <= stick[1])]
+        inside = inside[np.isfinite(inside)]
+        if len(inside):
+            found.numbers |= {"mu_static": float(inside.max()), "break_away": stick[1]}
+            if found.reasons.get("mu_static") in _STICK_WITHOUT:
+                del found.reasons["mu_static"]
+        else:
+            sentence = "The stick phase that was decided holds no T/N: the force is too low there, or nothing touches."
+            found.flaw(FlawName.DECISION, sentence, "doubtful", ("mu_static",))
+    if decided.direction is not None:
+        found.numbers |= {"direction": decided.direction, "direction_from": "decision"}
+        for name in DIRECTION:
+            found.reasons.pop(name, None)
 
 
 def _judge_way(found: Findings, track: Track, window: slice, settings: AnalysisSettings) -> None:

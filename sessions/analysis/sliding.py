@@ -7,30 +7,48 @@ from sessions.analysis.findings import COEFFICIENTS, DIRECTION, SPEED, Findings
 from sessions.analysis.flaws import FlawName
 from sessions.analysis.settings import AnalysisSettings
 from sessions.analysis.span import Span
-from sessions.analysis.steady import Movement, displacement, movement, steady_window
+from sessions.analysis.steady import FEWEST, Movement, displacement, movement, steady_window
 from sessions.analysis.track import Track, mean_vector
 from sessions.plan import Frame
 
 Array = NDArray[np.float64]
 
+_ROUNDING = 1e-9  # instants are told to the last bit, or rounded by people [s]
 
-def slide(found: Findings, span: Span, track: Track, frame: Frame, settings: AnalysisSettings) -> slice | None:
-    """Find the steady window and the speed in it; None, with the reason, where nothing slides steadily."""
+
+def slide(
+    found: Findings,
+    span: Span,
+    track: Track,
+    frame: Frame,
+    settings: AnalysisSettings,
+    decided: tuple[float, float] | None = None,
+) -> slice | None:
+    """Find the steady window and the speed in it; None, with the reason, where nothing slides steadily.
+
+    A window that a person `decided` [s, device clock] is taken; what speaks against it is named.
+    """
     window = None
-    if np.isfinite(track.speed).any():
+    if decided is not None:
+        window = _asked(track, decided)
+    elif np.isfinite(track.speed).any():
         limit = settings.sliding_share * float(np.nanpercentile(track.speed, 90))
         with np.errstate(invalid="ignore"):
             sliding = np.where(track.speed >= limit, track.ratio, np.nan)
         window = steady_window(sliding, track.rate, len(track.time), settings)
     moved, trouble = _speed(span, track, window, frame, settings)
-    if trouble is not None:  # the centre of pressure does not tell when the finger slides
+    if trouble is not None and decided is None:  # the centre of pressure does not tell when the finger slides
         window = steady_window(track.ratio, track.rate, len(track.time), settings)
         moved, trouble = _speed(span, track, window, frame, settings)
     at_rest = _rest(span, track, window, settings)
+    if window is not None and at_rest is not None and decided is not None:
+        found.flaw(at_rest[0], f"{at_rest[1]} The window was decided by a person: its numbers are given.", "doubtful")
+        at_rest = None
     if window is None or at_rest is not None:
         name, sentence = at_rest or (
-            FlawName.NO_STEADY_SLIDING,
-            "T/N holds steady over no long enough part of the stroke.",
+            (FlawName.NO_STEADY_SLIDING, "T/N holds steady over no long enough part of the stroke.")
+            if decided is None
+            else (FlawName.DECISION, "The window that was decided holds too few readings with a T/N.")
         )
         forbidden = (*COEFFICIENTS, *SPEED, *DIRECTION, "normal_force", "tangential_force")
         found.flaw(name, sentence, "refused", forbidden)
@@ -43,6 +61,13 @@ def slide(found: Findings, span: Span, track: Track, frame: Frame, settings: Ana
         _break_away(found, track, moved, settings)
     _direction(found, track, window, moved if trouble is None else None)
     return window
+
+
+def _asked(track: Track, decided: tuple[float, float]) -> slice | None:
+    """Return the readings between two instants; None where too few of them have a ratio."""
+    start = int(np.searchsorted(track.time, decided[0] - _ROUNDING))
+    stop = int(np.searchsorted(track.time, decided[1] + _ROUNDING, "right"))
+    return slice(start, stop) if np.isfinite(track.ratio[start:stop]).sum() >= FEWEST else None
 
 
 def _rest(span: Span, track: Track, window: slice | None, settings: AnalysisSettings) -> tuple[FlawName, str] | None:

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _EDGES = 121  # windows begin and end on a grid of so many instants
-_FEWEST = 5  # readings in a window
+FEWEST = 5  # readings in a window
 _HELD = 0.95  # share of a window's readings that must have a ratio
 _QUARTERS = 4
 _FEWEST_BLOCKS = 4  # of which a standard error is told
@@ -25,7 +25,7 @@ def steady_window(ratio: Array, rate: float, whole: int, settings: AnalysisSetti
     stroke has. Steady: the standard deviation is below 10 % of the mean and no quarter's mean lies more than 5 % from
     it (settings), beyond what the scatter of few readings explains.
     """
-    shortest = max(settings.steady_share * whole, settings.steady_shortest * rate, _FEWEST)
+    shortest = max(settings.steady_share * whole, settings.steady_shortest * rate, FEWEST)
     edges = np.unique(np.linspace(0, len(ratio), _EDGES).round().astype(int))
     held = np.isfinite(ratio)
     value = np.where(held, ratio, 0.0)
@@ -40,7 +40,7 @@ def steady_window(ratio: Array, rate: float, whole: int, settings: AnalysisSetti
         return None
     mean = (total[last] - total[first]) / n
     variance = np.maximum((squares[last] - squares[first]) / n - mean**2, 0.0)
-    allowed = settings.steady_trend * mean + 2.0 * np.sqrt(_QUARTERS * variance / n) * (n < _QUARTERS * _FEWEST)
+    allowed = settings.steady_trend * mean + 2.0 * np.sqrt(_QUARTERS * variance / n) * (n < _QUARTERS * FEWEST)
     steady = np.sqrt(variance) < settings.steady_spread * mean
     for quarter in range(_QUARTERS):
         a = first + (last - first) * quarter // _QUARTERS

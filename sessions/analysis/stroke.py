@@ -1,7 +1,7 @@
 """A stroke: the touching movement inside a trial, with its numbers and what is wrong with them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -24,10 +24,10 @@ class StrokeCurve:
 
     def __post_init__(self) -> None:
         """Make the columns read-only views."""
-        for field in fields(self):
-            view = getattr(self, field.name).view()
+        for column in fields(self):
+            view = getattr(self, column.name).view()
             view.flags.writeable = False
-            object.__setattr__(self, field.name, view)
+            object.__setattr__(self, column.name, view)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +40,7 @@ class Stroke:
     steady: Interval | None  # steady window [s, device time]
     break_away: float | None  # end of the stick phase [s, device time], where one is seen
     direction: int | None  # +1 proximal to distal (along +x of the face frame), -1 back
-    direction_from: str | None  # "centre of pressure" or "tangential force"
+    direction_from: str | None  # "centre of pressure", "tangential force" or "decision"
     speed: float | None  # slope of the centre of pressure on time over the steady window [mm/s]
     speed_error: float | None  # its standard error [mm/s]
     mu_static: float | None  # height of the static peak [-]; None where none stands out
@@ -58,8 +58,11 @@ class Stroke:
     zero_drift: float | None  # how far the forces' zero moved from before the stroke to after it [N]
     flaws: tuple[str, ...]
     reasons: Mapping[str, str]  # for each number withheld, the flaw that forbids it
+    number: int = 1  # within its trial, or within a recording without trials, from 1
+    kept: bool = True  # False: a person left it out, and the model does not get it
+    decided: Mapping[str, str] = field(default_factory=dict[str, str])  # what a person decided, with who and why
     curve: StrokeCurve | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the stroke as plain data, without its curve."""
-        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "curve"}
+        return {column.name: getattr(self, column.name) for column in fields(self) if column.name != "curve"}

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from drivers.readings import ReadingBlock
+from sessions.decisions import DECISIONS, content_of
 from sessions.exports import ExportSource, Progress
 from sessions.exports.readings_text import MISSING, columns, read_rows, rows, write_rows
 from sessions.exports.tables import Column, Table, tables
@@ -30,6 +31,7 @@ from sessions.recording.whole_file import write_json
 VERSION = "1.10.0"
 BREAK = 1.0  # a longer silence of the transducer begins a new file [s]
 PIPELINE = "daq-app"
+SOURCE = "sourcedata"  # BIDS lets it hold anything
 _KNOWN = frozenset({"onset", "duration"})  # BIDS itself says what they are
 _MARK = Column("simulated", "", "1: transducer or subject were simulated", ())
 
@@ -51,12 +53,16 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     _write_table(beh / f"{names.stem}_events", _events(recording), recording, told | whole)
     if recording.info is not None:
         _write_readings(recording, beh, names, progress)
+    decided = content_of(recording.folder)
+    if decided:
+        (folder / SOURCE).mkdir()
+        (folder / SOURCE / DECISIONS).write_bytes(decided)
     derived = folder / "derivatives" / PIPELINE
     made = derived / names.subject / "beh"
     made.mkdir(parents=True)
     write_json(derived / "dataset_description.json", _dataset(recording, "derivative", source.analysis["made_by"]))
     (derived / "README.md").write_text(_readme(recording), encoding="utf-8")
-    for name in ("answers", "positions", "strokes", "friction", "flaws", "predictions"):
+    for name in ("answers", "positions", "strokes", "friction", "flaws", "decisions", "predictions"):
         if name in found:
             _write_table(made / f"{names.stem}_desc-{name}_beh", found[name], recording, task)
 
@@ -72,7 +78,9 @@ def read(path: Path) -> ExportedSession:
     places = {name: place for place, name in enumerate(header.split("\t"))}
     events = tuple(_event(line.split("\t"), places) for line in lines)
     parts = sorted(events_file.parent.glob("*_physio.tsv.gz"), key=lambda part: _start(part))
-    return ExportedSession("bids", path, head_of(told["DaqAppSession"]), events, lambda: _blocks(parts))
+    return ExportedSession(
+        "bids", path, head_of(told["DaqAppSession"]), events, lambda: _blocks(parts), content_of(path / SOURCE)
+    )
 
 
 class _Names:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TextIO
 
 from drivers.readings import ReadingBlock
+from sessions.decisions import DECISIONS, content_of
 from sessions.exports import ExportSource, Progress
 from sessions.exports.readings_text import columns, read_rows, rows, write_rows
 from sessions.exports.tables import Column, Table, tables
@@ -39,6 +40,9 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
         if document is not None:
             head = {"SIMULATED": recording.simulated_sentence} if recording.simulated_sentence else {}
             write_json(folder / name, {**head, **document})
+    decided = content_of(recording.folder)
+    if decided:
+        (folder / DECISIONS).write_bytes(decided)
     (folder / README).write_text(_readme(recording, told), encoding="utf-8")
 
 
@@ -46,7 +50,9 @@ def read(path: Path) -> ExportedSession:
     """Return the session that `write` put into the folder `path`. Raises OSError, ValueError."""
     told = json.loads((path / DESCRIPTION_FILE).read_text(encoding="utf-8"))
     events = tuple(_event(row) for row in _rows_of(path / EVENTS))
-    return ExportedSession("csv", path, head_of(told), events, lambda: _read_readings(path / READINGS))
+    return ExportedSession(
+        "csv", path, head_of(told), events, lambda: _read_readings(path / READINGS), content_of(path)
+    )
 
 
 def _events(recording: Recording) -> Table:

@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 
 from drivers.readings import ReadingBlock
+from sessions.decisions import content_of
 from sessions.exports import ExportSource, Progress
 from sessions.exports.tables import Column, tables
 from sessions.recording import LoggedEvent
@@ -23,6 +24,7 @@ from sessions.recording.schema import COLUMNS, FORMAT, FORMAT_VERSION, SEALED_FI
 from sessions.recording.sealed_copy import DataSet, texts, write_copy
 
 PART = 65_536  # readings at once
+DECIDED = "derived/decisions"
 IN_THE_COPY = "trials"  # the table that the sealed copy holds itself
 
 
@@ -33,6 +35,9 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
         if document is not None:
             text = json.dumps(document, allow_nan=False)
             more.append(DataSet(f"derived/{name}", texts([text]), "", f"{name}.json, made by the versions in made_by"))
+    decided = content_of(source.recording.folder).decode(errors="replace")
+    if decided:
+        more.append(DataSet(DECIDED, texts([decided]), "", "decisions.jsonl, what people decided about strokes"))
     write_copy(source.recording, folder / SEALED_FILE, more, progress)
 
 
@@ -49,12 +54,13 @@ def read(path: Path) -> ExportedSession:
             digest=None,  # the file's own check sums guard it
         )
         columns = [file[f"events/{name}"][...].tolist() for name in ("number", "time_ns", "trial", "readings")]
+        decided = _text(file[DECIDED][0]).encode() if DECIDED in file else b""
         kinds, data = (list(map(_text, file[f"events/{name}"][...])) for name in ("kind", "data"))
     events = tuple(
         LoggedEvent(number, time_ns, kind, trial or None, readings, json.loads(text))
         for number, time_ns, trial, readings, kind, text in zip(*columns, kinds, data, strict=True)
     )
-    return ExportedSession("hdf5", path, head, events, lambda: _blocks(path))
+    return ExportedSession("hdf5", path, head, events, lambda: _blocks(path), decided)
 
 
 def _blocks(path: Path) -> Iterator[ReadingBlock]:

@@ -62,6 +62,8 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
             "flaws", "what is wrong with the recording or with a stroke", [_named(f) for f in analysis["flaws"]], _FLAW
         ),
     )
+    if analysis.get("decisions"):
+        made = (*made, _of("decisions", "what people decided, in force", analysis["decisions"], _DECISION))
     if prediction is None:
         return made
     rows = [{key: value for key, value in row.items() if key != "solver"} for row in prediction["trials"]]
@@ -207,10 +209,14 @@ _STROKE = {
     "zero": ("", "where the zero of the forces came from"),
     "zero_drift": ("N", "how far the zero moved from before the stroke to after it"),
     "flaws": ("", "names of what is wrong with it"),
+    "number": ("", "of the stroke within its trial, from 1"),
+    "kept": ("", "false: a person left it out, and the model is not given it"),
+    "decided": ("", "what a person decided about it, who and why"),
     "reasons": ("", "for each number left out, why"),
 }
 _FRICTION = {
     "trial": ("", "number of the trial"),
+    "stroke": ("", "position of the stroke, from 0"),
     "mu": ("", "coefficient of friction the model is given"),
     "mu_interval": ("", "its confidence interval, where it is a mean"),
     "tau_max": ("MPa", "traction bound the model is given"),
@@ -226,6 +232,17 @@ _FLAW = {
     "grade": ("", "note, doubtful or refused"),
     "trial": ("", "number of the trial it belongs to"),
     "stroke": ("", "position of the stroke it belongs to, from 0"),
+}
+_DECISION = {
+    "number": ("", "of its line in decisions.jsonl"),
+    "made_utc": ("", "when"),
+    "by": ("", "who, a code"),
+    "why": ("", "the reason given"),
+    "what": ("", "what was decided"),
+    "trial": ("", "number of the trial"),
+    "stroke": ("", "number of the stroke within the trial, from 1; none: of the trial"),
+    "old": ("", "what stood there before"),
+    "new": ("", "what was decided for it"),
 }
 _ANSWER = {
     "trial": ("", "number of the trial"),

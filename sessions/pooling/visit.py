@@ -15,7 +15,7 @@ from sessions.prediction import PredictionOptions, SessionPrediction, predict
 from sessions.recording import Recording
 from sessions.recording.log import TrialRecord
 
-FORM = 3  # raised when a row holds something else: what was stored before is then computed anew
+FORM = 4  # raised when a row holds something else: what was stored before is then computed anew
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,12 +135,12 @@ def _row(
     told = {flaw.name: None for flaw in analysis.flaws if flaw.trial == trial.number and flaw.grade != "note"}
     flaws = tuple(str(name) for name in told)
     friction = next((one for one in analysis.friction if one.trial == trial.number), None)
-    stroke = next((one for one in analysis.strokes if one.trial == trial.number), None)
-    if friction is None or stroke is None:
-        missing = "No stroke was found in this trial." if prediction is not None else "The visit recorded no forces."
+    answer = None if prediction is None else next((p for p in prediction.trials if p.trial == trial.number), None)
+    if friction is None:
+        missing = "The visit recorded no forces." if answer is None else answer.reasons.get("sed", "")
         return replace(row, flaws=flaws, why=missing)
-    at = analysis.strokes.index(stroke)
-    intervals = stroke_intervals(stroke, at)
+    stroke = analysis.strokes[friction.stroke]
+    intervals = stroke_intervals(stroke, friction.stroke)
     low, high = (intervals.mu_max if friction.rule == "maximum" else intervals.mu_dynamic) or (None, None)
     row = replace(
         row,
@@ -155,7 +155,6 @@ def _row(
         normal_force=stroke.normal_force,
         flaws=flaws,
     )
-    answer = None if prediction is None else next((p for p in prediction.trials if p.trial == trial.number), None)
     if answer is None:
         return row
     return replace(

@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import Any, cast
 
 from drivers.readings import ReadingBlock
+from sessions.decisions import DECISIONS
 from sessions.recording.digests import Digest, different, digest_of
 from sessions.recording.head import info_from_dict, plan_from_dict
 from sessions.recording.log import LoggedEvent
 from sessions.recording.provenance import software_versions
 from sessions.recording.reader import Recording
 from sessions.recording.schema import FORMAT, FORMAT_VERSION
+from sessions.recording.whole_file import write_whole
 from sessions.recording.writer import SessionWriter
 
 
@@ -37,6 +39,7 @@ class ExportedSession:
     head: Head
     events: tuple[LoggedEvent, ...]
     blocks: Callable[[], Iterator[ReadingBlock]]  # the readings in their order, read when asked for
+    decisions: bytes = b""  # what people decided, as the file holds it
 
 
 def head_of(description: Mapping[str, Any]) -> Head:
@@ -93,6 +96,8 @@ def restore(exported: ExportedSession, folder: Path) -> tuple[str, ...]:
             writer.event("not_restored", data={"sentence": sentence}, commit=False)
     finally:
         writer.close()
+    if exported.decisions:
+        write_whole(folder / DECISIONS, exported.decisions)
     return tuple(found)
 
 

@@ -69,7 +69,7 @@ def findings(
         versions=tuple(Fact(name, version) for name, version in software_versions().items()),
         people=facts.people(recording, tables),
         apparatus=facts.apparatus(recording, analysis),
-        excluded=facts.excluded(recording, found, tables),
+        excluded=facts.excluded(recording, analysis, found, tables),
         flaws=flaws(analysis),
         experiments=experiments(recording.plan, tables, predicted_seds(predicted)),
         course=course(recording),

@@ -83,9 +83,12 @@ def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
     return tuple(fact for fact in facts if fact.value)
 
 
-def excluded(recording: Recording, strokes: Sequence[StrokeFinding], tables: Sequence[ScoreTable]) -> tuple[str, ...]:
+def excluded(
+    recording: Recording, analysis: Analysis, strokes: Sequence[StrokeFinding], tables: Sequence[ScoreTable]
+) -> tuple[str, ...]:
     """Return what does not enter the results, and why, a sentence each."""
     sentences = [f"Lost: {loss}." for loss in recording.losses]
+    sentences += [f"By {one.sentence}{'' if one.sentence.endswith('.') else '.'}" for one in analysis.decisions]
     sentences += [table.left_out for table in tables if table.left_out]
     for record in recording.trials:
         sentences += _trial(record)

@@ -18,7 +18,7 @@ from solver.solution import solve
 
 PLAN = plan(protocol("sensotact-friction"), "S01", 3, frame=Frame("-z", "set", 20.0, "set"))
 MU, NORMAL, AREA = 0.6, 2.0, PLAN.contact_area
-FRICTION = FrictionParameters(1, MU, None, MU * NORMAL / AREA, AREA, 20.0, 1, "maximum", ())
+FRICTION = FrictionParameters(1, 0, MU, None, MU * NORMAL / AREA, AREA, 20.0, 1, "maximum", ())
 NOTHING = (0.0,) * 6
 FRAME = Frame("-z", "set", 20.0, "set")
 

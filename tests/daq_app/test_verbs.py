@@ -279,3 +279,54 @@ def test_a_csv_that_cannot_be_taken_is_one_sentence_and_leaves_no_folder(text, c
     assert named in said
     assert said.count("\n") == 1
     assert not (tmp_path / "a").exists()
+
+
+def test_a_decision_is_recorded_listed_followed_by_every_verb_and_undone(session, capsys, tmp_path):
+    run(["analyse", str(session), "--json"])
+    before = printed(capsys)
+    older = (session / "analysis.json").read_bytes()
+    manifest = (session / "session.sqlite").read_bytes()
+    start, stop = before["strokes"][3]["steady"]
+    window = [str(start + 0.2), str(stop - 0.3)]
+    decide = ["decide", str(session), "--by", "E02", "--why", "a ramp", "--json"]
+    assert run([*decide, "--trial", "4", "--steady", *window]) == 0
+    assert printed(capsys)["decision"]["old"] == [start, stop]
+    assert run([*decide, "--trial", "7", "--drop"]) == 0
+    assert printed(capsys)["changes"] == ["stroke 1 of trial 7: the model does not get it"]
+    run(["analyse", str(session), "--json"])
+    after = printed(capsys)
+    assert after["strokes"][3]["steady"] == pytest.approx([start + 0.2, stop - 0.3], abs=0.006)
+    assert [row["trial"] for row in after["friction"]] == [1, 2, 3, 4, 5, 6, 8, 9, 10]
+    assert [row["stroke"] for row in after["friction"]] == [0, 1, 2, 3, 4, 5, 7, 8, 9]
+    assert run(["verify", str(session), "--json"]) == 0
+    assert "decisions.jsonl" in printed(capsys)["checked"]
+    assert run(["export", str(session), "--format", "csv", "--out", str(tmp_path / "csv"), "--json"]) == 0
+    capsys.readouterr()
+    assert "a ramp" in (tmp_path / "csv" / "decisions.csv").read_text()
+    (session / "analysis.json").write_bytes(older)
+    assert run(["verify", str(session), "--json"]) == 3
+    assert any("analysis.json was made under other decisions" in problem for problem in printed(capsys)["problems"])
+    for number in ("1", "2"):
+        assert run([*decide, "--undo", number]) == 0
+        capsys.readouterr()
+    assert run(["decide", str(session), "--list", "--json"]) == 0
+    assert [line["in_force"] for line in printed(capsys)["decisions"]] == [False] * 4
+    run(["analyse", str(session), "--json"])
+    assert printed(capsys)["strokes"] == before["strokes"]
+    assert (session / "session.sqlite").read_bytes() == manifest
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "sentence"),
+    [
+        (["--trial", "4", "--drop", "--by", "E02"], 2, "give --by CODE and --why REASON"),
+        (["--trial", "4", "--steady", "900", "901", "--by", "E02", "--why", "w"], 2, "too few readings"),
+        (["--trial", "44", "--drop", "--by", "E02", "--why", "w"], 2, "there is no stroke 1 of trial 44"),
+        (["--undo", "9", "--by", "E02", "--why", "w"], 2, "nothing to undo"),
+        (["--trial", "4", "--drop", "--by", "Ada Lovelace", "--why", "w"], 1, "never a name"),
+    ],
+)
+def test_a_decision_that_cannot_be_is_refused_in_one_sentence(recorded, capsys, words, code, sentence):
+    assert run(["decide", str(recorded), *words]) == code
+    assert sentence in capsys.readouterr().err
+    assert not (recorded / "decisions.jsonl").exists()

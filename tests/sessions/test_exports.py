@@ -20,6 +20,7 @@ from test_runner import Session
 
 from drivers.readings import ReadingBlock
 from sessions.analysis import analyse
+from sessions.decisions import Decision, append, content_of
 from sessions.exports import FORMATS, ExportError, ExportSource, export
 from sessions.exports.tables import tables
 from sessions.import_csv import ImportRefused, import_csv
@@ -82,6 +83,8 @@ def sources(tmp_path_factory):
     for name, make in MADE.items():
         make(room / name)
         recording = Recording.open(room / name)
+        if name == "whole":
+            append(recording, Decision("E02", "seen", "kept", 1, 1, None, new=True))
         analysis = {"made_by": software_versions(), **analyse(recording).to_dict()}
         prediction = {"trials": [{"trial": 1, "sed": 0.009, "stimulus": {"index": 80}, "solver": {"dofs": 9}}]}
         found[name] = ExportSource(recording, analysis, prediction if name == "whole" else None)
@@ -154,6 +157,7 @@ def test_an_exported_session_comes_back_whole(sources, exports, tmp_path, form, 
         assert replace(again.info, calibration=recorded.info.calibration) == recorded.info
     assert set(recorded.losses) <= set(again.losses)
     assert made.readings == len(recorded.readings())
+    assert content_of(again.folder) == content_of(recorded.folder)
     assert [analyse(again).to_dict()[part] for part in ("strokes", "friction")] == [
         analyse(recorded).to_dict()[part] for part in ("strokes", "friction")
     ]

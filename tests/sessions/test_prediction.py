@@ -41,12 +41,13 @@ MEASURED = 2.5  # N
 
 def stroke(trial, **known):
     empty = dict.fromkeys(Stroke.__dataclass_fields__)
-    told = {"trial": trial, "readings": 100, "zero": "before contact", "flaws": (), "reasons": {}}
+    told = {"trial": trial, "readings": 100, "zero": "before contact", "flaws": (), "reasons": {}, "number": 1}
+    told |= {"kept": True, "decided": {}}
     return Stroke(**(empty | told | {"normal_force": MEASURED, "tangential_force": 1.2} | known))
 
 
 def parameters(trial, mu, tau_max, direction, speed=20.0, flaws=()):
-    return FrictionParameters(trial, mu, None, tau_max, 100.0, speed, direction, "maximum", flaws)
+    return FrictionParameters(trial, trial - 1, mu, None, tau_max, 100.0, speed, direction, "maximum", flaws)
 
 
 def analysis(friction, strokes):

@@ -1,0 +1,321 @@
+"""What people decided about a session's strokes: a file beside the recording that only grows.
+
+Readings stay as they are. A decision sets one thing of one stroke (or of a trial, or of the session), says who decided
+it, when and why, and what stood there before; undoing it is a line of its own. What is in force follows from all lines.
+"""
+
+import json
+import os
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from sessions.recording.errors import RecordingError
+from sessions.recording.head import json_text
+
+if TYPE_CHECKING:
+    from sessions.recording.reader import Recording
+
+DECISIONS = "decisions.jsonl"  # in a session's folder
+
+Span = tuple[float, float]
+Value = float | int | bool | Span | None
+
+# What can be decided, and what its value is. Times are on the device's clock.
+OF_STROKE: Mapping[str, str] = {
+    "onset": "an instant [s]",
+    "lift": "an instant [s]",
+    "steady": "two instants [s]: where the mean of T/N and the speed are taken",
+    "stick": "two instants [s]: the stick phase, whose greatest T/N is mu_static and whose end the break-away",
+    "direction": "1 (proximal to distal) or -1 (distal to proximal)",
+    "kept": "true, or false where the stroke is left out",
+}
+OF_TRIAL: Mapping[str, str] = {"choice": "the number of the stroke that the model gets, from 1"}
+
+
+class DecisionError(ValueError):
+    """A decision that cannot be: which, and what is allowed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """One line. Either it sets `what` of a stroke to `new`, or it undoes the line `undoes`."""
+
+    by: str  # a code, never a name
+    why: str
+    what: str = ""  # a name of OF_STROKE or OF_TRIAL; "" where a line is undone
+    trial: int | None = None  # None: of a recording without trials
+    stroke: int | None = None  # its number within the trial, from 1; None: of the trial
+    old: Value = None  # what stood there before
+    new: Value = None
+    undoes: int | None = None  # number of a line
+    number: int = 0  # from 1; 0 until it is recorded
+    made_utc: str = ""
+
+    @property
+    def place(self) -> tuple[int | None, int | None, str]:
+        """What it sets: of two in force for one place the later one acts."""
+        return self.trial, self.stroke, self.what
+
+    @property
+    def of(self) -> str:
+        """Where it belongs, for people.
+
+        >>> Decision("E02", "", "kept", trial=3, stroke=1).of
+        'stroke 1 of trial 3'
+        """
+        trial = "the recording" if self.trial is None else f"trial {self.trial}"
+        return trial if self.stroke is None else f"stroke {self.stroke} of {trial}"
+
+    @property
+    def sentence(self) -> str:
+        """The decision, for people.
+
+        >>> Decision("E02", "a ramp", "steady", 3, 1, (1.0, 2.0), (1.2, 2.0), number=4).sentence
+        'decision 4 by E02: steady of stroke 1 of trial 3 is 1.2 to 2 (it was 1 to 2): a ramp'
+        """
+        head = f"decision {self.number} by {self.by}: "
+        if self.undoes is not None:
+            return f"{head}decision {self.undoes} is undone: {self.why}"
+        if self.what == "kept":
+            return f"{head}{self.of} is {'kept' if self.new else 'left out'}: {self.why}"
+        return f"{head}{self.what} of {self.of} is {told(self.new)} (it was {told(self.old)}): {self.why}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data, as its line holds it."""
+        document = asdict(self)
+        head = {name: document.pop(name) for name in ("number", "made_utc", "by", "why")}
+        undoes = document.pop("undoes")
+        return {**head, "undoes": undoes} if undoes is not None else {**head, **document}
+
+
+def told(value: Value) -> str:
+    """Return a value for people."""
+    if isinstance(value, tuple):
+        return " to ".join(f"{part:.6g}" for part in value)
+    return "not known" if value is None else f"{value:.6g}"
+
+
+@dataclass(frozen=True, slots=True)
+class Decided:
+    """What is in force of one stroke."""
+
+    of: Mapping[str, Decision]  # by what
+
+    def instant(self, what: str) -> float | None:
+        """Return an instant [s] that was decided."""
+        found = self.of.get(what)
+        return None if found is None else float(cast("float", found.new))
+
+    def span(self, what: str) -> Span | None:
+        """Return two instants [s] that were decided."""
+        found = self.of.get(what)
+        return None if found is None else cast("Span", found.new)
+
+    @property
+    def direction(self) -> int | None:
+        """Return the direction that was decided."""
+        return None if "direction" not in self.of else cast("int", self.of["direction"].new)
+
+    @property
+    def kept(self) -> bool:
+        """Say whether the stroke stays in: so unless it was decided otherwise."""
+        return "kept" not in self.of or bool(self.of["kept"].new)
+
+    @property
+    def sentences(self) -> dict[str, str]:
+        """Return for each thing decided who decided it, and why."""
+        return {what: decision.sentence for what, decision in self.of.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Decisions:
+    """Every line of a session's file, in order, and what is wrong with the file."""
+
+    lines: tuple[Decision, ...] = ()
+    problems: tuple[str, ...] = ()
+
+    @property
+    def in_force(self) -> tuple[Decision, ...]:
+        """Return the decisions that act, by number: neither undone nor set anew since.
+
+        What undoes a line may be undone itself; the line is then in force again.
+        """
+        acting: dict[tuple[int | None, int | None, str], Decision] = {}
+        for decision in self.standing:
+            if decision.undoes is None:
+                acting[decision.place] = decision
+        return tuple(sorted(acting.values(), key=lambda decision: decision.number))
+
+    @property
+    def standing(self) -> tuple[Decision, ...]:
+        """Return the lines that are not undone, in order."""
+        undone: set[int] = set()
+        kept: list[Decision] = []
+        for decision in reversed(self.lines):  # whatever undoes a line comes after it
+            if decision.number not in undone:
+                kept.append(decision)
+                if decision.undoes is not None:
+                    undone.add(decision.undoes)
+        return tuple(reversed(kept))
+
+    def of_stroke(self, trial: int | None, stroke: int) -> Decided:
+        """Return what is in force of a stroke, its number counted within the trial from 1."""
+        found = [one for one in self.in_force if (one.trial, one.stroke) == (trial, stroke)]
+        return Decided({decision.what: decision for decision in found})
+
+    def choice(self, trial: int | None) -> Decision | None:
+        """Return the decision which stroke of a trial the model gets, None where nobody decided."""
+        found = (one for one in self.in_force if one.trial == trial and one.what == "choice")
+        return next(found, None)
+
+    def with_line(self, decision: Decision) -> "Decisions":
+        """Return them with one more that is not recorded, as to see what it would do.
+
+        Raises DecisionError where it cannot be.
+        """
+        _check(decision, self)
+        numbered = replace(decision, number=self._next)
+        return replace(self, lines=(*self.lines, numbered))
+
+    @property
+    def _next(self) -> int:
+        return max((line.number for line in self.lines), default=0) + 1
+
+
+def read(folder: Path) -> Decisions:
+    """Return the decisions kept in a session's folder, none where there is no file.
+
+    A line that is torn or damaged is left out and named. Raises RecordingError where the file cannot be read.
+    """
+    return parsed(content_of(folder))
+
+
+def content_of(folder: Path) -> bytes:
+    """Return the bytes of the file, none where there is no file. Raises RecordingError where it cannot be read."""
+    path = folder / DECISIONS
+    try:
+        return path.read_bytes() if path.is_file() else b""
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read ({error.strerror}); permit reading, or copy the folder") from error
+
+
+def parsed(content: bytes) -> Decisions:
+    """Return the decisions in the bytes of a file."""
+    lines: list[Decision] = []
+    problems: list[str] = []
+    *whole, rest = content.split(b"\n")
+    for place, line in enumerate(whole, 1):
+        found = _decision(line)
+        if isinstance(found, str):
+            problems.append(f"line {place} of {DECISIONS} is left out: {found}")
+        elif found is not None and lines and found.number <= lines[-1].number:
+            problems.append(f"line {place} of {DECISIONS} is left out: its number, {found.number}, comes before it")
+        elif found is not None:
+            lines.append(found)
+    if rest:
+        problems.append(f"the last line of {DECISIONS} is torn and left out: it was never acknowledged, or was cut off")
+    missing = sorted({*range(1, max((line.number for line in lines), default=0))} - {line.number for line in lines})
+    if missing and not problems:
+        problems.append(f"{DECISIONS} lacks decision {', '.join(map(str, missing))}: lines were removed")
+    return Decisions(tuple(lines), tuple(problems))
+
+
+def append(recording: "Recording", decision: Decision) -> Decision:
+    """Record a decision, or that one is undone; return it with its number and date, safe on the disk.
+
+    Raises DecisionError where it cannot be, RecordingError where it cannot be written.
+    """
+    path = recording.folder / DECISIONS
+    content = content_of(recording.folder)
+    before = parsed(content)
+    _check(decision, before)
+    try:
+        torn = bool(content) and not content.endswith(b"\n")
+        number = max(before.with_line(decision).lines[-1].number, content.count(b"\n") + torn + 1)
+        made = replace(decision, number=number, made_utc=datetime.now(UTC).isoformat(timespec="seconds"))
+        ending = b"\n" if torn else b""  # a torn line stays, as a line of its own
+        with path.open("ab") as file:
+            file.write(ending + _line(made, recording.simulated_sentence))
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be written ({error.strerror}); free space or permit writing") from error
+    return made
+
+
+def _line(decision: Decision, simulated: str | None) -> bytes:
+    """Return a line: compact JSON whose last name, crc32, is that of the JSON text without it."""
+    head: dict[str, Any] = {"SIMULATED": simulated} if simulated else {}
+    text = json_text({**head, **decision.to_dict()})
+    return f'{text[:-1]},"crc32":{zlib.crc32(text.encode())}}}\n'.encode()
+
+
+def _decision(line: bytes) -> Decision | str | None:
+    """Return the decision in a line, or what is wrong with it; None for an empty one."""
+    if not line.strip():
+        return None
+    try:
+        document = json.loads(line)
+        crc = document.pop("crc32")
+        if zlib.crc32(json_text(document).encode()) != crc:
+            return "its CRC-32 is not that of its text, which was changed or damaged"
+        document.pop("SIMULATED", None)
+        for name in ("old", "new"):
+            if isinstance(document.get(name), list):
+                document[name] = tuple(document[name])
+        return Decision(**document)
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return "it holds no decision"
+
+
+def _check(decision: Decision, before: Decisions) -> None:
+    """Raise DecisionError unless a decision can be recorded after those before it."""
+    if not decision.by.strip() or not decision.why.strip():
+        raise DecisionError("a decision says who decides and why: give both")
+    if decision.undoes is not None:
+        if decision.undoes not in {line.number for line in before.standing}:
+            raise DecisionError(f"decision {decision.undoes} is not in force: there is nothing to undo")
+        return
+    allowed = OF_TRIAL if decision.stroke is None else OF_STROKE
+    if decision.stroke is None and decision.trial is None:
+        raise DecisionError("a recording without trials gives the model every stroke: decide about one of them")
+    if decision.what not in allowed:
+        raise DecisionError(f"nobody decides {decision.what!r} of {decision.of}: give one of {', '.join(allowed)}")
+    if not _FITS[decision.what](decision.new):
+        raise DecisionError(f"{decision.what} of {decision.of} cannot be {decision.new!r}: {allowed[decision.what]}")
+
+
+def _number(value: object) -> bool:
+    return isinstance(value, float | int) and not isinstance(value, bool) and -1e9 < value < 1e9
+
+
+def _span(value: object) -> bool:
+    parts = cast("Sequence[object]", value) if isinstance(value, tuple) else ()
+    return len(parts) == 2 and all(map(_number, parts)) and cast("float", parts[0]) < cast("float", parts[1])
+
+
+def _count(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 1
+
+
+def _way(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and abs(value) == 1
+
+
+def _flag(value: object) -> bool:
+    return isinstance(value, bool)
+
+
+_FITS: Mapping[str, Callable[[object], bool]] = {
+    "onset": _number,
+    "lift": _number,
+    "steady": _span,
+    "stick": _span,
+    "direction": _way,
+    "kept": _flag,
+    "choice": _count,
+}

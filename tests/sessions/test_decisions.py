@@ -1,0 +1,275 @@
+"""What people decided about strokes: kept in a file that only grows, and what it does to the numbers."""
+
+import json
+import tempfile
+import zlib
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_strokes import INFO, SETTINGS, block, felt, plan, stroke, times, trapezium, trial, wrench
+from recordings import ended
+
+from sessions.analysis.analysis import analyse_blocks
+from sessions.analysis.decided import with_old
+from sessions.decisions import DECISIONS, Decision, DecisionError, Decisions, append, parsed, read
+from sessions.plan import Frame
+from sessions.recording import Recording
+from sessions.recording.archive import problems, seal
+
+WINDOW = Decision("E02", "the ramp was in it", "steady", 1, 1, (1.1, 2.9), (1.5, 2.5))
+
+
+@pytest.fixture(scope="module")
+def sealed(tmp_path_factory):
+    """A sealed recording, for tests that write to its decisions alone."""
+    folder = ended(tmp_path_factory.mktemp("decided") / "S01")
+    seal(folder)
+    return Recording.open(folder)
+
+
+@pytest.fixture
+def recording(sealed):
+    (sealed.folder / DECISIONS).unlink(missing_ok=True)
+    return sealed
+
+
+def lines(recording):
+    return (recording.folder / DECISIONS).read_bytes()
+
+
+def test_a_decision_is_a_line_with_who_when_why_and_what_stood_before(recording):
+    made = append(recording, WINDOW)
+    document = json.loads(lines(recording))
+    told = {"by": "E02", "why": "the ramp was in it", "what": "steady", "trial": 1, "stroke": 1}
+    assert told.items() <= document.items()
+    assert (document["old"], document["new"], document["number"]) == ([1.1, 2.9], [1.5, 2.5], 1)
+    assert document["made_utc"] == made.made_utc > "2026"
+    assert read(recording.folder).in_force == (made,)
+
+
+def test_the_check_sum_is_that_of_the_text_before_it(recording):
+    append(recording, WINDOW)
+    text, crc = lines(recording).decode().rstrip("\n").split(',"crc32":')
+    assert zlib.crc32(f"{text}}}".encode()) == int(crc.rstrip("}"))
+
+
+def test_deciding_leaves_a_sealed_session_as_it_was(recording):
+    before = {path.name: path.read_bytes() for path in recording.folder.iterdir()}
+    append(recording, WINDOW)
+    after = {path.name: path.read_bytes() for path in recording.folder.iterdir()}
+    assert {name: after[name] for name in before} == before
+    assert set(after) - set(before) == {DECISIONS}
+    assert problems(recording.folder) == ()
+
+
+def test_every_line_of_a_simulated_session_says_so(recording):
+    append(replace(recording, simulated_sentence="SIMULATED: all"), WINDOW)
+    assert lines(recording).startswith(b'{"SIMULATED":"SIMULATED: all"')
+    assert read(recording.folder).in_force[0].new == WINDOW.new
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"by": " "}, "says who decides and why"),
+        ({"why": ""}, "says who decides and why"),
+        ({"what": "mood"}, "give one of onset, lift"),
+        ({"new": (2.0, 1.0)}, "cannot be"),
+        ({"new": (1.0, float("nan"))}, "cannot be"),
+        ({"what": "direction", "new": 2}, "cannot be"),
+        ({"what": "kept", "new": 1}, "cannot be"),
+        ({"what": "choice", "stroke": None, "new": 0}, "cannot be"),
+        ({"trial": None, "stroke": None}, "gives the model every stroke"),
+        ({"undoes": 1}, "nothing to undo"),
+    ],
+)
+def test_what_cannot_be_decided_is_refused_in_a_sentence_and_leaves_no_line(recording, changes, sentence):
+    with pytest.raises(DecisionError, match=sentence):
+        append(recording, replace(WINDOW, **changes))
+    assert not (recording.folder / DECISIONS).exists()
+
+
+def test_a_torn_last_line_is_named_and_what_came_before_holds(recording):
+    first = append(recording, WINDOW)
+    append(recording, replace(WINDOW, new=(1.6, 2.6)))
+    whole = lines(recording)
+    (recording.folder / DECISIONS).write_bytes(whole[:-9])
+    found = read(recording.folder)
+    assert found.in_force == (first,)
+    assert "torn" in found.problems[0]
+    third = append(recording, replace(WINDOW, new=(1.7, 2.7)))
+    assert third.number == 3  # the torn line keeps its place
+    assert read(recording.folder).in_force == (third,)
+    assert "line 2" in read(recording.folder).problems[0]
+
+
+def test_a_line_that_was_changed_or_taken_away_is_named(recording):
+    for end in (2.5, 2.6, 2.7):
+        append(recording, replace(WINDOW, new=(1.5, end)))
+    whole = lines(recording)
+    changed = parsed(whole.replace(b"2.6]", b"2.4]"))
+    assert "CRC-32" in changed.problems[0]
+    assert [line.number for line in changed.lines] == [1, 3]
+    first, _, third = whole.splitlines(keepends=True)
+    assert "lacks decision 2" in parsed(first + third).problems[0]
+    assert "comes before" in parsed(third + first).problems[0]
+
+
+# Undoing: every step is either a decision about one of two strokes, or undoes one of the lines before it.
+STEPS = st.lists(
+    st.one_of(
+        st.tuples(st.just("set"), st.integers(1, 2), st.integers(1, 9)),
+        st.tuples(st.just("undo"), st.integers(1, 12), st.just(0)),
+    ),
+    max_size=12,
+)
+
+
+def worked_out(steps):
+    """What is in force of each stroke, by asking of each line anew: who undoes it, and who undoes that?"""
+
+    def alive(number):
+        return not any(kind == "undo" and target == number and alive(n) for n, (kind, target, _) in all_lines[number:])
+
+    all_lines = list(enumerate(steps, 1))
+    standing = {}
+    for number, (kind, target, value) in all_lines:
+        if kind == "set" and alive(number):
+            standing[target] = float(value)
+    return standing
+
+
+@settings(max_examples=30, deadline=None)
+@given(steps=STEPS, cut=st.integers(0, 10_000))
+def test_what_is_in_force_follows_from_the_lines_whatever_the_order_of_deciding_undoing_and_a_crash(sealed, steps, cut):
+    with tempfile.TemporaryDirectory() as room:
+        recording = replace(sealed, folder=Path(room))
+        path = Path(room) / DECISIONS
+        done, content = [], b""
+        for kind, target, value in steps:
+            undo = Decision("E02", "w", undoes=target)
+            decision = undo if kind == "undo" else Decision("E02", "w", "onset", 1, target, None, float(value))
+            try:
+                append(recording, decision)
+            except DecisionError:
+                assert path.is_file() == bool(content)
+                continue  # what is not in force cannot be undone
+            done.append((kind, target, value))
+            grown = path.read_bytes()
+            assert grown.startswith(content)  # nothing that was written is altered
+            content = grown
+            assert {one.stroke: one.new for one in read(Path(room)).in_force} == worked_out(done)
+        torn = content[: cut % (len(content) + 1)]
+        found = parsed(torn)
+        assert {one.stroke: one.new for one in found.in_force} == worked_out(done[: torn.count(b"\n")])
+        assert bool(found.problems) == (torn != b"" and not torn.endswith(b"\n"))
+
+
+# What decisions do
+
+
+T = times()
+SLOW = stroke(T, mu=0.5)  # touches at 1 s, lifts at 3 s, 25 mm/s, 2 N
+
+
+def decided(*decisions, raw=None, t=T, of=True):
+    lines = tuple(replace(one, number=at) for at, one in enumerate(decisions, 1))
+    one = trial() if of else None
+    frame = Frame("-z", "set", 12.0, "set")
+    readings = block(t, felt(SLOW) if raw is None else raw)
+    parts = [(one, readings)]
+    return analyse_blocks(parts, plan([one] if one else [], frame), INFO, SETTINGS, (), Decisions(lines))
+
+
+def rising():
+    """A stroke whose T/N is 0.4 until 2 s and 0.5 after it."""
+    n = trapezium(T, 1.0, 3.0, 0.1, 2.0)
+    return felt(wrench(T, n, 0.4 + 0.1 * (T > 2.0), 25.0 * (T - 2.0)))
+
+
+@pytest.mark.parametrize(("window", "mu"), [((1.3, 1.9), 0.4), ((2.1, 2.8), 0.5)])
+def test_mu_and_speed_are_those_of_the_window_decided(window, mu):
+    found = decided(replace(WINDOW, new=window), raw=rising())
+    (one,) = found.strokes
+    assert one.mu_dynamic == pytest.approx(mu, rel=0.005)
+    assert one.speed == pytest.approx(25.0, rel=0.03)
+    assert one.steady == pytest.approx(window, abs=0.006)
+    assert found.friction[0].mu == one.mu_dynamic
+    assert "the ramp was in it" in one.decided["steady"]
+
+
+def test_a_window_decided_where_nothing_slides_gives_its_numbers_with_the_flaw():
+    held = felt(wrench(T, trapezium(T, 1.0, 3.0, 0.1, 2.0), 0.3 + 0.0 * T, 0.0 * T))
+    assert decided(raw=held).strokes[0].mu_dynamic is None
+    found = decided(WINDOW, raw=held)
+    assert found.strokes[0].mu_dynamic == pytest.approx(0.3, rel=0.01)
+    doubted = [flaw for flaw in found.flaws if flaw.name == "no_steady_sliding"]
+    assert [flaw.grade for flaw in doubted] == ["doubtful"]
+
+
+def test_a_window_decided_where_nothing_touches_gives_no_number_and_says_so():
+    found = decided(replace(WINDOW, new=(3.2, 3.6)))
+    assert found.strokes[0].mu_dynamic is None
+    assert found.strokes[0].reasons["mu_dynamic"] == "decision"
+
+
+def test_the_stick_phase_decided_gives_static_friction_and_break_away():
+    n = trapezium(T, 1.0, 3.0, 0.1, 2.0)
+    bump = 0.5 + 0.03 * (abs(T - 1.4) < 0.1)  # too low to stand out by itself
+    raw = felt(wrench(T, n, bump, 25.0 * (T - 2.0)))
+    found = decided(Decision("E02", "seen", "stick", 1, 1, None, (1.1, 1.6)), raw=raw)
+    (one,) = found.strokes
+    assert one.mu_static == pytest.approx(0.53, rel=0.01)
+    assert one.break_away == 1.6
+    assert "mu_static" not in one.reasons
+
+
+def test_onset_lift_and_direction_are_those_decided():
+    ends = [Decision("E02", "w", "onset", 1, 1, None, 0.9), Decision("E02", "w", "lift", 1, 1, None, 2.7)]
+    (one,) = decided(*ends, Decision("E02", "w", "direction", 1, 1, 1, -1)).strokes
+    assert (one.onset, one.lift, one.direction, one.direction_from) == (0.9, 2.7, -1, "decision")
+    assert one.mu_dynamic == pytest.approx(0.5, rel=0.005)
+    assert one.steady[1] < 2.7
+
+
+def test_a_stroke_left_out_is_shown_with_its_numbers_and_the_model_gets_none():
+    found = decided(Decision("E02", "talked", "kept", 1, 1, True, new=False))
+    (one,) = found.strokes
+    assert one.mu_dynamic == pytest.approx(0.5, rel=0.005)
+    assert not one.kept
+    assert found.friction == ()
+    again = decided(Decision("E02", "talked", "kept", 1, 1, True, new=False), Decision("E03", "fine", undoes=1))
+    assert len(again.friction) == 1
+
+
+def test_the_model_gets_the_stroke_decided_and_never_one_that_was_left_out():
+    t = times(8.0)
+    both = felt(stroke(t, mu=0.4, begin=1.0, end=3.0) + stroke(t, mu=0.6, begin=5.0, end=7.0))
+    choose = Decision("E02", "w", "choice", 1, None, 1, 2)
+    drop = Decision("E02", "w", "kept", 1, 2, True, new=False)
+    assert decided(raw=both, t=t).friction[0].mu == pytest.approx(0.4, rel=0.01)
+    chosen = decided(choose, raw=both, t=t)
+    assert chosen.friction[0].mu == pytest.approx(0.6, rel=0.01)
+    assert chosen.friction[0].stroke == 1
+    assert any("gets the one numbered 2" in flaw.sentence for flaw in chosen.flaws)
+    left = decided(choose, drop, raw=both, t=t)
+    assert left.friction[0].mu == pytest.approx(0.4, rel=0.01)
+    assert any(flaw.name == "decision" and "left out" in flaw.sentence for flaw in left.flaws)
+
+
+def test_a_decision_about_no_stroke_that_is_there_is_named():
+    found = decided(replace(WINDOW, stroke=4), Decision("E02", "w", "lift", 9, 1, None, 2.0))
+    assert [flaw.name for flaw in found.flaws] == ["decision", "decision"]
+    with pytest.raises(DecisionError, match="there is no stroke 4 of trial 1: it has 1"):
+        with_old(found, replace(WINDOW, stroke=4))
+
+
+def test_a_decision_is_told_what_stands_before_it():
+    found = decided()
+    (one,) = found.strokes
+    assert with_old(found, replace(WINDOW, old=None)).old == one.steady
+    assert with_old(found, Decision("E02", "w", "choice", 1, None, None, 1)).old == 1
+    assert with_old(found, Decision("E02", "w", "kept", 1, 1, None, new=False)).old is True
