@@ -123,10 +123,9 @@ def _settings(cut_off: str, window: str) -> AnalysisSettings:
 
 def _varied(analysis: Analysis, path: Path, usual: Mapping[int | None, FrictionParameters]) -> Analysis:
     """Return the analysis with the friction that a path gives each trial."""
-    first = {stroke.trial: stroke for stroke in reversed(analysis.strokes)}
     friction: list[FrictionParameters] = []
     for one in analysis.friction:
-        stroke = first[one.trial]
+        stroke = analysis.strokes[one.stroke]
         area = AREAS[path.area](stroke)
         mu = stroke.mu_max if path.mu == "maximum" else stroke.mu_dynamic
         tau_max = None if stroke.tau_max is None or not area else stroke.tau_max / area

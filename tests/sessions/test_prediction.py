@@ -47,7 +47,8 @@ def stroke(trial, **known):
 
 
 def parameters(trial, mu, tau_max, direction, speed=20.0, flaws=()):
-    return FrictionParameters(trial, trial - 1, mu, None, tau_max, 100.0, speed, direction, "maximum", flaws)
+    at = 0 if trial is None else trial - 1
+    return FrictionParameters(trial, at, mu, None, tau_max, 100.0, speed, direction, "maximum", flaws)
 
 
 def analysis(friction, strokes):
