@@ -87,7 +87,7 @@ def _session(options: argparse.Namespace) -> None:
     window = start.opened(application)
     window.resize(*map(int, options.size.split("x")))
     window.show()
-    _until(lambda: window.bridge.state.bench.link == "open" and bool(window.live.plots))
+    _until(lambda: window.bridge.state.bench.link == "open")
     window.live.show_seconds(options.shown)
     last, own = time.perf_counter(), time.thread_time()
 

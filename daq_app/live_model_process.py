@@ -78,15 +78,21 @@ class LiveModel:
             self._process.terminate()
         self._process = self._connection = None
 
-    def follow(self, plan: SessionPlan | None, kinematics: Kinematics | None = None) -> None:
-        """Follow the finger of another plan, or in another kinematics."""
+    def follow(self, plan: SessionPlan | None) -> None:
+        """Follow the finger of another plan."""
         self._plan = plan
-        self._kinematics = kinematics or self._kinematics
         self.settled = None
         if self._process is None and self.problem:
             self.prepare()  # one that has ended gets another chance with the next session
         elif self._process is not None:
             self._use()
+
+    def follow_at(self, kinematics: Kinematics) -> None:
+        """Follow the same finger in this kinematics."""
+        if kinematics != self._kinematics:
+            self._kinematics = kinematics
+            if self._process is not None:
+                self._use()
 
     @property
     def kinematics(self) -> Kinematics:

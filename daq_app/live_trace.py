@@ -1,6 +1,6 @@
 """The last minute of readings, kept for drawing: a ring, and the least and greatest in each column of pixels."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,15 +27,16 @@ class Columns:
 class LiveTrace:
     """A ring of readings. The only thing here that changes; nothing is recorded from it."""
 
-    def __init__(self, rate: float, longest: float = LONGEST) -> None:
-        """Keep `longest` seconds of readings at `rate` [Hz]."""
+    def __init__(self, rate: float, channels: int = len(CHANNELS), gap: float | None = None) -> None:
+        """Keep `LONGEST` seconds of readings at `rate` [Hz]; times further apart than `gap` [s] have a gap between."""
         self.rate = rate if np.isfinite(rate) and rate > 0 else 1000.0
-        self._capacity = int(self.rate * longest * 1.05) + 16
+        self._gap = GAP / self.rate if gap is None else gap
+        self._capacity = int(self.rate * LONGEST * 1.05) + 16
         self._time = np.full(2 * self._capacity, np.nan)
-        self._values = np.full((len(CHANNELS), 2 * self._capacity), np.nan, np.float32)
+        self._values = np.full((channels, 2 * self._capacity), np.nan, np.float32)
         self._end = 0  # one behind the newest; the ring is written from left to right and moved when full
         self._start = 0
-        self._made = _Made(0.0, 0.0)
+        self._made = self._none_made()
 
     def add(self, time: Array, values: Array) -> None:
         """Take readings: time (n,) [s, device time, rising] and values (channels, n)."""
@@ -61,12 +62,16 @@ class LiveTrace:
     def clear(self) -> None:
         """Forget every reading, as at a new connection."""
         self._start = self._end = 0
-        self._made = _Made(0.0, 0.0)
+        self._made = self._none_made()
 
-    def between(self, first: float, last: float) -> tuple[Array, Array]:
-        """Return time (n,) [s] and values (channels, n) of the readings from `first` to `last` [s]."""
+    def between(self, first: float, last: float, every: int = 1) -> tuple[Array, Array]:
+        """Return time (n,) [s] and values (channels, n) of the readings from `first` to `last` [s], or of each `every`.
+
+        The newest is always one of them.
+        """
         a, b = self._positions(first, last)
-        return self._time[a:b], self._values[:, a:b].astype(np.float64)
+        at = slice(a + (b - a - 1) % every if b > a else a, b, every)
+        return self._time[at], self._values[:, at].astype(np.float64)
 
     def columns(self, first: float, last: float, count: int) -> Columns:
         """Return about `count` columns of the readings from `first` to `last` [s]; few readings one by one.
@@ -76,13 +81,16 @@ class LiveTrace:
         """
         a, b = self._positions(first, last)
         if b - a <= 2 * count:
-            return _one_by_one(self._time[a:b], self._values[:, a:b], self.rate)
+            return _one_by_one(self._time[a:b], self._values[:, a:b], self._gap)
         width = (last - first) / count
         if self._made.width != width or self._made.first > first:
-            self._made = _Made(width, first)
+            self._made = self._none_made(width, first)
         begin, _ = self._positions(self._made.open_from, last)
         self._made = self._made.onward(self._time[begin:b], self._values[:, begin:b], first)
-        return self._made.drawn(self.rate)
+        return self._made.drawn(self._gap)
+
+    def _none_made(self, width: float = 0.0, first: float = 0.0) -> "_Made":
+        return _Made(width, first, np.empty(0, np.int64), np.empty((len(self._values), 0), np.float32))
 
     def _positions(self, first: float, last: float) -> tuple[int, int]:
         kept = self._time[self._start : self._end]
@@ -96,8 +104,8 @@ class _Made:
 
     width: float  # of a column [s]
     first: float  # stretch they were begun for [s]
-    numbers: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))  # (k,) time / width
-    pairs: NDArray[np.float32] = field(default_factory=lambda: np.empty((len(CHANNELS), 0), np.float32))  # (c, 2 k)
+    numbers: NDArray[np.int64]  # (k,) time / width
+    pairs: NDArray[np.float32]  # (c, 2 k)
 
     @property
     def open_from(self) -> float:
@@ -113,9 +121,9 @@ class _Made:
         numbers = np.concatenate([self.numbers[keep], column[starts]])
         return _Made(self.width, first, numbers, np.hstack([old, _pairs(values, starts)]))
 
-    def drawn(self, rate: float) -> Columns:
+    def drawn(self, gap: float) -> Columns:
         """Return what is drawn of them."""
-        behind = np.flatnonzero(np.diff(self.numbers) > 1 + GAP / (rate * self.width))
+        behind = np.flatnonzero(np.diff(self.numbers) > 1 + gap / self.width)
         at = np.repeat((self.numbers.astype(np.float64) + 0.5) * self.width, 2)
         return _with_gaps(at, self.pairs.astype(np.float64), behind, 2)
 
@@ -134,8 +142,8 @@ def _pairs(values: NDArray[np.float32], starts: NDArray[np.int64]) -> NDArray[np
     return pairs
 
 
-def _one_by_one(time: Array, values: NDArray[np.float32], rate: float) -> Columns:
-    gaps = np.flatnonzero(np.diff(time) > GAP / rate)
+def _one_by_one(time: Array, values: NDArray[np.float32], gap: float) -> Columns:
+    gaps = np.flatnonzero(np.diff(time) > gap)
     return _with_gaps(time.copy(), values.astype(np.float64), gaps, 1)
 
 

@@ -1,6 +1,8 @@
-"""The scale of a live plot: it stays until the data leave it, and then steps."""
+"""The scale of a live plot: it stays until the data leave it, and then steps; and the numbers there is room for."""
 
 from dataclasses import dataclass
+
+import numpy as np
 
 STEPS = (1.0, 2.0, 5.0)
 MARGIN = 0.05  # data may go beyond the scale by this share of it: so much is drawn [-]
@@ -42,6 +44,31 @@ class PlotScale:
             return self
         low = 0.0 if self.low == 0.0 else -max(_step(-least), self.least / 2)
         return PlotScale(low, max(_step(greatest), self.least if low == 0.0 else self.least / 2), self.least, now)
+
+
+def ticks(low: float, high: float, room: float) -> tuple[float, ...]:
+    """Return the values from `low` to `high` that get a number, where `room` lines of text find room along the axis.
+
+    >>> ticks(-5.0, 5.0, 8.0), ticks(-5.0, 5.0, 3.0), ticks(-5.0, 5.0, 1.2), ticks(-0.5, 5.0, 6.0)
+    ((-5.0, -2.5, 0.0, 2.5, 5.0), (-5.0, 0.0, 5.0), (-5.0, 5.0), (0.0, 2.5, 5.0))
+    """
+    taken: list[float] = []
+    for value in (high, 0.0, low, high / 2, low / 2):  # the more telling first
+        apart = min((abs(value - other) for other in taken), default=np.inf)
+        if low <= value <= high and apart * room >= high - low:
+            taken.append(value)
+    return tuple(sorted(taken))
+
+
+def times(seconds: float, room: float) -> tuple[float, ...]:
+    """Return the instants [s] before now that get a number, where `room` of them find room along the axis.
+
+    >>> times(10.0, 12.0), times(60.0, 3.5)
+    ((-10.0, -8.0, -6.0, -4.0, -2.0, 0.0), (-60.0, -40.0, -20.0, 0.0))
+    """
+    steps = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
+    step = next((step for step in steps if seconds / step < min(room, 8.0)), seconds)
+    return tuple(-step * n + 0.0 for n in range(int(seconds / step + 1e-9), -1, -1))
 
 
 def _step(value: float) -> float:

@@ -1,17 +1,12 @@
 """What is said of the live model: a sentence, and the SED over the last seconds. No Qt."""
 
-from collections import deque
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
+from daq_app.live_model import STEP, Provisional, Settled
+from daq_app.live_trace import Columns, LiveTrace
 
-from daq_app.live_model import Provisional, Settled
-from daq_app.live_trace import GAP, LONGEST, Columns
-
-Array = NDArray[np.float64]
-
+GAP = 0.1  # predictions further apart have a gap between them [s]
 CHANNELS = ("SED",)
 KINEMATICS = {"small": "small strain", "finite": "finite strain"}
 
@@ -60,22 +55,16 @@ class ModelTrace:
 
     def __init__(self) -> None:
         """Start with nothing."""
-        self._said: deque[Provisional] = deque()
+        self._trace = LiveTrace(1.0 / STEP, channels=1, gap=GAP)
+        self._stream: int | None = None
 
     def add(self, said: Provisional) -> None:
         """Take another prediction."""
-        if self._said and self._said[-1].stream != said.stream:
-            self._said.clear()
-        self._said.append(said)
-        while said.time[-1] - self._said[0].time[-1] > LONGEST:
-            self._said.popleft()
+        if said.stream != self._stream:
+            self._stream = said.stream
+            self._trace.clear()
+        self._trace.add(said.time, 1000.0 * said.sed[None])
 
-    def columns(self, first: float, last: float) -> Columns:
-        """Return the SED [kPa] from `first` to `last` [s, device time]; a gap stays a gap."""
-        near = [said for said in self._said if said.time[-1] >= first and said.time[0] <= last]
-        if not near:
-            return Columns(np.empty(0), np.empty((1, 0)))
-        time = np.concatenate([said.time for said in near])
-        sed = 1000.0 * np.concatenate([said.sed for said in near])
-        gaps = np.flatnonzero(np.diff(time) > GAP * 0.02) + 1
-        return Columns(np.insert(time, gaps, time[gaps]), np.insert(sed, gaps, np.nan)[None])
+    def columns(self, first: float, last: float, count: int) -> Columns:
+        """Return the SED [kPa] from `first` to `last` [s, device time] in about `count` columns; a gap stays a gap."""
+        return self._trace.columns(first, last, count)

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from daq_app.bench_load import Load
 from daq_app.live_feed import LiveFeed
 from daq_app.live_model import Settle
 from daq_app.live_model_process import LiveModel
@@ -21,7 +22,7 @@ from sessions.plan import Frame
 
 FRAME = 16  # between two looks at the recorder [ms]: 60 a second
 AFTER_OPENING = 1500  # what is not needed at once waits until the window stands [ms]
-TICK = 0.1  # between two looks at the clock, for what tells an age [s]
+TICK = 0.1  # between two looks at the clock, for what tells an age, and at the load [s]
 
 
 class Client(Protocol):
@@ -59,10 +60,12 @@ class Bridge(QObject):
         self._clock = clock
         self._client = client
         self._ticked = -1.0
+        self._load = Load()  # the greatest since the last tick
         self._from_threads: SimpleQueue[Message] = SimpleQueue()
         self._judge = Judge(self._from_threads.put)
         self.state = fold(AppState(), Tick(clock()))
         self.view: View = derive_view(self.state)
+        self._shown = self.state
         self.feed = LiveFeed()
         self.model = LiveModel()
         self.session_offset = 0.0  # session clock minus this machine's [s]
@@ -118,6 +121,8 @@ class Bridge(QObject):
         if now - self._ticked >= TICK:
             self._ticked = now
             self._fold(Tick(now))
+            self._fold(Loaded(self._load))  # no sooner than it can be read
+            self._load = Load()
         for report in self._client.poll():
             try:
                 self._take(report)
@@ -140,7 +145,7 @@ class Bridge(QObject):
     def _take(self, report: Report) -> None:
         match report:
             case m.Live():
-                self._fold(Loaded(self.feed.add(report, self._frame())))
+                self._load = self._load.latched(self.feed.add(report, self._frame()))
                 self._judge.look(self.feed, self.state)
                 self.model.add(report, self._frame())
                 return
@@ -168,6 +173,9 @@ class Bridge(QObject):
         self.state = fold(self.state, message)
 
     def _show(self) -> None:
+        if self.state is self._shown:
+            return
+        self._shown = self.state
         view = derive_view(self.state)
         if view != self.view:
             self.view = view

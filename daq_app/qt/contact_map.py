@@ -3,14 +3,16 @@
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from daq_app.qt.shapes import lines
 from daq_app.qt.tokens import MU, SMALL, Tokens, font
 
 Array = NDArray[np.float64]
 
 ALONG, ACROSS = 60.0, 40.0  # what is drawn of the face [mm]
+TOO_SMALL = 0.2  # a picture with fewer pixels to the millimetre is left out
 
 
 class ContactMap(QWidget):
@@ -22,7 +24,9 @@ class ContactMap(QWidget):
         self._tokens = tokens
         self._scale = scale
         self._trail: Array = np.empty((0, 2))
+        self._ground: QPixmap | None = None  # what stands still
         self._direction = 0
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # nothing behind it needs painting
         self.setMinimumSize(100, 60)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("centre of pressure on the sample: nothing touches")
@@ -30,38 +34,73 @@ class ContactMap(QWidget):
     def set_tokens(self, tokens: Tokens) -> None:
         """Follow another theme."""
         self._tokens = tokens
+        self._ground = None
         self.update()
 
     def show_direction(self, direction: int) -> None:
         """Show which way the stroke is to go: +1 away from the subject, -1 towards, 0 none."""
         if direction != self._direction:
             self._direction = direction
+            self._ground = None
             self.update()
 
     def show_trail(self, position: Array) -> None:
         """Show the last positions (n, 2) [mm], the newest last; nan where nothing presses."""
-        known = position[np.isfinite(position[:, 0])]
+        shown = position[np.isfinite(position[:, 0])]
         touching = bool(len(position)) and bool(np.isfinite(position[-1, 0]))
-        shown = known[:: max(len(known) // 120, 1)] if len(known) else known
         if not len(shown) and not len(self._trail):
             return
         self._trail = shown
         self._touching = touching
-        where = f"x {known[-1, 0]:.0f}, y {known[-1, 1]:.0f} mm" if touching else "nothing touches"
+        where = f"x {shown[-1, 0]:.0f}, y {shown[-1, 1]:.0f} mm" if touching else "nothing touches"
         self.setAccessibleName(f"centre of pressure on the sample: {where}")
         self.update()
 
     _touching = False
 
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Draw the sample anew."""
+        super().resizeEvent(event)
+        self._ground = None
+
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
-        """Paint sample, scale, arrow and trail."""
-        t = self._tokens
+        """Copy the sample, and paint the trail upon it."""
+        ratio = self.devicePixelRatioF()
+        if self._ground is None or self._ground.devicePixelRatio() != ratio:
+            self._ground = self._painted_ground(ratio)
         painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        margin = round(24 * self._scale)
-        per_mm = min((self.height() - 2 * margin) / ALONG, (self.width() - 2 * margin) / ACROSS)
-        if per_mm <= 0.2:
+        painter.drawPixmap(0, 0, self._ground)
+        per_mm = self._per_mm()
+        if not len(self._trail) or per_mm <= TOO_SMALL:
             return
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        # +x of the face frame points away from the subject: up. +y then points to the subject's left.
+        x = self.width() / 2 - self._trail[:, 1] * per_mm
+        y = self.height() / 2 - self._trail[:, 0] * per_mm
+        painter.setPen(QPen(QColor(MU), 2))
+        for piece in lines(x, y):
+            painter.drawPolyline(piece)
+        if self._touching:
+            painter.setPen(QPen(QColor(self._tokens.text), 2))
+            painter.setBrush(QColor(MU))
+            painter.drawEllipse(QPointF(x[-1], y[-1]), 6, 6)
+
+    def _per_mm(self) -> float:
+        """Return how many pixels a millimetre has."""
+        margin = round(24 * self._scale)
+        return min((self.height() - 2 * margin) / ALONG, (self.width() - 2 * margin) / ACROSS)
+
+    def _painted_ground(self, ratio: float) -> QPixmap:
+        """Return sample, grid, words and arrow."""
+        t = self._tokens
+        made = QPixmap(round(self.width() * ratio), round(self.height() * ratio))
+        made.setDevicePixelRatio(ratio)
+        made.fill(QColor(t.surface))
+        per_mm = self._per_mm()
+        if per_mm <= TOO_SMALL:
+            return made
+        painter = QPainter(made)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         middle = QPointF(self.width() / 2, self.height() / 2)
         box = QRectF(0, 0, ACROSS * per_mm, ALONG * per_mm)
         box.moveCenter(middle)
@@ -70,12 +109,11 @@ class ContactMap(QWidget):
         painter.drawRoundedRect(box, 4, 4)
         painter.setFont(font(SMALL, self._scale))
         painter.setPen(QColor(t.quiet))
-        words = QRectF(0, 0, self.width(), margin)
+        words = QRectF(0, 0, self.width(), round(24 * self._scale))
         painter.drawText(words, Qt.AlignmentFlag.AlignCenter, "distal")
         words.moveBottom(self.height())
         painter.drawText(words, Qt.AlignmentFlag.AlignCenter, "proximal · 10 mm grid")
-        grid = QPen(QColor(t.line), 1, Qt.PenStyle.DotLine)
-        painter.setPen(grid)
+        painter.setPen(QPen(QColor(t.line), 1, Qt.PenStyle.DotLine))
         for mm in range(-20, 30, 10):
             y = middle.y() - mm * per_mm
             painter.drawLine(QPointF(box.left(), y), QPointF(box.right(), y))
@@ -83,16 +121,8 @@ class ContactMap(QWidget):
             x = middle.x() + mm * per_mm
             painter.drawLine(QPointF(x, box.top()), QPointF(x, box.bottom()))
         self._paint_arrow(painter, box)
-        if not len(self._trail):
-            return
-        # +x of the face frame points away from the subject: up. +y then points to the subject's left.
-        points = [QPointF(middle.x() - y * per_mm, middle.y() - x * per_mm) for x, y in self._trail]
-        painter.setPen(QPen(QColor(MU), 2))
-        painter.drawPolyline(QPolygonF(points))
-        if self._touching:
-            painter.setPen(QPen(QColor(t.text), 2))
-            painter.setBrush(QColor(MU))
-            painter.drawEllipse(points[-1], 6, 6)
+        painter.end()
+        return made
 
     def _paint_arrow(self, painter: QPainter, box: QRectF) -> None:
         if not self._direction:

@@ -1,26 +1,26 @@
 """The deforming finger with its SED in colour, true to scale, and the SED along the skin at the receptor's depth."""
 
-from typing import Any
-
 import numpy as np
-import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from daq_app.live_model import Picture
 from daq_app.plot_scale import PlotScale
+from daq_app.qt.shapes import faces, lines
 from daq_app.qt.tokens import MODEL, SMALL, Tokens, font
 from daq_app.view_model import ModelWords
 from solver.receptor import ROW
 
-pg: Any = pyqtgraph  # it has no types
 Array = NDArray[np.float64]
 
 SHOWN = (-9.0, 9.0, -1.0, 13.0)  # left, right, below, above of what is drawn [mm]
 PART = 0.62  # of the height that the finger takes; the row has the rest
-SHADES = 128
+# The colour map magma (van der Walt and Smith, 2015), from its light end to a fifth before its dark one.
+MAGMA = ("#fcfdbf", "#fecf92", "#fe9f6d", "#f7705c", "#de4968", "#b5367a", "#8c2981", "#641a80", "#3b0f70")
+SHADES = 32
+EVERY = 1 / 30  # no new picture sooner after another: nobody sees more [s]
 TOP = 0.97  # of the faces' SED lies below the end of the colour scale
 
 
@@ -36,9 +36,8 @@ class FingerView(QWidget):
         self._words = ModelWords("", "none")
         self._colours = PlotScale(0.0, 5.0, 5.0)  # [kPa]
         self._heights = PlotScale(0.0, 5.0, 5.0)  # [kPa]
-        shades: Any = pg.colormap.get("magma")
-        table = shades.map(np.linspace(1.0, 0.2, SHADES), mode="byte")
-        self._shades = [QColor(int(r), int(g), int(b)) for r, g, b, *_ in table]
+        self._drawn_at = -1.0  # [s]
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # nothing behind it needs painting
         self.setMinimumSize(100, 1)  # it is folded where it is low
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("finger as the model sees it")
@@ -50,8 +49,9 @@ class FingerView(QWidget):
 
     def show_model(self, picture: Picture | None, row: Array, words: ModelWords, clock: float) -> None:
         """Show a state; `row` (r,) [MPa] at `solver.receptor.ROW`, `clock` [s] is for the scales' patience."""
-        if picture is self._picture and words == self._words:
+        if words == self._words and (clock - self._drawn_at < EVERY or _alike(picture, self._picture)):
             return
+        self._drawn_at = clock
         self._picture, self._row, self._words = picture, 1000.0 * row, words
         if picture is not None and len(picture.sed):
             self._colours = self._colours.following(0.0, 1000.0 * float(np.quantile(picture.sed, TOP)), clock)
@@ -65,6 +65,7 @@ class FingerView(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint words, finger and row."""
         painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor(self._tokens.surface))
         painter.setFont(font(SMALL, self._scale, bold=self._words.state in ("settled", "beyond")))
         painter.setPen(QColor(self._tokens.look if self._words.state == "beyond" else self._tokens.quiet))
         line = painter.fontMetrics().height()
@@ -84,9 +85,8 @@ class FingerView(QWidget):
             return
         origin = QPointF(box.center().x() - per_mm * (left + right) / 2.0, box.bottom() + per_mm * below)
 
-        def placed(points: Array) -> list[QPointF]:
-            x, y = origin.x() + per_mm * points[:, 0], origin.y() - per_mm * points[:, 1]
-            return [QPointF(a, b) for a, b in zip(x.tolist(), y.tolist(), strict=True)]
+        def placed(points: Array) -> Array:
+            return np.array([origin.x(), origin.y()]) + per_mm * points * [1.0, -1.0]
 
         painter.save()
         painter.setClipRect(box)
@@ -94,20 +94,11 @@ class FingerView(QWidget):
         painter.drawLine(QPointF(box.left(), origin.y()), QPointF(box.right(), origin.y()))
         picture = self._picture
         if picture is not None:
-            if len(picture.faces):
-                painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-                painter.setPen(Qt.PenStyle.NoPen)
-                points = placed(picture.nodes)
-                part = 1000.0 * picture.sed / self._colours.high
-                shades: list[int] = (np.clip(np.nan_to_num(part), 0.0, 1.0) * (SHADES - 1)).astype(int).tolist()
-                faces: list[list[int]] = picture.faces.tolist()
-                for face, shade in zip(faces, shades, strict=True):
-                    painter.setBrush(self._shades[shade])
-                    painter.drawPolygon(QPolygonF([points[node] for node in face]))
-                painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+            self._paint_faces(painter, picture, placed(picture.nodes))
             style = Qt.PenStyle.SolidLine if self._words.state == "settled" else Qt.PenStyle.DashLine
             painter.setPen(QPen(QColor(self._tokens.text), 1.5, style))
-            painter.drawPolyline(QPolygonF(placed(picture.outline)))
+            for piece in lines(*placed(picture.outline).T):
+                painter.drawPolyline(piece)
         painter.restore()
         painter.setPen(QColor(self._tokens.quiet))
         painter.drawText(
@@ -115,6 +106,19 @@ class FingerView(QWidget):
             Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop,
             f"0 to {self._colours.high:g} kPa",
         )
+
+    def _paint_faces(self, painter: QPainter, picture: Picture, places: Array) -> None:
+        """Paint the faces, those of one shade at once."""
+        part = np.clip(np.nan_to_num(1000.0 * picture.sed / self._colours.high), 0.0, 1.0)
+        shade = (part * (SHADES - 1)).astype(int)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+        painter.setPen(Qt.PenStyle.NoPen)
+        numbers: list[int] = np.unique(shade).tolist()
+        for number in numbers:
+            painter.setBrush(_COLOURS[number])
+            painter.drawPath(faces(places[picture.faces[shade == number]]))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
 
     def _paint_row(self, painter: QPainter, box: QRectF) -> None:
         line = painter.fontMetrics().height()
@@ -144,4 +148,24 @@ class FingerView(QWidget):
         y = plot.bottom() - plot.height() * self._row[known] / self._heights.high
         style = Qt.PenStyle.SolidLine if self._words.state == "settled" else Qt.PenStyle.DashLine
         painter.setPen(QPen(QColor(MODEL), 2, style))
-        painter.drawPolyline(QPolygonF([QPointF(a, b) for a, b in zip(x.tolist(), y.tolist(), strict=True)]))
+        for piece in lines(x, y):
+            painter.drawPolyline(piece)
+
+
+def _alike(one: Picture | None, other: Picture | None) -> bool:
+    """Say whether two pictures show the same: a finger that nothing touches is said anew sixty times a second."""
+    if one is None or other is None:
+        return one is other
+    return one is other or np.array_equal(one.outline, other.outline)
+
+
+def _shades() -> list[QColor]:
+    """Return the colours from none of the SED to all of the scale."""
+    known = np.array([[int(name[i : i + 2], 16) for i in (1, 3, 5)] for name in MAGMA], float)
+    at = np.linspace(0.0, len(MAGMA) - 1.0, SHADES)
+    table = np.column_stack([np.interp(at, np.arange(len(MAGMA)), known[:, i]) for i in range(3)])
+    rows: list[list[int]] = table.round().astype(int).tolist()
+    return [QColor(*row) for row in rows]
+
+
+_COLOURS = _shades()

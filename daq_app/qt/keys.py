@@ -35,6 +35,7 @@ KEYS = (
     Key("H", "hold", "hold the picture; readings go on"),
     Key("+", "longer", "show a longer stretch of time"),
     Key("-", "shorter", "show a shorter stretch of time"),
+    Key("M", "model", "live model at finite strain, or at small strain again"),
     Key("B", "bench", "show or fold the bench"),
     Key("F6", "subject", "show the subject's window and go to it"),
     Key("Ctrl+M", "ruler", "hold the subject's line against a ruler"),

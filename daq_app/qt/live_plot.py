@@ -1,24 +1,30 @@
-"""One live plot: curves over the last seconds, with gaps left as gaps and what was found in them marked."""
+"""One live plot: curves over the last seconds, with gaps left as gaps and what was found in them marked.
+
+Painted by hand: what stands still is painted once and copied, curves are lines a pixel wide. So a frame costs
+a fraction of what a scene of items does (docs/decisions/2026-11-21-the-live-plots-are-painted.md).
+"""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
-from PySide6.QtCore import QPointF, Qt
-from PySide6.QtGui import QColor, QResizeEvent
-from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
+from numpy.typing import NDArray
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QPixmap, QResizeEvent, QStaticText
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from daq_app.course_state import Mark
 from daq_app.live_trace import CHANNELS, Columns
-from daq_app.plot_scale import MARGIN, PlotScale
+from daq_app.plot_scale import MARGIN, PlotScale, ticks, times
 from daq_app.qt.curve import Curve
+from daq_app.qt.shapes import lines
 from daq_app.qt.tokens import SMALL, Tokens, font
 
-pg: Any = pyqtgraph  # it has no types
+Array = NDArray[np.float64]
 
 AXIS_WIDTH = 52  # the same for all, so that their times stand under each other [before the font's scale]
-LEAST_FOR_HALVES = 100  # a lower plot has numbers at its ends alone
+SAMPLE = 14  # length of the piece of line before a curve's name, likewise
+DASHES = 45  # times two thirds of a dash in the stretch that is shown
+FAR = 1e4  # a value so many pixels away is as good as any beyond it
 
 
 class LivePlot(QWidget):
@@ -35,125 +41,206 @@ class LivePlot(QWidget):
     ) -> None:
         """Show nothing yet; `channels` names the rows of what will be shown."""
         super().__init__()
-        self._channels = tuple(channels)
+        self._name = name
+        self._rows = tuple(tuple(channels).index(curve.channel) for curve in curves)
         self._curves = tuple(curves)
         self._scale = scale
         self._tokens = tokens
-        self._marks: list[Any] = []
-        self._shown_marks: tuple[tuple[str, float, float], ...] = ()
-        self._seconds = 0.0
+        self._type_scale = type_scale
+        self._seconds = 10.0
+        self._times_shown = True
+        self._now = 0.0
+        self._columns = Columns(np.empty(0), np.empty((len(tuple(channels)), 0)))
+        self._marks: tuple[Mark, ...] = ()
+        self._words = {kind: QStaticText(kind) for kind in ("onset", "lift")}
+        self._ground: QPixmap | None = None  # what stands still
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # nothing behind it needs painting
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setMinimumSize(40, 32)
         self.setAccessibleName(f"plot of {name}")
-        self._plot: Any = pg.PlotWidget()
-        self._plot.setMinimumSize(40, 32)
-        self._plot.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self._plot)
-        item = self._item = self._plot.getPlotItem()
-        item.setMenuEnabled(False)
-        item.hideButtons()
-        item.setMouseEnabled(False, False)
-        item.showGrid(x=False, y=True, alpha=0.15)
-        for side in ("left", "bottom"):
-            axis = item.getAxis(side)
-            # Painted once and copied from then on: the axes stand still while the curves move.
-            axis.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
-            axis.setStyle(
-                tickFont=font(SMALL, type_scale), tickLength=-4, autoExpandTextSpace=False, hideOverlappingLabels=False
-            )
-        item.getAxis("left").setStyle(hideOverlappingLabels=False)
-        item.getAxis("left").setWidth(round(AXIS_WIDTH * type_scale))
-        item.getAxis("bottom").setHeight(round(22 * type_scale))
-        self._label = pg.TextItem(name, anchor=(0, 0))
-        self._label.setFont(font(SMALL, type_scale, bold=True))
-        self._label.setParentItem(item.getViewBox())
-        self._label.setPos(QPointF(6, 2))
-        self._items = [pg.PlotCurveItem(connect="finite", antialias=False) for _ in self._curves]
-        for made in self._items:
-            item.addItem(made)
-        self.set_tokens(tokens)
-        self._show_scale()
 
     def set_tokens(self, tokens: Tokens) -> None:
         """Follow another theme."""
         self._tokens = tokens
-        self._plot.setBackground(tokens.surface)
-        for side in ("left", "bottom"):
-            axis = self._item.getAxis(side)
-            axis.setPen(QColor(tokens.line))
-            axis.setTextPen(QColor(tokens.quiet))
-        self._label.setColor(QColor(tokens.quiet))
-        for curve, made in zip(self._curves, self._items, strict=True):
-            style = Qt.PenStyle.DashLine if curve.dashed else Qt.PenStyle.SolidLine
-            made.setPen(pg.mkPen(self._colour(curve.colour), width=1, style=style))
+        self._anew()
 
     def show_seconds(self, seconds: float) -> None:
         """Show the last so many seconds."""
         if seconds != self._seconds:
             self._seconds = seconds
-            self._item.getViewBox().setXRange(-seconds, 0.0, padding=0)
+            self._anew()
+
+    def show_times(self, shown: bool) -> None:
+        """Show the numbers of the time axis, or leave them to the plot below."""
+        if shown != self._times_shown:
+            self._times_shown = shown
+            self._anew()
 
     def show_columns(self, columns: Columns, now: float, marks: Sequence[Mark], clock: float) -> None:
         """Draw the columns with `now` [s, device time] at the right edge; `clock` [s] is for the scale's patience."""
-        time = columns.time - now
-        least, greatest = np.inf, -np.inf
-        for curve, made in zip(self._curves, self._items, strict=True):
-            values = columns.values[self._channels.index(curve.channel)]
-            known = np.isfinite(values)
-            if known.any():
-                least, greatest = min(least, float(values[known].min())), max(greatest, float(values[known].max()))
-            made.setData(time, values)
+        self._columns, self._now, self._marks = columns, now, tuple(marks)
+        least, greatest = _range(columns.values, self._rows)
         scale = self._scale.following(least, greatest, clock)
         if (scale.low, scale.high) != (self._scale.low, self._scale.high):
-            self._scale = scale
-            self._show_scale()
+            self._ground = None
         self._scale = scale
-        self._show_marks(marks, now)
-
-    def _show_scale(self) -> None:
-        low, high = self._scale.low, self._scale.high
-        self._item.getViewBox().setYRange(low, high, padding=MARGIN)
-        ends = [value for value in (low, 0.0, high) if value == 0.0 or abs(value) >= 0.2 * (high - low)]
-        halves = [low / 2, high / 2] if self.height() >= LEAST_FOR_HALVES else []
-        ticks = sorted({value for value in (*ends, *halves) if low <= value <= high})
-        self._item.getAxis("left").setTicks([[(value, f"{value:g}".replace("-", "−")) for value in ticks]])
+        self.update()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Show as many numbers as there is room for."""
         super().resizeEvent(event)
-        self._show_scale()
+        self._ground = None
 
-    def _show_marks(self, marks: Sequence[Mark], now: float) -> None:
-        """Move the marks with the readings: a line for onset and lift, a shaded stretch for the steady window."""
-        wanted = tuple((mark.kind, mark.start, mark.stop) for mark in marks)
-        if wanted != self._shown_marks:
-            for made in self._marks:
-                self._item.removeItem(made)
-            self._marks = [self._mark(mark) for mark in marks]
-            for made in self._marks:
-                self._item.addItem(made)
-            self._shown_marks = wanted
-        for made, (kind, start, stop) in zip(self._marks, wanted, strict=True):
-            if kind == "steady":
-                made.setRegion((start - now, stop - now))
-            else:
-                made.setPos(start - now)
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
+        """Copy what stands still, and draw the rest upon it."""
+        ratio = self.devicePixelRatioF()
+        if self._ground is None or self._ground.devicePixelRatio() != ratio:
+            self._ground = self._painted_ground(ratio)
+        painter = QPainter(self)
+        painter.drawPixmap(0, 0, self._ground)
+        inside = self._inside()
+        painter.setClipRect(inside)
+        self._paint_marks(painter, inside)
+        x = inside.right() + (self._columns.time - self._now) * inside.width() / self._seconds
+        low, high = self._reach()
+        for curve, row in zip(self._curves, self._rows, strict=True):
+            values = self._columns.values[row]
+            y = inside.bottom() - (values - low) * (inside.height() / (high - low))
+            if curve.dashed:
+                # Dashes belong to the readings, and move with them.
+                y = np.where(np.floor(self._columns.time * DASHES / self._seconds) % 3 < 2, y, np.nan)
+            pieces = lines(x, np.clip(y, -FAR, FAR))
+            painter.setPen(_fine(self._colour(curve.colour)))
+            # Twice, a pixel apart: a pen of two pixels takes a hundred times as long.
+            for down in (0.0, 1.0 / ratio):
+                painter.translate(0.0, down)
+                for piece in pieces:
+                    painter.drawPolyline(piece)
+            painter.translate(0.0, -1.0 / ratio)
 
-    def _mark(self, mark: Mark) -> Any:  # noqa: ANN401  pyqtgraph has no types
-        colour = QColor(self._tokens.quiet)
-        if mark.kind == "steady":
-            fill = QColor(self._tokens.act)
-            fill.setAlpha(36)
-            return pg.LinearRegionItem(
-                brush=fill, pen=pg.mkPen(self._tokens.act, style=Qt.PenStyle.DotLine), movable=False
-            )
-        style = Qt.PenStyle.SolidLine if mark.kind == "onset" else Qt.PenStyle.DashLine
-        position = 0.86 if mark.kind == "onset" else 0.72
-        return pg.InfiniteLine(
-            pen=pg.mkPen(colour, width=1, style=style),
-            label=mark.kind,
-            labelOpts={"position": position, "color": colour, "movable": False},
-        )
+    def _anew(self) -> None:
+        self._ground = None
+        self.update()
+
+    def _inside(self) -> QRectF:
+        """Return where the curves are."""
+        left = round(AXIS_WIDTH * self._type_scale)
+        below = round((SMALL + 5) * self._type_scale) if self._times_shown else 3
+        return QRectF(left, 2, max(self.width() - left - 4, 8), max(self.height() - below - 2, 8))
+
+    def _reach(self) -> tuple[float, float]:
+        """Return the values at the lower and the upper edge."""
+        beyond = MARGIN * (self._scale.high - self._scale.low)
+        return self._scale.low - beyond, self._scale.high + beyond
+
+    def _painted_ground(self, ratio: float) -> QPixmap:
+        """Return axes, grid, numbers and names."""
+        made = QPixmap(round(self.width() * ratio), round(self.height() * ratio))
+        made.setDevicePixelRatio(ratio)
+        made.fill(QColor(self._tokens.surface))
+        painter = QPainter(made)
+        painter.setFont(font(SMALL, self._type_scale))
+        inside = self._inside()
+        self._paint_values(painter, inside)
+        self._paint_times(painter, inside)
+        painter.setPen(_fine(self._tokens.line))
+        painter.drawLine(inside.topLeft(), inside.bottomLeft())
+        painter.drawLine(inside.bottomLeft(), inside.bottomRight())
+        self._paint_names(painter, inside)
+        painter.end()
+        return made
+
+    def _paint_values(self, painter: QPainter, inside: QRectF) -> None:
+        line = painter.fontMetrics().height()
+        low, high = self._reach()
+        for value in ticks(self._scale.low, self._scale.high, inside.height() / line):
+            y = inside.bottom() - (value - low) * inside.height() / (high - low)
+            faint = QColor(self._tokens.line)
+            faint.setAlpha(110)
+            painter.setPen(_fine(faint))
+            painter.drawLine(QPointF(inside.left(), y), QPointF(inside.right(), y))
+            painter.setPen(QColor(self._tokens.quiet))
+            top = min(max(y - line / 2.0, 0.0), self.height() - line)
+            box = QRectF(0, top, inside.left() - 5, line)
+            painter.drawText(box, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, _number(value))
+
+    def _paint_times(self, painter: QPainter, inside: QRectF) -> None:
+        metrics = QFontMetricsF(painter.font())
+        widest = metrics.horizontalAdvance("−00 s ")
+        for value in times(self._seconds, inside.width() / widest):
+            x = inside.right() + value * inside.width() / self._seconds
+            painter.setPen(_fine(self._tokens.line))
+            painter.drawLine(QPointF(x, inside.bottom()), QPointF(x, inside.bottom() - 4))
+            if not self._times_shown:
+                continue
+            text = f"{_number(value)} s" if value else "now"
+            width = metrics.horizontalAdvance(text)
+            left = min(max(x - width / 2.0, 0.0), self.width() - width - 1)
+            painter.setPen(QColor(self._tokens.quiet))
+            painter.drawText(QPointF(left, inside.bottom() + metrics.ascent() + 1), text)
+
+    def _paint_names(self, painter: QPainter, inside: QRectF) -> None:
+        """Name the plot; where it has several curves, with a piece of the line of each."""
+        metrics = QFontMetricsF(font(SMALL, self._type_scale, bold=True))
+        painter.setFont(font(SMALL, self._type_scale, bold=True))
+        x, baseline = inside.left() + 6, inside.top() + metrics.ascent() + 1
+        several = len(self._curves) > 1
+        for curve in self._curves if several else ():
+            pen = QPen(QColor(self._colour(curve.colour)), 3)
+            if curve.dashed:
+                pen.setDashPattern([1.6, 1.2])
+            painter.setPen(pen)
+            end = x + SAMPLE * self._type_scale
+            middle = baseline - metrics.xHeight() / 2.0
+            painter.drawLine(QPointF(x, middle), QPointF(end, middle))
+            painter.setPen(QColor(self._tokens.quiet))
+            painter.drawText(QPointF(end + 4, baseline), curve.channel)
+            x = end + 4 + metrics.horizontalAdvance(f"{curve.channel}  ")
+        painter.setPen(QColor(self._tokens.quiet))
+        painter.drawText(QPointF(x, baseline), self._name[self._name.index("[") :] if several else self._name)
+
+    def _paint_marks(self, painter: QPainter, inside: QRectF) -> None:
+        """Mark what was found: a line for onset and lift, a shaded stretch for the steady window."""
+        across = inside.width() / self._seconds
+        painter.setFont(font(SMALL, self._type_scale))
+        line = painter.fontMetrics().height()
+        for mark in self._marks:
+            start, stop = (inside.right() + (at - self._now) * across for at in (mark.start, mark.stop))
+            if mark.kind == "steady":
+                fill = QColor(self._tokens.act)
+                fill.setAlpha(36)
+                painter.fillRect(QRectF(start, inside.top(), stop - start, inside.height()), fill)
+                painter.setPen(_fine(self._tokens.act, Qt.PenStyle.DotLine))
+                painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
+                painter.drawLine(QPointF(stop, inside.top()), QPointF(stop, inside.bottom()))
+                continue
+            onset = mark.kind == "onset"
+            painter.setPen(_fine(self._tokens.quiet, Qt.PenStyle.SolidLine if onset else Qt.PenStyle.DashLine))
+            painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
+            words = self._words[mark.kind]
+            if inside.height() >= 3 * line:  # a lower plot has no room for words; the ones above it say them
+                left = start - words.size().width() - 3 if onset else start + 3
+                painter.drawStaticText(QPointF(left, inside.top() + line), words)
 
     def _colour(self, name: str) -> str:
         return name if name.startswith("#") else str(getattr(self._tokens, name))
+
+
+def _range(values: Array, rows: Sequence[int]) -> tuple[float, float]:
+    """Return the least and the greatest known value of some rows; (inf, -inf) where there is none."""
+    chosen = values[list(rows)]
+    if not chosen.size:
+        return np.inf, -np.inf
+    least, greatest = float(np.fmin.reduce(chosen, axis=None)), float(np.fmax.reduce(chosen, axis=None))
+    return (np.inf, -np.inf) if np.isnan(least) else (least, greatest)
+
+
+def _fine(colour: str | QColor, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:
+    """Return a pen one pixel of the screen wide, whatever the scaling."""
+    made = QPen(QColor(colour), 1, style)
+    made.setCosmetic(True)
+    return made
+
+
+def _number(value: float) -> str:
+    return f"{value:g}".replace("-", "−")

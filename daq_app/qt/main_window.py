@@ -6,7 +6,7 @@ from datetime import datetime
 from pathlib import Path
 
 from PySide6.QtCore import QEvent, QObject, QSize, Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent, QShowEvent
+from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QFileDialog,
@@ -42,7 +42,6 @@ WIDE = 1366  # below it the bench folds to a strip of lamps
 ROOMY = 1100  # below it the six axes and the sample fold away
 TALL = 620  # below it the type of the headline is smaller
 LOW = 500  # below it an empty notice gives up its line
-SOON = 30  # after the window is shown [ms]
 LEAVING = 10.0  # closing twice within so long leaves a session that is being recorded [s]
 
 
@@ -150,6 +149,8 @@ class MainWindow(QMainWindow):
                 self.bridge.send(AcknowledgeOverloads())
             case "hold":
                 self.live.toggle_hold()
+            case "model":
+                self.live.toggle_finite()
             case "longer" | "shorter":
                 self.live.change_length(1 if act == "longer" else -1)
             case "bench":
@@ -184,11 +185,6 @@ class MainWindow(QMainWindow):
             self.keyPressEvent(event)
             return True
         return super().eventFilter(watched, event)
-
-    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802  Qt's name
-        """Build the plots once the window stands."""
-        super().showEvent(event)
-        QTimer.singleShot(SOON, self.live.build)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Fold what there is no room for."""

@@ -132,7 +132,7 @@ def test_a_gap_in_the_readings_is_a_gap_in_the_curve(follower):
     trace = ModelTrace()
     for start in (0.0, 1.0):
         trace.add(follower.take(forces_of(live(start + np.arange(20) / 200, np.zeros((20, 6))), FRAME)))
-    columns = trace.columns(0.0, 2.0)
+    columns = trace.columns(0.0, 2.0, 600)
     assert np.isnan(columns.values[0]).sum() == 1
     assert np.flatnonzero(np.isnan(columns.values[0])).tolist() == [20]
 

@@ -99,7 +99,6 @@ def one_window(application):
 def driver(application, one_window, tmp_path):
     driver = Driver(application, one_window)
     driver.until(lambda: driver.state.bench.link == "open", "the simulated bench")
-    driver.until(lambda: one_window.live.plots, "the plots")
     one_window.page.folder.setText(str(tmp_path / "recordings"))
     (tmp_path / "three.toml").write_text(THREE)
     one_window.page.add_protocol(str(tmp_path / "three.toml"))

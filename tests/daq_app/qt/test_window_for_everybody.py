@@ -123,7 +123,7 @@ def test_numbers_have_a_point_in_every_country(driver, locale):
     QLocale.setDefault(QLocale(locale))
     try:
         driver.window.live._read_at = 0.0
-        driver.until(lambda: "." in driver.window.live._values["N"].text(), "a number")
+        driver.until(lambda: "." in driver.window.live.bar.values["N"].text(), "a number")
         shown = repr(driver.view)
         assert not re.search(r"\d,\d", shown)
     finally:

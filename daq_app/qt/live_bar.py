@@ -1,0 +1,102 @@
+"""The row above the live plots: the numbers of this moment, which model is followed, how long a stretch is shown."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QFontMetrics, QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
+
+from daq_app.live_trace import CHANNELS
+from daq_app.qt.parts import button, choice, label, say
+from daq_app.qt.tokens import GRID, MU, TITLE, N, T, font
+
+LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
+READ = (("N", "N", 2, N), ("T", "N", 2, T), ("mu", "", 2, MU), ("speed", "mm/s", 0, ""))
+WIDEST = {"N": "−00.00 N", "T": "00.00 N", "mu": "0.00", "speed": "000 mm/s"}  # each number keeps its place
+
+
+class LiveBar(QWidget):
+    """Numbers that are read, and what is shown."""
+
+    def __init__(
+        self, scale: float, length: Callable[[int], None], hold: Callable[[], None], finite: Callable[[bool], None]
+    ) -> None:
+        """Show no numbers; `length` takes what is chosen [s], `hold` is told of a press, `finite` takes a choice."""
+        super().__init__()
+        self._show_length = length
+        self._forces_shown = True
+        self._scale = scale
+        self.values: dict[str, QLabel] = {}
+        self._pairs: list[tuple[QLabel, QLabel]] = []
+        self.hold = button("Hold  H", "hold the picture; readings go on", hold)
+        self.finite = button("Finite  M", "live model at finite strain", lambda: finite(self.finite.isChecked()))
+        self.finite.setToolTip("Live model at small strain, or at finite strain where the forces are within its reach")
+        self.length = choice("stretch of time that is shown")
+        for seconds in LENGTHS:
+            self.length.addItem(f"{seconds} s", seconds)
+        self.length.activated.connect(self._chosen)
+        self.length.setFixedWidth(round(84 * scale))
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(GRID)
+        self._place_numbers(row)
+        row.addStretch(1)
+        row.addWidget(self.finite)
+        row.addWidget(self.length)
+        row.addWidget(self.hold)
+        for made in (self.hold, self.finite):
+            made.setCheckable(True)
+        for made in (self.hold, self.finite, self.length):
+            made.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setMinimumWidth(1)  # numbers give way where there is no room for all of them
+
+    def show_forces(self, shown: bool) -> None:
+        """Show the numbers, or keep them from the experimenter where the protocol does."""
+        self._forces_shown = shown
+        self._fit()
+
+    def show_held(self, held: bool) -> None:
+        """Say whether the picture is held."""
+        self.hold.setText("Held  H" if held else "Hold  H")
+
+    def show_numbers(self, values: NDArray[np.float64]) -> None:
+        """Show the means of the last readings (channels, n)."""
+        for channel, unit, digits, _ in READ:
+            known = values[CHANNELS.index(channel)]
+            known = known[np.isfinite(known)]
+            # Adding nothing makes a zero of what would be a minus zero.
+            text = f"{round(float(known.mean()), digits) + 0.0:.{digits}f} {unit}".strip() if len(known) else "–"
+            say(self.values[channel], text.replace("-", "−"))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Leave out the numbers that would be cut, the last first."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def _chosen(self, at: int) -> None:
+        self._show_length(LENGTHS[at])
+
+    def _fit(self) -> None:
+        room = self.width() - sum(w.sizeHint().width() + GRID for w in (self.finite, self.hold)) - self.length.width()
+        for caption, value in self._pairs:
+            room -= caption.sizeHint().width() + value.width() + 2 * GRID
+            caption.setVisible(self._forces_shown and room >= 0)
+            value.setVisible(self._forces_shown and room >= 0)
+
+    def _place_numbers(self, row: QHBoxLayout) -> None:
+        for channel, _, _, colour in READ:
+            name = {"mu": "µ"}.get(channel, channel)
+            value = label("–", "title")
+            bold = font(TITLE, self._scale, bold=True)
+            value.setFixedWidth(QFontMetrics(bold).horizontalAdvance(WIDEST[channel]) + 4)
+            value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            value.setAccessibleName(f"{name} now")
+            caption = label(name, "quiet")
+            if colour:
+                caption.setStyleSheet(f"border-bottom: 3px solid {colour};")
+            row.addWidget(caption)
+            row.addWidget(value)
+            self.values[channel] = value
+            self._pairs.append((caption, value))
