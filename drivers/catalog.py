@@ -5,13 +5,11 @@ from dataclasses import dataclass
 
 from drivers.address import Address, AddressError, parse_address
 from drivers.clock import Clock
-from drivers.digital_ft.handshake import identify_digital_ft, open_digital_ft
-from drivers.labjack_u6.handshake import identify_labjack_u6, open_labjack_u6
-from drivers.links import UdpLink
-from drivers.net_ft import handshake
-from drivers.net_ft.device import NetFtTransducer
-from drivers.nidaq.handshake import identify_nidaq, open_nidaq
-from drivers.serial_ft.handshake import identify_serial_ft, open_serial_ft
+from drivers.digital_ft.device import identify_digital_ft, open_digital_ft
+from drivers.labjack_u6.device import identify_labjack_u6, open_labjack_u6
+from drivers.net_ft.handshake import identify_net_ft, open_net_ft
+from drivers.nidaq.device import identify_nidaq, open_nidaq
+from drivers.serial_ft.device import identify_serial_ft, open_serial_ft
 from drivers.tool import TransducerWithTool, with_tool, without_tool
 from drivers.transducer import DeviceFault, LinkLost, SetupError, Transducer, TransducerInfo
 
@@ -35,23 +33,8 @@ class Found:
     problem: str | None
 
 
-def _open_net_ft(address: Address, clock: Clock) -> Transducer:
-    place = handshake.where(address)
-    return NetFtTransducer(
-        handshake.prepare(place),
-        connect=lambda: UdpLink(address.host, place.rdt_port),
-        still_there=lambda: handshake.answers(place),
-        clock=clock,
-        request=handshake.start_request(place),
-    )
-
-
-def _identify_net_ft(address: Address, patience: float) -> TransducerInfo:
-    return handshake.identify(handshake.where(address), patience)
-
-
 DRIVERS: tuple[Driver, ...] = (
-    Driver("net-ft", _open_net_ft, _identify_net_ft, ("net-ft://192.168.1.1",)),
+    Driver("net-ft", open_net_ft, identify_net_ft, ("net-ft://192.168.1.1",)),
     Driver("serial-ft", open_serial_ft, identify_serial_ft, ()),
     Driver("digital-ft", open_digital_ft, identify_digital_ft, ()),
     Driver("labjack-u6", open_labjack_u6, identify_labjack_u6, ("labjack-u6://",)),

@@ -7,9 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivers.address import Address, AddressError, check_options
-from drivers.links import http_get, tcp_answer
+from drivers.clock import Clock
+from drivers.links import UdpLink, http_get, tcp_answer
 from drivers.net_ft import wire
 from drivers.net_ft.configuration import Configuration, parse_configuration, true_rate
+from drivers.net_ft.device import NetFtTransducer
 from drivers.net_ft.wire import COUNTER_RATE
 from drivers.transducer import LinkLost, SetupError, TransducerInfo
 
@@ -31,6 +33,23 @@ class Where:
     buffered: bool = False  # several records a datagram: fewer datagrams, later
     set_bias: bool = False  # what is felt at opening reads as zero from then on
     reset_latch: bool = False  # of the monitor condition
+
+
+def open_net_ft(address: Address, clock: Clock) -> NetFtTransducer:
+    """Return the box at `address`, set as it asks, not streaming. Raises SetupError or LinkLost with the reason."""
+    place = where(address)
+    return NetFtTransducer(
+        prepare(place),
+        connect=lambda: UdpLink(address.host, place.rdt_port),
+        still_there=lambda: answers(place),
+        clock=clock,
+        request=start_request(place),
+    )
+
+
+def identify_net_ft(address: Address, patience: float) -> TransducerInfo:
+    """Return who answers, changing nothing. Raises SetupError or LinkLost with the reason."""
+    return identify(where(address), patience)
 
 
 def where(address: Address) -> Where:

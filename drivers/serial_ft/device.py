@@ -1,13 +1,23 @@
-"""What is said to the stand-alone controller around a stream."""
+"""The stand-alone controller: finding out who answers, how fast it streams, and what is said around a stream."""
 
 import contextlib
+import math
 import time
+from dataclasses import dataclass
+from functools import partial
 
+import numpy as np
+
+from drivers.address import Address, check_options
+from drivers.calibration import Calibration
+from drivers.clock import Clock
 from drivers.links import Link
-from drivers.pacing import Pacing
+from drivers.pacing import GAP, Pacing
 from drivers.records import RecordDecoder
 from drivers.serial_ft import wire
-from drivers.transducer import DeviceFault, LinkLost
+from drivers.serial_link import SerialLink, port_of
+from drivers.streaming import StreamingTransducer, measured_rate
+from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo
 
 # All in real seconds.
 _SETTLED = 0.05  # of silence behind a prompt that show it is one, and no byte of a record
@@ -17,6 +27,138 @@ _BANNER = 6.0  # for all the controller says when it starts
 _SILENT = 0.02  # behind the prompt after a stream
 _END = 0.08  # for the prompt after a stream
 _TRIES = 3
+BAUDS = (38400, 9600, 115200, 19200, 57600, 4800)  # tried in this order; published drivers disagree on the usual one
+_MEASURED = 0.6  # for how long the stream is watched to learn its rate [real s]
+_OPTIONS = frozenset({"baud", "format", "counts_per_N", "counts_per_Nm", "range_N", "range_Nm", "serial", "simulated"})
+
+
+@dataclass(frozen=True, slots=True)
+class _Where:
+    """What an address says."""
+
+    address: Address
+    port: str
+    bauds: tuple[int, ...]
+    binary: bool
+    calibration: Calibration
+
+
+def open_serial_ft(address: Address, clock: Clock) -> StreamingTransducer:
+    """Return the controller at `address`, set and watched for its rate, not streaming.
+
+    Raises SetupError, LinkLost or DeviceFault with the reason.
+    """
+    place = _where(address)
+    conversation = ControllerConversation(binary=place.binary)
+    try:
+        link, baud = _answering(place, math.inf)
+        try:
+            said = banner(link)
+            rate = measured_rate(link, conversation, clock, _MEASURED)
+        finally:
+            link.close()
+    except (LinkLost, DeviceFault) as error:
+        raise type(error)(f"{address.uri}: {error}") from None
+    info = _info(place, baud, said, rate)
+    return StreamingTransducer(info, partial(SerialLink, place.port, baud), conversation, clock)
+
+
+def identify_serial_ft(address: Address, patience: float) -> TransducerInfo:
+    """Return who answers within `patience` real seconds, changing no setting (a stream nobody reads is ended)."""
+    place = _where(address)
+    try:
+        link, baud = _answering(place, patience)
+        link.close()
+    except LinkLost as error:
+        raise LinkLost(f"{address.uri}: {error}") from None
+    return _info(place, baud, "", math.nan)
+
+
+def _answering(place: _Where, patience: float) -> tuple[SerialLink, int]:
+    """Return an open line on which a controller answers, and its baud rate."""
+    deadline = time.monotonic() + patience
+    for baud in place.bauds:
+        if time.monotonic() > deadline:
+            break
+        link = SerialLink(place.port, baud)
+        try:
+            if prompted(link, tries=2):
+                return link, baud
+        except BaseException:
+            link.close()
+            raise
+        link.close()
+    tried = ", ".join(str(baud) for baud in place.bauds)
+    raise LinkLost(f"no controller answers (tried {tried} baud); check its power and the cable")
+
+
+def _info(place: _Where, baud: int, said: str, rate: float) -> TransducerInfo:
+    address = place.address
+    settings = {
+        "baud": f"{baud}, {'as the address says' if len(place.bauds) == 1 else 'found by trying'}",
+        "output": "binary, without checksum" if place.binary else "ASCII, without checksum",
+        "bias": "all biases of the controller dropped when a stream begins",
+        "filter": "no moving average",
+        "units": "counts per N and N-m as the address says; the controller cannot be asked",
+        "time": "host arrival at the measured rate; the controller has no clock or record number, "
+        f"and a loss shorter than {GAP:g} s that leaves no broken bytes is not noticed",
+    }
+    if said:
+        settings |= {"banner": said, "rate": "measured at opening; the controller cannot be asked"}
+    return TransducerInfo(
+        uri=address.uri,
+        driver="serial-ft",
+        model="SIMULATED F/T Controller" if _is_simulated(address, said) else "F/T Controller",
+        serial=place.calibration.serial,
+        simulated=_is_simulated(address, said),
+        rate=rate,
+        counter_rate=math.nan,
+        calibration=place.calibration,
+        settings=settings,
+    )
+
+
+def _is_simulated(address: Address, said: str) -> bool:
+    return "SIMULATED" in said.upper() or "simulated" in address.options
+
+
+def _where(address: Address) -> _Where:
+    """Return what a serial-ft address says. Raises SetupError when it is not one."""
+    check_options(address, _OPTIONS)
+    port = port_of(address)
+    form = address.options.get("format", "binary")
+    if form not in ("binary", "ascii"):
+        raise SetupError(f"{address.uri}: format={form} must be binary or ascii")
+    baud = address.number("baud", 0, 300, 921600)
+    counts = [_above_zero(address, option) for option in ("counts_per_N", "counts_per_Nm")]
+    if not all(math.isfinite(value) for value in counts):
+        raise SetupError(
+            f"{address.uri}: the controller cannot tell its units; add ?counts_per_N=...&counts_per_Nm=... "
+            "as they stand in the calibration sheet"
+        )
+    ranges = np.repeat([_above_zero(address, "range_N"), 1000.0 * _above_zero(address, "range_Nm")], 3)
+    calibration = Calibration(
+        address.options.get("serial", ""),
+        "counts",
+        np.diag(np.repeat([1.0 / counts[0], 1000.0 / counts[1]], 3)),
+        ranges,
+        "counts per unit as the address says",
+    )
+    return _Where(address, port, (baud,) if baud else BAUDS, form == "binary", calibration)
+
+
+def _above_zero(address: Address, option: str) -> float:
+    """Return a number option, nan where it is not given. Raises SetupError where it is no number above 0."""
+    text = address.options.get(option)
+    if text is None:
+        return math.nan
+    try:
+        value = float(text) if text.isascii() and "_" not in text else math.nan
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and 1e-9 < value < 1e9):
+        raise SetupError(f"{address.uri}: {option}={text[:40]} must be a number above 0")
+    return value
 
 
 class ControllerConversation:

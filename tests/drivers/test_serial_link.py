@@ -6,8 +6,8 @@ import serial
 from drivers import serial_link
 from drivers.address import parse_address
 from drivers.clock import RealClock
-from drivers.digital_ft.handshake import open_digital_ft
-from drivers.serial_ft.handshake import open_serial_ft
+from drivers.digital_ft.device import open_digital_ft
+from drivers.serial_ft.device import open_serial_ft
 from drivers.serial_link import SerialLink, port_of
 from drivers.transducer import LinkLost, SetupError
 from simulators.pseudo_terminal import PseudoTerminal

@@ -12,11 +12,11 @@ import pytest
 from drivers import streaming
 from drivers.address import parse_address
 from drivers.clock import Clock, PacedClock
-from drivers.digital_ft import handshake as digital_ft_handshake
-from drivers.digital_ft.handshake import identify_digital_ft, open_digital_ft
+from drivers.digital_ft import device as digital_ft_device
+from drivers.digital_ft.device import identify_digital_ft, open_digital_ft
 from drivers.readings import ReadingBlock
-from drivers.serial_ft import handshake as serial_ft_handshake
-from drivers.serial_ft.handshake import identify_serial_ft, open_serial_ft
+from drivers.serial_ft import device as serial_ft_device
+from drivers.serial_ft.device import identify_serial_ft, open_serial_ft
 from drivers.serial_link import port_of
 from drivers.transducer import DeviceFault, LinkLost, SetupError
 from simulators.bench import Bench
@@ -77,8 +77,8 @@ def open_files():
 @pytest.fixture(params=WIRES)
 def simulator(request, monkeypatch):
     """Return a function that starts the simulator. The stream is watched for its rate only as long as a test needs."""
-    monkeypatch.setattr(serial_ft_handshake, "_MEASURED", 0.25)
-    monkeypatch.setattr(digital_ft_handshake, "_MEASURED", 0.15)
+    monkeypatch.setattr(serial_ft_device, "_MEASURED", 0.25)
+    monkeypatch.setattr(digital_ft_device, "_MEASURED", 0.15)
     threads_before, files_before = set(threading.enumerate()), open_files()
     started = []
 

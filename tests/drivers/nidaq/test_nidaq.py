@@ -8,8 +8,8 @@ import pytest
 
 from drivers.address import parse_address
 from drivers.clock import RealClock
-from drivers.nidaq import handshake
-from drivers.nidaq.handshake import identify_nidaq, open_nidaq
+from drivers.nidaq import device
+from drivers.nidaq.device import identify_nidaq, open_nidaq
 from drivers.readings import ReadingBlock
 from drivers.transducer import SetupError
 from simulators.bench import RATED, Bench
@@ -85,7 +85,7 @@ class _Task:
 def library(monkeypatch):
     before = set(threading.enumerate())
     stand_in = StandIn(RealClock())
-    monkeypatch.setattr(handshake, "library", lambda: stand_in)
+    monkeypatch.setattr(device, "library", lambda: stand_in)
     yield stand_in
     assert stand_in.open == 0, "an acquisition was left open"
     assert set(threading.enumerate()) <= before, "a thread was left running"
