@@ -7,8 +7,9 @@ import numpy as np
 
 from solver.contact import STICK, Contact
 from solver.finger import FingerModel
+from solver.hyperelastic import HUMAN_SKIN
 from solver.mesh import Array
-from solver.scene import Scene
+from solver.scene import Material, Scene
 
 DENSITY = 1.1e-9  # of soft tissue [t/mm3 = N s2/mm4]
 # Relaxation of the fingerpad under load: times from Pawluk and Howe 1999 (J. Biomech. Eng. 121, 178); their weights are
@@ -25,9 +26,15 @@ def _laws(scene: Scene) -> str:
     said: list[str] = []
     for name in ("epidermis", "dermis", "fat"):
         tissue = scene.materials.of(name)
-        law = f"Demiray, stiffening {tissue.stiffening:g}" if tissue.stiffening is not None else usual
+        law = _ogden(tissue) if tissue.law == "ogden" else usual
         said.append(f"{name} {law}" + (f", relaxing in {len(tissue.prony)} terms" if tissue.prony else ""))
     return "; ".join(said)
+
+
+def _ogden(tissue: Material) -> str:
+    if tissue.stiffening is not None:
+        return f"Ogden, exponent {tissue.stiffening:g}"
+    return f"Ogden, exponent {HUMAN_SKIN:g} (default: human skin, Shergold and Fleck 2004)"
 
 
 def _held(scene: Scene) -> str:

@@ -33,7 +33,7 @@ class FiniteBody:
     centre: Array  # (e, 2) the modes are combinations of 1, x - centre, y - centre
     combination: Array  # (e, 3, 3) mode m = sum over l of combination[m, l] (1, x - centre, y - centre)[l]
     shear: Array  # (e,) [MPa]
-    stiffening: Array  # (e,)
+    stiffening: Array  # (e,) Ogden's exponent [-]
     lame: Array  # (e,) [MPa]
     nodes: Narrow  # (e, 9)
     unknown: Narrow  # (e, 8, 2) of the outer nodes, -1 where fixed

@@ -12,6 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+PLAIN = 2.0  # Ogden's exponent of the neo-Hookean law
+HUMAN_SKIN = 9.0  # and that of human skin (Shergold and Fleck 2004)
+NEAR = 0.04  # Q up to which the series serves: further on, nothing is lost by differences
+TERMS = 14  # of it: enough up to an exponent of 20
 
 
 class Law(Protocol):
@@ -31,7 +35,7 @@ class Law(Protocol):
 
     @property
     def stiffening(self) -> float:
-        """Exponent b of exp(b Q) by which the shear modulus grows with strain, 0 where it stays [-]."""
+        """Ogden's exponent, by which the shear modulus grows with strain; PLAIN where it stays [-]."""
         ...
 
 
@@ -62,26 +66,27 @@ class NeoHooke:
     @property
     def stiffening(self) -> float:
         """No stiffening."""
-        return 0.0
+        return PLAIN
 
 
 @dataclass(frozen=True, slots=True)
-class Demiray:
-    """W = G/(2 b) (exp(b (tr C - 3 - 2 ln J)) - 1) + lambda/2 (ln J)^2: skin that stiffens as its collagen straightens.
+class Ogden:
+    """W = 2 G/a^2 (l^a + l^-a - 2) + lambda/2 (ln J)^2, with l^2 + l^-2 - 2 = Q: skin, that stiffens as it is strained.
 
-    The exponential in the first invariant is Demiray's (1972, J. Biomech. 5, 309, eq. 16), made compressible like the
-    neo-Hookean law, which it becomes as b goes to 0. P = G exp(b Q) (F - F^-T) + lambda ln J F^-T.
-    Simple shear 1 has Q = 1, so that b = 1 multiplies its energy G/2 by e - 1:
+    Ogden's law of one term (1972, Proc. R. Soc. Lond. A 326, 565) in plane strain, where l and 1/l are the stretches as
+    long as the volume stays; made compressible like the neo-Hookean law, which it is for a = 2. Shergold and Fleck
+    (2004, Proc. R. Soc. Lond. A 460, 3037) fit human skin with a = 9. P = G f(Q) (F - F^-T) + lambda ln J F^-T with
+    f = 2/a sinh(a s)/sinh(2 s), l = exp(s). Pulled to twice its length, with a = 4: 2 G/16 (16 + 1/16 - 2):
 
-    >>> law = Demiray(0.08, 0.48, 1.0)
-    >>> float((energy(law, np.array([[1.0, 1.0], [0.0, 1.0]])) / (law.shear / 2.0)).round(6))
-    1.718282
+    >>> law = Ogden(0.08, 0.48, 4.0)
+    >>> float((energy(law, np.diag([2.0, 0.5])) / law.shear).round(6))
+    1.757812
     """
 
-    name: ClassVar[str] = "Demiray"
+    name: ClassVar[str] = "Ogden"
     E: float  # Young's modulus of the undeformed tissue [MPa]
     nu: float  # its Poisson's ratio [-]
-    stiffening: float  # b [-]
+    stiffening: float = HUMAN_SKIN  # a [-]
 
     @property
     def shear(self) -> float:
@@ -92,6 +97,35 @@ class Demiray:
     def lame(self) -> float:
         """Lamé's first constant, lambda = E nu / ((1 + nu) (1 - 2 nu)) [MPa]."""
         return self.E * self.nu / ((1.0 + self.nu) * (1.0 - 2.0 * self.nu))
+
+
+def shape(exponent: Array, Q: Array) -> Array:
+    """Return W by G/2 (...) of Ogden's exponents, without the term of ln J: 16/a^2 sinh^2(a s/2), Q = 4 sinh^2 s."""
+    some = np.where(np.real(Q) > 0.0, Q, 0.0 * Q)
+    return 16.0 / exponent**2 * np.sinh(exponent / 2.0 * np.arcsinh(np.sqrt(some) / 2.0)) ** 2
+
+
+def slopes(exponent: Array, Q: Array) -> tuple[Array, Array]:
+    """Return f = dW/dQ by G/2, by which the shear modulus has grown, and df/dQ (...).
+
+    f is Gauss's series 2F1(1 + a/2, 1 - a/2; 3/2; -Q/4), of which the first terms serve where Q is small.
+
+    >>> [float(number) for number in slopes(np.array(4.0), np.array(0.01))]  # 1 + Q/2
+    [1.005, 0.5]
+    """
+    a, x = exponent, -Q / 4.0
+    value, slope, term = np.ones_like(x), np.zeros_like(x), np.ones_like(x)
+    for n in range(TERMS):
+        factor = (1.0 + a / 2.0 + n) * (1.0 - a / 2.0 + n) / ((1.5 + n) * (n + 1.0))
+        slope = slope - (n + 1.0) / 4.0 * factor * term
+        term = term * factor * x
+        value = value + term
+    far = np.real(Q) > NEAR
+    s = np.arcsinh(np.sqrt(np.where(far, Q, 1.0)) / 2.0)
+    one, two = np.sinh(a * s), np.sinh(2.0 * s)
+    wide = 2.0 / a * one / two
+    bend = (2.0 * np.cosh(a * s) - 2.0 * wide * np.cosh(2.0 * s)) / (4.0 * two**2)
+    return np.where(far, wide, value), np.where(far, bend, slope)
 
 
 def _parts(F: Array) -> tuple[Array, Array, Array]:
@@ -107,9 +141,8 @@ def _parts(F: Array) -> tuple[Array, Array, Array]:
 def energy(law: Law, F: Array) -> Array:
     """Return W (...) [MPa] at deformation gradients F (..., 2, 2); nan where det F is not positive."""
     J, _, Q = _parts(F)
-    b = law.stiffening
-    shape = (np.exp(b * Q) - 1.0) / b if b > 0.0 else Q
-    return law.shear / 2.0 * shape + law.lame / 2.0 * np.log(J) ** 2
+    grown = Q if law.stiffening == PLAIN else shape(np.array(law.stiffening), Q)
+    return law.shear / 2.0 * grown + law.lame / 2.0 * np.log(J) ** 2
 
 
 def stress(law: Law, F: Array) -> Array:
@@ -120,7 +153,7 @@ def stress(law: Law, F: Array) -> Array:
     -0.193089
     """
     J, inverse, Q = _parts(F)
-    shear = (law.shear * np.exp(law.stiffening * Q))[..., None, None]
+    shear = (law.shear * slopes(np.array(law.stiffening), Q)[0])[..., None, None]
     return shear * (F - inverse) + law.lame * np.log(J)[..., None, None] * inverse
 
 
@@ -128,14 +161,15 @@ def tangent(law: Law, F: Array) -> Array:
     """Return dP_aA/dF_bB (..., a, A, b, B) [MPa]."""
     J, inverse, Q = _parts(F)
     wide = (..., None, None, None, None)
-    shear = (law.shear * np.exp(law.stiffening * Q))[wide]
+    grown, growth = slopes(np.array(law.stiffening), Q)
+    shear, more = (law.shear * grown)[wide], (2.0 * law.shear * growth)[wide]
     pressure = law.lame * np.log(J)[wide]
     excess = F - inverse
     unit = np.einsum("ab,AB->aAbB", np.eye(2), np.eye(2))
     crossed = np.einsum("...aB,...bA->...aAbB", inverse, inverse)  # minus the derivative of F^-T
-    grown = np.einsum("...aA,...bB->...aAbB", excess, excess)
+    both = np.einsum("...aA,...bB->...aAbB", excess, excess)
     squeezed = np.einsum("...aA,...bB->...aAbB", inverse, inverse)
-    return shear * (unit + crossed + 2.0 * law.stiffening * grown) - pressure * crossed + law.lame * squeezed
+    return shear * (unit + crossed) + more * both - pressure * crossed + law.lame * squeezed
 
 
-LAWS = (NeoHooke, Demiray)
+LAWS = (NeoHooke, Ogden)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from solver.finite_body import FiniteBody
+from solver.hyperelastic import shape, slopes
 from solver.mesh import Array
 
 
@@ -26,11 +27,8 @@ def energy(body: FiniteBody, u: Array) -> float:
     """Return the energy stored in the body [N mm per mm]."""
     F = deformation(body, u)
     J, volume = _logarithm(body, F)
-    b = body.stiffening[:, None]
-    safe = np.where(b > 0.0, b, 1.0)
-    Q = _excess(F, J)
-    shape = np.where(b > 0.0, np.expm1(b * Q) / safe, Q)
-    return float(np.sum(body.weight * body.shear[:, None] / 2.0 * shape) + np.sum(body.lame / 2.0 * (volume**2).T))
+    grown = shape(body.stiffening[:, None], _excess(F, J))
+    return float(np.sum(body.weight * body.shear[:, None] / 2.0 * grown) + np.sum(body.lame / 2.0 * (volume**2).T))
 
 
 def forces_and_tangents(body: FiniteBody, u: Array, pressure: Array) -> tuple[Array, Array]:
@@ -43,7 +41,8 @@ def forces_and_tangents(body: FiniteBody, u: Array, pressure: Array) -> tuple[Ar
     inverse = np.swapaxes(np.linalg.inv(F), -1, -2)
     gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
     w = body.weight
-    G = body.shear[:, None] * np.exp(body.stiffening[:, None] * _excess(F, J))
+    grown, growth = slopes(body.stiffening[:, None], _excess(F, J))
+    G = body.shear[:, None] * grown
     spatial = np.einsum("eqaA,eqiA->eqia", inverse, gradient)  # gradients in the deformed body
     dilate = np.einsum("eq,eqm,eqia->emia", w, body.modes, spatial)
     excess = np.einsum("eqaA,eqiA->eqia", F - inverse, gradient)
@@ -52,7 +51,7 @@ def forces_and_tangents(body: FiniteBody, u: Array, pressure: Array) -> tuple[Ar
     geometric = w * (G - np.einsum("eqm,em->eq", body.modes, pressure))
     tangent = np.einsum("eq,eqiA,eqjA,ab->eiajb", w * G, gradient, gradient, np.eye(2))
     tangent += np.einsum("eq,eqja,eqib->eiajb", geometric, spatial, spatial)
-    tangent += np.einsum("eq,eqia,eqjb->eiajb", 2.0 * body.stiffening[:, None] * w * G, excess, excess)
+    tangent += np.einsum("eq,eqia,eqjb->eiajb", 2.0 * growth * w * body.shear[:, None], excess, excess)
     tangent += np.einsum("e,emia,emjb->eiajb", body.lame, dilate, dilate)
     count = len(body.nodes)
     return force.reshape(count, 18), tangent.reshape(count, 18, 18)

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 Slide = Literal["+x", "-x", "none"]
-Law = Literal["hooke", "neo-hookean", "demiray"]
+Law = Literal["hooke", "neo-hookean", "ogden"]
 TISSUES = ("epidermis", "dermis", "fat", "bone")  # in the order of the mesh's regions
-LAWS_OF = {"small": ("hooke",), "finite": ("neo-hookean", "demiray")}  # that each kinematics has
+LAWS_OF = {"small": ("hooke",), "finite": ("neo-hookean", "ogden")}  # that each kinematics has
 
 
 class SceneError(ValueError):
@@ -120,7 +120,7 @@ class Material:
     E: float  # Young's modulus, of the undeformed tissue, at once [MPa]
     nu: float  # Poisson's ratio, likewise [-]
     law: Law | None = None  # None: Hooke at small strain, neo-Hookean at finite strain
-    stiffening: float | None = None  # b of Demiray's law [-]
+    stiffening: float | None = None  # exponent of Ogden's law [-]; None: that of human skin
     prony: tuple[Relaxation, ...] = ()  # of the shear modulus; the bulk modulus does not relax
 
     def check(self, key: str) -> None:
@@ -129,12 +129,12 @@ class Material:
         if not 0.0 <= self.nu <= 0.4999999:
             allowed = "it must lie between 0 and 0.4999999, since a material with nu = 0.5 has no strain energy of "
             raise SceneError(f"{key}.nu", self.nu, allowed + "volume change to compute")
-        if self.law not in (None, "hooke", "neo-hookean", "demiray"):
-            raise SceneError(f"{key}.law", self.law, 'it must be "hooke", "neo-hookean" or "demiray"')
-        if (self.stiffening is not None) != (self.law == "demiray"):
-            raise SceneError(f"{key}.stiffening", self.stiffening, 'it belongs to law = "demiray", which needs it')
+        if self.law not in (None, "hooke", "neo-hookean", "ogden"):
+            raise SceneError(f"{key}.law", self.law, 'it must be "hooke", "neo-hookean" or "ogden"')
+        if self.stiffening is not None and self.law != "ogden":
+            raise SceneError(f"{key}.stiffening", self.stiffening, 'it belongs to law = "ogden"')
         if self.stiffening is not None:
-            _within(f"{key}.stiffening", self.stiffening, 0.0, 20.0)
+            _within(f"{key}.stiffening", self.stiffening, 2.0, 20.0)
         for number, term in enumerate(self.prony):
             _within(f"{key}.prony[{number}].g", term.g, 0.0, 0.99)
             _within(f"{key}.prony[{number}].tau", term.tau, 1e-6, 1e6, "s")

@@ -1,6 +1,6 @@
 """The tissues of a scene as the laws that elements are made of, in the order of the mesh's regions."""
 
-from solver.hyperelastic import Demiray, Law, NeoHooke
+from solver.hyperelastic import Law, NeoHooke, Ogden
 from solver.materials import Moduli, Prony
 from solver.scene import Material, Materials
 
@@ -23,6 +23,6 @@ def finite_laws(materials: Materials) -> list[Law]:
 
 def _finite(tissue: Material, moduli: Moduli) -> Law:
     young, nu = moduli.engineering if tissue.prony else (tissue.E, tissue.nu)
-    if tissue.stiffening is not None:
-        return Demiray(young, nu, tissue.stiffening)
-    return NeoHooke(young, nu)
+    if tissue.law != "ogden":
+        return NeoHooke(young, nu)
+    return Ogden(young, nu) if tissue.stiffening is None else Ogden(young, nu, tissue.stiffening)

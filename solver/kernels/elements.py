@@ -5,6 +5,25 @@ import numpy as np
 
 from solver.kernels.compiling import Array, Narrow, compiled
 
+PLAIN = 2.0  # exponent of tissue that does not stiffen
+
+
+@compiled
+def stiffened(exponent: float, excess: float) -> tuple[float, float]:
+    """Return by how much the shear modulus has grown, and how fast it grows: `solver.hyperelastic.slopes`."""
+    if excess > 0.04:
+        s = np.arcsinh(0.5 * np.sqrt(excess))
+        two = np.sinh(2.0 * s)
+        grown = 2.0 / exponent * np.sinh(exponent * s) / two
+        return grown, (np.cosh(exponent * s) - grown * np.cosh(2.0 * s)) / (2.0 * two * two)
+    x, grown, growth, term = -excess / 4.0, 1.0, 0.0, 1.0
+    for n in range(14):
+        factor = (1.0 + exponent / 2.0 + n) * (1.0 - exponent / 2.0 + n) / ((1.5 + n) * (n + 1.0))
+        growth -= (n + 1.0) / 4.0 * factor * term
+        term *= factor * x
+        grown += term
+    return grown, growth
+
 
 @compiled
 def assemble(
@@ -30,7 +49,7 @@ def assemble(
 
     `pressure` (e, 3) are the pressure modes that the tangent sees (the linearised prediction), while the forces follow
     from `u` alone. `grad_x`, `grad_y` (e, q, 9), `weight` (e, q), `modes` (e, q, 3, orthonormal over the element);
-    `shear`, `stiffening`, `lame` (e,); `nodes` (e, 9), `unknown` (e, 8, 2), -1 where fixed.
+    `shear`, `stiffening` (Ogden's exponent), `lame` (e,); `nodes` (e, 9), `unknown` (e, 8, 2), -1 where fixed.
     Filled: `tangent` (e, 16, 16) of the outer nodes, lower half, `force` (n,), `fold` (e, 2, 17)
     (centre = -(fold @ (outer unknowns, 1))), `core` (e, 3) of the centre's stiffness inverted (xx, xy, yy),
     `dilate` (e, 3, 18) derivative of the modes of ln J, `volume` (e, 3) those modes.
@@ -72,9 +91,11 @@ def assemble(
             v1 += w * m1 * log
             v2 += w * m2 * log
             g = shear[e]
-            if stiffening[e] > 0.0:
+            growth = 0.0
+            if stiffening[e] != PLAIN:
                 excess = f00 * f00 + f01 * f01 + f10 * f10 + f11 * f11 - 2.0 - 2.0 * log
-                g *= np.exp(stiffening[e] * excess)
+                grown, growth = stiffened(stiffening[e], excess)
+                g *= grown
             wg = w * g
             geometric = wg - w * (m0 * pressure[e, 0] + m1 * pressure[e, 1] + m2 * pressure[e, 2])
             a00, a01, a10, a11 = f11 / j, -f10 / j, -f01 / j, f00 / j  # inverse transposed
@@ -99,8 +120,8 @@ def assemble(
                     xx[i, k] += laplace + qx * hx[k]
                     yy[i, k] += laplace + qy * hy[k]
                     xy[i, k] += qy * hx[k]
-            if stiffening[e] > 0.0:
-                more = 2.0 * stiffening[e] * wg
+            if stiffening[e] != PLAIN:
+                more = 2.0 * growth * w * shear[e]
                 for i in range(9):
                     for k in range(9):
                         xx[i, k] += more * sx[i] * sx[k]
@@ -197,9 +218,9 @@ def forces(
             v1 += w * modes[e, q, 1] * log
             v2 += w * modes[e, q, 2] * log
             g = w * shear[e]
-            if stiffening[e] > 0.0:
+            if stiffening[e] != PLAIN:
                 excess = f00 * f00 + f01 * f01 + f10 * f10 + f11 * f11 - 2.0 - 2.0 * log
-                g *= np.exp(stiffening[e] * excess)
+                g *= stiffened(stiffening[e], excess)[0]
             a00, a01, a10, a11 = f11 / j, -f10 / j, -f01 / j, f00 / j
             inverse[q, 0], inverse[q, 1], inverse[q, 2], inverse[q, 3] = a00, a01, a10, a11
             p00, p01, p10, p11 = g * (f00 - a00), g * (f01 - a01), g * (f10 - a10), g * (f11 - a11)
@@ -317,6 +338,7 @@ def energies(
             f11 += y * at_y[p, i]
         fit = at_modes[p, 0] * v0 + at_modes[p, 1] * v1 + at_modes[p, 2] * v2
         excess = f00 * f00 + f01 * f01 + f10 * f10 + f11 * f11 - 2.0 - 2.0 * np.log(f00 * f11 - f01 * f10)
-        if stiffening[e] > 0.0:
-            excess = np.expm1(stiffening[e] * excess) / stiffening[e]
+        if stiffening[e] != PLAIN:
+            half = np.sinh(stiffening[e] / 2.0 * np.arcsinh(0.5 * np.sqrt(max(excess, 0.0))))
+            excess = 16.0 / stiffening[e] ** 2 * half * half
         out[p] = 0.5 * shear[e] * excess + 0.5 * lame[e] * fit * fit
