@@ -65,7 +65,7 @@ def on_mesh(scene: Scene, fineness: float, shift: bool) -> list[float]:
         contact = settled(scene, finger)
         if not finger.reaches_out(contact, finger.displacement(contact), depth):
             break
-    return numbers_on(finger, contact).tolist()
+    return numbers_on(finger, [contact])[0].tolist()
 
 
 def measured(number: int) -> dict[str, Any]:

@@ -14,6 +14,9 @@ from solver.mesh import Array, Indices, Mesh
 from solver.stiffness import Elastic, Isotropic
 
 Motion = Literal["x", "y", "turn"]
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+_VALUES, _SLOPES = line(_POINTS)  # (q, 3)
+UNHELD = 1e14  # stiffness by its inverse, largest numbers, from which a body is taken to move freely [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,9 +131,9 @@ def _touchable(mesh: Mesh, reduced: Reduced, free: Sequence[Motion]) -> Touchabl
         # surface's forces are asked to balance the loads along every motion that anything drives.
         rigid = np.linalg.qr(np.stack([np.r_[zero, one], np.r_[one, zero], np.r_[x, -y]], axis=1))[0]
         stiffness = stiffness + np.trace(stiffness) / (2 * k) * rigid @ rigid.T
-    if np.linalg.matrix_rank(stiffness) < 2 * k:
-        raise LinAlgError("the body is neither held nor balanced")
     compliance = np.linalg.inv(stiffness)
+    if k and not np.abs(stiffness).max() * np.abs(compliance).max() < UNHELD:
+        raise LinAlgError("the body is neither held nor balanced")
     compliance = (compliance + compliance.T) / 2.0
     load = reduced.load.sum(axis=1)
     moved = compliance @ load
@@ -157,10 +160,9 @@ def skin_lengths(mesh: Mesh) -> Array:
 def edge_load(mesh: Mesh, chain: Indices, traction: Array) -> Array:
     """Return the nodal forces (nodes, c) of a traction (2 k + 1, c) [MPa] along a chain of edges (2 k + 1,)."""
     out = np.zeros((len(mesh.nodes), traction.shape[1]))
-    points, weights = np.polynomial.legendre.leggauss(4)
-    values, slopes = line(points)  # (4, 3)
-    edges = np.stack([np.arange(0, len(chain) - 2, 2) + n for n in range(3)], axis=1)
-    stretch = np.linalg.norm(np.einsum("qn,enc->eqc", slopes, mesh.nodes[chain[edges]]), axis=2)
-    local = np.einsum("q,eq,qn,qm,emc->enc", weights, stretch, values, values, traction[edges])
+    edges = np.arange(0, len(chain) - 2, 2)[:, None] + np.arange(3)
+    tangent = _SLOPES @ mesh.nodes[chain[edges]]  # (e, q, 2)
+    length = _WEIGHTS * np.hypot(tangent[..., 0], tangent[..., 1])
+    local = _VALUES.T @ (length[:, :, None] * (_VALUES @ traction[edges]))
     np.add.at(out, chain[edges], local)
     return out

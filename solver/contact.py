@@ -13,13 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.friction import FrictionLaw
-from solver.lapack import dgetrf, dgetrs
+from solver.lapack import dgesv, dgetrf, dgetrs
 
 Array = NDArray[np.float64]
 States = NDArray[np.int8]
+Flags = NDArray[np.bool_]
 OPEN, STICK, SLIP, CAP = 0, 1, 2, 3
 NAMES = ("open", "stick", "slip", "cap")
 SMALL = 1e-11  # a contradiction smaller than this, relative to the largest of its kind, is round-off
+ROUNDS = 12  # systems after which the short way to settled sliding is given up
+HERTZ = 0.5  # part of the depth below which skin is first thought to touch: half as deep is half the overlap's square
 
 
 class ContactLost(Exception):
@@ -121,6 +124,8 @@ class Course:
         guesses = [np.where(low, SLIP, OPEN)] if guess is None else [guess]
         if guess is None and np.isfinite(self.law.tau_max):
             guesses.append(np.where(low, CAP, OPEN))
+        if guess is None and not self.body.motions.shape[1] and (found := self._slid(depth, -float(direction))):
+            return found
         for number, first in enumerate(guesses):
             try:
                 return self._consistent(depth, 0.0, np.zeros(count), first.astype(np.int8), sense, free=False)
@@ -128,6 +133,47 @@ class Course:
                 if number == len(guesses) - 1:
                     raise
         raise AssertionError  # there is always a guess
+
+    def _slid(self, depth: float, sense: float) -> Contact | None:
+        """Return what `_consistent` does where all that touches slips one way; None where that takes many rounds.
+
+        Points are then open, slipping or slipping at the bound, and the drag follows from the pressure.
+        """
+        body, mu = self.body, self.law.mu
+        slips = body.normal_by_normal + sense * mu * body.normal_by_tangential
+        above, bound = body.gap + body.normal_free - depth, self.law.bound(body.length)
+        on: Flags = above < -HERTZ * depth
+        none: Array = np.zeros(len(on))
+        capped: Flags = np.zeros(len(on), bool)
+        for iteration in range(1, ROUNDS + 1):
+            matrix, lifted, pull = slips, above, none
+            if capped.any():
+                pull = np.where(capped, sense * bound, 0.0)
+                matrix = np.where(capped, body.normal_by_normal, slips)
+                lifted = above + body.normal_by_tangential @ pull
+            at = on.nonzero()[0]
+            if not len(at):
+                return None
+            columns = matrix.take(at, 1)
+            found = dgesv(columns.take(at, 0), -lifted[at])
+            pressing: Array = found[2]
+            if found[3]:  # no unique forces
+                return None
+            normal = none.copy()
+            normal[at] = pressing
+            gap = lifted + columns @ pressing
+            slack = SMALL * max(float(pressing.max()), -float(pressing.min()))
+            low = -SMALL * max(float(body.gap.max()), float(gap.max()))
+            now: Flags = (on & (normal >= -slack)) | (~on & (gap < low))
+            over: Flags = now & on & (mu * normal > bound + np.where(capped, -slack, slack))
+            if (now == on).all() and (over == capped).all():
+                tangential = np.where(on & ~capped, sense * mu * normal, pull)
+                shift = body.tangential_free + body.tangential_by_tangential @ tangential
+                shift += body.normal_by_tangential.T @ normal
+                state = np.where(capped, CAP, np.where(on, SLIP, OPEN)).astype(np.int8)
+                return Contact(state, np.full(len(on), sense), normal, tangential, shift, gap, np.zeros(0), iteration)
+            on, capped = now, over
+        return None
 
     def step(self, before: Contact, depth: float, travel: float, resultants: Array | None = None) -> Contact:
         """Return the state after the body was driven to `depth` and `travel` along +x [mm], coming from `before`.

@@ -15,7 +15,7 @@ from numpy.linalg import LinAlgError
 from solver.lapack import dposv, dpotrs
 from solver.mesh import Array, Indices
 
-LEAF = 16  # elements in a part that is not halved any more: fewer means more Python, more means more arithmetic
+LEAF = 12  # elements in a part that is not halved any more: fewer means more Python, more means more arithmetic
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,6 +26,7 @@ class Part:
     border: Indices  # (b,) unknowns passed on
     children: tuple[int, ...]  # numbers of parts joined here, none for a leaf
     places: tuple[Indices, ...]  # for each child: position in (inner, border) of each of its border unknowns
+    spots: tuple[Indices, ...]  # for each child: flat positions in the (k + b)^2 matrix of what it passes on
     entries: Indices  # leaf: flat positions in the (k + b)^2 matrix of its elements' entries; trash at the end
     elements: slice  # leaf: its elements, in the order of `Tree.order`
 
@@ -72,12 +73,13 @@ class Tree:
             where[inner] = np.arange(len(inner))
             where[border] = np.arange(len(inner), total)
             places = tuple(where[parts[c].border] for c in below)
+            spots = tuple((place[:, None] * total + place).ravel() for place in places)
             entries = np.empty(0, np.int64)
             if not below:
                 at = np.where(free[mine], where[mine], -1)
                 both = (at[:, :, None] >= 0) & (at[:, None, :] >= 0)
                 entries = np.where(both, at[:, :, None] * total + at[:, None, :], total * total).ravel()
-            parts.append(Part(inner, border, below, places, entries, slice(low, high)))
+            parts.append(Part(inner, border, below, places, spots, entries, slice(low, high)))
         return Tree(order, tuple(parts), kept, size)
 
 
@@ -158,17 +160,17 @@ class Reduced:
             force = np.zeros((total, loads.shape[1]))
             force[:k] = loads[part.inner]
             if part.children:
-                matrix = np.zeros((total, total))
-                for child, place in zip(part.children, part.places, strict=True):
+                flat = np.zeros(total * total)
+                for child, place, spots in zip(part.children, part.places, part.spots, strict=True):
                     below = passed[child]
                     assert below is not None  # children come first, and each has one parent
-                    matrix[place[:, None], place] += below[0]
+                    flat[spots] += below[0].ravel()
                     force[place] += below[1]
                     passed[child] = None
             else:
                 values = stiffness[tree.order[part.elements]].ravel()
-                matrix = np.bincount(part.entries, values, total * total + 1).astype(np.float64)[:-1]
-                matrix = matrix.reshape(total, total)
+                flat = np.bincount(part.entries, values, total * total + 1).astype(np.float64, copy=False)[:-1]
+            matrix = flat.reshape(total, total)
             factor, solution = _solved(matrix[:k, :k], np.concatenate([matrix[:k, k:], force[:k]], axis=1))
             factors.append(factor)
             own.append(solution[:, total - k :])

@@ -1,6 +1,8 @@
 """The finger as the solver sees it: meshed, reduced to its skin, with its endings placed. One serves many surfaces."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from time import perf_counter
 
 import numpy as np
@@ -8,24 +10,22 @@ import numpy as np
 from solver.body import Body, elimination
 from solver.contact import Contact
 from solver.elements import Q2P1
-from solver.mesh import Array, Mesh
+from solver.mesh import Array
 from solver.mesher import FingerMesh, Sizing, finger_mesh
 from solver.receptor import ROW, Endings, endings, middle
-from solver.scene import Scene
+from solver.scene import Receptor, Scene
 from solver.stiffness import Probes
 from solver.tissues import settled_moduli
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)  # without slots: what few ask for is made when they ask
 class FingerModel:
     """A finger on one mesh. Bone frame: the bone stays, the surface comes up by the indentation."""
 
+    receptor: Receptor
     geometry: FingerMesh
     body: Body
     ending: Endings  # the reference ending alone
-    point: Endings  # its middle
-    row: Endings  # the row of receptors
-    corners: Probes  # every corner of every element: strains are largest at corners
     solve_s: float  # what assembling and reducing took, beside mesh and tables [s]
 
     @staticmethod
@@ -40,15 +40,24 @@ class FingerModel:
         body = Body.of(geometry.mesh, settled_moduli(scene.materials), tree=tree)
         took = perf_counter() - begun
         at_touch = endings(geometry, body.elastic, scene.receptor, np.zeros(1))
-        return FingerModel(
-            geometry,
-            body,
-            at_touch,
-            middle(geometry, body.elastic, scene.receptor),
-            endings(geometry, body.elastic, scene.receptor, ROW),
-            _corners(geometry.mesh, body),
-            took,
-        )
+        return FingerModel(scene.receptor, geometry, body, at_touch, took)
+
+    @cached_property
+    def point(self) -> Endings:
+        """The middle of the reference ending."""
+        return middle(self.geometry, self.body.elastic, self.receptor)
+
+    @cached_property
+    def row(self) -> Endings:
+        """The row of receptors."""
+        return endings(self.geometry, self.body.elastic, self.receptor, ROW)
+
+    @cached_property
+    def corners(self) -> Probes:
+        """Every corner of every element: strains are largest at corners."""
+        count = len(self.geometry.mesh.elements)
+        element = np.repeat(np.arange(count), 4)
+        return Probes.at(self.geometry.mesh, self.body.elastic, element, np.tile(Q2P1.corners, (count, 1)))
 
     def skin_displacement(self, contact: Contact) -> Array:
         """Return the displacement (2 k, 1) of the skin that may touch, normal first [mm]."""
@@ -67,6 +76,13 @@ class FingerModel:
     def sed_ending(self, displacement: Array) -> float:
         """Return the SED averaged over the reference ending [MPa] for displacements (nodes, 2)."""
         return float(self.ending.average(self.geometry.mesh, self.body.elastic, displacement[:, :, None])[0, 0])
+
+    def sed_endings(self, contacts: Sequence[Contact]) -> Array:
+        """Return the SED averaged over the reference ending (c,) [MPa] of several states, unfolded together there."""
+        mesh = self.geometry.mesh
+        forces = np.array([(*c.normal, *c.tangential) for c in contacts]).T
+        displacement = self.body.displacement(self.body.skin_displacement(forces), only=self.ending.nodes(mesh))
+        return self.ending.average(mesh, self.body.elastic, displacement)[0]
 
     def sed_point(self, displacement: Array) -> float:
         """Return the SED in the middle of the reference ending [MPa]."""
@@ -110,9 +126,3 @@ class FingerModel:
         may = np.isin(whole, self.geometry.mesh.skin)
         ends = bool(contact.touching[0] and may[0] == 0) or bool(contact.touching[-1] and may[-1] == 0)
         return ends or bool((below & ~may).any())
-
-
-def _corners(mesh: Mesh, body: Body) -> Probes:
-    """Return a probe in every corner of every element."""
-    element = np.repeat(np.arange(len(mesh.elements)), 4)
-    return Probes.at(mesh, body.elastic, element, np.tile(Q2P1.corners, (len(mesh.elements), 1)))

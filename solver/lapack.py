@@ -28,4 +28,5 @@ def _loaded() -> ModuleType:
 
 
 _wrappers = _loaded()
-dgetrf, dgetrs, dposv, dpotrs = _wrappers.dgetrf, _wrappers.dgetrs, _wrappers.dposv, _wrappers.dpotrs
+dgesv, dgetrf, dgetrs = _wrappers.dgesv, _wrappers.dgetrf, _wrappers.dgetrs
+dposv, dpotrs = _wrappers.dposv, _wrappers.dpotrs

@@ -344,7 +344,7 @@ def _error_estimates(scene: Scene, shared: _Shared, contact: Contact, numbers: A
     element, so that the edges of contact fall differently between nodes.
     """
     try:
-        others = [numbers_on(finger, _nearest(scene, finger)) for finger in shared.coarse]
+        others = [numbers_on(finger, [_nearest(scene, finger)])[0] for finger in shared.coarse]
     except (ContactLost, SolveFailure):
         return 1.0, 1.0, 1.0  # so near a limit that a coarser mesh has no state: nothing is known of the error
     depth = indentation(scene, contact)
@@ -362,10 +362,10 @@ def _nearest(scene: Scene, finger: FingerModel) -> Contact:
         return settled(scene.undragged(), finger)
 
 
-def numbers_on(finger: FingerModel, contact: Contact) -> Array:
-    """Return what errors are estimated of: SED of the ending, normal and tangential force along +x (3,)."""
-    sed = finger.sed_ending(finger.displacement(contact))
-    return np.array([sed, contact.normal.sum(), contact.tangential.sum()])
+def numbers_on(finger: FingerModel, contacts: Sequence[Contact]) -> Array:
+    """Return what errors are estimated of (c, 3): SED of the ending, normal and tangential force along +x."""
+    forces = [(c.normal.sum(), c.tangential.sum()) for c in contacts]
+    return np.column_stack([finger.sed_endings(contacts), forces])
 
 
 def _skin(finger: FingerModel, contact: Contact, skin: Array) -> Skin:

@@ -11,6 +11,7 @@ from solver.elements import Q2P1
 from solver.mesh import Array, Indices, Mesh
 
 _VALUES, _GRADIENTS = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
+_ALONG, _UP = np.ascontiguousarray(_GRADIENTS[..., 0].T), np.ascontiguousarray(_GRADIENTS[..., 1].T)  # (9 nodes, 9)
 
 
 class Isotropic(Protocol):
@@ -46,32 +47,39 @@ class Elastic:
         """
         corners = mesh.nodes[mesh.elements]  # (e, 9, 2)
         count = len(corners)
-        jacobian = np.swapaxes(corners, 1, 2)[:, None] @ _GRADIENTS  # (e, q, 2, 2) dx/dxi
-        det = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
-        inverse = np.empty_like(jacobian)
-        inverse[..., 0, 0], inverse[..., 1, 1] = jacobian[..., 1, 1] / det, jacobian[..., 0, 0] / det
-        inverse[..., 0, 1], inverse[..., 1, 0] = -jacobian[..., 0, 1] / det, -jacobian[..., 1, 0] / det
-        gradient = (_GRADIENTS @ inverse).reshape(count, 9, 18)  # (e, q, node and direction)
-        weight = det * Q2P1.weights  # (e, q)
+        x, y = np.ascontiguousarray(corners[..., 0]), np.ascontiguousarray(corners[..., 1])
+        x_xi, x_eta, y_xi, y_eta = x @ _ALONG, x @ _UP, y @ _ALONG, y @ _UP  # (e, q)
+        det = x_xi * y_eta - x_eta * y_xi
+        weight = det * Q2P1.weights
+        by_x = (y_eta / det)[:, :, None] * _ALONG.T  # (e, q, 9) dN/dx
+        by_x -= (y_xi / det)[:, :, None] * _UP.T
+        by_y = (x_xi / det)[:, :, None] * _UP.T
+        by_y -= (x_eta / det)[:, :, None] * _ALONG.T
 
         shear = np.array([m.shear for m in materials])[mesh.region]
         lame = np.array([m.lame for m in materials])[mesh.region]
-        weighted = np.swapaxes(gradient * weight[:, :, None], 1, 2)
-        products = (weighted @ gradient).reshape(count, 9, 2, 9, 2)  # integral of dN_i/da dN_j/db
-        laplace = products[:, :, 0, :, 0] + products[:, :, 1, :, 1]
-        stiff = products.transpose(0, 1, 4, 3, 2).copy()  # K_ia,jb gets dN_i/db dN_j/da
-        stiff[:, :, 0, :, 0] += laplace
-        stiff[:, :, 1, :, 1] += laplace
-        stiff = stiff.reshape(count, 18, 18) * shear[:, None, None]
-
         place = _VALUES @ corners  # (e, q, 2)
         centre = place.mean(axis=1)
-        modes = np.concatenate([np.ones((count, 9, 1)), place - centre[:, None]], axis=2)  # (e, q, 3)
+        modes = np.ones((count, 9, 3))
+        modes[:, :, 1:] = place - centre[:, None]
         loaded = np.swapaxes(modes * weight[:, :, None], 1, 2)  # (e, 3, q)
-        moments = loaded @ gradient  # (e, 3, 18): integral of mode times divergence
-        fit: Array = np.linalg.inv(loaded @ modes).astype(np.float64)
-        dilatation = fit @ moments
-        stiff += lame[:, None, None] * (np.swapaxes(moments, 1, 2) @ dilatation)
+        moments = np.empty((count, 3, 9, 2))  # integral of mode times divergence
+        moments[..., 0], moments[..., 1] = loaded @ by_x, loaded @ by_y
+        moments = moments.reshape(count, 3, 18)
+        dilatation = np.linalg.inv(loaded @ modes) @ moments
+        stiff: Array = np.swapaxes(lame[:, None, None] * moments, 1, 2) @ dilatation
+
+        # K_ia,jb gets G (delta_ab grad N_i . grad N_j + dN_i/db dN_j/da), one pair of directions after the other
+        blocks = stiff.reshape(count, 9, 2, 9, 2)
+        weight *= shear[:, None]
+        along = np.swapaxes(by_x * weight[:, :, None], 1, 2)
+        xx, xy = along @ by_x, along @ by_y
+        yy = np.swapaxes(by_y * weight[:, :, None], 1, 2) @ by_y
+        both = xx + yy
+        blocks[:, :, 0, :, 0] += both + xx
+        blocks[:, :, 1, :, 1] += both + yy
+        blocks[:, :, 0, :, 1] += np.swapaxes(xy, 1, 2)
+        blocks[:, :, 1, :, 0] += xy
         return Elastic(stiff, dilatation, centre, shear, lame)
 
 

@@ -1,6 +1,6 @@
 """Every way of solving a scene that the project keeps, behind one face, so that all are measured alike."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any, Literal, Protocol
@@ -41,6 +41,10 @@ class Meshed(Protocol):
         """Return SED of the ending [MPa], normal force and drag [N/mm] (3,)."""
         ...
 
+    def numbers_together(self, states: Sequence[State]) -> Array:
+        """Return them for several states (n, 3)."""
+        ...
+
     def floor(self) -> float:
         """Return the time of one assembly, factorisation and solve of this system [s]."""
         ...
@@ -78,7 +82,11 @@ class SmallMeshed:
 
     def numbers(self, state: State) -> Array:
         """Return SED, normal force and drag."""
-        return np.abs(numbers_on(self.finger, state))
+        return self.numbers_together([state])[0]
+
+    def numbers_together(self, states: Sequence[State]) -> Array:
+        """Return them for several states (n, 3)."""
+        return np.abs(numbers_on(self.finger, states))
 
     def floor(self) -> float:
         """Return what assembling, eliminating and unfolding once took."""
@@ -123,6 +131,10 @@ class ClimbingMeshed:
         """Return SED, normal force and drag."""
         return np.abs(state.finger.numbers(state.shape))
 
+    def numbers_together(self, states: Sequence[Climbed]) -> Array:
+        """Return them for several states (n, 3)."""
+        return np.array([self.numbers(state) for state in states])
+
     def floor(self) -> float:
         """Return what one assembly, factorisation and solve takes."""
         return _system(self._newton)
@@ -148,6 +160,10 @@ class FiniteMeshed:
     def numbers(self, state: State) -> Array:
         """Return SED, normal force and drag."""
         return np.array([self.finger.sed_ending(state), state.force[1], abs(state.force[0])])
+
+    def numbers_together(self, states: Sequence[State]) -> Array:
+        """Return them for several states (n, 3)."""
+        return np.array([self.numbers(state) for state in states])
 
     def floor(self) -> float:
         """Return what one assembly, factorisation and solve takes."""

@@ -66,6 +66,19 @@ def test_friction_with_a_bound_on_a_hertz_pressure_carries_the_closed_form(press
     assert np.ptp(capped) / 2 == pytest.approx(0.782578 * np.sqrt(1 - k**2), abs=0.035)
 
 
+@pytest.mark.parametrize("tau_max", [np.inf, 1e-4, 0.0])
+def test_the_short_way_to_settled_sliding_ends_where_steps_from_another_guess_do(pressed, tau_max):
+    touch = pressed[0].touchable
+    course = Course(touch, FrictionLaw(0.4, tau_max))
+    far = np.where(touch.gap < 0.02, SLIP, OPEN).astype(np.int8)
+    short, long = course.sliding(0.01, +1), course.sliding(0.01, +1, far)
+    assert np.array_equal(short.state, long.state)
+    assert (short.state == CAP).any() == (tau_max < np.inf)
+    for name in ("normal", "tangential", "gap", "shift"):
+        mine, other = getattr(short, name), getattr(long, name)
+        np.testing.assert_allclose(mine, other, rtol=0.0, atol=1e-12 * np.abs(other).max() + 1e-300)
+
+
 @pytest.mark.parametrize("mu", [0.1, 0.4])
 def test_what_slides_without_a_bound_drags_by_mu_times_the_normal_force(mu):
     body = cylinder(4.5, 0.2)
