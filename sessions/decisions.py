@@ -19,6 +19,7 @@ from sessions.recording.head import json_text
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording
 
+MOST_TILT = 20.0  # more is a face mounted wrongly, not one that leans [degrees]
 DECISIONS = "decisions.jsonl"  # in a session's folder
 
 Span = tuple[float, float]
@@ -36,6 +37,11 @@ OF_STROKE: Mapping[str, str] = {
 OF_TRIAL: Mapping[str, str] = {"choice": "the number of the stroke that the model gets, from 1"}
 
 
+OF_SESSION: Mapping[str, str] = {
+    "tilt": "two angles [degrees]: how far the face's normal leans to +x and to +y, which is levelled"
+}
+
+
 class DecisionError(ValueError):
     """A decision that cannot be: which, and what is allowed."""
 
@@ -46,9 +52,9 @@ class Decision:
 
     by: str  # a code, never a name
     why: str
-    what: str = ""  # a name of OF_STROKE or OF_TRIAL; "" where a line is undone
-    trial: int | None = None  # None: of a recording without trials
-    stroke: int | None = None  # its number within the trial, from 1; None: of the trial
+    what: str = ""  # a name of OF_STROKE, OF_TRIAL or OF_SESSION; "" where a line is undone
+    trial: int | None = None  # None: of a recording without trials, or of the session
+    stroke: int | None = None  # its number within the trial, from 1; None: of the trial, or of the session
     old: Value = None  # what stood there before
     new: Value = None
     undoes: int | None = None  # number of a line
@@ -75,7 +81,7 @@ class Decision:
         """The decision, for people.
 
         >>> Decision("E02", "a ramp", "steady", 3, 1, (1.0, 2.0), (1.2, 2.0), number=4).sentence
-        'decision 4 by E02: steady of stroke 1 of trial 3 is 1.2 to 2 (it was 1 to 2): a ramp'
+        'decision 4 by E02: steady of stroke 1 of trial 3 is 1.2 and 2 (it was 1 and 2): a ramp'
         """
         head = f"decision {self.number} by {self.by}: "
         if self.undoes is not None:
@@ -95,7 +101,7 @@ class Decision:
 def told(value: Value) -> str:
     """Return a value for people."""
     if isinstance(value, tuple):
-        return " to ".join(f"{part:.6g}" for part in value)
+        return " and ".join(f"{part:.6g}" for part in value)
     return "not known" if value is None else f"{value:.6g}"
 
 
@@ -171,6 +177,13 @@ class Decisions:
         """Return the decision which stroke of a trial the model gets, None where nobody decided."""
         found = (one for one in self.in_force if one.trial == trial and one.what == "choice")
         return next(found, None)
+
+    @property
+    def tilt(self) -> Span | None:
+        """Return how far the face leans to +x and to +y [degrees], where that was decided."""
+        found = (one for one in self.in_force if one.what == "tilt")
+        decision = next(found, None)
+        return None if decision is None else cast("Span", decision.new)
 
     def with_line(self, decision: Decision) -> "Decisions":
         """Return them with one more that is not recorded, as to see what it would do.
@@ -280,9 +293,7 @@ def _check(decision: Decision, before: Decisions) -> None:
         if decision.undoes not in {line.number for line in before.standing}:
             raise DecisionError(f"decision {decision.undoes} is not in force: there is nothing to undo")
         return
-    allowed = OF_TRIAL if decision.stroke is None else OF_STROKE
-    if decision.stroke is None and decision.trial is None:
-        raise DecisionError("a recording without trials gives the model every stroke: decide about one of them")
+    allowed = OF_STROKE if decision.stroke is not None else OF_SESSION if decision.trial is None else OF_TRIAL
     if decision.what not in allowed:
         raise DecisionError(f"nobody decides {decision.what!r} of {decision.of}: give one of {', '.join(allowed)}")
     if not _FITS[decision.what](decision.new):
@@ -296,6 +307,11 @@ def _number(value: object) -> bool:
 def _span(value: object) -> bool:
     parts = cast("Sequence[object]", value) if isinstance(value, tuple) else ()
     return len(parts) == 2 and all(map(_number, parts)) and cast("float", parts[0]) < cast("float", parts[1])
+
+
+def _angles(value: object) -> bool:
+    parts = cast("Sequence[object]", value) if isinstance(value, tuple) else ()
+    return len(parts) == 2 and all(map(_number, parts)) and all(abs(cast("float", part)) <= MOST_TILT for part in parts)
 
 
 def _count(value: object) -> bool:
@@ -318,4 +334,5 @@ _FITS: Mapping[str, Callable[[object], bool]] = {
     "direction": _way,
     "kept": _flag,
     "choice": _count,
+    "tilt": _angles,
 }

@@ -12,6 +12,7 @@ from daq_app.cli import WrongValue
 from daq_app.console import Console, number, table
 from daq_app.derived import analysed
 from sessions.analysis.bootstrap import BootstrapSettings, StrokeIntervals, stroke_intervals
+from sessions.analysis.tilt import Tilt
 from sessions.recording import Recording
 
 EXAMPLE = "daq-app analyse recordings/P07 --json"
@@ -62,10 +63,23 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if rows:
         console.say(f"\n{chosen.kind}:")
         console.say(table([_row(found) for found in intervals], head=INTERVALS))
+    if analysis.tilt is not None:
+        console.say(_leaning(analysis.tilt, analysis.settings.tilt))
     for flaw in analysis.flaws:
         where = "" if flaw.trial is None else f"trial {flaw.trial}: "
         console.say(f"{flaw.grade}: {where}{flaw.sentence}")
     return 3 if analysis.flaws else 0
+
+
+def _leaning(tilt: Tilt, levelled: tuple[float, float]) -> str:
+    """Say how the face leans, and whether that was levelled."""
+    ends = (tilt.x_interval, tilt.y_interval)
+    told = [
+        f"{number(a)}° ({number(low)} to {number(high)}) to +{axis}"
+        for axis, a, (low, high) in zip("xy", tilt.lean, ends, strict=True)
+    ]
+    done = f"levelled by {levelled[0]:g}° and {levelled[1]:g}°" if levelled != (0.0, 0.0) else "not levelled"
+    return f"tilt of the face, if the hand pressed straight down: {', '.join(told)}; {tilt.kind}; {done}"
 
 
 def _bootstrap(options: argparse.Namespace) -> BootstrapSettings:

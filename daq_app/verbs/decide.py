@@ -14,7 +14,7 @@ from daq_app.console import Console, number
 from daq_app.derived import ANALYSIS, PREDICTION, analysed
 from sessions.analysis import Analysis, Stroke, analyse
 from sessions.analysis.decided import tried, with_old
-from sessions.decisions import Decision, Decisions, append, read
+from sessions.decisions import Decision, DecisionError, Decisions, append, read
 from sessions.recording import Recording
 from sessions.study import check_code
 
@@ -40,6 +40,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     what.add_argument("--keep", action="store_true", help="the stroke stays in, its flaws were looked at")
     what.add_argument("--choose", action="store_true", help="of its trial's strokes the model gets this one")
+    what.add_argument(
+        "--tilt",
+        type=float,
+        nargs="*",
+        metavar="DEGREES",
+        help="of the session: level a face that leans so far to +x and to +y; without numbers as its presses tell",
+    )
     what.add_argument("--undo", type=int, metavar="NUMBER", help="take a decision back")
     what.add_argument("--list", action="store_true", help="only tell what was decided")
     parser.add_argument("--by", metavar="CODE", help="who decides: a code, never a name")
@@ -55,8 +62,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.by is None or options.why is None:
         raise WrongValue("a decision says who decides and why: give --by CODE and --why REASON")
     check_code("--by", options.by)
-    asked = _asked(options)
     analysis = analyse(recording, decisions=before)
+    asked = _asked(options) if options.tilt is None else _tilt(options, analysis)
     decision = with_old(analysis, asked)
     after = tried(recording, decision, before)
     made = append(recording, decision)
@@ -89,6 +96,18 @@ def _asked(options: argparse.Namespace) -> Decision:
             return replace(decision, what=what, new=(span[0], span[1]))
     what = next(name for name in ("onset", "lift", "direction") if getattr(options, name) is not None)
     return replace(decision, what=what, new=getattr(options, what))
+
+
+def _tilt(options: argparse.Namespace, analysis: Analysis) -> Decision:
+    """Return the decision to level the face, by the angles given or by those that its presses tell."""
+    given: list[float] = options.tilt
+    if len(given) not in (0, 2):
+        raise WrongValue("--tilt takes two angles, to +x and to +y in degrees, or none")
+    if given:
+        return Decision(options.by, options.why, "tilt", new=(given[0], given[1]))
+    if analysis.tilt is None:
+        raise DecisionError("nothing pressed without sliding, so no tilt is told: give two angles after --tilt")
+    return Decision(options.by, options.why, "tilt", new=analysis.tilt.lean)
 
 
 def _list(decisions: Decisions, console: Console) -> int:

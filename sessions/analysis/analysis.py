@@ -17,7 +17,8 @@ from sessions.analysis.settings import AnalysisSettings
 from sessions.analysis.soundness import soundness
 from sessions.analysis.span import Span, ZeroInForce, recorded_zero, span_of, zero_for
 from sessions.analysis.stroke import Stroke
-from sessions.decisions import Decided, Decision, Decisions, read
+from sessions.analysis.tilt import Press, Tilt, press_of, tilt_of
+from sessions.decisions import OF_SESSION, Decided, Decision, Decisions, read
 from sessions.plan import SessionPlan, Trial
 
 if TYPE_CHECKING:  # the runner imports the detector from here: it must not pay for the reader
@@ -39,6 +40,12 @@ class Analysis:
     filtered: str  # what was done to the forces, for people
     settings: AnalysisSettings
     decisions: tuple[Decision, ...] = ()  # of people, in force
+    presses: tuple[Press, ...] = ()  # that tell how the face leans
+
+    @property
+    def tilt(self) -> Tilt | None:
+        """Return how the face leans against the transducer; None where nothing pressed without sliding."""
+        return tilt_of(self.presses, self.settings)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, None where honesty allows no number; curves are left out."""
@@ -48,6 +55,7 @@ class Analysis:
             "friction": [asdict(parameters) for parameters in self.friction],
             "flaws": [asdict(flaw) for flaw in self.flaws],
             "decisions": [decision.to_dict() for decision in self.decisions],
+            "tilt": None if self.tilt is None else self.tilt.to_dict(),
             "filter": self.filtered,
             "interval": self.settings.interval_kind,
             "settings": asdict(self.settings),
@@ -60,11 +68,13 @@ def analyse(
 ) -> Analysis:
     """Return the strokes of a recording: within each trial's valid take, or anywhere where it has no trials.
 
-    Trials of practice and pre-evaluation are left out: they are no part of the experiment. `decisions` are those kept
-    in the session's folder, unless others are given. Raises RecordingError where their file cannot be read.
+    Trials of practice and pre-evaluation are no part of the experiment: of them only presses are taken. `decisions` are
+    those kept in the session's folder, unless others are given. Raises RecordingError where their file cannot be read.
     """
-    chosen = settings or AnalysisSettings()
     decided = read(recording.folder) if decisions is None else decisions
+    chosen = settings or AnalysisSettings()
+    if decided.tilt is not None:
+        chosen = replace(chosen, tilt=decided.tilt)
     told = [Flaw(FlawName.RECORDING, sentence, "doubtful") for sentence in (*recording.losses, *recording.flaws)]
     if recording.info is None:
         return Analysis(recording.simulated, (), (), tuple(told), "no forces were recorded", chosen)
@@ -78,7 +88,13 @@ def analyse(
         else [(None, recording.readings())]
     )
     found = analyse_blocks(parts, recording.plan, recording.info, chosen, told, decided)
-    return replace(found, simulated=recording.simulated)
+    aside = [
+        (record.trial, recording.readings(record.trial.number))
+        for record in recording.trials
+        if record.take and record.trial.phase != "main"
+    ]
+    others = analyse_blocks(aside, recording.plan, recording.info, chosen).presses
+    return replace(found, simulated=recording.simulated, presses=(*others, *found.presses))
 
 
 def analyse_blocks(
@@ -93,6 +109,7 @@ def analyse_blocks(
     decided = decisions or Decisions()
     strokes: list[Stroke] = []
     friction: list[FrictionParameters] = []
+    presses: list[Press] = []
     flaws = [*told, *(Flaw(FlawName.DECISION, problem, "doubtful") for problem in decided.problems)]
     filtered = ""
     for trial, block in parts:
@@ -107,9 +124,19 @@ def analyse_blocks(
             for stroke in _given(found.strokes, trial, decided)
         ]
         strokes += found.strokes
+        presses += found.presses
         filtered = filtered or found.filtered
     flaws += _without_stroke(decided, strokes)
-    return Analysis(info.simulated, tuple(strokes), tuple(friction), tuple(flaws), filtered, settings, decided.in_force)
+    return Analysis(
+        info.simulated,
+        tuple(strokes),
+        tuple(friction),
+        tuple(flaws),
+        filtered,
+        settings,
+        decided.in_force,
+        tuple(presses),
+    )
 
 
 def _given(strokes: tuple[Stroke, ...], trial: Trial | None, decided: Decisions) -> tuple[Stroke, ...]:
@@ -128,6 +155,8 @@ def _without_stroke(decided: Decisions, strokes: Iterable[Stroke]) -> list[Flaw]
     kept = {(stroke.trial, stroke.number) for stroke in strokes if stroke.kept}
     flaws: list[Flaw] = []
     for one in decided.in_force:
+        if one.what in OF_SESSION:
+            continue
         meant = (one.trial, one.new if one.what == "choice" else one.stroke)
         if meant not in (kept if one.what == "choice" else there):
             what = "left out, or not found" if meant in there else "not found"
@@ -141,6 +170,7 @@ class _Part:
     strokes: tuple[Stroke, ...]
     flaws: tuple[Flaw, ...]  # `stroke` counts within the part
     filtered: str
+    presses: tuple[Press, ...] = ()
 
 
 def _of_part(
@@ -159,8 +189,8 @@ def _of_part(
     if sound.refused:
         return _Part((), tuple(flaws), "")
     span = span_of(block, sound, info.calibration, plan.frame, settings)
-    found, more = _strokes(span, plan, info, settings, trial, decided)
-    return _Part(found, (*flaws, *more), span.filtered)
+    found, more, presses = _strokes(span, plan, info, settings, trial, decided)
+    return _Part(found, (*flaws, *more), span.filtered, presses)
 
 
 def _strokes(
@@ -170,24 +200,17 @@ def _strokes(
     settings: AnalysisSettings,
     trial: Trial | None,
     decisions: Decisions,
-) -> tuple[tuple[Stroke, ...], list[Flaw]]:
-    """Find and measure the strokes of a span."""
+) -> tuple[tuple[Stroke, ...], list[Flaw], tuple[Press, ...]]:
+    """Find and measure the strokes of a span, and the presses among them."""
     stated = info.settings.get(ZERO_SETTING) == ZERO_STATED
-    fallback = recorded_zero(span, stated=stated) if stated or info.calibration.raw_unit == RAW_WRENCH else None
-    first = span.windows.after(-np.inf, settings.zero_stretch)
-    if stated and fallback is not None:
-        general = fallback
-    elif first is not None:
-        general = ZeroInForce(first.level, first.noise, first.error, "", None, (0.0, 0.0), None)
-    elif fallback is not None:
-        general = fallback
-    else:
+    general = _general_zero(span, info, settings, stated=stated)
+    if general is None:
         sentence = "No stretch is unloaded: without a zero the readings of this transducer show no contact."
-        return (), [Flaw(FlawName.NO_UNLOADED_STRETCH, sentence, "refused")]
+        return (), [Flaw(FlawName.NO_UNLOADED_STRETCH, sentence, "refused")], ()
     normal = -(span.wrench[:, 2] - general.level[2])
     implausible = _normal_trouble(normal, float(general.noise[2]), plan.frame.normal, settings)
     if implausible is not None:
-        return (), [implausible]
+        return (), [implausible], ()
     unknown = general.flaw is FlawName.NO_UNLOADED_STRETCH
     threshold = settings.light_share * float(np.percentile(normal, 99.9))
     noise = threshold / settings.detector.onset_noise if unknown else float(general.noise[2])
@@ -205,21 +228,41 @@ def _strokes(
         flaws += [] if unlike is None else [replace(unlike, stroke=at)]
         idle[kept[at].start : kept[at].stop] = False
     strokes: list[Stroke] = []
+    presses: list[Press] = []
     for at, piece in enumerate(kept):
         zero = general if stated else zero_for(span, piece, idle, settings) or recorded_zero(span, stated=False)
         stroke, more = measured(span, piece, zero, plan.frame, plan.contact_area, settings, trial, at + 1, decided[at])
         flaws += [replace(flaw, stroke=len(strokes)) for flaw in more]
         strokes.append(stroke)
+        if stroke.mu_dynamic is None and zero.flaw is not FlawName.NO_UNLOADED_STRETCH:
+            press = press_of(span, piece, zero, plan.frame, number, settings)
+            presses += [] if press is None else [press]
+    flaws += _counted(tuple(strokes), trial, plan, decisions)
+    return tuple(strokes), flaws, tuple(presses)
+
+
+def _general_zero(span: Span, info: TransducerInfo, settings: AnalysisSettings, *, stated: bool) -> ZeroInForce | None:
+    """Return the zero that contacts are looked for with; None where nothing tells one."""
+    if stated:
+        return recorded_zero(span, stated=True)
+    first = span.windows.after(-np.inf, settings.zero_stretch)
+    if first is not None:
+        return ZeroInForce(first.level, first.noise, first.error, "", None, (0.0, 0.0), None)
+    return recorded_zero(span, stated=False) if info.calibration.raw_unit == RAW_WRENCH else None
+
+
+def _counted(strokes: tuple[Stroke, ...], trial: Trial | None, plan: SessionPlan, decisions: Decisions) -> list[Flaw]:
+    """Name it where there is no stroke, or more than the trial asks for."""
     if not strokes:
-        flaws.append(Flaw(FlawName.NO_STROKE, "No contact is a stroke.", "refused"))
+        return [Flaw(FlawName.NO_STROKE, "No contact is a stroke.", "refused")]
     allowed = 1 if trial is None else plan.strokes_allowed(trial)
     if trial is not None and len(strokes) > allowed:
         asked = "one" if allowed == 1 else f"up to {allowed}"
-        model = next((stroke.number for stroke in _given(tuple(strokes), trial, decisions)), None)
+        model = next((stroke.number for stroke in _given(strokes, trial, decisions)), None)
         gets = "none, as was decided" if model is None else "the first" if model == 1 else f"the one numbered {model}"
         sentence = f"{len(strokes)} strokes in a trial that asks for {asked}: the model gets {gets}."
-        flaws.append(Flaw(FlawName.SECOND_STROKE, sentence, "doubtful"))
-    return tuple(strokes), flaws
+        return [Flaw(FlawName.SECOND_STROKE, sentence, "doubtful")]
+    return []
 
 
 def _moved(piece: Contact, decided: Decided, span: Span) -> tuple[Contact, Flaw | None]:

@@ -13,6 +13,8 @@ def with_old(analysis: Analysis, decision: Decision) -> Decision:
     """Return a decision with what stands in its place now. Raises DecisionError where there is no such stroke."""
     if decision.undoes is not None:
         return decision
+    if decision.what == "tilt":
+        return replace(decision, old=analysis.settings.tilt)
     found = [stroke for stroke in analysis.strokes if stroke.trial == decision.trial]
     if decision.stroke is None:
         given = next((one.stroke for one in analysis.friction if one.trial == decision.trial), None)

@@ -73,6 +73,24 @@ def in_face_frame(wrench: Array, frame: Frame) -> Array:
     return np.hstack([wrench[:, order] * signs, wrench[:, [3 + i for i in order]] * signs])
 
 
+def levelled(wrench: Array, lean: tuple[float, float]) -> Array:
+    """Return a wrench (n, 6) of the face frame turned so that +z is the normal of a face that leans [degrees].
+
+    A rotation by the shortest way, so torques turn along.
+
+    >>> (levelled(np.array([[-1.0, 0, 0, 0, 0, 0]]), (90.0, 0.0)).round(9) + 0.0).tolist()
+    [[0.0, 0.0, -1.0, 0.0, 0.0, 0.0]]
+    """
+    if lean == (0.0, 0.0):
+        return wrench
+    x, y = np.radians(lean)
+    angle = float(np.hypot(x, y))
+    axis = np.array([y, -x, 0.0]) / angle  # turns the normal back to z
+    skew = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    turn = np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew
+    return np.hstack([wrench[:, :3] @ turn.T, wrench[:, 3:] @ turn.T])
+
+
 def normal_force(wrench: Array, frame: Frame) -> Array:
     """Return the normal force (n,) [N], positive when pressing, of a wrench (n, 6) as the transducer gives it."""
     return wrench[:, _AXES[frame.normal[1]]] * (1.0 if frame.normal[0] == "+" else -1.0)

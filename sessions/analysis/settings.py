@@ -48,6 +48,10 @@ class AnalysisSettings:
     frozen_readings: int = 8  # ... and in so many readings
     frozen_refused: float = 0.5  # share of frozen readings from which on nothing is analysed [-]
     uneven: float = 0.05  # spread of the time steps that makes the rate irregular [-]
+    press_shortest: float = 0.5  # a contact held so long [s] ...
+    press_moves: float = 1.0  # ... whose centre of pressure moves no further [mm] ...
+    press_ratio: float = 0.2  # ... and whose T/N stays below this is a press, and tells how the face leans [-]
+    tilt: tuple[float, float] = (0.0, 0.0)  # lean of the face's normal to +x and +y that is levelled [degrees]
     slow_onset: float = 0.5  # from onset to a fifth of the peak; a finger takes a tenth of it [s]
 
     @property

@@ -9,7 +9,7 @@ from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from sessions.analysis.contacts import Contact
 from sessions.analysis.flaws import FlawName
-from sessions.analysis.forces import Filter, in_face_frame
+from sessions.analysis.forces import Filter, in_face_frame, levelled
 from sessions.analysis.settings import AnalysisSettings
 from sessions.analysis.soundness import Soundness
 from sessions.analysis.zero import QuietWindows, quiet_windows
@@ -40,7 +40,7 @@ def span_of(
     """Return the sound readings of a block."""
     good = sound.good
     time = block.time[good]
-    wrench = in_face_frame(calibration.wrench(block.raw[good], np.zeros(6)), frame)
+    wrench = levelled(in_face_frame(calibration.wrench(block.raw[good], np.zeros(6)), frame), settings.tilt)
     place = np.concatenate([[0], np.cumsum(good)])
     segments = [slice(int(place[s.start]), int(place[s.stop])) for s in sound.segments]
     smoother = Filter(settings.cut_off)

@@ -81,7 +81,7 @@ def mean_of(values: Array, rate: float, common: float, settings: AnalysisSetting
     """
     held = values[np.isfinite(values)]
     mean = float(held.mean())
-    blocks = _block_means(values[:, None], rate, settings)[:, 0]
+    blocks = block_means(values[:, None], rate, settings)[:, 0]
     interval = None
     if len(blocks) >= _FEWEST_BLOCKS:
         error = float(blocks.std(ddof=1)) / len(blocks) ** 0.5
@@ -102,7 +102,7 @@ class Movement:
 
 def movement(time: Array, position: Array, rate: float, settings: AnalysisSettings) -> Movement | None:
     """Return the regression of position (n, 2) [mm] on time (n,) [s] over block means; None where there are too few."""
-    blocks = _block_means(np.column_stack([time, position]), rate, settings)
+    blocks = block_means(np.column_stack([time, position]), rate, settings)
     if len(blocks) < _FEWEST_BLOCKS:
         return None
     t = blocks[:, 0] - blocks[:, 0].mean()
@@ -131,7 +131,7 @@ def displacement(position: Array) -> float:
     return float(np.hypot(*(held[-fifth:].mean(axis=0) - held[:fifth].mean(axis=0))))
 
 
-def _block_means(values: Array, rate: float, settings: AnalysisSettings) -> Array:
+def block_means(values: Array, rate: float, settings: AnalysisSettings) -> Array:
     """Return the means (k, m) of values (n, m) over whole blocks, leaving out readings with nan."""
     held = values[np.isfinite(values).all(axis=1)]
     length = max(1, round(settings.block * rate))

@@ -73,6 +73,7 @@ def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
         Fact("normal axis", f"pressing is positive along {plan.frame.normal}", _ORIGIN[plan.frame.normal_origin]),
         Fact("height of the face", f"{plan.frame.height:g} mm above the origin", _ORIGIN[plan.frame.height_origin]),
         Fact("contact area", f"{plan.contact_area:g} mm²", _ORIGIN[plan.contact_area_origin]),
+        Fact("tilt of the face", *_tilt(analysis)),
         Fact("filter", analysis.filtered),
         Fact("interval of µ", analysis.settings.interval_kind),
     ]
@@ -81,6 +82,18 @@ def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
         words = f"{factor:g} times as fast as the wall clock" if factor else "which moves when it is waited on"
         facts.append(Fact("clock", f"told time, {words}"))
     return tuple(fact for fact in facts if fact.value)
+
+
+def _tilt(analysis: Analysis) -> tuple[str, str]:
+    """Return how the face leans, and whether that was levelled; nothing where nobody told."""
+    tilt, x_y = analysis.tilt, analysis.settings.tilt
+    done = "not levelled" if x_y == (0.0, 0.0) else f"levelled by {x_y[0]:.2g}° and {x_y[1]:.2g}°"
+    if tilt is None:
+        return ("" if x_y == (0.0, 0.0) else f"{x_y[0]:.2g}° to +x and {x_y[1]:.2g}° to +y"), done
+    (low_x, high_x), (low_y, high_y) = tilt.x_interval, tilt.y_interval
+    along = f"{tilt.lean[0]:.2g}° ({low_x:.2g} to {high_x:.2g}) to +x"
+    across = f"{tilt.lean[1]:.2g}° ({low_y:.2g} to {high_y:.2g}) to +y"
+    return f"{along}, {across}", f"{tilt.kind}; {done}"
 
 
 def excluded(

@@ -82,7 +82,8 @@ def test_every_line_of_a_simulated_session_says_so(recording):
         ({"what": "direction", "new": 2}, "cannot be"),
         ({"what": "kept", "new": 1}, "cannot be"),
         ({"what": "choice", "stroke": None, "new": 0}, "cannot be"),
-        ({"trial": None, "stroke": None}, "gives the model every stroke"),
+        ({"trial": None, "stroke": None}, "give one of tilt"),
+        ({"what": "tilt", "trial": None, "stroke": None, "new": (30.0, 0.0)}, "two angles"),
         ({"undoes": 1}, "nothing to undo"),
     ],
 )

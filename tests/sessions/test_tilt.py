@@ -1,0 +1,90 @@
+"""How the face leans, told from presses: the lean is planted by turning a whole bench in closed form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_strokes import INFO, SETTINGS, analysed, block, felt, plan, stroke, times, trapezium, trial, wrench
+
+from sessions.analysis.analysis import analyse_blocks
+from sessions.analysis.tilt import tilt_of
+
+T = times(12.0)
+LEAN = (2.0, -1.2)  # degrees, to +x and to +y
+
+
+def leaning(clean, lean=LEAN):
+    """Return a wrench as a transducer feels it under a face that leans: turned about x, then about y, by hand."""
+    a, b = np.arctan(np.tan(np.radians(lean)))
+    about_y = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
+    about_x = np.array([[1, 0, 0], [0, np.cos(-b), -np.sin(-b)], [0, np.sin(-b), np.cos(-b)]])
+    turn = about_x @ about_y
+    return np.hstack([clean[:, :3] @ turn.T, clean[:, 3:] @ turn.T])
+
+
+def presses(pushed=(0.0, 0.0, 0.0)):
+    """Three presses of 2 N, each with a push of its own sideways, as a share of N."""
+    clean = np.zeros((len(T), 6))
+    for at, push in zip((1.0, 5.0, 9.0), pushed, strict=True):
+        n = trapezium(T, at, at + 2.0, 0.1, 2.0)
+        clean += wrench(T, n, push * np.ones_like(T), np.zeros_like(T))
+    return clean
+
+
+def test_a_lean_that_was_planted_comes_back_within_its_interval():
+    found = analysed(block(T, felt(leaning(presses())))).tilt
+    assert len(found.presses) == 3
+    assert found.lean == pytest.approx(LEAN, abs=0.05)
+    assert found.x_interval[0] <= LEAN[0] <= found.x_interval[1]
+    assert found.y_interval[0] <= LEAN[1] <= found.y_interval[1]
+    assert found.x_interval[1] - found.x_interval[0] < 0.2
+
+
+def test_presses_that_push_sideways_differently_make_the_interval_wider_and_it_still_holds():
+    found = analysed(block(T, felt(leaning(presses((0.03, -0.02, 0.0)))))).tilt
+    assert found.x_interval[0] <= LEAN[0] <= found.x_interval[1]
+    assert found.x_interval[1] - found.x_interval[0] > 3.0
+    assert "3 presses" in found.kind
+
+
+def test_the_interval_of_presses_holds_the_lean_as_often_as_it_says():
+    draw = np.random.default_rng(5)
+    inside = 0
+    (press, *_), _ = analysed(block(T, felt(leaning(presses())))).tilt.presses, None
+    for _ in range(400):
+        leans = 2.0 + draw.standard_normal(4)
+        found = tilt_of([replace(press, lean=(float(one), 0.0)) for one in leans], SETTINGS)
+        inside += found.x_interval[0] <= 2.0 <= found.x_interval[1]
+    assert 0.92 <= inside / 400 <= 0.98
+
+
+def test_one_press_tells_a_lean_and_that_the_hand_is_not_in_its_interval():
+    one = T < 4.0
+    found = analysed(block(T[one], felt(leaning(presses()))[one])).tilt
+    assert found.lean == pytest.approx(LEAN, abs=0.05)
+    assert "what the hand itself pushed sideways is not in it" in found.kind
+
+
+def test_a_stroke_tells_no_lean():
+    assert analysed(block(T, felt(leaning(stroke(T))))).tilt is None
+
+
+def test_levelling_takes_the_error_of_the_lean_out_of_friction():
+    """mu is off by about e (1 + mu^2) under a lean of e along the stroke; levelled it is the planted one."""
+    raw = felt(leaning(stroke(T, mu=0.5)))
+    (leant,) = analysed(block(T, raw)).strokes
+    assert leant.mu_dynamic - 0.5 == pytest.approx(np.radians(-LEAN[0]) * 1.25, rel=0.1)
+    (level,) = analysed(block(T, raw), settings=replace(SETTINGS, tilt=LEAN)).strokes
+    assert level.mu_dynamic == pytest.approx(0.5, rel=2e-3)
+    assert level.speed == pytest.approx(25.0, rel=0.01)
+
+
+def test_a_lean_that_was_levelled_is_still_told_as_that_of_the_face():
+    found = analysed(block(T, felt(leaning(presses()))), settings=replace(SETTINGS, tilt=LEAN)).tilt
+    assert found.lean == pytest.approx(LEAN, abs=0.05)
+
+
+def test_presses_of_practice_count_and_its_strokes_do_not():
+    one = replace(trial(), phase="practice")
+    found = analyse_blocks([(one, block(T, felt(leaning(presses()))))], plan([one]), INFO, SETTINGS)
+    assert [press.trial for press in found.presses] == [1, 1, 1]
