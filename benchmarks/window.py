@@ -1,10 +1,12 @@
-"""What the window costs: first paint, frame times and blocking at 7000 readings a second, and the recorder's lag.
+"""What the window costs: first paint, frames, blocking and latencies at 7000 readings a second, the recorder's lag.
 
 Run: python -m benchmarks.window [--seconds 20] [--rate 7000] [--size 1920x1080]. It draws in memory, with the processor
-alone; a session with simulated people runs meanwhile. Figures depend on what else the computer does: its load is shown.
+alone; a session with simulated people runs meanwhile. Times by the clock depend on what else the computer does, whose
+load is shown; processor times hardly do.
 """
 
 import argparse
+import contextlib
 import os
 import statistics
 import subprocess
@@ -16,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+BEAT = 5  # of a timer of the event loop [ms]
 FIRST_PAINT = """
 import os, sys, time
 sys.argv = ["daq-app"]
@@ -69,72 +72,117 @@ def _session(options: argparse.Namespace) -> None:
     from PySide6.QtWidgets import QApplication
 
     from daq_app.qt import start
-    from daq_app.qt.main_window import MainWindow
 
     start.SIMULATED_BENCH = f"sim:?seed=7&rate={options.rate}"
-    frames: list[float] = []
-    lateness: list[float] = []
-    busy: list[float] = []  # processor time of the loop's own thread: what is left where nobody else wants it
-    lags: list[float] = []
-    drawn = MainWindow._draw
-
-    def timed(window: MainWindow) -> None:
-        frames.append(time.perf_counter())
-        drawn(window)
-
-    MainWindow._draw = timed
+    watched = _Watched()
     application = QApplication([])
     window = start.opened(application)
     window.resize(*map(int, options.size.split("x")))
     window.show()
     _until(lambda: window.bridge.state.bench.link == "open")
     window.live.show_seconds(options.shown)
-    last, own = time.perf_counter(), time.thread_time()
-
-    def tick() -> None:
-        nonlocal last, own
-        now = time.perf_counter()
-        busy.append(time.thread_time() - own)
-        own = time.thread_time()
-        lateness.append(now - last - 0.005)
-        lags.append(window.bridge.state.bench.health.lag_ms)
-        last = now
-
     heart = QTimer()
-    heart.setInterval(5)
-    heart.timeout.connect(tick)
+    heart.setInterval(BEAT)
+    heart.timeout.connect(lambda: watched.beat(window))
     with tempfile.TemporaryDirectory() as folder:
         window.page.folder.setText(folder)
         window.page.subject.setText("B01")
         window.page.simulated.setChecked(True)
         window.act("primary")
-        _until(lambda: window.bridge.state.session is not None)
+        _until(lambda: window.bridge.state.session is not None and window.bridge.model.said is not None)
         _for(3.0)
-        for values in (frames, lateness, busy, lags):
-            values.clear()
-        last, own = time.perf_counter(), time.thread_time()
+        watched.begin(window)
         heart.start()
-        used = sum(os.times()[:2])
+        before = _processor()
         _for(options.seconds)
-        used = sum(os.times()[:2]) - used
+        used = {name: taken - before.get(name, 0.0) for name, taken in _processor().items()}
         heart.stop()
-        state = window.bridge.state
-        steps = np.diff(frames)
         print(f"{options.rate} readings a second, {options.shown} s shown, {options.size}, {options.seconds:g} s long:")
-        print(f"  frames: {len(frames) / options.seconds:.0f} a second, {_parts(steps)} ms apart")
-        print(f"  processor of the window: {1000 * used / len(frames):.1f} ms a frame, all it does counted")
-        print(
-            f"  blocking of the event loop: {_parts(lateness)} ms, over 50 ms {sum(x > 0.05 for x in lateness)} times"
-        )
-        print(f"  recorder: {np.median(lags):.1f} ms behind at the median, {max(lags):.1f} ms at most")
-        print(f"  readings lost: {state.bench.health.lost}")
+        watched.tell(options.seconds, used)
+        print(f"  readings lost: {window.bridge.state.bench.health.lost}")
         window.bridge.end()
-        for _ in range(100):
-            if not Path(folder).exists():
-                break
-            time.sleep(0.1)
-            if window.bridge._client._process.poll() is not None:
-                break
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            window.bridge._client._process.wait(20.0)
+
+
+class _Watched:
+    """What is noted while the window works: its paints, and the beats of a timer of its event loop."""
+
+    def __init__(self) -> None:
+        """Watch every plot that is made from now on."""
+        from daq_app.qt.live_plot import LivePlot
+
+        self.window = None
+        self.painted: list[float] = []  # instants of a painted frame [s]
+        self.late: list[float] = []  # between two beats, beyond what was asked for [s]
+        self.busy: list[float] = []  # processor time between two beats: what is left where nobody else wants it [s]
+        self.behind: list[float] = []  # recorder to device [ms]
+        self.age: list[float] = []  # from a reading's arrival to the paint that shows it [s]
+        self.model_age: list[float] = []  # from a reading's arrival to the paint of the SED it led to [s]
+        self.predictions = 0
+        paint = LivePlot.paintEvent
+
+        def watched(plot: LivePlot, event: object) -> None:
+            paint(plot, event)
+            self._note(plot)
+
+        LivePlot.paintEvent = watched
+
+    def begin(self, window: object) -> None:
+        """Begin to count."""
+        for values in (self.painted, self.late, self.busy, self.behind, self.age, self.model_age):
+            values.clear()
+        self.window, self.predictions = window, window.bridge.model.predictions
+        self._last, self._own, self._shown, self._said = time.perf_counter(), time.thread_time(), 0, None
+
+    def beat(self, window: object) -> None:
+        """Note how late a beat is, and what was worked since the one before."""
+        now, own = time.perf_counter(), time.thread_time()
+        self.late.append(now - self._last - BEAT / 1000)
+        self.busy.append(own - self._own)
+        self.behind.append(window.bridge.state.bench.health.lag_ms)
+        self._last, self._own = now, own
+
+    def _note(self, plot: object) -> None:
+        """Note the paint of a plot: how old the newest reading in it is."""
+        if self.window is None:
+            return
+        bridge, now = self.window.bridge, time.monotonic()
+        if plot is self.window.live.plots[0]:
+            self.painted.append(time.perf_counter())
+            received = int(bridge.feed._take[-1].received_ns[-1])
+            if received != self._shown:
+                self.age.append(now - (1e-9 * received - bridge.session_offset))
+                self._shown = received
+        elif plot is self.window.live._model_plot and bridge.model.said is not self._said:
+            self._said = bridge.model.said
+            self.model_age.append(now - (1e-9 * self._said.received_ns - bridge.session_offset))
+
+    def tell(self, seconds: float, used: dict[str, float]) -> None:
+        """Print what was noted in so many seconds; `used` is processor time by process [s]."""
+        said = self.window.bridge.model.predictions - self.predictions
+        print(f"  frames: {len(self.painted) / seconds:.0f} a second, {_parts(np.diff(self.painted))} ms apart")
+        print(f"  processor of the window: {1000 * used['window'] / len(self.painted):.1f} ms a frame, all it does")
+        print("  processor by process: " + ", ".join(f"{name} {taken / seconds:.2f}" for name, taken in used.items()))
+        late, busy = (sum(x > 0.05 for x in values) for values in (self.late, self.busy))
+        print(f"  between two turns of the event loop: {_parts(self.late)} ms, over 50 ms {late} times")
+        print(f"  of that its own work: {_parts(self.busy)} ms, over 50 ms {busy} times")
+        print(f"  from a reading's arrival to the paint that shows it: {_parts(self.age)} ms")
+        print(f"  to the paint of the SED it leads to: {_parts(self.model_age)} ms, {said / seconds:.0f} a second")
+        print(f"  recorder: {np.median(self.behind):.1f} ms behind at the median, {max(self.behind):.1f} ms at most")
+
+
+def _processor() -> dict[str, float]:
+    """Return the processor time of the window's process and of those it started [s]; Linux alone knows the latter."""
+    found = {"window": sum(os.times()[:2])}
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            parts = status.read_text().rsplit(")", 1)[1].split()
+            if int(parts[1]) == os.getpid():
+                command = (status.parent / "cmdline").read_text()
+                name = "recorder" if "daq_app.recorder" in command else f"helper {status.parent.name}"
+                found[name] = (int(parts[11]) + int(parts[12])) / os.sysconf("SC_CLK_TCK")
+    return found
 
 
 def _parts(seconds: object) -> str:

@@ -7,6 +7,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from daq_app.live_model import Forces, Kinematics, Provisional, Ready, Settle, Settled, Use, forces_of, joined
+from daq_app.priority import give_way
 from daq_app.recorder.messages import Live
 from sessions.plan import Frame, SessionPlan
 
@@ -17,6 +18,7 @@ WAITING = 2.0  # forces older than so long are dropped, where the model does not
 def run(connection: Connection) -> None:
     """Serve the window until it is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the window decides when this ends
+    give_way()
     # Loaded in the process alone: the window has no need of the solver, and opens sooner without it.
     from daq_app.live_follower import Follower
     from solver.grid import MeshError

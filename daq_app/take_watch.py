@@ -5,6 +5,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing import get_context
 
 from daq_app.live_feed import LiveFeed
+from daq_app.priority import give_way
 from daq_app.recorder import messages as m
 from daq_app.state import AppState
 from daq_app.stroke_quality import Quality, in_newtons, stroke_quality
@@ -83,4 +84,5 @@ class Judge:
 
 
 def _warm() -> None:
-    """Load what the analysis needs."""
+    """Load what the analysis needs, which unpacking this very call does, and let it go behind window and recorder."""
+    give_way()

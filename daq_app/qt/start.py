@@ -1,5 +1,6 @@
 """Starts the window: checks that there is a screen, opens it at once with the simulated bench, and runs it."""
 
+import gc
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -71,6 +72,15 @@ def opened(
 
     Without a `theme` that of the system is followed.
     """
+    gc.disable()  # what is made now stays: looking through it again and again would only hold the window up
+    try:
+        return _opened(application, start, theme)
+    finally:
+        gc.freeze()
+        gc.enable()
+
+
+def _opened(application: "QApplication", start: "Callable[[], Client] | None", theme: "Tokens | None") -> "MainWindow":
     from daq_app.recorder.client import Recorder
     from daq_app.recorder.messages import Connect
 
