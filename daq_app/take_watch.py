@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
+from importlib import import_module
 from multiprocessing import get_context
 
 from daq_app.live_feed import LiveFeed
@@ -84,5 +85,7 @@ class Judge:
 
 
 def _warm() -> None:
-    """Load what the analysis needs, which unpacking this very call does, and let it go behind window and recorder."""
+    """Load what the analysis needs, and let this process go behind window and recorder."""
     give_way()
+    for name in ("scipy.signal", "scipy.special"):
+        import_module(name)

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from sessions.analysis.settings import AnalysisSettings
 
@@ -84,6 +83,8 @@ def mean_of(values: Array, rate: float, common: float, settings: AnalysisSetting
     blocks = block_means(values[:, None], rate, settings)[:, 0]
     interval = None
     if len(blocks) >= _FEWEST_BLOCKS:
+        from scipy.special import stdtrit  # slow to load, and neither window nor recorder has need of it
+
         error = float(blocks.std(ddof=1)) / len(blocks) ** 0.5
         half = float(stdtrit(len(blocks) - 1, 0.5 + settings.confidence / 2) * np.hypot(error, common))
         interval = (mean - half, mean + half)
