@@ -3,14 +3,14 @@
 import numpy as np
 
 from solver import kernels
-from solver.elements import line
-from solver.finite_body import FiniteBody
+from solver.elements import Q2P1, line
+from solver.finite_body import VALUES, FiniteBody
 from solver.mesh import Array
 from solver.mesher import FingerMesh, with_middles
 from solver.newton import Shape
 
 
-def carried(shape: Shape, coarse: FingerMesh, fine: FingerMesh, body: FiniteBody) -> Shape:
+def carried(shape: Shape, coarse: FingerMesh, coarse_body: FiniteBody, fine: FingerMesh, body: FiniteBody) -> Shape:
     """Return `shape`, found on `coarse`, as a start on `body`, made of `fine`, a mesh of the same finger.
 
     Displacements are interpolated by the elements' own functions in arc position and height over the bone, so a mesh
@@ -33,20 +33,38 @@ def carried(shape: Shape, coarse: FingerMesh, fine: FingerMesh, body: FiniteBody
     nearest = np.abs(places[1][:, None] - places[0]).argmin(axis=1)
     touching = np.interp(places[1], places[0], shape.touching.astype(float)) > 0.5
     state = np.where(touching, np.maximum(shape.state[nearest], kernels.SLIP), kernels.OPEN)
-    pressure = np.zeros((len(body.nodes), 3))
-    start = Shape(
+    return Shape(
         u,
-        pressure,
+        _pressure(shape.pressure, coarse, coarse_body, fine, body),
         state.astype(np.int32),
         shape.sense[nearest].copy(),
         reaction * lengths[1][:, None],
         shape.pull,
         shape.iterations,
     )
-    by_x, by_y = body.grad_x @ u[body.nodes], body.grad_y @ u[body.nodes]  # (e, q, 2)
-    J = np.maximum((1.0 + by_x[..., 0]) * (1.0 + by_y[..., 1]) - by_x[..., 1] * by_y[..., 0], 1e-2)
-    pressure[:] = body.lame[:, None] * ((body.weight * np.log(J))[:, None] @ body.modes)[:, 0]
-    return start
+
+
+def _pressure(
+    pressure: Array, coarse: FingerMesh, coarse_body: FiniteBody, fine: FingerMesh, body: FiniteBody
+) -> Array:
+    """Return the pressure modes (e, 3) of `body` that fit the field of `pressure` on `coarse_body` best.
+
+    Carried displacements would not do: what they change in volume, small as it is, a stiff body answers strongly.
+    """
+    arcs, heights = _gauss(fine.arcs), _gauss(_heights(fine)[::2])
+    station = np.clip(np.searchsorted(coarse.arcs, arcs) - 1, 0, len(coarse.arcs) - 2)  # (a, 3)
+    lines = _heights(coarse)[::2]
+    layer = np.clip(np.searchsorted(lines, heights) - 1, 0, len(lines) - 2)  # (b, 3)
+    host = (station[:, None, :, None] * (len(lines) - 1) + layer[None, :, None, :]).reshape(-1, 9)
+    place = VALUES @ body.mesh.nodes[body.mesh.elements] - coarse_body.centre[host]  # (e, q, 2)
+    slope = (pressure[:, None] @ coarse_body.combination)[:, 0][host]  # (e, q, 3)
+    field = slope[..., 0] + slope[..., 1] * place[..., 0] + slope[..., 2] * place[..., 1]
+    return ((body.weight * field)[:, None] @ body.modes)[:, 0]
+
+
+def _gauss(lines: Array) -> Array:
+    """Return the three quadrature points (n, 3) between each two of `lines` (n + 1,)."""
+    return lines[:-1, None] + np.diff(lines)[:, None] * (1.0 + Q2P1.points[:3, 0]) / 2.0
 
 
 def _heights(finger: FingerMesh) -> Array:

@@ -14,7 +14,7 @@ from solver.mesh import Array, Indices, Mesh
 from solver.receptor import Endings
 
 Narrow = NDArray[np.int32]
-_VALUES, _SLOPES = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
+VALUES, _SLOPES = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +52,7 @@ class FiniteBody:
         inverse[..., 0, 1], inverse[..., 1, 0] = -jacobian[..., 0, 1] / det, -jacobian[..., 1, 0] / det
         gradient = _SLOPES @ inverse  # (e, q, 9, 2)
         weight = det * Q2P1.weights
-        place = _VALUES @ corners
+        place = VALUES @ corners
         centre = place.mean(axis=1)
         raw = np.concatenate([np.ones((*place.shape[:2], 1)), place - centre[:, None]], axis=2)
         mass = np.swapaxes(raw * weight[:, :, None], 1, 2) @ raw

@@ -55,7 +55,7 @@ class FiniteFinger:
 
     def brought(self, shape: Shape, other: "FiniteFinger") -> Shape:
         """Return `shape`, found on `other`, as a start on this mesh."""
-        return carried(shape, other.geometry, self.geometry, self.newton.body)
+        return carried(shape, other.geometry, other.newton.body, self.geometry, self.newton.body)
 
     def edges(self, shape: Shape) -> tuple[float, float] | None:
         """Return the arc positions [mm] where contact ends; None where it is too short to tell.

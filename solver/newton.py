@@ -196,7 +196,7 @@ class Newton:
             if not largest < 1e3:
                 raise NotConverged("the displacements grow without bound")
             fall = min(largest / last, 1.0) if last > 0.0 else 1.0
-            left = min((2.0 * fall) ** 2, 1.0) if not kept else 1.0 if new else min(2.0 * fall, 1.0)
+            left = min((2.0 * fall) ** 2 if not kept else 4.0 * fall if new else 2.0 * fall, 1.0)
             if largest * left < MARGIN * tolerance and not changed and scale == 1.0:
                 self._tangent_at = shape
                 return shape

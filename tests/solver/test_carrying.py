@@ -20,7 +20,7 @@ def meshed(fineness):
 def test_a_mesh_carries_a_state_to_itself_unchanged():
     newton, _, _ = finger(5)
     shape = settled(newton, PULL)
-    same = carried(shape, meshed(5), meshed(5), newton.body)
+    same = carried(shape, meshed(5), newton.body, meshed(5), newton.body)
     np.testing.assert_allclose(same.u, shape.u, atol=1e-13)
     np.testing.assert_array_equal(same.touching, shape.touching)
     np.testing.assert_allclose(same.pressure, shape.pressure, atol=1e-7)
@@ -30,7 +30,7 @@ def test_a_mesh_carries_a_state_to_itself_unchanged():
 def test_a_carried_state_is_a_few_iterations_from_the_finer_meshs_own(fineness):
     coarse, _, _ = finger(5)
     fine, _, _ = finger(fineness)
-    start = carried(settled(coarse, PULL), meshed(5), meshed(fineness), fine.body)
+    start = carried(settled(coarse, PULL), meshed(5), coarse.body, meshed(fineness), fine.body)
     found, direct = settled(fine, PULL, start), settled(fine, PULL)
-    assert found.iterations - start.iterations <= 7
+    assert found.iterations - start.iterations <= 5
     np.testing.assert_allclose(found.u, direct.u, atol=1e-9)
