@@ -204,21 +204,17 @@ def test_a_session_is_never_written_over(recorded, capsys):
     assert {path.name: path.read_bytes() for path in recorded.iterdir()} == before
 
 
-def test_report_is_one_page_that_says_simulated(session, tmp_path, capsys):
-    page = tmp_path / "page.html"
-    assert run(["report", str(session), "-o", str(page), "--json"]) == 0
+def test_a_report_is_one_page_that_says_simulated_listed_in_the_sessions_manifest_and_verified(session, capsys):
+    assert run(["report", str(session), "--json"]) == 0
+    page = session / "report.html"
     assert printed(capsys)["page"] == str(page)
     text = page.read_text()
     assert "SIMULATED" in text
     assert "<script" not in text
     assert "http://" not in text.replace("http://www.w3.org/", "")
-
-
-def test_a_report_kept_in_the_session_is_listed_in_its_manifest_and_verified(session, capsys):
-    assert run(["report", str(session)]) == 0
     assert run(["verify", str(session)]) == 0
     assert "report.html" in (session / "MANIFEST.json").read_text()
-    (session / "report.html").write_text("<p>another page</p>")
+    page.write_text("<p>another page</p>")
     capsys.readouterr()
     assert run(["verify", str(session), "--json"]) == 3
     assert any("report.html" in problem for problem in printed(capsys)["problems"])

@@ -60,8 +60,25 @@ def report():
 
 
 @pytest.fixture(scope="module")
-def drawn(report):
-    return plates(report)
+def cut():
+    """The pictures of `drawn` over whose edge a label goes."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def drawn(report, cut):
+    save = Figure.savefig
+
+    def looked_at(self, *args, **kwargs):
+        self.draw_without_rendering()
+        box, drawn = self.bbox_inches, self.get_tightbbox()
+        if min(drawn.x0, drawn.y0, box.x1 - drawn.x1, box.y1 - drawn.y1) < 0:
+            cut.append([axes.get_ylabel() for axes in self.axes])
+        return save(self, *args, **kwargs)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", looked_at)
+        return plates(report)
 
 
 @pytest.fixture(scope="module")
@@ -107,19 +124,8 @@ def test_every_axis_names_its_unit(drawn):
             assert len(with_unit) >= 2, panel.name
 
 
-def test_no_label_of_any_picture_is_cut(report, monkeypatch):
-    cut = []
-    save = Figure.savefig
-
-    def looked_at(self, *args, **kwargs):
-        self.draw_without_rendering()
-        box, drawn = self.bbox_inches, self.get_tightbbox()
-        if min(drawn.x0, drawn.y0, box.x1 - drawn.x1, box.y1 - drawn.y1) < 0:
-            cut.append([axes.get_ylabel() for axes in self.axes])
-        return save(self, *args, **kwargs)
-
-    monkeypatch.setattr(Figure, "savefig", looked_at)
-    plates(report)
+@pytest.mark.usefixtures("drawn")
+def test_no_label_of_any_picture_is_cut(cut):
     assert cut == []
 
 

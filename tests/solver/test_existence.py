@@ -12,7 +12,18 @@ from tests.solver.finite_examples import finger
 TOWARDS_TIP = -1
 
 
-@pytest.mark.parametrize(("mu", "tau"), [(0.44, 0.015478), (0.48, 0.019038), (0.64, 0.049998), (0.67, 0.05255)])
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    ("mu", "tau"),
+    [
+        (0.44, 0.015478),
+        pytest.param(0.48, 0.019038, marks=SLOW),
+        pytest.param(0.64, 0.049998, marks=SLOW),
+        (0.67, 0.05255),
+    ],
+)
 def test_four_surfaces_have_no_settled_sliding_at_two_millimetres_and_the_refusal_says_how_far_they_have(mu, tau):
     newton, _, outline = finger(8, margin=3.0)
     with pytest.raises(NoSteadyState, match="folds") as refusal:

@@ -53,7 +53,11 @@ def test_a_result_is_json_and_says_what_was_modelled(four):
     assert "finite strain" not in document["model"]["left_out"]
 
 
-@pytest.mark.parametrize("surface", STICKINESS[1:], ids=lambda s: str(s.index))
+@pytest.mark.parametrize(
+    "surface",
+    [*(pytest.param(surface, marks=pytest.mark.slow) for surface in STICKINESS[1:-1]), STICKINESS[-1]],
+    ids=lambda s: str(s.index),
+)
 def test_where_no_settled_sliding_exists_there_is_no_number_but_both_limits(surface):
     with pytest.raises(NoSteadyState) as refusal:
         solve(finite(surface))
