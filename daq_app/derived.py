@@ -7,7 +7,8 @@ from typing import Any
 
 from daq_app.cli import WrongValue
 from daq_app.console import Console
-from sessions.analysis import Analysis, analyse
+from sessions.analysis import Analysis, AnalysisSettings, analyse
+from sessions.analysis.area import FIXED, AreaLaw
 from sessions.blinding import revealed
 from sessions.decisions import Decisions
 from sessions.prediction import PredictionOptions, SessionPrediction, predict
@@ -21,9 +22,9 @@ ANALYSIS = "analysis.json"
 PREDICTION = "prediction.json"
 
 
-def analysed(recording: Recording, console: Console) -> Analysis:
-    """Return the analysis of a session, and keep it in the session's folder."""
-    analysis = analyse(recording)
+def analysed(recording: Recording, console: Console, area: AreaLaw = FIXED) -> Analysis:
+    """Return the analysis of a session, tau_max told by a law of the area, and keep it in the session's folder."""
+    analysis = analyse(recording, AnalysisSettings(area=area))
     _keep(recording, ANALYSIS, analysis.to_dict(), console)
     return analysis
 
@@ -51,6 +52,15 @@ def predicted_again(recording: Recording, analysis: Analysis, stored: Mapping[st
     stimuli: list[Mapping[str, Any]] = [row.get("stimulus") or {} for row in stored.get("trials", ())]
     blind = all(stimulus.get("index") is None for stimulus in stimuli)
     return predict(analysis, (recording if blind else revealed(recording)).plan, options).to_dict()
+
+
+def settings_of(stored: Mapping[str, Any]) -> AnalysisSettings:
+    """Return the settings with which a stored analysis, or that under a stored prediction, is made once more.
+
+    The law of the contact area is all that can be asked for; the rest is the program's. Raises SettingsError.
+    """
+    area: Mapping[str, Any] = (stored.get("settings") or stored).get("area") or {}
+    return AnalysisSettings(area=from_table(area, AreaLaw, "area"))
 
 
 def made_under(stored: Mapping[str, Any], decisions: Decisions) -> bool:

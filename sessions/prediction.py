@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Literal
 
 from sessions.analysis import Analysis, FrictionParameters, Stroke
+from sessions.analysis.area import FIXED, AreaLaw
 from sessions.decisions import Decision
 from sessions.plan import DISTAL_TO_PROXIMAL, PROXIMAL_TO_DISTAL, Block, SessionPlan, Stimulus, Trial
 from solver.failures import SolveFailure
@@ -96,6 +97,7 @@ class SessionPrediction:
     width_origin: str  # "set" or "assumed"
     options: PredictionOptions
     decisions: tuple[Decision, ...] = ()  # of people about the strokes, in force
+    area: AreaLaw = FIXED  # by which tau_max was told
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, None where honesty allows no number."""
@@ -103,6 +105,7 @@ class SessionPrediction:
             **({"simulated": "SIMULATED"} if self.simulated else {}),
             "trials": [trial.to_dict() for trial in self.trials],
             "decisions": [decision.to_dict() for decision in self.decisions],
+            "area": asdict(self.area),
             "width": self.width,
             "width_origin": self.width_origin,
             "options": asdict(self.options),
@@ -149,6 +152,7 @@ def predict(
         width_origin="assumed" if base is None or base.width == _template(PredictionOptions()).width else "set",
         options=asked,
         decisions=analysis.decisions,
+        area=analysis.settings.area,
     )
 
 

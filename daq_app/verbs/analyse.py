@@ -8,6 +8,7 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
+from daq_app.area_option import add_area, area_law
 from daq_app.cli import WrongValue
 from daq_app.console import Console, number, table
 from daq_app.derived import analysed
@@ -31,13 +32,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="standard uncertainty of each axis of the transducer (1, assumed)",
     )
     parser.add_argument("--bootstrap-seed", type=int, default=0, metavar="SEED", help="of the intervals (0)")
+    add_area(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Analyse the session, keep the result in its folder and print it."""
     chosen = _bootstrap(options)
     recording = Recording.open(options.session)
-    analysis = analysed(recording, console)
+    analysis = analysed(recording, console, area_law(options))
     intervals = [stroke_intervals(stroke, at, chosen) for at, stroke in enumerate(analysis.strokes)]
     told = {"kind": chosen.kind, "settings": asdict(chosen), "strokes": [found.to_dict() for found in intervals]}
     console.result({**analysis.to_dict(), "bootstrap": told})

@@ -11,11 +11,12 @@ from pathlib import Path
 
 from daq_app.cli import DONE, FLAWED, WrongValue
 from daq_app.console import Console, number
-from daq_app.derived import ANALYSIS, PREDICTION, analysed
+from daq_app.derived import ANALYSIS, PREDICTION, analysed, settings_of
 from sessions.analysis import Analysis, Stroke, analyse
 from sessions.analysis.decided import tried, with_old
 from sessions.decisions import Decision, DecisionError, Decisions, append, read
 from sessions.recording import Recording
+from sessions.recording.derived import load_derived
 from sessions.study import check_code
 
 EXAMPLE = 'daq-app decide recordings/P07 --trial 4 --steady 31.2 32.6 --by E02 --why "the ramp was in it"'
@@ -67,8 +68,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     decision = with_old(analysis, asked)
     after = tried(recording, decision, before)
     made = append(recording, decision)
-    if (recording.folder / ANALYSIS).is_file():
-        analysed(recording, console)
+    stored = load_derived(recording.folder, ANALYSIS)
+    if stored is not None:
+        analysed(recording, console, settings_of(stored).area)
     older = (recording.folder / PREDICTION).is_file()
     changed = _changes(analysis, after)
     console.result({"decision": made.to_dict(), "changes": changed, "prediction_is_older": older})

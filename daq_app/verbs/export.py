@@ -9,7 +9,7 @@ from pathlib import Path
 
 from daq_app.cli import FLAWED
 from daq_app.console import Console
-from daq_app.derived import ANALYSIS, PREDICTION, made_under, predicted_again
+from daq_app.derived import ANALYSIS, PREDICTION, made_under, predicted_again, settings_of
 from sessions.analysis import analyse
 from sessions.blinding import revealed
 from sessions.decisions import read
@@ -48,12 +48,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
 def _source(recording: Recording, console: Console) -> ExportSource:
     """Return the session with the numbers kept in it; those made under other decisions are made anew."""
     decided = read(recording.folder)
-    found = analyse(recording, decisions=decided)
     made_by = {"made_by": software_versions()}
     analysis, prediction = load_derived(recording.folder, ANALYSIS), load_derived(recording.folder, PREDICTION)
     if analysis is None or not made_under(analysis, decided):
-        analysis = made_by | found.to_dict()
+        analysis = made_by | analyse(recording, settings_of(analysis or {}), decided).to_dict()
     if prediction is not None and not made_under(prediction, decided):
         console.note(f"{PREDICTION} was made under other decisions than those in force, and is made anew")
+        found = analyse(recording, settings_of(prediction), decided)
         prediction = made_by | predicted_again(recording, found, prediction)
     return ExportSource(recording, analysis, prediction)

@@ -8,6 +8,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from daq_app.area_option import add_area, area_law
 from daq_app.cli import WrongValue
 from daq_app.console import Console, number, table
 from daq_app.derived import analysed, predicted, visit
@@ -57,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="hash and keep the prediction, so that it is shown to be older than unblinding",
     )
+    add_area(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -70,7 +72,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         kinematics=options.kinematics,
     )
     recording = visit(options.session, options.subject)
-    analysis = analysed(recording, console)
+    analysis = analysed(recording, console, area_law(options))
     prediction = predicted(recording, analysis, console, asked)
     intervals = _intervals(analysis, prediction, console) if options.intervals else ()
     seal = {"sealed_sha256": seal_prediction(recording, prediction.to_dict())} if options.seal else {}

@@ -15,7 +15,7 @@ from typing import Any
 
 from daq_app.cli import WrongValue
 from daq_app.console import Console
-from daq_app.derived import ANALYSIS, PREDICTION, predicted_again
+from daq_app.derived import ANALYSIS, PREDICTION, predicted_again, settings_of
 from sessions.analysis import analyse
 from sessions.decisions import read
 from sessions.recording import Recording
@@ -53,15 +53,15 @@ def run(options: argparse.Namespace, console: Console) -> int:
         found = [*different_readings(recording, replayed), *told(list(different_events(recording, replayed)))]
         compared = ["readings", "events", ANALYSIS]
         decided = read(recording.folder)  # people decided about the recording, not about its replay
-        analysis = analyse(replayed, decisions=decided)
-        fresh = _plain(analysis.to_dict())
         stored = load_derived(options.session, ANALYSIS)
+        fresh = _plain(analyse(replayed, settings_of(stored or {}), decided).to_dict())
         expected = _plain(analyse(recording).to_dict()) if stored is None else stored
         found += _changed(ANALYSIS, expected, fresh)
         if not options.no_prediction:
             predicted = load_derived(options.session, PREDICTION)
             if predicted is not None:
                 console.progress(0.9, f"making {PREDICTION} again")
+                analysis = analyse(replayed, settings_of(predicted), decided)
                 again = _plain(predicted_again(recording, analysis, predicted))
                 found += _changed(PREDICTION, predicted, again)
                 compared.append(PREDICTION)

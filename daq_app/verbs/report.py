@@ -6,6 +6,7 @@ Scores of further visits (other subjects, or this one without a transducer) are 
 import argparse
 from pathlib import Path
 
+from daq_app.area_option import add_area, area_law
 from daq_app.console import Console
 from daq_app.derived import analysed, predicted, visit
 from sessions.blinding import revealed
@@ -26,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--out", type=Path, metavar="FILE.html", help="the page (SESSION/report.html)")
     parser.add_argument("--scores", type=Path, nargs="+", default=[], metavar="SESSION", help="further visits")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="also write every picture as SVG, its data as CSV")
+    add_area(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -38,7 +40,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     for one in (recording, *others):
         if one.plan.blinded:
             raise Blinded(f"{one.folder} is blinded: a report tells scores by index; 'daq-app unblind' opens the key")
-    analysis = analysed(recording, console)
+    analysis = analysed(recording, console, area_law(options))
     prediction = predicted(recording, analysis, console)
     from sessions.exports import html
     from sessions.report import findings, score_table

@@ -12,6 +12,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from daq_app.area_option import add_area, area_law
 from daq_app.cli import WrongValue
 from daq_app.console import Console
 from daq_app.pooling import Shelf, visits
@@ -59,6 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tau", choices=["computed", "as-printed"], default="computed", help="as for 'daq-app predict'"
     )
+    add_area(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -68,7 +70,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if not sessions:
         raise RecordingError(f"{folder} holds no session: give the folder that holds a folder for each of them")
     model = PredictionOptions(tau_reading=options.tau, course="steady", kinematics=options.kinematics)
-    asked = VisitOptions(model, options.paths)
+    asked = VisitOptions(model, area_law(options), options.paths)
     shelf = Shelf(out / "results", asked)
     done, failed = visits(sessions, asked, shelf, console, scheduler=options.scheduler, workers=options.workers)
     planted = folder / PLANTED

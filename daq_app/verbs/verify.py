@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 
 from daq_app.console import Console
-from daq_app.derived import ANALYSIS, PREDICTION, made_under, predicted_again
+from daq_app.derived import ANALYSIS, PREDICTION, made_under, predicted_again, settings_of
 from sessions.analysis import analyse
 from sessions.decisions import DECISIONS, read
 from sessions.recording import Recording, RecordingError
@@ -35,14 +35,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
     decided = read(folder)
     found += decided.problems
     checked += [DECISIONS] if decided.lines or decided.problems else []
-    analysis = None
     for name in (ANALYSIS, PREDICTION):
         console.progress(0.5, f"making {name} again")
         try:
             stored = load_derived(folder, name)
             if stored is None:
                 continue
-            analysis = analysis or analyse(recording, decisions=decided)
+            analysis = analyse(recording, settings_of(stored), decided)
             if not made_under(stored, decided):
                 found.append(f"{name} was made under other decisions than those in force: make it anew")
             fresh = analysis.to_dict() if name == ANALYSIS else predicted_again(recording, analysis, stored)

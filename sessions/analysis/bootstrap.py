@@ -54,7 +54,7 @@ class StrokeIntervals:
     mu_static: Interval | None  # [-]
     mu_dynamic: Interval | None  # [-]
     mu_max: Interval | None  # [-]
-    tau_max: Interval | None  # [MPa]; the contact area is taken as given
+    tau_max: Interval | None  # [MPa]; the contact area, or its law, is taken as given
     speed: Interval | None  # [mm/s]
 
     def to_dict(self) -> dict[str, Any]:
@@ -122,9 +122,9 @@ class _Repeats:
         """Return the numbers (repeats,) of each repeat, by name."""
         found: dict[str, Array] = {}
         if self._stroke.tau_max is not None and self._stroke.peak_tangential:
-            area = self._stroke.peak_tangential / self._stroke.tau_max
-            peak = self._stroke.peak_tangential * self._gain_t + self._zero_t + self._top()
-            found["tau_max"] = peak / area
+            area = self._stroke.contact_area or self._stroke.peak_tangential / self._stroke.tau_max
+            peak = self._stroke.tau_max * area * self._gain_t + self._zero_t + self._top()
+            found["tau_max"] = peak / (area * self._gain_n**self._stroke.area_exponent)
         for name in ("mu_static", "mu_max"):
             value = getattr(self._stroke, name)
             if value is not None:

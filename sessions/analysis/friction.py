@@ -47,7 +47,7 @@ def friction_parameters(stroke: Stroke, at: int, trial: Trial | None, contact_ar
         mu=stroke.mu_max if rule == "maximum" else stroke.mu_dynamic,
         mu_interval=None if rule == "maximum" else stroke.mu_dynamic_interval,
         tau_max=stroke.tau_max,
-        contact_area=contact_area,
+        contact_area=stroke.contact_area or contact_area,
         speed=stroke.speed,
         direction=stroke.direction,
         rule=rule,

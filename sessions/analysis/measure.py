@@ -65,6 +65,7 @@ def measured(
         zero_drift=None if zero.drift is None else float(np.linalg.norm(zero.drift[:3])),
         flaws=tuple(dict.fromkeys(str(flaw.name) for flaw in found.flaws)),
         reasons=dict(found.reasons),
+        area_exponent=settings.area.exponent,
         number=number,
         kept=decided.kept,
         decided=decided.sentences,
@@ -128,7 +129,13 @@ def _judge_loads(found: Findings, track: Track, contact_area: float, settings: A
     """Give the greatest forces, and say where they are implausible."""
     peak = float(np.nanmax(track.normal, initial=0.0))
     greatest = float(np.nanmax(track.tangential, initial=0.0))
-    found.numbers |= {"peak_normal": peak, "peak_tangential": greatest, "tau_max": greatest / contact_area}
+    traction, area = _greatest_traction(track, contact_area, settings)
+    found.numbers |= {
+        "peak_normal": peak,
+        "peak_tangential": greatest,
+        "tau_max": traction,
+        "contact_area": area,
+    }
     found.numbers["mu_max"] = _greatest_ratio(track, track.floor, settings)
     if peak < settings.force_floor:
         sentence = f"The normal force reaches {peak:.2g} N: below {settings.force_floor:g} N friction means nothing."
@@ -146,6 +153,20 @@ def _judge_loads(found: Findings, track: Track, contact_area: float, settings: A
         )
         found.flaw(FlawName.RATIO_ABOVE_ONE, sentence, "doubtful", ("mu_static",))
         found.numbers["mu_max"] = _greatest_ratio(track, 0.5 * peak, settings)
+
+
+def _greatest_traction(track: Track, planned: float, settings: AnalysisSettings) -> tuple[float | None, float | None]:
+    """Return the greatest mean traction [MPa] and the area [mm2] it acts on; None where an area that grows has no N."""
+    if settings.area.law == "fixed":
+        return float(np.nanmax(track.tangential, initial=0.0)) / planned, planned
+    with np.errstate(invalid="ignore"):
+        pressed = np.flatnonzero(track.normal >= track.floor)
+    if not len(pressed):
+        return None, None
+    areas = settings.area.area(track.normal[pressed], planned)
+    tractions = track.tangential[pressed] / areas
+    top = int(np.argmax(tractions))
+    return float(tractions[top]), float(areas[top])
 
 
 def _greatest_ratio(track: Track, floor: float, settings: AnalysisSettings) -> float | None:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from sessions.analysis.area import FIXED, AreaLaw
 from sessions.analysis.onset import DetectorSettings
 
 
@@ -51,6 +52,7 @@ class AnalysisSettings:
     press_shortest: float = 0.5  # a contact held so long [s] ...
     press_moves: float = 1.0  # ... whose centre of pressure moves no further [mm] ...
     press_ratio: float = 0.2  # ... and whose T/N stays below this is a press, and tells how the face leans [-]
+    area: AreaLaw = FIXED  # by which tau_max is told
     tilt: tuple[float, float] = (0.0, 0.0)  # lean of the face's normal to +x and +y that is levelled [degrees]
     slow_onset: float = 0.5  # from onset to a fifth of the peak; a finger takes a tenth of it [s]
 

@@ -48,7 +48,7 @@ class Stroke:
     mu_dynamic_sd: float | None  # standard deviation of T/N in it [-]
     mu_dynamic_interval: Interval | None  # see `AnalysisSettings.interval_kind`
     mu_max: float | None  # greatest T/N above the force floor, smoothed as the settings say [-]
-    tau_max: float | None  # greatest tangential force over the contact area [MPa]
+    tau_max: float | None  # greatest tangential force over the contact area there [MPa]
     normal_force: float | None  # mean over the steady window [N]
     tangential_force: float | None  # mean over the steady window [N]
     peak_normal: float | None  # [N]
@@ -58,6 +58,8 @@ class Stroke:
     zero_drift: float | None  # how far the forces' zero moved from before the stroke to after it [N]
     flaws: tuple[str, ...]
     reasons: Mapping[str, str]  # for each number withheld, the flaw that forbids it
+    contact_area: float | None = None  # by which tau_max was told [mm2]
+    area_exponent: float = 0.0  # with which that area follows the normal force [-]
     number: int = 1  # within its trial, or within a recording without trials, from 1
     kept: bool = True  # False: a person left it out, and the model does not get it
     decided: Mapping[str, str] = field(default_factory=dict[str, str])  # what a person decided, with who and why

@@ -209,6 +209,8 @@ _STROKE = {
     "zero": ("", "where the zero of the forces came from"),
     "zero_drift": ("N", "how far the zero moved from before the stroke to after it"),
     "flaws": ("", "names of what is wrong with it"),
+    "contact_area": ("mm2", "by which tau_max was told"),
+    "area_exponent": ("", "with which that area follows the normal force"),
     "number": ("", "of the stroke within its trial, from 1"),
     "kept": ("", "false: a person left it out, and the model is not given it"),
     "decided": ("", "what a person decided about it, who and why"),

@@ -6,7 +6,8 @@ from typing import Any, Literal
 
 import msgspec
 
-from sessions.analysis import Analysis, analyse
+from sessions.analysis import Analysis, AnalysisSettings, analyse
+from sessions.analysis.area import FIXED, AreaLaw
 from sessions.analysis.bootstrap import stroke_intervals
 from sessions.blinding import revealed
 from sessions.paths import Seds, trial_paths
@@ -15,7 +16,7 @@ from sessions.prediction import PredictionOptions, SessionPrediction, predict
 from sessions.recording import Recording
 from sessions.recording.log import TrialRecord
 
-FORM = 4  # raised when a row holds something else: what was stored before is then computed anew
+FORM = 5  # raised when a row holds something else: what was stored before is then computed anew
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +24,7 @@ class VisitOptions:
     """What is asked of each session of a study."""
 
     prediction: PredictionOptions = field(default_factory=lambda: PredictionOptions(course="steady"))
+    area: AreaLaw = FIXED  # by which tau_max is told; the paths have areas of their own
     paths: Literal["none", "small", "finite"] = "none"  # many paths too, and at which strain; see `sessions.paths`
 
 
@@ -89,7 +91,7 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
     Raises Blinded while the stimuli's key is sealed, RecordingError where the session cannot be read.
     """
     known = revealed(recording)
-    analysis = analyse(known)
+    analysis = analyse(known, AnalysisSettings(area=options.area))
     prediction = predict(analysis, known.plan, options.prediction) if known.plan.forces else None
     along: Mapping[int, Seds] = {}
     if options.paths != "none" and known.plan.forces:

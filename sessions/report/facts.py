@@ -72,7 +72,11 @@ def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
         Fact("calibration", info.calibration.source, f"readings in {info.calibration.raw_unit}"),
         Fact("normal axis", f"pressing is positive along {plan.frame.normal}", _ORIGIN[plan.frame.normal_origin]),
         Fact("height of the face", f"{plan.frame.height:g} mm above the origin", _ORIGIN[plan.frame.height_origin]),
-        Fact("contact area", f"{plan.contact_area:g} mm²", _ORIGIN[plan.contact_area_origin]),
+        Fact(
+            "contact area",
+            f"{plan.contact_area:g} mm², {analysis.settings.area.sentence}",
+            _ORIGIN[plan.contact_area_origin],
+        ),
         Fact("tilt of the face", *_tilt(analysis)),
         Fact("filter", analysis.filtered),
         Fact("interval of µ", analysis.settings.interval_kind),

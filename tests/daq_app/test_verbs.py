@@ -326,3 +326,21 @@ def test_a_decision_that_cannot_be_is_refused_in_one_sentence(recorded, capsys, 
     assert run(["decide", str(recorded), *words]) == code
     assert sentence in capsys.readouterr().err
     assert not (recorded / "decisions.jsonl").exists()
+
+
+def test_a_law_of_the_contact_area_is_recorded_and_verify_goes_by_it(session, capsys):
+    run(["analyse", str(session), "--json"])
+    fixed = printed(capsys)["strokes"]
+    assert run(["analyse", str(session), "--area", "hertz", "--area-force", "1", "--json"]) == 0
+    document = printed(capsys)
+    assert document["settings"]["area"] == {"law": "hertz", "exponent": pytest.approx(2 / 3), "force": 1.0}
+    for one, other in zip(document["strokes"], fixed, strict=True):
+        assert one["tau_max"] * one["contact_area"] <= other["tau_max"] * 100.0 * (1 + 1e-9)
+        assert one["contact_area"] > 100.0  # every stroke of the simulated subject presses harder than 1 N
+    assert run(["verify", str(session)]) == 0
+
+
+@pytest.mark.parametrize("words", [["--area", "round"], ["--area", "1.5"], ["--area-force", "2"]])
+def test_a_law_of_the_area_that_is_none_is_refused_with_exit_code_2(recorded, capsys, words):
+    assert run(["analyse", str(recorded), *words]) == 2
+    assert "--area" in capsys.readouterr().err
