@@ -6,10 +6,10 @@ whole tangential force is taken to act along the finger, in the sense of its par
 """
 
 from collections import deque
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq_app.live_model import Forces, Kinematics, Picture, Provisional, Settle, Settled, Use
 from sessions.analysis import FrictionParameters
@@ -19,19 +19,22 @@ from solver.failures import SolveFailure
 from solver.fields import fields_of
 from solver.finger import FingerModel
 from solver.live_picture import LivePicture
+from solver.mesh import Array
 from solver.mesher import Sizing
 from solver.receptor import ROW
 from solver.scene import Friction, Loading, Scene, Solve
 from solver.small_stepper import Condensed, SmallStepper
 from solver.solution import solve
-from solver.stepper import FINENESS, MARGIN, Stepper, stepper
+from solver.stepper import FINENESS, MARGIN
 
-Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    from daq_app.live_finite import LiveFinite
 
 TOUCH = 0.05  # less normal force is no touch [N]
 FLOOR = 0.3  # a ratio means nothing below this normal force [N]
 LEAST_MU = 0.05  # before any was measured [-]
 KEPT = 60.0  # predictions that are kept for the difference to the full solve [s]
+SEEN, SEEN_EVERY = 100, 0.1  # states that are kept for a stroke whose full solve fails, and the time between them [s]
 DEFAULT_DEPTH = 2.0  # for which the mesh is made where no plan tells one [mm]
 DEFAULT_AREA = 100.0  # of contact, for the traction bound, likewise [mm2]
 
@@ -44,12 +47,14 @@ def live_scene(plan: SessionPlan | None, kinematics: Kinematics = "small") -> Sc
     return replace(base, friction=Friction(LEAST_MU), loading=Loading(depth), solve=Solve(kinematics))
 
 
-def settled_scene(plan: SessionPlan, friction: FrictionParameters, normal_force: float) -> Scene | None:
+def settled_scene(
+    plan: SessionPlan, friction: FrictionParameters, normal_force: float, kinematics: Kinematics = "small"
+) -> Scene | None:
     """Return the scene of a finished stroke, pressed by its measured force [N]; None where it gives no friction."""
     if friction.mu is None or friction.direction is None or normal_force <= 0.0:
         return None
     return replace(
-        live_scene(plan),
+        live_scene(plan, kinematics),
         friction=Friction(max(friction.mu, 0.0), friction.tau_max),
         loading=Loading(
             slide=SLIDES[friction.direction],
@@ -60,19 +65,43 @@ def settled_scene(plan: SessionPlan, friction: FrictionParameters, normal_force:
     )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """A state that was shown while something touched."""
+
+    time: float  # [s, device time]
+    row: Array
+    picture: Picture
+    depth: float
+
+    @property
+    def shown(self) -> tuple[Array, Picture, float]:
+        """Return what is drawn of it."""
+        return self.row, self.picture, self.depth
+
+
 class Follower:
-    """Follows one finger, batch by batch; holds the stepper's state and the last minute of predictions."""
+    """Follows one finger, batch by batch; holds the steppers' states and the last minute of predictions.
+
+    Small strain is always followed. Where finite strain is asked for it tells instead, as far as it reaches.
+    """
 
     def __init__(self, use: Use) -> None:
         """Mesh and condense the finger. Raises SceneError or MeshError where it cannot be meshed."""
-        scene = live_scene(use.plan, use.kinematics)
+        scene = live_scene(use.plan)
+        finger = FingerModel.of(scene, Sizing(FINENESS["small"], scene.loading.depth, margin=MARGIN["small"]))
         self._scene = scene
         self._area = DEFAULT_AREA if use.plan is None else use.plan.contact_area
-        self._kinematics: Kinematics = scene.solve.kinematics
-        self._stepper, self._drawn = _stepper(scene)
+        self._kinematics: Kinematics = use.kinematics
+        self._small, self._drawn = SmallStepper(Condensed.of(finger), LEAST_MU), LivePicture.of(finger)
+        self._small.step(1e-3, 0.0)  # compiles, or loads what was compiled
+        self._small.forget()
+        self._finite = _finite(live_scene(use.plan, "finite")) if use.kinematics == "finite" else None
+        self._reached = False  # by finite strain, at the last step
         self._mu, self._tangential = LEAST_MU, 0.0
         self._stream: int | None = None
         self._said: deque[tuple[float, float]] = deque()
+        self._seen: deque[_Seen] = deque(maxlen=SEEN)
 
     def take(self, forces: Forces) -> Provisional:
         """Return what the model says of a batch."""
@@ -80,15 +109,19 @@ class Follower:
             self._stream = forces.stream
             self._said.clear()
             self._untouched()
-        sed = np.array([self._step(n, p) for n, p in zip(forces.normal, forces.pull, strict=True)])
+        steps = [self._step(n, p) for n, p in zip(forces.normal, forces.pull, strict=True)]
+        sed = np.array([said for said, _ in steps])
+        instead = np.array([self._finite is not None and not reached for _, reached in steps])
         self._said += zip(forces.time.tolist(), sed.tolist(), strict=True)
         while self._said and self._said[0][0] < forces.time[-1] - KEPT:
             self._said.popleft()
-        row, outline = self._stepper.row(), self._stepper.outline()
-        picture = self._picture(outline)
+        shown = self._finite if self._finite is not None and self._reached else self._small
+        row, picture, now = shown.row(), self._picture(), float(forces.time[-1])
+        if sed[-1] > 0.0 and (not self._seen or abs(now - self._seen[-1].time) >= SEEN_EVERY):
+            self._seen.append(_Seen(now, row, picture, shown.depth))
         return Provisional(
-            forces.time, sed, row, picture, self._stepper.depth, self._mu,
-            self._kinematics, forces.received_ns, forces.stream,
+            forces.time, sed, row, picture, shown.depth, self._mu,
+            self._kinematics, instead, forces.received_ns, forces.stream,
         )  # fmt: skip
 
     def settle(self, asked: Settle) -> Settled:
@@ -97,31 +130,44 @@ class Follower:
         said = np.array([sed for time, sed in self._said if first <= time <= last])
         said = said[np.isfinite(said)]
         provisional = float(said.mean()) if len(said) else None
-        scene = settled_scene(asked.plan, asked.friction, asked.normal_force)
-        if scene is None:
-            why = "the stroke gives no friction."
-            return Settled(asked.trial, None, None, provisional, np.full(len(ROW), np.nan), None, None, why)
+        scene = settled_scene(asked.plan, asked.friction, asked.normal_force, self._kinematics)
         try:
-            found = solve(scene)
+            found = None if scene is None else solve(scene)
         except SolveFailure as failure:
-            return Settled(asked.trial, None, None, provisional, np.full(len(ROW), np.nan), None, None, str(failure))
+            return self._unsettled(asked, provisional, str(failure))
+        if found is None:
+            return self._unsettled(asked, provisional, "the stroke gives no friction.")
         fields = fields_of(found)
         sed = fields.sed[fields.triangles].mean(axis=1)
         picture = Picture(fields.nodes, fields.triangles, sed, fields.outlines["skin"])
         return Settled(
-            asked.trial, found.sed_ending, found.error_estimate, provisional, found.row.sed, picture, found.indentation
-        )
+            asked.trial, found.sed_ending, found.error_estimate, provisional, found.row.sed, picture,
+            found.indentation, self._kinematics,
+        )  # fmt: skip
 
-    def _step(self, normal: float, pull: float) -> float:
+    def _unsettled(self, asked: Settle, provisional: float | None, why: str) -> Settled:
+        """Return why there is no full solve, with the last state that was followed in the steady window."""
+        first, last = asked.steady
+        seen = next((seen for seen in reversed(self._seen) if first <= seen.time <= last), None)
+        row, picture, depth = (np.full(len(ROW), np.nan), None, None) if seen is None else seen.shown
+        return Settled(asked.trial, None, None, provisional, row, picture, depth, self._kinematics, why)
+
+    def _step(self, normal: float, pull: float) -> tuple[float, bool]:
+        """Return the SED under forces [N], and whether finite strain told it; nothing that touches is within reach."""
         if normal < TOUCH:
             self._untouched()
-            return 0.0
+            return 0.0, True
         if normal >= FLOOR:
             self._mu = max(self._mu, abs(pull) / normal)
             self._tangential = max(self._tangential, abs(pull))
-        follows = self._stepper
-        follows.mu, follows.tau = self._mu, self._bound()
-        return follows.step(normal / self._scene.width, pull / self._scene.width)
+        self._small.mu, self._small.tau = self._mu, self._bound()
+        normal, pull = normal / self._scene.width, pull / self._scene.width
+        small = self._small.step(normal, pull)
+        if self._finite is not None:
+            finite = self._finite.step(normal, pull, self._mu, self._bound())
+            self._reached = not np.isnan(finite)
+            return (finite, True) if self._reached else (small, False)
+        return small, False
 
     def _bound(self) -> float:
         """Return the traction bound so far [MPa]: as the analysis has it, the largest T over the contact area."""
@@ -129,23 +175,21 @@ class Follower:
 
     def _untouched(self) -> None:
         self._mu, self._tangential = LEAST_MU, 0.0
-        self._stepper.forget()
+        self._small.forget()
+        self._reached = self._finite is not None
+        if self._finite is not None:
+            self._finite.forget()
 
-    def _picture(self, outline: Array) -> Picture:
-        if self._drawn is None or not isinstance(self._stepper, SmallStepper):
-            return Picture(np.empty((0, 2)), np.empty((0, 4), np.int64), np.empty(0), outline)
-        forces = self._stepper.forces()
-        nodes = self._drawn.nodes(forces, self._stepper.depth)
-        return Picture(nodes, self._drawn.faces, self._drawn.sed(forces), outline)
+    def _picture(self) -> Picture:
+        if self._finite is not None and self._reached:
+            return Picture(*self._finite.drawn(), self._finite.outline())
+        forces = self._small.forces()
+        nodes = self._drawn.nodes(forces, self._small.depth)
+        return Picture(nodes, self._drawn.faces, self._drawn.sed(forces), self._small.outline())
 
 
-def _stepper(scene: Scene) -> tuple[Stepper, LivePicture | None]:
-    """Return a stepper, and the matrices of its picture where it has any."""
-    kind = scene.solve.kinematics
-    if kind == "finite":
-        return stepper(scene), None
-    finger = FingerModel.of(scene, Sizing(FINENESS[kind], scene.loading.depth, margin=MARGIN[kind]))
-    follows = SmallStepper(Condensed.of(finger), LEAST_MU)
-    follows.step(1e-3, 0.0)  # compiles, or loads what was compiled
-    follows.forget()
-    return follows, LivePicture.of(finger)
+def _finite(scene: Scene) -> "LiveFinite":
+    # Imported here: only what is asked for is loaded, compiled loops of finite strain are not.
+    from daq_app.live_finite import LiveFinite
+
+    return LiveFinite(scene, LEAST_MU)

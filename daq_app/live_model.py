@@ -63,7 +63,8 @@ class Provisional:
     picture: Picture
     depth: float  # of the bone, below first touch [mm]
     mu: float  # taken so far [-]
-    kinematics: Kinematics
+    kinematics: Kinematics  # that is asked for
+    instead: NDArray[np.bool_]  # (n,) where small strain tells, the forces being beyond the reach of finite strain
     received_ns: int
     stream: int
 
@@ -93,15 +94,16 @@ class Settled:
     error: float | None  # its estimated relative error [-]
     provisional: float | None  # mean over the steady window of what was shown [MPa]; None where nothing was
     row: Array  # (r,) [MPa]
-    picture: Picture | None
+    picture: Picture | None  # of the full solve; where it failed, of the last state that was followed
     depth: float | None  # [mm]
+    kinematics: Kinematics
     reason: str = ""
 
     @property
     def difference(self) -> float | None:
         """Return by which part of the full solve the provisional value is larger [-]; None where one is missing.
 
-        >>> Settled(1, 0.004, 0.01, 0.005, np.empty(0), None, 2.0).difference
+        >>> Settled(1, 0.004, 0.01, 0.005, np.empty(0), None, 2.0, "small").difference
         0.25
         """
         if not self.sed or self.provisional is None:

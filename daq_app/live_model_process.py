@@ -159,4 +159,5 @@ class LiveModel:
         self._under_way = 1
 
     def _use(self) -> None:
+        self.said = None  # of another finger
         self._asked = [Use(self._plan, self._kinematics)]

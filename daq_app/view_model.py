@@ -3,11 +3,13 @@
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from daq_app.live_model import STEP, Provisional, Settled
 from daq_app.live_trace import Columns, LiveTrace
 
 GAP = 0.1  # predictions further apart have a gap between them [s]
-CHANNELS = ("SED",)
+CHANNELS = ("SED", "SED instead")  # the latter at small strain, where finite strain is asked for and out of reach
 KINEMATICS = {"small": "small strain", "finite": "finite strain"}
 
 
@@ -16,7 +18,7 @@ class ModelWords:
     """A line over the picture."""
 
     words: str
-    state: Literal["none", "provisional", "beyond", "settled"]
+    state: Literal["none", "provisional", "instead", "beyond", "failed", "settled"]
 
 
 def model_words(said: Provisional | None, settled: Settled | None, problem: str) -> ModelWords:
@@ -24,26 +26,30 @@ def model_words(said: Provisional | None, settled: Settled | None, problem: str)
     if problem:
         return ModelWords(f"No live model: {problem}.", "none")
     if settled is not None:
-        return ModelWords(_of_settled(settled), "settled")
+        return ModelWords(_of_settled(settled), "failed" if settled.sed is None else "settled")
     if said is None:
         return ModelWords("The live model is starting.", "none")
-    how = KINEMATICS[said.kinematics]
     if said.beyond:
-        return ModelWords(f"These forces are beyond the reach of the model at {how}.", "beyond")
+        return ModelWords("These forces are beyond the reach of the model.", "beyond")
     if said.sed[-1] <= 0.0:
-        return ModelWords("Model: nothing touches.", "none")
-    return ModelWords(f"PROVISIONAL  SED {_kpa(float(said.sed[-1]))} · {said.depth:.1f} mm deep · {how}", "provisional")
+        return ModelWords(f"Model at {KINEMATICS[said.kinematics]}: nothing touches.", "none")
+    told = f"PROVISIONAL  SED {_kpa(float(said.sed[-1]))} · {said.depth:.1f} mm deep · "
+    if said.instead[-1]:
+        return ModelWords(f"{told}small strain: these forces are beyond the reach of finite strain", "instead")
+    return ModelWords(told + KINEMATICS[said.kinematics], "provisional")
 
 
 def _of_settled(settled: Settled) -> str:
     shown = "" if settled.provisional is None else f" · shown live {_kpa(settled.provisional)}"
+    how = KINEMATICS[settled.kinematics]
     if settled.sed is None:
-        return f"No full solve: {settled.reason}{shown}"
+        kept = "" if settled.picture is None else " The picture is the last state that was followed."
+        return f"No full solve at {how}: {settled.reason}{kept}{shown}"
     error = "" if settled.error is None else f" ± {100 * settled.error:.1f} %"
     by = settled.difference
     if by is not None:
         shown += f" ({100 * by:+.1f} %)".replace("-", "−")
-    return f"Full solve  SED {_kpa(settled.sed)}{error}{shown}"
+    return f"Full solve  SED {_kpa(settled.sed)}{error} · {how}{shown}"
 
 
 def _kpa(sed: float) -> str:
@@ -55,7 +61,7 @@ class ModelTrace:
 
     def __init__(self) -> None:
         """Start with nothing."""
-        self._trace = LiveTrace(1.0 / STEP, channels=1, gap=GAP)
+        self._trace = LiveTrace(1.0 / STEP, channels=len(CHANNELS), gap=GAP)
         self._stream: int | None = None
 
     def add(self, said: Provisional) -> None:
@@ -63,7 +69,8 @@ class ModelTrace:
         if said.stream != self._stream:
             self._stream = said.stream
             self._trace.clear()
-        self._trace.add(said.time, 1000.0 * said.sed[None])
+        sed = 1000.0 * said.sed
+        self._trace.add(said.time, np.stack([np.where(said.instead, np.nan, sed), np.where(said.instead, sed, np.nan)]))
 
     def columns(self, first: float, last: float, count: int) -> Columns:
         """Return the SED [kPa] from `first` to `last` [s, device time] in about `count` columns; a gap stays a gap."""

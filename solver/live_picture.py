@@ -13,8 +13,8 @@ from solver.mesh import Array, Indices
 from solver.stiffness import Probes
 
 # A nine-node element as four quadrilaterals, and the middle of each in its coordinates.
-_QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
-_MIDDLES = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
+MIDDLES = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,11 +35,11 @@ class LivePicture:
         mesh, elastic = finger.geometry.mesh, finger.body.elastic
         everywhere = finger.body.displacement(finger.skin_compliance())  # (nodes, 2, 2 k)
         count = len(mesh.elements)
-        element = np.repeat(np.arange(count), len(_MIDDLES))
-        probes = Probes.at(mesh, elastic, element, np.tile(_MIDDLES, (count, 1)))
+        element = np.repeat(np.arange(count), len(MIDDLES))
+        probes = Probes.at(mesh, elastic, element, np.tile(MIDDLES, (count, 1)))
         gradient = probes.displacement_gradient(mesh, everywhere)
         return cls(
-            mesh.elements[:, _QUARTERS].reshape(-1, 4),
+            mesh.elements[:, QUARTERS].reshape(-1, 4),
             mesh.nodes,
             np.ascontiguousarray(everywhere.reshape(2 * len(mesh.nodes), -1)),
             np.stack([gradient[:, 0, 0], gradient[:, 1, 1], gradient[:, 0, 1] + gradient[:, 1, 0]]),

@@ -10,3 +10,4 @@ class Curve:
     channel: str
     colour: str  # a token's name, or a colour
     dashed: bool = False
+    named: bool = True  # in the plot, where it has several

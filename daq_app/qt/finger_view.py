@@ -19,6 +19,7 @@ SHOWN = (-9.0, 9.0, -1.0, 13.0)  # left, right, below, above of what is drawn [m
 PART = 0.62  # of the height that the finger takes; the row has the rest
 # The colour map magma (van der Walt and Smith, 2015), from its light end to a fifth before its dark one.
 MAGMA = ("#fcfdbf", "#fecf92", "#fe9f6d", "#f7705c", "#de4968", "#b5367a", "#8c2981", "#641a80", "#3b0f70")
+WORDS = 0.45  # of the height, at most, that a sentence takes
 SHADES = 32
 EVERY = 1 / 30  # no new picture sooner after another: nobody sees more [s]
 TOP = 0.97  # of the faces' SED lies below the end of the colour scale
@@ -66,13 +67,17 @@ class FingerView(QWidget):
         """Paint words, finger and row."""
         painter = QPainter(self)
         painter.fillRect(self.rect(), QColor(self._tokens.surface))
-        painter.setFont(font(SMALL, self._scale, bold=self._words.state in ("settled", "beyond")))
-        painter.setPen(QColor(self._tokens.look if self._words.state == "beyond" else self._tokens.quiet))
-        line = painter.fontMetrics().height()
-        box = QRectF(4, 0, self.width() - 8, 2 * line)
-        painter.drawText(box, int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignTop), self._words.words)
+        painter.setFont(font(SMALL, self._scale, bold=self._words.state in ("settled", "instead", "beyond", "failed")))
+        painter.setPen(
+            QColor(self._tokens.look if self._words.state in ("instead", "beyond", "failed") else self._tokens.quiet)
+        )
+        flags = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignTop)
+        box = QRectF(4, 0, self.width() - 8, self.height() * WORDS)
+        needed = painter.boundingRect(box, flags, self._words.words).height()
+        painter.drawText(box, flags, self._words.words)
+        # Two lines are always left to them, so that the picture stays where it is; a failure takes what it needs.
+        top = min(max(needed, 2.0 * painter.fontMetrics().height()), box.height()) + 4
         painter.setFont(font(SMALL, self._scale))
-        top = 2.0 * line + 4
         room = self.height() - top
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         self._paint_finger(painter, QRectF(0, top, self.width(), room * PART))

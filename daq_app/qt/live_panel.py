@@ -38,7 +38,11 @@ AXES = (
         PlotScale(-50.0, 50.0, 100.0),
     ),
 )
-SED = ("SED [kPa], model", (Curve("SED", MODEL),), PlotScale(0.0, 5.0, 5.0))
+SED = (
+    "SED [kPa], model",
+    (Curve("SED", MODEL), Curve("SED instead", MODEL, dashed=True, named=False)),
+    PlotScale(0.0, 5.0, 5.0),
+)
 FINITE = "live model/finite strain"  # under which the choice is remembered
 
 

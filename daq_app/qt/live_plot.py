@@ -184,8 +184,9 @@ class LivePlot(QWidget):
         metrics = QFontMetricsF(font(SMALL, self._type_scale, bold=True))
         painter.setFont(font(SMALL, self._type_scale, bold=True))
         x, baseline = inside.left() + 6, inside.top() + metrics.ascent() + 1
-        several = len(self._curves) > 1
-        for curve in self._curves if several else ():
+        named = [curve for curve in self._curves if curve.named]
+        several = len(named) > 1
+        for curve in named if several else ():
             pen = QPen(QColor(self._colour(curve.colour)), 3)
             if curve.dashed:
                 pen.setDashPattern([1.6, 1.2])

@@ -61,6 +61,33 @@ def test_the_picture_holds_the_energy_that_the_row_tells(follower):
     assert said.picture.outline[:, 1].min() == pytest.approx(0.0, abs=1e-3)
 
 
+def test_finite_strain_tells_within_its_reach_and_small_strain_is_marked_where_it_tells_instead(follower):
+    finite = Follower(Use(PLAN, "finite"))
+    within = finite.take(forces_of(stroke(), FRAME))
+    assert not within.instead.any()
+    found = solve(settled_scene(PLAN, FRICTION, NORMAL, "finite"))
+    assert within.sed[-1] == pytest.approx(found.sed_ending, rel=0.03)  # what the stepper's mesh is good to
+    assert within.depth == pytest.approx(found.indentation, rel=0.01)
+    assert model_words(within, None, "").state == "provisional"
+    lifted = Forces(np.array([5.0]), np.array([0.0]), np.array([0.0]), 0, 1)
+    finite.take(lifted)
+    hard = forces_of(stroke(), FRAME)
+    beyond = finite.take(Forces(5.0 + hard.time, 3.0 * hard.normal, 5.0 * hard.pull, 0, 1))
+    first = int(np.argmax(beyond.instead))
+    assert first > 0
+    assert beyond.instead[first:].all()  # what it lost is not taken up again in the middle of a press
+    follower.take(lifted)
+    small = follower.take(Forces(5.0 + hard.time, 3.0 * hard.normal, 5.0 * hard.pull, 0, 1))
+    assert beyond.sed[first:].tolist() == small.sed[first:].tolist()
+    assert model_words(beyond, None, "").state == "instead"
+    trace = ModelTrace()
+    trace.add(beyond)
+    told = np.isfinite(trace.columns(5.0, 8.0, 2000).values)
+    assert (told[0] != told[1]).all()
+    finite.take(lifted)
+    assert not finite.take(forces_of(stroke(0.5), FRAME)).instead.any()
+
+
 def test_a_lifted_finger_forgets_the_friction_of_the_touch_before(follower):
     follower.take(forces_of(stroke(), FRAME))
     lifted = follower.take(Forces(np.array([5.0]), np.array([0.0]), np.array([0.0]), 0, 1))
@@ -93,6 +120,8 @@ def test_a_full_solve_that_fails_says_why_and_keeps_what_was_shown(follower):
     assert settled.difference is None
     assert settled.provisional is not None
     assert settled.reason in model_words(None, settled, "").words
+    assert settled.picture.sed.max() > 0.0  # the last good state stays to be seen
+    assert settled.depth == pytest.approx(1.54, abs=0.02)
 
 
 def test_readings_become_200_steps_a_second_and_unhealthy_ones_are_left_out():
@@ -118,8 +147,9 @@ def test_joined_batches_are_one_batch():
     [
         (None, None, "", "none"),
         (None, None, "no finger", "none"),
-        (None, Settled(1, 0.004, 0.01, 0.0041, np.empty(0), None, 2.0), "", "settled"),
-        (None, Settled(1, 0.004, None, None, np.empty(0), None, 2.0), "", "settled"),
+        (None, Settled(1, 0.004, 0.01, 0.0041, np.empty(0), None, 2.0, "small"), "", "settled"),
+        (None, Settled(1, 0.004, None, None, np.empty(0), None, 2.0, "finite"), "", "settled"),
+        (None, Settled(1, None, None, None, np.empty(0), None, None, "finite", "it wedges"), "", "failed"),
     ],
 )
 def test_every_state_of_the_model_has_words(said, settled, problem, state):

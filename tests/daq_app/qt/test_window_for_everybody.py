@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, Q
 from daq_app.live_trace import CHANNELS, LiveTrace
 from daq_app.qt import score_line, screens, tokens
 from daq_app.qt.keys import KEYS, act_of
+from daq_app.qt.live_panel import FINITE, LivePanel
 from daq_app.qt.press_bar import FULL, PressBar
 
 pytestmark = pytest.mark.qt
@@ -115,6 +116,17 @@ def test_below_1366_pixels_the_bench_folds_and_a_key_unfolds_it(driver):
     window._bench_shown = None
     window.resize(1440, 900)
     assert window.bench.isVisible()
+
+
+def test_a_key_chooses_the_kinematics_of_the_live_model_and_the_choice_is_remembered(driver):
+    window, model = driver.window, driver.window.bridge.model
+    remembered = screens.settings
+    for kinematics, kept in (("finite", "yes"), ("small", "no")):
+        QTest.keyClick(window, Qt.Key.Key_M)
+        assert model.kinematics == kinematics
+        assert remembered().value(FINITE) == kept
+        again = LivePanel(window.bridge.feed, model, tokens.LIGHT, 1.0)
+        assert again.bar.finite.isChecked() == (kinematics == "finite")
 
 
 @pytest.mark.parametrize("locale", ["de_DE", "ja_JP", "tr_TR"])
