@@ -9,11 +9,18 @@ from pathlib import Path
 from daq_app.area_option import add_area, area_law
 from daq_app.console import Console
 from daq_app.derived import analysed, predicted, visit
+from sessions.afferent import AfferentSettings, session_firing
+from sessions.analysis import Analysis
 from sessions.blinding import revealed
+from sessions.paths import trial_paths
 from sessions.plan import Blinded
+from sessions.prediction import Progress, SessionPrediction
 from sessions.recording import Recording
 from sessions.recording.derived import store_page
+from sessions.report import Further
+from sessions.report.predictions import afferent_facts
 from sessions.study_file import is_study
+from sessions.uncertainty import sed_intervals
 from sessions.visits import score_visits
 
 PAGE = "report.html"
@@ -26,6 +33,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--subject", metavar="CODE", help="of a study: whose visit with forces; all its scores join in")
     parser.add_argument("-o", "--out", type=Path, metavar="FILE.html", help="the page (SESSION/report.html)")
     parser.add_argument("--scores", type=Path, nargs="+", default=[], metavar="SESSION", help="further visits")
+    parser.add_argument(
+        "--paths",
+        nargs="?",
+        const="small",
+        choices=["small", "finite"],
+        metavar="finite",
+        help="also along every other reasonable choice of the analysis; with 'finite' at finite strain too (a minute)",
+    )
+    parser.add_argument(
+        "--afferent", action="store_true", help="also firing rates of an SA-II afferent: an illustration"
+    )
     parser.add_argument("--figures", type=Path, metavar="DIR", help="also write every picture as SVG, its data as CSV")
     add_area(parser)
 
@@ -45,7 +63,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from sessions.exports import html
     from sessions.report import findings, score_table
 
-    report = findings(recording, analysis, prediction, [score_table(one) for one in others])
+    further = _further(recording, analysis, prediction, options, console)
+    report = findings(recording, analysis, prediction, [score_table(one) for one in others], further=further)
     console.progress(0.9, "drawing")
     if options.out is None:  # beside the recording it is one more thing made of it, and listed in its manifest
         page = store_page(recording.folder, PAGE, html.page(report))
@@ -56,3 +75,28 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.result({"page": str(page), "pictures": [str(path) for path in pictures], "flaws": len(report.flaws)})
     console.say(f"{page}{' (SIMULATED)' if report.simulated else ''}")
     return 3 if analysis.flaws else 0
+
+
+def _further(
+    recording: Recording,
+    analysis: Analysis,
+    prediction: SessionPrediction,
+    options: argparse.Namespace,
+    console: Console,
+) -> Further:
+    """Return the intervals of the SEDs, and what was asked for beside."""
+
+    def shown(text: str) -> Progress:
+        def tell(part: float) -> bool:
+            console.progress(0.9 * part, text)
+            return True
+
+        return tell
+
+    intervals = sed_intervals(analysis, prediction, progress=shown("carrying the uncertainty of friction through"))
+    reference, firing = session_firing(prediction) if options.afferent else (None, ())
+    paths = None
+    if options.paths is not None and recording.plan.forces:
+        finite = options.paths == "finite"
+        paths = trial_paths(recording, progress=shown("many paths of the analysis"), finite=finite)
+    return Further(intervals, firing, afferent_facts(AfferentSettings(), reference), paths)

@@ -1,8 +1,10 @@
 """The report as one self-contained page, and its figures as files with their numbers."""
 
+import base64
 import csv
 import io
 import os
+from functools import partial
 from itertools import chain
 from pathlib import Path
 
@@ -39,6 +41,7 @@ def page(report: Report) -> str:
         summary=summary(report),
         figures=figures,
         drawing=drawn,
+        data_address=partial(data_address, head=report.head if report.simulated else ""),
         numbers=_numbers(figures, tables),
         contents=_contents(report, figures, tables),
         tables=tables,
@@ -72,7 +75,7 @@ def write_figures(report: Report, folder: Path) -> tuple[Path, ...]:
 
 def _numbers(figures: dict[str, Plate], tables: dict[str, tuple[Table, ...]]) -> dict[str, int]:
     """Return the numbers of figures and of tables, each counted from 1 in the order of the page."""
-    order = ("scores", "course", "friction", "speed", "finger", "response", "relation")
+    order = ("scores", "course", "friction", "speed", "finger", "response", "relation", "paths")
     numbered = {name: n for n, name in enumerate((name for name in order if name in figures), 1)}
     return numbered | {table.name: n for n, table in enumerate(chain.from_iterable(tables.values()), 1)}
 
@@ -88,6 +91,7 @@ def _contents(
         ("friction", "forces and friction", "course" in figures or bool(tables["strokes"])),
         ("predictions", "predicted responses", bool(tables["predictions"])),
         ("relation", "prediction against score", bool(tables["relation"])),
+        ("paths", "many paths", bool(tables["paths"])),
         ("planted", "planted against recovered", bool(tables["planted"])),
         ("model", "the model", bool(report.modelled or report.left_out)),
         ("again", "to do it again", True),
@@ -98,6 +102,11 @@ def _contents(
 def drawn(panel: Panel) -> Markup:
     """Return the picture as it stands in a page: without the head an SVG file has."""
     return Markup(panel.svg[panel.svg.index("<svg") :])
+
+
+def data_address(panel: Panel, head: str) -> str:
+    """Return an address that holds the numbers of a picture as CSV, so that a page needs no file beside it."""
+    return "data:text/csv;charset=utf-8;base64," + base64.b64encode(panel_csv(panel, head).encode()).decode()
 
 
 def panel_csv(panel: Panel, head: str) -> str:

@@ -1,6 +1,7 @@
 """What a report says in sentences: its question and, in short, its answer."""
 
 from sessions.analysis.scores import Relation
+from sessions.exports.report_tables.paths import paths_sentence
 from sessions.exports.wording import correlation, digits, plural, spread_share
 from sessions.report import Experiment, Report
 
@@ -33,6 +34,8 @@ def summary(report: Report) -> tuple[str, ...]:
         seds = [p.sed for p in report.predictions if p.experiment == experiment.name and p.sed is not None]
         if seds:
             sentences.append(_predicted(experiment, min(seds), max(seds)))
+        if experiment.paths:
+            sentences.append(paths_sentence(experiment.name, experiment.paths))
     missing = sum(p.sed is None for p in report.predictions)
     if missing:
         sentences.append(f"{_capital(plural(missing, 'trial'))} got no prediction; the tables say why.")

@@ -1,11 +1,12 @@
 """The result of a study as one self-contained page."""
 
+from functools import partial
 from itertools import chain
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
 from sessions.exports.figures.study import study_plates
-from sessions.exports.html import drawn
+from sessions.exports.html import data_address, drawn
 from sessions.exports.report_tables.paths import paths_sentence
 from sessions.exports.study_tables import study_tables
 from sessions.exports.wording import correlation, digits, plural
@@ -44,6 +45,7 @@ def study_page(study: StudyFindings, name: str) -> str:
         tables=tables,
         numbers=numbers,
         drawing=drawn,
+        data_address=partial(data_address, head=study.simulated),
     )
 
 

@@ -25,7 +25,7 @@ def list_in_manifest(folder: Path, names: Iterable[str], simulated: str | None) 
     )
     for name in names:
         path = folder / name
-        files[name] = {"sha256": _sha256(path), "bytes": path.stat().st_size}
+        files[name] = {"sha256": file_sha256(path), "bytes": path.stat().st_size}
     document = {**head, "files": dict(sorted(files.items()))}
     write_whole(folder / MANIFEST_FILE, json.dumps(document, indent=1).encode() + b"\n")
 
@@ -44,7 +44,7 @@ def changed_files(folder: Path, simulated: str | None, form: Mapping[str, Any]) 
         path = folder / name
         if not path.is_file():
             found.append(f"{name} is listed in {MANIFEST_FILE} and missing")
-        elif _sha256(path) != told["sha256"] or path.stat().st_size != told["bytes"]:
+        elif file_sha256(path) != told["sha256"] or path.stat().st_size != told["bytes"]:
             found.append(
                 f"{name} is not what it was when it was listed: its SHA-256 or size differs from {MANIFEST_FILE}"
             )
@@ -73,6 +73,7 @@ def _files(folder: Path) -> dict[str, Any]:
         raise RecordingError(f"{path} cannot be read ({error}); restore the folder from a copy") from error
 
 
-def _sha256(path: Path) -> str:
+def file_sha256(path: Path) -> str:
+    """Return the SHA-256 of a file in hexadecimal. Raises OSError."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

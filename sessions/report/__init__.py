@@ -1,9 +1,13 @@
 """The findings of a session as plain data, ready for any export."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
+from sessions.afferent import Firing
 from sessions.analysis import Analysis
+from sessions.analysis.bootstrap import BootstrapSettings
 from sessions.analysis.scores import MeanScore, Relation, ScoreTable, joined, score_table
+from sessions.paths import Seds
 from sessions.prediction import SessionPrediction
 from sessions.recording.provenance import software_versions
 from sessions.recording.reader import Recording
@@ -25,6 +29,7 @@ from sessions.report.experiments import experiments
 from sessions.report.predictions import fields, left_out, modelled, predicted_seds, predictions
 from sessions.report.strokes import course, flaws, strokes
 from sessions.sealing import NUMBERS, sealed_sentence
+from sessions.uncertainty import SedInterval
 
 __all__ = [
     "Answers",
@@ -32,6 +37,7 @@ __all__ = [
     "Experiment",
     "Fact",
     "Field",
+    "Further",
     "History",
     "MeanScore",
     "Planted",
@@ -45,21 +51,34 @@ __all__ = [
 ]
 
 
+@dataclass(frozen=True, slots=True)
+class Further:
+    """What a report can hold beside the prediction itself."""
+
+    intervals: Sequence[SedInterval] = ()  # of each predicted trial, in order
+    firing: Sequence[Firing] = ()  # of each trial with a course
+    afferent: tuple[Fact, ...] = ()  # the parameters that `firing` was told with
+    paths: Mapping[int, Seds] | None = None  # trial -> SED along many paths of the analysis
+
+
 def findings(
     recording: Recording,
     analysis: Analysis,
     prediction: SessionPrediction | None = None,
     scores: Sequence[ScoreTable] | None = None,
     planted: Sequence[Planted] | None = None,
+    further: Further | None = None,
 ) -> Report:
     """Return the findings of a session.
 
     `scores` are the tables of further visits, of this subject or others, joined by subject code; the session's own
     scores are always among them. `planted` is what a simulator planted, trial by trial; None for real sessions.
+    `further` is what took more solves, or was asked for.
     """
     tables = joined((score_table(recording), *(scores or ())))
     found = strokes(recording, analysis)
-    predicted = predictions(prediction)
+    more = further or Further()
+    predicted = predictions(prediction, more.intervals, more.firing)
     head = _head(recording, tables)
     return Report(
         title=_title(recording),
@@ -71,7 +90,7 @@ def findings(
         apparatus=facts.apparatus(recording, analysis),
         excluded=facts.excluded(recording, analysis, found, tables),
         flaws=flaws(analysis),
-        experiments=experiments(recording.plan, tables, predicted_seds(predicted)),
+        experiments=experiments(recording.plan, tables, predicted_seds(predicted), more.paths),
         course=course(recording),
         strokes=found,
         predictions=predicted,
@@ -83,6 +102,8 @@ def findings(
         again=facts.again(recording, analysis),
         commands=facts.commands(recording, predicted=prediction is not None),
         width=None if prediction is None else prediction.width,
+        interval_kind=BootstrapSettings().kind,
+        afferent=more.afferent,
     )
 
 

@@ -3,6 +3,7 @@
 from dataclasses import asdict, dataclass
 
 from sessions.analysis.scores import MeanScore, Relation
+from sessions.paths import PathFinding
 
 Numbers = tuple[float, ...]
 
@@ -39,6 +40,7 @@ class Experiment:
     answers: tuple[Answers, ...]
     score_relation: Relation | None  # SED [MPa] against mean score; None where one of the two is missing
     index_relation: Relation | None  # SED [MPa] against index
+    paths: tuple[PathFinding, ...] = ()  # the first of them along many paths of the analysis, where they were asked for
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +81,7 @@ class StrokeFinding:
     flaws: tuple[str, ...]
     reasons: dict[str, str]
     trace: Trace | None
+    bootstrap: dict[str, tuple[float, float]]  # intervals by the number's name; see `Report.interval_kind`
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +118,10 @@ class PredictionFinding:
     wall_s: float | None
     history: History | None
     reasons: dict[str, str]
+    sed_interval: tuple[float, float] | None = None  # that the uncertainty of friction alone makes [MPa]
+    interval_by: str = ""  # "derivatives" or "sampling"
+    peak_rate: float | None = None  # of an SA-II afferent, an illustration [imp/s]
+    settled_rate: float | None = None  # likewise
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +186,8 @@ class Report:
     again: tuple[Fact, ...]  # everything needed to do it again ...
     commands: tuple[str, ...]  # ... and what to type
     width: float | None  # of the finger [mm], where forces per mm met forces
+    interval_kind: str = ""  # what the intervals in `StrokeFinding.bootstrap` are
+    afferent: tuple[Fact, ...] = ()  # every parameter of the afferent, where its rates are told
 
     def to_dict(self) -> dict[str, object]:
         """Return the report as JSON can hold it."""

@@ -2,21 +2,33 @@
 
 from collections.abc import Mapping, Sequence
 
+from sessions.analysis.friction import rule_for
 from sessions.analysis.scores import MeanScore, Relation, ScoreTable, mean_scores, relation, score_matrix
+from sessions.paths import PathTrial, Seds, path_findings
 from sessions.plan import Block, SessionPlan
 from sessions.report.contents import Answers, Experiment
 
 
 def experiments(
-    plan: SessionPlan, tables: Sequence[ScoreTable], seds: Mapping[tuple[str, int], float]
+    plan: SessionPlan,
+    tables: Sequence[ScoreTable],
+    seds: Mapping[tuple[str, int], float],
+    paths: Mapping[int, Seds] | None = None,
 ) -> tuple[Experiment, ...]:
-    """Return one experiment a block; `seds` holds the predicted SED [MPa] by block and index, where there is one."""
+    """Return one experiment a block; `seds` holds the predicted SED [MPa] by block and index, where there is one.
+
+    `paths` holds the SED of each trial along many paths of the analysis, where they were asked for.
+    """
     means = mean_scores(tables)
-    return tuple(_experiment(block, means, tables, seds) for block in plan.blocks if block.phase == "main")
+    return tuple(_experiment(block, means, tables, seds, paths or {}) for block in plan.blocks if block.phase == "main")
 
 
 def _experiment(
-    block: Block, means: Sequence[MeanScore], tables: Sequence[ScoreTable], seds: Mapping[tuple[str, int], float]
+    block: Block,
+    means: Sequence[MeanScore],
+    tables: Sequence[ScoreTable],
+    seds: Mapping[tuple[str, int], float],
+    paths: Mapping[int, Seds],
 ) -> Experiment:
     descriptor = block.trials[0].stimulus.descriptor
     indices = tuple(sorted({trial.stimulus.known_index for trial in block.trials}))
@@ -37,6 +49,15 @@ def _experiment(
         ),
         score_relation=_related({mean.index: mean.mean for mean in own}, predicted),
         index_relation=_related({index: float(index) for index in indices}, predicted),
+        paths=path_findings(
+            [
+                PathTrial("", trial.stimulus.known_index, None, rule_for(trial), paths.get(trial.number, ()))
+                for trial in block.trials
+            ],
+            {mean.index: mean.mean for mean in own},
+            "small",
+            within=False,
+        ),
     )
 
 

@@ -12,7 +12,9 @@ from sessions.analysis.settings import AnalysisSettings
 from sessions.plan import PROXIMAL_TO_DISTAL, Block, Origin
 from sessions.recording.head import calibration_hash
 from sessions.recording.log import TrialRecord
+from sessions.recording.manifest import file_sha256
 from sessions.recording.reader import Recording
+from sessions.recording.schema import LIVE_FILE
 from sessions.report.contents import Fact, StrokeFinding
 
 _ORIGIN: dict[Origin, str] = {"measured": "measured", "set": "set", "default": "default: nobody set it"}
@@ -144,6 +146,7 @@ def again(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
     provenance, info = recording.provenance, recording.info
     facts = [
         Fact("session folder", recording.folder.name),
+        Fact("recording", f"SHA-256 {file_sha256(recording.folder / LIVE_FILE)}", LIVE_FILE),
         Fact("recorded", str(provenance.get("created_utc", "at an unknown time")), "UTC"),
         Fact("recorded by", _versions(provenance.get("software", {}))),
         Fact("machine", ", ".join(f"{name} {value}" for name, value in provenance.get("machine", {}).items())),

@@ -3,14 +3,16 @@
 import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sessions.afferent import AfferentSettings, Firing, parameters
 from sessions.prediction import SessionPrediction, TrialPrediction
 from sessions.report.contents import Fact, Field, History, PredictionFinding
+from sessions.uncertainty import SedInterval
 
 _SCENE = {"finger": "mm, degrees", "materials": "E in MPa", "receptor": "mm"}  # what all trials share, with its units
 _READINGS = {
@@ -20,9 +22,32 @@ _READINGS = {
 _FROM_ROW = {"tau_max": "mu", "error_estimate": "sed", "normal_per_mm": "normal_force", "wall_s": "sed"}
 
 
-def predictions(found: SessionPrediction | None) -> tuple[PredictionFinding, ...]:
+def predictions(
+    found: SessionPrediction | None, intervals: Sequence[SedInterval] = (), firing: Sequence[Firing] = ()
+) -> tuple[PredictionFinding, ...]:
     """Return a finding for each trial, or for each stroke of a recording without trials."""
-    return () if found is None else tuple(_finding(row) for row in found.trials)
+    if found is None:
+        return ()
+    rates = {one.trial: one for one in firing}
+    told = list(intervals) or [None] * len(found.trials)
+    return tuple(
+        _with_more(_finding(row), interval, rates.get(row.trial))
+        for row, interval in zip(found.trials, told, strict=True)
+    )
+
+
+def afferent_facts(settings: AfferentSettings, reference: float | None) -> tuple[Fact, ...]:
+    """Return every parameter of the afferent with its value, and what it rests on."""
+    facts = [
+        Fact(
+            told["name"].replace("_", " "),
+            f"{told['value']:g} {told['unit']}".removesuffix(" -"),
+            f"{told['standing']}: {told['basis']}",
+        )
+        for told in parameters(settings)
+    ]
+    known = "" if reference is None else f"{1e3 * reference:.4g} kPa"
+    return (Fact("SED at which x is 1", known, "median of this session's trials"), *facts) if known else ()
 
 
 def predicted_seds(findings: Sequence[PredictionFinding]) -> dict[tuple[str, int], float]:
@@ -119,6 +144,17 @@ def _finding(row: TrialPrediction) -> PredictionFinding:
         history=None if history is None else History(_numbers(history.time), _numbers(history.sed_ending)),
         reasons=reasons,
     )
+
+
+def _with_more(finding: PredictionFinding, interval: SedInterval | None, firing: Firing | None) -> PredictionFinding:
+    """Return the finding with the interval of its SED, and with an afferent's rates."""
+    if interval is not None and interval.low is not None and interval.high is not None:
+        finding = replace(finding, sed_interval=(interval.low, interval.high), interval_by=interval.method or "")
+    elif interval is not None:
+        finding = replace(finding, reasons={**finding.reasons, "sed_interval": interval.reason})
+    if firing is not None:
+        finding = replace(finding, peak_rate=float(firing.rate.max()), settled_rate=firing.settled_rate)
+    return finding
 
 
 def field_of(experiment: str, row: TrialPrediction) -> Field | None:

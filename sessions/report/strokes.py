@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.analysis.analysis import Analysis
+from sessions.analysis.bootstrap import stroke_intervals
 from sessions.analysis.flaws import Flaw
 from sessions.analysis.forces import in_face_frame
 from sessions.analysis.stroke import Stroke
@@ -47,9 +48,16 @@ def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ..
                 flaws=stroke.flaws,
                 reasons=_reasons(stroke, position, analysis.flaws),
                 trace=_trace(stroke),
+                bootstrap=_bootstrap(stroke, position),
             )
         )
     return tuple(found)
+
+
+def _bootstrap(stroke: Stroke, position: int) -> dict[str, tuple[float, float]]:
+    found = stroke_intervals(stroke, position)
+    told = {name: getattr(found, name) for name in ("mu_static", "mu_dynamic", "mu_max", "tau_max", "speed")}
+    return {name: interval for name, interval in told.items() if interval is not None}
 
 
 def flaws(analysis: Analysis) -> tuple[Fact, ...]:

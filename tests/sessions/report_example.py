@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from sessions.analysis.scores import Score, ScoreTable, mean_scores, relation, score_matrix
+from sessions.paths import PATHS, PathTrial, path_findings
 from sessions.report import (
     Answers,
     Course,
@@ -76,7 +77,19 @@ def experiment(descriptor, score_tables):
         ),
         score_relation=relation([m.mean for m in means], seds, [m.index for m in means]) if means else None,
         index_relation=relation(list(rows), [row[3] for row in rows.values()], list(rows)),
+        paths=path_findings(
+            [PathTrial("", i, None, "maximum", along(i, row[3])) for i, row in rows.items()],
+            {mean.index: mean.mean for mean in means},
+            "small",
+            within=False,
+        ),
     )
+
+
+def along(index, sed):
+    """Return a made-up SED along each path: one choice of the filter bends it."""
+    small = [path for path in PATHS if path.kinematics == "small"]
+    return tuple(sed * (1.001 if path.filter == "10 Hz" and index == 50 else 1.0) for path in small)
 
 
 def trace(mu, speed, onset):
@@ -125,6 +138,7 @@ def stroke(number, descriptor, index):
             **({"speed": "the centre of pressure moves in steps as large as the stroke"} if number == 7 else {}),
         },
         trace=trace(mu, speed, onset),
+        bootstrap={} if number == 7 else {"mu_dynamic": (mu * 0.98, mu * 1.02), "tau_max": (tau * 0.97, tau * 1.03)},
     )
 
 
@@ -156,6 +170,10 @@ def prediction(number, descriptor, index):
         wall_s=0.05,
         history=History(tuple(t.tolist()), tuple(course.tolist())),
         reasons={} if number != 10 else {"matching_depth": "at no depth up to 3 mm does the model press so hard"},
+        sed_interval=(0.995 * sed, 1.005 * sed),
+        interval_by="derivatives",
+        peak_rate=34.5,
+        settled_rate=22.6,
     )
 
 
@@ -240,5 +258,7 @@ def example(**changes):
         "again": (Fact("seed", "7"),),
         "commands": ("daq-app analyse P01-forces", "daq-app report P01-forces -o report.html"),
         "width": 15.0,
+        "interval_kind": "95 % percentile interval of made-up repeats",
+        "afferent": (Fact("static gain", "20 imp/s", "assumed"),),
     }
     return Report(**{**values, **changes})

@@ -1,22 +1,26 @@
+import base64
 import csv
 import re
 import shutil
 import subprocess
 import xml.etree.ElementTree as ET
-from html import escape
 from html.parser import HTMLParser
+from unittest.mock import patch
 
 import pytest
+from browser import CHROMIUM, FLAGS, PAPER_HEIGHT, opened
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from report_example import TABLES, example
+from study_example import study
 
 from sessions.exports.figures import plates
 from sessions.exports.figures.labels import spread
 from sessions.exports.html import ReportError, page, write_figures, write_report
+from sessions.exports.study_page import study_page
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+PDFTOTEXT = shutil.which("pdftotext")
 SVG = "{http://www.w3.org/2000/svg}"
 
 
@@ -60,30 +64,35 @@ def report():
 
 
 @pytest.fixture(scope="module")
-def cut():
-    """The pictures of `drawn` over whose edge a label goes."""
-    return []
-
-
-@pytest.fixture(scope="module")
-def drawn(report, cut):
-    save = Figure.savefig
+def drawing(report):
+    """Return the pictures, drawn once for all tests, and the axes of which a label is cut."""
+    cut, save = [], Figure.savefig
 
     def looked_at(self, *args, **kwargs):
-        self.draw_without_rendering()
+        save(self, *args, **kwargs)
         box, drawn = self.bbox_inches, self.get_tightbbox()
         if min(drawn.x0, drawn.y0, box.x1 - drawn.x1, box.y1 - drawn.y1) < 0:
             cut.append([axes.get_ylabel() for axes in self.axes])
-        return save(self, *args, **kwargs)
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Figure, "savefig", looked_at)
-        return plates(report)
+    with patch.object(Figure, "savefig", looked_at):
+        return plates(report), cut
 
 
 @pytest.fixture(scope="module")
-def made(report):
-    return page(report)
+def drawn(drawing):
+    return drawing[0]
+
+
+@pytest.fixture
+def drawn_before(drawn, monkeypatch):
+    """Let nothing be drawn anew."""
+    monkeypatch.setattr("sessions.exports.html.plates", lambda _: drawn)
+
+
+@pytest.fixture(scope="module")
+def made(report, drawn):
+    with patch("sessions.exports.html.plates", lambda _: drawn):  # drawn once for all
+        return page(report)
 
 
 def test_simulated_is_the_first_thing_a_reader_sees(made):
@@ -100,7 +109,7 @@ def test_nothing_on_the_page_is_fetched_from_anywhere(made):
     seen = Words(made)
     assert "script" not in seen.tags
     assert not {"link", "img", "iframe", "object", "embed"} & set(seen.tags)
-    assert all(address.startswith("#") for address in seen.fetched)
+    assert all(address.startswith(("#", "data:text/csv;")) for address in seen.fetched)
     assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", made))
     assert "@import" not in made
 
@@ -108,7 +117,7 @@ def test_nothing_on_the_page_is_fetched_from_anywhere(made):
 def test_every_link_and_clip_of_the_page_leads_to_exactly_one_place(made):
     seen = Words(made)
     assert len(seen.ids) == len(set(seen.ids))
-    wanted = {address[1:] for address in seen.fetched} | set(re.findall(r"url\(#([^)]*)\)", made))
+    wanted = {address[1:] for address in seen.fetched if address[0] == "#"} | set(re.findall(r"url\(#([^)]*)\)", made))
     assert wanted <= set(seen.ids)
 
 
@@ -124,9 +133,8 @@ def test_every_axis_names_its_unit(drawn):
             assert len(with_unit) >= 2, panel.name
 
 
-@pytest.mark.usefixtures("drawn")
-def test_no_label_of_any_picture_is_cut(cut):
-    assert cut == []
+def test_no_label_of_any_picture_is_cut(drawing):
+    assert drawing[1] == []
 
 
 def test_hovering_over_a_point_tells_its_values(drawn):
@@ -223,6 +231,7 @@ def test_a_place_that_is_no_folder_is_refused_in_one_sentence(tmp_path):
         write_report(bare(), tmp_path / "file" / "report.html")
 
 
+@pytest.mark.usefixtures("drawn_before")
 def test_every_picture_is_a_file_with_its_numbers_beside_it(tmp_path, report):
     written = write_figures(report, tmp_path)
     assert {path.suffix for path in written} == {".svg", ".csv"}
@@ -234,6 +243,7 @@ def test_every_picture_is_a_file_with_its_numbers_beside_it(tmp_path, report):
             assert ET.fromstring(text).tag == f"{SVG}svg"
 
 
+@pytest.mark.usefixtures("drawn_before")
 def test_the_numbers_beside_a_picture_are_those_of_the_report(tmp_path, report):
     write_figures(report, tmp_path)
     lines = (tmp_path / "relation-slipperiness.csv").read_text(encoding="utf-8").splitlines()
@@ -260,28 +270,77 @@ def test_labels_keep_their_distance_their_order_and_their_place_where_there_is_r
         assert all(-1e-6 <= place <= 100 + 1e-6 for place in placed)
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to open the page in")
-@pytest.mark.parametrize("width", [360, 1280])
-def test_the_page_is_no_wider_than_its_window(tmp_path, made, width):
-    frame = f'<iframe style="width: {width}px; border: 0" srcdoc="{escape(made)}"></iframe>'
-    measure = (
-        "<script>onload = () => { const page = document.querySelector('iframe').contentDocument.documentElement;"
-        "document.title = `width ${page.clientWidth} ${page.scrollWidth}` }</script>"
+def test_the_numbers_of_a_picture_are_on_the_page_itself(made, drawn):
+    (panel,) = [p for plate in drawn for p in plate.panels if p.name == "relation-stickiness"]
+    link = re.search(r'download="relation-stickiness.csv" href="data:text/csv;charset=utf-8;base64,([^"]*)"', made)
+    rows = list(csv.reader(base64.b64decode(link[1]).decode().splitlines()))
+    assert rows[0][0].startswith("# SIMULATED")
+    assert rows[2:] == [[str(value) for value in row] for row in panel.rows]
+
+
+@pytest.fixture(scope="module", params=["session", "study"])
+def text(request, made):
+    return made if request.param == "session" else study_page(study(), "example")
+
+
+@pytest.fixture(scope="module")
+def shown(text, tmp_path_factory):
+    if CHROMIUM is None:
+        pytest.skip("no Chromium to open the pages in")
+    return opened(tmp_path_factory.mktemp("browser"), text)
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to open the pages in")
+def test_a_page_that_asks_fails_overlaps_or_is_cut_is_found_out(tmp_path):
+    bad = (
+        '<p>one<img src="http://127.0.0.1:9/x.png"><script>nothing()</script>'
+        '<p style="position: absolute; top: 14px">another'
+        '<pre style="width: 50px; overflow: auto">far too long a line</pre>'
     )
-    (tmp_path / "page.html").write_text(f"<title></title>{frame}{measure}", encoding="utf-8")
-    shown = subprocess.run(
-        [
-            CHROMIUM,
-            *("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking"),
-            f"--user-data-dir={tmp_path / 'profile'}",
-            "--window-size=1400,900",
-            "--dump-dom",
-            (tmp_path / "page.html").as_uri(),
-        ],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-    ).stdout
-    inside, needed = map(int, re.search(r"<title>width (\d+) (\d+)", shown).groups())
-    assert needed <= inside <= width
+    seen, console, asked = opened(tmp_path, bad)
+    assert "nothing is not defined" in console[0]
+    assert asked == {"http://127.0.0.1:9/x.png"}
+    assert seen["wide"]["overlaps"] == ["one | another"]
+    assert seen["paper"]["cut"] == ["far too long a line"]
+
+
+def test_no_request_leaves_the_page(shown):
+    seen, _, asked = shown
+    assert all(not frame["fetched"] for frame in seen.values())
+    assert asked == set()
+
+
+def test_nothing_is_wrong_in_the_console(shown):
+    assert shown[1] == []
+
+
+@pytest.mark.parametrize("window", ["narrow", "wide", "paper"])
+def test_no_text_lies_over_another_and_the_page_is_no_wider_than_its_window(shown, window):
+    frame = shown[0][window]
+    assert frame["texts"] > 200  # there is something to overlap
+    assert frame["overlaps"] == []
+    assert frame["needed"] <= frame["window"]
+
+
+def test_nothing_is_cut_where_there_is_room_and_on_paper_nothing_at_all(shown):
+    assert shown[0]["wide"]["cut"] == []
+    assert shown[0]["paper"]["cut"] == []
+    assert shown[0]["paper"]["tallest"] <= PAPER_HEIGHT  # what does not break fits on a page
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    CHROMIUM is None or PDFTOTEXT is None, reason="no Chromium to print with, or no pdftotext to read it"
+)
+def test_every_word_of_every_table_is_on_the_printed_a4_pages(text, tmp_path):
+    (tmp_path / "page.html").write_text(text, encoding="utf-8")
+    where = f"--print-to-pdf={tmp_path / 'page.pdf'}"
+    asked = [CHROMIUM, *FLAGS, f"--user-data-dir={tmp_path / 'p'}", "--no-pdf-header-footer", where]
+    subprocess.run([*asked, (tmp_path / "page.html").as_uri()], capture_output=True, timeout=200, check=True)
+    sizes = re.findall(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", (tmp_path / "page.pdf").read_bytes())
+    assert {(round(float(w) / 72 * 25.4), round(float(h) / 72 * 25.4)) for w, h in sizes} == {(210, 297)}
+    printed = subprocess.run([PDFTOTEXT, tmp_path / "page.pdf", "-"], capture_output=True, text=True, check=True).stdout
+    cells = re.findall(r"<td[^>]*>([^<]+)<", text)
+    words = {word for cell in cells for word in cell.split() if "&" not in word}
+    assert words
+    assert words - set(re.split(r"\s+", printed)) == set()

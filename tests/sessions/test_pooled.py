@@ -6,40 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from study_example import visit
 
 from sessions.exports.study_page import study_page
 from sessions.exports.study_tables import trials_csv
 from sessions.pooling.exclusions import Exclusion, exclusions_in
 from sessions.pooling.pooled import CARRY_OVER, DRIFT, INDEX, pooled
-from sessions.pooling.visit import TrialRow, Visit
+from sessions.pooling.visit import Visit
 from sessions.toml_file import SettingsError
-
-INDICES = (0, 20, 50, 80, 100)
-
-
-def visit(number, *, gain=0.8, noise=3.0, sed=lambda index: 0.008 + 1e-5 * index, simulated=""):
-    rng = np.random.default_rng(number)
-    level, order = rng.normal(0.0, 5.0), rng.permutation(INDICES).tolist()
-    rows = [
-        TrialRow(
-            trial=place + 1,
-            block="stickiness",
-            descriptor="stickiness",
-            index=index,
-            code=f"K{index}",
-            direction=1,
-            repetition=1,
-            place=place,
-            before=order[place - 1] if place else None,
-            outcome="scored",
-            score=50.0 + level + gain * (index - 50) + 0.4 * place + noise * rng.normal(),
-            mu=0.4,
-            sed=None if sed is None else sed(index) * (1.0 + 0.01 * rng.normal()),
-        )
-        for place, index in enumerate(order)
-    ]
-    return Visit(f"S{number:02d}", f"S{number:02d}", "p", simulated, sed is not None, True, tuple(rows), (), {})
-
 
 VISITS = [visit(number) for number in range(1, 11)]
 

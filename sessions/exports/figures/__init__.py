@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from sessions.exports.figures.course import course_panel
 from sessions.exports.figures.finger import common_levels, finger_panels
+from sessions.exports.figures.paths import CAPTION, paths_panel
 from sessions.exports.figures.relation import relation_panel
 from sessions.exports.figures.responses import response_panel
 from sessions.exports.figures.scores import score_panel
@@ -25,7 +26,7 @@ def plates(report: Report) -> tuple[Plate, ...]:
             _fingers(report),
             _responses(report),
         )
-        made += (_relations(report),)
+        made += (_relations(report), _paths(report))
     return tuple(plate for plate in made if plate.panels)
 
 
@@ -106,6 +107,11 @@ def _relations(report: Report) -> Plate:
         for e in report.experiments
     ]
     return Plate("relation", caption, tuple(panel for panel in panels if panel is not None))
+
+
+def _paths(report: Report) -> Plate:
+    panels = [paths_panel(e.name, e.paths, simulated=report.simulated) for e in report.experiments if e.paths]
+    return Plate("paths", CAPTION, tuple(panel for panel in panels if panel is not None))
 
 
 def _grouped(report: Report) -> list[tuple[str, Sequence[StrokeFinding]]]:

@@ -34,7 +34,7 @@ def paths_panel(descriptor: str, findings: Sequence[PathFinding], *, simulated: 
         low, high = _ends(held)
         counts, edges = np.histogram(held, _BINS, (low, high))
         above.bar(edges[:-1], counts, np.diff(edges), align="edge", color=PALE, edgecolor=GREY, linewidth=0.6)
-        above.set_ylabel("paths")
+        above.set_ylabel("paths [number]")
         above.set_title(f"{descriptor}: {len(held)} paths")
         for y, (choice, name, of, is_usual) in enumerate(told):
             if of is None:

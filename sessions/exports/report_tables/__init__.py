@@ -1,9 +1,15 @@
 """The tables of a report: cells as text, and for every number that is missing the reason."""
 
 from sessions.exports.report_tables.cells import Cell, Column, Group, Table
-from sessions.exports.report_tables.predictions import direction_table, force_table, prediction_table
+from sessions.exports.report_tables.paths import paths_table
+from sessions.exports.report_tables.predictions import (
+    afferent_table,
+    direction_table,
+    force_table,
+    prediction_table,
+)
 from sessions.exports.report_tables.scores import answer_tables, relation_table, score_table
-from sessions.exports.report_tables.strokes import planted_table, stroke_table
+from sessions.exports.report_tables.strokes import interval_table, planted_table, stroke_table
 from sessions.report import Report
 
 __all__ = ["Cell", "Column", "Group", "Table", "tables"]
@@ -13,9 +19,11 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
     """Return the tables a report has numbers for, by section, in their order."""
     sections = {
         "scores": (score_table(report), *answer_tables(report)),
-        "strokes": (stroke_table(report),),
+        "strokes": (stroke_table(report), interval_table(report)),
         "predictions": (prediction_table(report), force_table(report), direction_table(report)),
+        "afferent": (afferent_table(report),),
         "relation": (relation_table(report),),
+        "paths": (paths_table((e.name, e.paths) for e in report.experiments),),
         "planted": (planted_table(report),),
     }
     return {name: tuple(table for table in made if table is not None) for name, made in sections.items()}

@@ -17,6 +17,7 @@ def prediction_table(report: Report) -> Table | None:
         Column("τ max", "kPa"),
         Column("depth", "mm"),
         Column("SED", "kPa"),
+        Column("95 % interval", "kPa"),
         Column("estimated error", "%"),
         Column("solved in", "s"),
     )
@@ -25,20 +26,49 @@ def prediction_table(report: Report) -> Table | None:
         return (
             *_named(p),
             notes.number(p.mu, places(3), p.reasons.get("mu")),
-            Cell(p.mu_rule),
+            Cell({"mean over steady window": "mean"}.get(p.mu_rule, p.mu_rule)),
             notes.number(p.tau_max, tau, p.reasons.get("tau_max")),
             _depth(p, notes),
             notes.number(p.sed, sed, p.reasons.get("sed")),
+            _interval(p, notes),
             notes.number(p.error_estimate, lambda v: significant(100 * v, 2), p.reasons.get("error_estimate")),
             notes.number(p.wall_s, lambda v: significant(v, 2), p.reasons.get("wall_s")),
         )
 
     groups = grouped(report, report.predictions, lambda p: p.experiment, row)
     caption = (
-        "Predictions: SED averaged over the ending in the settled state (1 kPa = 1 mJ/cm³). Estimated error: of one "
+        "Predictions: SED averaged over the ending in the settled state (1 kPa = 1 mJ/cm³). Which µ: the mean over the "
+        "steady window, or the maximum. Interval: what the uncertainty of friction alone makes of the SED, by "
+        "derivatives, or where marked * by solving draws; the model's own error is not in it. Estimated error: of one "
         "SED, from the mesh; differences between stimuli, which share the mesh, are more accurate."
     )
     return Table("table-predictions", caption, columns, groups, notes.listed())
+
+
+def _interval(p: PredictionFinding, notes: Notes) -> Cell:
+    if p.sed_interval is None:
+        return notes.number(None, sed, p.reasons.get("sed_interval") or p.reasons.get("sed") or "not computed")
+    low, high = p.sed_interval
+    return Cell(f"{sed(low)} to {sed(high)}{'*' if p.interval_by == 'sampling' else ''}")
+
+
+def afferent_table(report: Report) -> Table | None:
+    """Return the firing rates of an afferent, where they were asked for."""
+    if all(p.settled_rate is None for p in report.predictions):
+        return None
+    notes = Notes()
+    columns = (*_who(report), Column("SED", "kPa"), Column("peak rate", "imp/s"), Column("settled rate", "imp/s"))
+
+    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+        rates = (notes.number(rate, places(1), p.reasons.get("sed")) for rate in (p.peak_rate, p.settled_rate))
+        return (*_named(p), notes.number(p.sed, sed, p.reasons.get("sed")), *rates)
+
+    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
+    caption = (
+        "Firing of an SA-II afferent: an illustration. No fitted map from SED to the rate of a human SA-II afferent is "
+        "known; every parameter below is assumed. The order of the settled rates is that of the SED whatever they are."
+    )
+    return Table("table-afferent", caption, columns, groups, notes.listed())
 
 
 def force_table(report: Report) -> Table | None:

@@ -57,6 +57,38 @@ def _stroke_row(stroke: StrokeFinding, notes: Notes, *, planned: bool) -> tuple[
     )
 
 
+def interval_table(report: Report) -> Table | None:
+    """Return the bootstrap intervals of each stroke's numbers."""
+    if not any(stroke.bootstrap for stroke in report.strokes):
+        return None
+    notes = Notes()
+    planned = any(stroke.trial is not None for stroke in report.strokes)
+    shown: tuple[tuple[str, Column, Callable[[float], str]], ...] = (
+        ("mu_static", Column("µ static"), places(3)),
+        ("mu_dynamic", Column("µ dynamic"), places(3)),
+        ("mu_max", Column("µ maximum"), places(3)),
+        ("tau_max", Column("τ max", "kPa"), tau),
+        ("speed", Column("speed", "mm/s"), places(1)),
+    )
+
+    def row(stroke: StrokeFinding) -> tuple[Cell, ...]:
+        cells = [Cell(str(stroke.number))]
+        if planned:
+            cells += [notes.number(v, places(0), "no trial asks for it") for v in (stroke.trial, stroke.index)]
+        for name, _, told in shown:
+            interval = stroke.bootstrap.get(name)
+            why = stroke.reasons.get(name) or "the stroke has too few readings for an interval"
+            cells.append(
+                notes.number(None, told, why) if interval is None else Cell(" to ".join(told(end) for end in interval))
+            )
+        return tuple(cells)
+
+    who = (Column("stroke"), *((Column("trial"), Column("index")) if planned else ()))
+    caption = f"Intervals of the strokes' numbers: {report.interval_kind}. The contact area is taken as given."
+    groups = grouped(report, report.strokes, lambda s: s.experiment, row)
+    return Table("table-intervals", caption, (*who, *(column for _, column, _ in shown)), groups, notes.listed())
+
+
 def planted_table(report: Report) -> Table | None:
     """Return what the simulator planted beside what the analysis found."""
     if not report.planted:

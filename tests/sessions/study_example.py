@@ -1,0 +1,70 @@
+"""A made-up study: ten subjects, five surfaces of one descriptor, every section of the page filled."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from sessions.paths import PATHS
+from sessions.pooling.exclusions import Exclusion
+from sessions.pooling.pooled import pooled
+from sessions.pooling.visit import TrialRow, Visit, VisitOptions
+
+INDICES = (0, 20, 50, 80, 100)
+
+
+def visit(number, *, gain=0.8, noise=3.0, sed=lambda index: 0.008 + 1e-5 * index, simulated=""):
+    rng = np.random.default_rng(number)
+    level, order = rng.normal(0.0, 5.0), rng.permutation(INDICES).tolist()
+    rows = [
+        TrialRow(
+            trial=place + 1,
+            block="stickiness",
+            descriptor="stickiness",
+            index=index,
+            code=f"K{index}",
+            direction=1,
+            repetition=1,
+            place=place,
+            before=order[place - 1] if place else None,
+            outcome="scored",
+            score=50.0 + level + gain * (index - 50) + 0.4 * place + noise * rng.normal(),
+            mu=0.4,
+            sed=None if sed is None else sed(index) * (1.0 + 0.01 * rng.normal()),
+        )
+        for place, index in enumerate(order)
+    ]
+    return Visit(f"S{number:02d}", f"S{number:02d}", "p", simulated, sed is not None, True, tuple(rows), (), {})
+
+
+def study():
+    """Return its findings."""
+    simulated = "SIMULATED: made up"
+    visits = [_full(visit(number, simulated=simulated)) for number in range(1, 11)]
+    planted = {
+        "score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0},
+        "strokes": [{"subject": v.subject, "trial": row.trial, "mu": 0.4} for v in visits for row in v.rows],
+    }
+    out = (Exclusion("S03", "used the scale backwards, and said so afterwards", "E02"),)
+    return pooled(visits, [("S11", "session.sqlite is damaged")], out, planted, VisitOptions(paths="small"))
+
+
+def _full(made):
+    small = [path for path in PATHS if path.kinematics == "small"]
+    rows = [
+        replace(
+            row,
+            rule="maximum",
+            mu_low=0.38,
+            mu_high=0.42,
+            tau_max=0.02,
+            speed=20.0,
+            normal_force=2.5,
+            error_estimate=0.002,
+            model_normal_force=2.1,
+            matching_depth=2.2,
+            flaws=("too_little_force",) if row.trial == 3 else (),
+            paths=tuple(row.sed * (1.0 if path.receptor == "ending" else 1.0 - 0.002 * row.index) for path in small),
+        )
+        for row in made.rows
+    ]
+    return replace(made, rows=tuple(rows))
