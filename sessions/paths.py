@@ -7,14 +7,15 @@ in traction bounds that the skin nowhere reaches.
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Literal
 
 import numpy as np
 
-from sessions.analysis import Analysis, FrictionParameters, Stroke, analyse
+from sessions.analysis import Analysis, FrictionParameters, analyse
+from sessions.analysis.area import FIXED, HERTZ, AreaLaw
 from sessions.analysis.friction import Rule
 from sessions.analysis.scores import relation
 from sessions.analysis.settings import AnalysisSettings
@@ -25,8 +26,6 @@ from sessions.recording import Recording
 Kinematics = Literal["small", "finite"]
 Seds = tuple[float | None, ...]  # along each of `PATHS`, or only those at small strain [MPa]
 
-PLANNED_AT = 2.0  # normal force at which an area that grows with it is the planned one [N]
-
 # Of each choice the usual one comes first.
 FILTERS: Mapping[str, float] = {"20 Hz": 20.0, "10 Hz": 10.0, "50 Hz": 50.0}
 WINDOWS: Mapping[str, tuple[float, float]] = {  # spread of T/N, and of the means of its quarters [-]
@@ -35,11 +34,11 @@ WINDOWS: Mapping[str, tuple[float, float]] = {  # spread of T/N, and of the mean
     "within 20 %, quarters 10 %": (0.20, 0.10),
 }
 MUS: tuple[Rule, ...] = ("mean over steady window", "maximum")  # the usual one is the paper's for the descriptor
-AREAS: Mapping[str, Callable[[Stroke], float | None]] = {  # contact area over the planned one [-]
-    "planned": lambda _: 1.0,
-    "half": lambda _: 0.5,
-    "twice": lambda _: 2.0,
-    "grows with √N": lambda s: None if s.normal_force is None else (max(s.normal_force, 0.0) / PLANNED_AT) ** 0.5,
+AREAS: Mapping[str, tuple[AreaLaw, float]] = {  # law of the contact area, and its share of the planned one [-]
+    "planned": (FIXED, 1.0),
+    "half": (FIXED, 0.5),
+    "twice": (FIXED, 2.0),
+    "grows as N^2/3": (AreaLaw("hertz", HERTZ), 1.0),
 }
 RECEPTORS = ("ending", "its middle")
 
@@ -55,10 +54,10 @@ class Path:
     receptor: str
     kinematics: Kinematics
 
-    def usual(self, rule: str, kinematics: str) -> bool:
-        """Say whether it is the way that every other number of a study went, mu being told by `rule`."""
-        first = (next(iter(FILTERS)), next(iter(WINDOWS)), next(iter(AREAS)), RECEPTORS[0])
-        own = (self.filter, self.window, self.area, self.receptor)
+    def usual(self, rule: str, kinematics: str, law: AreaLaw = FIXED) -> bool:
+        """Say whether it is the way that every other number went, mu being told by `rule` and tau_max by `law`."""
+        first = (next(iter(FILTERS)), next(iter(WINDOWS)), RECEPTORS[0], (law, 1.0))
+        own = (self.filter, self.window, self.receptor, AREAS[self.area])
         return own == first and self.mu == rule and self.kinematics == kinematics
 
 
@@ -98,12 +97,13 @@ def trial_paths(
     """
     paths = [path for path in PATHS if finite or path.kinematics == "small"]
     asked = replace(options or PredictionOptions(), course="steady")
-    analyses = {(f, w): analyse(recording, _settings(f, w)) for f, w in product(FILTERS, WINDOWS)}
+    laws = dict.fromkeys(law for law, _ in AREAS.values())
+    analyses = {(f, w, a): analyse(recording, _settings(f, w, a)) for f, w, a in product(FILTERS, WINDOWS, laws)}
     usual = {one.trial: one for one in next(iter(analyses.values())).friction}
     scenes: dict[tuple[str, ...], Mapping[int, Scene]] = {}
     for path in paths:
         if path.receptor == RECEPTORS[0]:
-            varied = _varied(analyses[path.filter, path.window], path, usual)
+            varied = _varied(analyses[path.filter, path.window, AREAS[path.area][0]], path, usual)
             kind = replace(asked, kinematics=path.kinematics)
             scenes[_without_receptor(path)] = scenes_of(varied, recording.plan, kind)
     wanted = dict.fromkeys(scene for of_path in scenes.values() for scene in of_path.values())
@@ -116,9 +116,9 @@ def _without_receptor(path: Path) -> tuple[str, ...]:
     return (path.filter, path.window, path.mu, path.area, path.kinematics)
 
 
-def _settings(cut_off: str, window: str) -> AnalysisSettings:
+def _settings(cut_off: str, window: str, area: AreaLaw) -> AnalysisSettings:
     spread, trend = WINDOWS[window]
-    return AnalysisSettings(cut_off=FILTERS[cut_off], steady_spread=spread, steady_trend=trend)
+    return AnalysisSettings(cut_off=FILTERS[cut_off], steady_spread=spread, steady_trend=trend, area=area)
 
 
 def _varied(analysis: Analysis, path: Path, usual: Mapping[int | None, FrictionParameters]) -> Analysis:
@@ -126,9 +126,8 @@ def _varied(analysis: Analysis, path: Path, usual: Mapping[int | None, FrictionP
     friction: list[FrictionParameters] = []
     for one in analysis.friction:
         stroke = analysis.strokes[one.stroke]
-        area = AREAS[path.area](stroke)
         mu = stroke.mu_max if path.mu == "maximum" else stroke.mu_dynamic
-        tau_max = None if stroke.tau_max is None or not area else stroke.tau_max / area
+        tau_max = None if stroke.tau_max is None else stroke.tau_max / AREAS[path.area][1]
         same = usual.get(one.trial, one)
         friction.append(replace(one, mu=mu, tau_max=tau_max, direction=same.direction, speed=same.speed))
     return replace(analysis, friction=tuple(friction))
@@ -199,7 +198,12 @@ class PathTrial:
 
 
 def path_findings(
-    trials: Sequence[PathTrial], means: Mapping[int, float], kinematics: str, *, within: bool
+    trials: Sequence[PathTrial],
+    means: Mapping[int, float],
+    kinematics: str,
+    law: AreaLaw = FIXED,
+    *,
+    within: bool,
 ) -> tuple[PathFinding, ...]:
     """Return how predictions go with scores along each path, `means` being the mean score of each index.
 
@@ -210,7 +214,7 @@ def path_findings(
         return ()
     rule, gone = held[0].rule, min(len(trial.seds) for trial in held)
     return tuple(
-        _finding(n, path, held, means, usual=path.usual(rule, kinematics), within=within)
+        _finding(n, path, held, means, usual=path.usual(rule, kinematics, law), within=within)
         for n, path in enumerate(PATHS[:gone])
     )
 

@@ -188,6 +188,7 @@ def _descriptor(
             [PathTrial(v.subject, row.index, row.score, row.rule, row.paths) for v, row in trials],
             score_of,
             options.prediction.kinematics,
+            options.area,
             within=True,
         ),
     )

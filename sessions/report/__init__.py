@@ -90,7 +90,7 @@ def findings(
         apparatus=facts.apparatus(recording, analysis),
         excluded=facts.excluded(recording, analysis, found, tables),
         flaws=flaws(analysis),
-        experiments=experiments(recording.plan, tables, predicted_seds(predicted), more.paths),
+        experiments=experiments(recording.plan, tables, predicted_seds(predicted), more.paths, analysis.settings.area),
         course=course(recording),
         strokes=found,
         predictions=predicted,

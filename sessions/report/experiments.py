@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+from sessions.analysis.area import FIXED, AreaLaw
 from sessions.analysis.friction import rule_for
 from sessions.analysis.scores import MeanScore, Relation, ScoreTable, mean_scores, relation, score_matrix
 from sessions.paths import PathTrial, Seds, path_findings
@@ -14,13 +15,17 @@ def experiments(
     tables: Sequence[ScoreTable],
     seds: Mapping[tuple[str, int], float],
     paths: Mapping[int, Seds] | None = None,
+    law: AreaLaw = FIXED,
 ) -> tuple[Experiment, ...]:
     """Return one experiment a block; `seds` holds the predicted SED [MPa] by block and index, where there is one.
 
-    `paths` holds the SED of each trial along many paths of the analysis, where they were asked for.
+    `paths` holds the SED of each trial along many paths of the analysis, where they were asked for, and `law` the
+    contact area by which every other number was told.
     """
     means = mean_scores(tables)
-    return tuple(_experiment(block, means, tables, seds, paths or {}) for block in plan.blocks if block.phase == "main")
+    return tuple(
+        _experiment(block, means, tables, seds, paths or {}, law) for block in plan.blocks if block.phase == "main"
+    )
 
 
 def _experiment(
@@ -29,6 +34,7 @@ def _experiment(
     tables: Sequence[ScoreTable],
     seds: Mapping[tuple[str, int], float],
     paths: Mapping[int, Seds],
+    law: AreaLaw,
 ) -> Experiment:
     descriptor = block.trials[0].stimulus.descriptor
     indices = tuple(sorted({trial.stimulus.known_index for trial in block.trials}))
@@ -56,6 +62,7 @@ def _experiment(
             ],
             {mean.index: mean.mean for mean in own},
             "small",
+            law,
             within=False,
         ),
     )

@@ -7,7 +7,6 @@ from report_session import record
 
 from sessions.analysis import analyse
 from sessions.paths import (
-    AREAS,
     PATHS,
     RECEPTORS,
     PathTrial,
@@ -68,12 +67,6 @@ def test_a_path_that_shared_its_solve_comes_to_what_its_own_solve_gives(recordin
 def test_finite_strain_is_left_out_unless_it_is_asked_for(along):
     assert {len(seds) for seds in along.values()} == {len(SMALL)}
     assert len(PATHS) > len(SMALL)
-
-
-def test_an_area_that_grows_is_the_planned_one_at_two_newton_and_twice_at_eight(analysis):
-    stroke = analysis.strokes[0]
-    areas = [AREAS["grows with √N"](replace(stroke, normal_force=force)) for force in (2.0, 8.0, None)]
-    assert areas == [1.0, 2.0, None]
 
 
 def planted():
