@@ -87,7 +87,11 @@ def connected(uri: str, clock: Clock) -> Generator[Connected]:
     """
     if uri.startswith(REPLAY):
         recording = Recording.open(Path(uri.removeprefix(REPLAY)))
-        yield Connected(ReplayTransducer(recording, clock, uri), recorded_frame=recording.plan.frame)
+        replayed = ReplayTransducer(recording, clock, uri)
+        try:
+            yield Connected(replayed, recorded_frame=recording.plan.frame)
+        finally:
+            replayed.close()
         return
     address = parse_address(uri)
     if address.scheme != SIMULATED:

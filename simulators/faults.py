@@ -76,6 +76,12 @@ class Faults:
         self.made: list[bytes] | None = [] if remember else None  # every datagram the box made
         self.delivered: list[bytes] | None = [] if remember else None  # every datagram that left, in that order
 
+    def put(self, *timetable: Fault) -> None:
+        """Let this go wrong from now on, and nothing else. A device that was `slow` stays so."""
+        kept = tuple(fault for fault in self._timetable if fault.kind == "slow")
+        self._timetable = (*kept, *timetable)
+        self._clock = _device_clock([fault for fault in self._timetable if fault.kind == "slow"], self._repeat)
+
     def active(self, kind: Kind, time: float) -> bool:
         """Tell whether a fault of the box itself is on at `time` [s]."""
         return self._at(kind, time) is not None

@@ -1,6 +1,10 @@
-"""The gauges of a published transducer: what turns their voltages into a wrench."""
+"""The gauges of a published transducer: what turns their voltages into a wrench, and a file that says so."""
+
+from pathlib import Path
 
 import numpy as np
+
+from simulators.bench import RATED
 
 # Nano43 FT32831, SI-36-0.5, calibrated 2020-12-14: N and N mm per volt of gauge, in the maker's sensing frame.
 FT32831 = np.array(
@@ -13,3 +17,20 @@ FT32831 = np.array(
         [-1.25627, -38.28410, 0.53176, -37.15623, -0.42515, -37.35515],
     ]
 )
+
+
+def calibration_file(folder: Path, serial: str) -> Path:
+    """Write the maker's file for simulated gauges of that serial number; return where."""
+    axes = "".join(
+        f'<Axis Name="{name}" values="{" ".join(map(repr, row))}" max="{rated}" scale="1"/>\n'
+        for name, row, rated in zip(("Fx", "Fy", "Fz", "Tx", "Ty", "Tz"), FT32831.tolist(), RATED, strict=True)
+    )
+    path = folder / f"{serial}.cal"
+    path.write_text(
+        f'<?xml version="1.0"?><FTSensor Serial="{serial}" BodyStyle="Nano43" Family="DAQ" NumGages="6" '
+        'CalFileVersion="1.0"><Calibration PartNumber="SIMULATED SI-36-0.5" CalDate="12/14/2020" ForceUnits="N" '
+        'TorqueUnits="N-mm" DistUnits="mm" OutputMode="Ground Referenced Differential" OutputRange="20">\n'
+        f"{axes}</Calibration></FTSensor>\n",
+        encoding="utf-8",
+    )
+    return path

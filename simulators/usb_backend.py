@@ -23,6 +23,10 @@ class SimulatedBus(_Backend):
         self._boxes = tuple(boxes)
         self._held: dict[int, object] = {}  # by the box's place: the handle that claimed it
 
+    def held(self) -> int:
+        """Return how many converters somebody holds."""
+        return len(self._held)
+
     def enumerate_devices(self) -> Iterator[int]:
         """Return the places at which something is plugged in."""
         return iter([place for place, box in enumerate(self._boxes) if box.is_plugged])

@@ -23,6 +23,7 @@ from drivers.streaming import StreamingTransducer
 from drivers.transducer import LinkLost, SetupError, TransducerInfo
 
 GAUGES = 6
+RANGE = 10.0  # [V]
 LIMIT = 9.9  # of a gauge's voltage [V]; a converter of 16 bits clips slightly outside of 10 V
 SATURATED = 0x3F00  # status: bit 8 + i says that gauge i is at its limit
 _BUFFER = 10.0  # readings that the library keeps for a computer that is late [s]
@@ -45,13 +46,14 @@ def library() -> Any:  # noqa: ANN401 - it is not always there
 
 def open_nidaq(address: Address, clock: Clock) -> StreamingTransducer:
     """Return the transducer at `address`, not streaming. Raises SetupError with the reason."""
+    check_options(address, _OPTIONS)
     api = library()
     device, info = _found(api, address)
     rate = address.number("rate", _DEFAULT_RATE, 1, 100_000)
     link = TaskLink(api, device, rate)
     link.close()
     return StreamingTransducer(
-        replace(info, rate=link.rate, counter_rate=link.rate),
+        replace(info, rate=link.rate, counter_rate=link.rate, settings={**info.settings, "gauges": link.gauges}),
         partial(TaskLink, api, device, rate),
         TaskConversation(),
         clock,
@@ -60,12 +62,12 @@ def open_nidaq(address: Address, clock: Clock) -> StreamingTransducer:
 
 def identify_nidaq(address: Address, _patience: float) -> TransducerInfo:
     """Return who is there; nothing is acquired. Raises SetupError with the reason."""
+    check_options(address, _OPTIONS)
     return _found(library(), address)[1]
 
 
 def _found(api: Any, address: Address) -> tuple[str, TransducerInfo]:  # noqa: ANN401
     """Return the device's name as NI-DAQmx spells it, and who the transducer on it is."""
-    check_options(address, _OPTIONS)
     file = address.options.get("cal")
     if not address.host or file is None:
         raise AddressError(f"{address.uri}: write nidaq://Dev1?cal=FILE, with the transducer's own .cal file")
@@ -110,12 +112,21 @@ class TaskLink:
         self._task: Any = None
         try:
             self._task = library.Task()
-            self._task.ai_channels.add_ai_voltage_chan(
+            differential = library.constants.TerminalConfiguration.DIFF
+            channels = self._task.ai_channels.add_ai_voltage_chan(
                 f"{device}/ai0:{GAUGES - 1}",
-                terminal_config=library.constants.TerminalConfiguration.DIFF,
-                min_val=-10.0,
-                max_val=10.0,
+                terminal_config=differential,
+                min_val=-RANGE,
+                max_val=RANGE,
             )
+            low, high = float(channels.ai_min), float(channels.ai_max)
+            if low > -RANGE or high < RANGE or channels.ai_term_cfg != differential:
+                self.close()
+                raise SetupError(
+                    f"-{RANGE:g} to {RANGE:g} V was asked of {device} and it took {low:g} to {high:g} V, "
+                    f"{channels.ai_term_cfg}; use a device with six differential inputs of that range"
+                )
+            self.gauges = f"six differential pairs from ai0 on, {low:g} to {high:g} V, as read back"
             self._task.timing.cfg_samp_clk_timing(
                 rate,
                 sample_mode=library.constants.AcquisitionType.CONTINUOUS,

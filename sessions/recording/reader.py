@@ -177,7 +177,7 @@ class Recording:
 
     def blocks(
         self, losses: list[str] | None = None, between: tuple[int, int | None] | None = None
-    ) -> Iterator[ReadingBlock]:
+    ) -> Generator[ReadingBlock]:
         """Yield the readings block by block as they were committed; damaged blocks are left out and named in `losses`.
 
         `between` limits it to blocks that hold readings received in that span of the session clock [ns].

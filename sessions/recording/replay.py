@@ -1,6 +1,6 @@
 """A transducer that speaks from a recording: sequence, device counter, status and raw numbers as they were recorded."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable
 from dataclasses import fields, replace
 
 import numpy as np
@@ -20,9 +20,13 @@ class RecordedReadings:
 
     def __init__(self, recording: Recording) -> None:
         """Begin at the first reading."""
-        self._blocks: Iterator[ReadingBlock] = recording.blocks()
+        self._blocks: Generator[ReadingBlock] = recording.blocks()
         self._waiting: list[ReadingBlock] = []
         self.position = 0  # how many were handed over
+
+    def close(self) -> None:
+        """Close the file; no more readings come."""
+        self._blocks.close()
 
     def up_to(self, position: int | None) -> ReadingBlock:
         """Hand over the next readings until `position` of them were, or until none are left (None: all that are)."""
@@ -122,8 +126,9 @@ class ReplayTransducer:
             self._stopped_ns = self._clock.now_ns() - self._shift_ns
 
     def close(self) -> None:
-        """Stop; there is nothing else to give back."""
+        """Stop, and close the recording."""
         self.stop()
+        self._readings.close()
 
     def _shifted(self, block: ReadingBlock, shift_ns: int) -> ReadingBlock:
         """Return the readings as received on our clock."""

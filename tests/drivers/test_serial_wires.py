@@ -1,4 +1,4 @@
-"""What the drivers on serial lines do, each on its own simulator over a real port of the system."""
+"""What the drivers on serial lines do beyond what every driver does (test_driver_contract), over real ports."""
 
 import os
 import threading
@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers import streaming
 from drivers.address import parse_address
 from drivers.clock import Clock, PacedClock
 from drivers.digital_ft import device as digital_ft_device
@@ -23,7 +22,6 @@ from simulators.bench import Bench
 from simulators.digital_ft_box import DigitalFtBox
 from simulators.faults import Fault, Faults
 from simulators.serial_ft_box import SerialFtBox
-from simulators.stroke import Stroke
 from simulators.surface import paper_surfaces
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="there are no pseudo-terminals on this system")
@@ -102,58 +100,6 @@ def readings(device, transducer, until):
     return ReadingBlock.joined([*blocks, transducer.read(0.0)])
 
 
-def test_it_says_who_it_is_and_that_it_is_simulated(simulator):
-    device = simulator()
-    found = device.identify()
-    transducer = device.open()
-    transducer.close()
-    info = transducer.info
-    assert info.simulated
-    assert found.simulated
-    assert info.uri == device.uri
-    assert info.model == found.model
-    assert info.serial == found.serial == info.calibration.serial == "SIM00003"
-    assert info.calibration.rated.tolist() == pytest.approx(device.bench.settings.rated)
-    assert info.rate > 50.0
-    assert np.isnan(info.counter_rate)
-    assert "host arrival" in info.settings["time"]
-
-
-def test_a_second_program_is_told_that_the_port_is_taken_and_the_stream_goes_on(simulator):
-    device = simulator()
-    transducer = device.open()
-    transducer.start()
-    with pytest.raises(SetupError, match="another program has it"):
-        device.identify()
-    with pytest.raises(SetupError, match="another program has it"):
-        device.open()
-    block = readings(device, transducer, device.box.now() + 1.0)
-    transducer.close()
-    assert transducer.health.restarted == transducer.health.lost == 0
-    assert len(block) > 0.8 * transducer.info.rate
-
-
-def test_an_undisturbed_stream_is_whole_evenly_timed_and_feels_what_the_bench_exerts(simulator):
-    device = simulator()
-    transducer = device.open()
-    device.bench.mount(paper_surfaces()["stickiness", 80])
-    transducer.start()
-    planted = device.bench.begin_stroke(Stroke(7.81, 17.5, approach=0.3, stick=0.3, slide=1.0), device.box.now() + 0.1)
-    block = readings(device, transducer, planted.end + 0.5)
-    transducer.close()
-    info, health = transducer.info, transducer.health
-    assert health.received == len(block)
-    assert health.lost == health.malformed == health.restarted == health.saturated == 0
-    assert block.sequence.tolist() == list(range(1, len(block) + 1))
-    assert block.time[0] == 0.0
-    assert np.all(np.diff(block.time) > 0.0)
-    np.testing.assert_allclose(block.time[-1] / (len(block) - 1), 1.0 / info.rate, rtol=0.05)
-    assert np.all(np.diff(block.received_ns) >= 0)
-    wrench = info.calibration.wrench(block.raw, np.zeros(6))
-    assert -wrench[:, 2].min() == pytest.approx(planted.peak_normal_force, abs=0.05)
-    assert wrench[:, 0].max() == pytest.approx(planted.mu * planted.peak_normal_force, abs=0.05)
-
-
 FAULTS = {  # what a line without numbers and clock can show of each
     "lose": lambda health: health.lost > 0,
     "corrupt": lambda health: health.malformed > 0,
@@ -162,11 +108,6 @@ FAULTS = {  # what a line without numbers and clock can show of each
     "reboot": lambda health: health.restarted >= 1 and health.lost > 0,
     "unplug": lambda health: health.restarted >= 1 and health.lost > 0,
 }
-
-
-@pytest.mark.parametrize("kind", FAULTS)
-def test_it_survives_each_fault_and_accounts_for_every_reading(simulator, kind):
-    survives(simulator(), kind)
 
 
 @pytest.mark.parametrize("kind", ["shorten", "reboot"])
@@ -204,42 +145,6 @@ def survives(device, kind):
     assert wrong <= (0.2 * health.malformed + 2 if kind in ("corrupt", "shorten") else 0)
 
 
-def test_a_device_that_goes_away_is_lost_in_one_sentence(simulator, monkeypatch):
-    monkeypatch.setattr(streaming, "_SILENCE", 0.8)
-    device = simulator()
-    transducer = device.open()
-    transducer.start()
-    device.box.close()
-    sentence = None
-    while sentence is None:
-        try:
-            transducer.read(10.0)
-        except LinkLost as error:
-            sentence = str(error)
-    transducer.close()
-    assert device.uri in sentence
-    assert "\n" not in sentence
-    with pytest.raises(SetupError, match="no such port"):
-        device.open()
-
-
-def test_stopping_and_closing_twice_are_harmless_and_it_can_start_again(simulator):
-    device = simulator()
-    transducer = device.open()
-    transducer.start()
-    with pytest.raises(SetupError, match="already"):
-        transducer.start()
-    transducer.stop()
-    transducer.stop()
-    transducer.start()
-    block = readings(device, transducer, device.box.now() + 1.0)
-    transducer.close()
-    transducer.close()
-    assert block.time[0] == 0.0
-    assert block.sequence[0] == 1
-    assert transducer.health.lost == 0
-
-
 def test_a_stop_ends_even_a_device_that_is_being_brought_back(simulator):
     device = simulator()
     transducer = device.open()
@@ -249,12 +154,6 @@ def test_a_stop_ends_even_a_device_that_is_being_brought_back(simulator):
         pass
     transducer.close()
     assert transducer.health.received > 0
-
-
-def test_a_malformed_address_is_refused_in_one_sentence(simulator):
-    device = simulator()
-    with pytest.raises(SetupError, match="unheard-of"):
-        device.open("&unheard-of=1")
 
 
 def test_the_baud_rate_of_a_controller_is_found_by_trying():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from drivers import usb_link
 from drivers.address import parse_address
-from drivers.catalog import open_transducer, reachable
+from drivers.catalog import open_transducer
 from drivers.clock import PacedClock, RealClock
 from drivers.labjack_u6 import wire
 from drivers.labjack_u6.device import identify_labjack_u6
@@ -18,7 +18,7 @@ from drivers.scan_count import ScanCount
 from drivers.transducer import DeviceFault, LinkLost, SetupError
 from simulators.bench import RATED, Bench
 from simulators.faults import Fault, Faults
-from simulators.gauges import FT32831
+from simulators.gauges import calibration_file
 from simulators.labjack_u6_box import LabJackU6Box
 from simulators.stroke import Stroke
 from simulators.surface import paper_surfaces
@@ -26,22 +26,12 @@ from simulators.usb_backend import SimulatedBus
 
 NOMINAL = wire.Constants(3.1580578e-4, -3.158058e-4, 33523.0)
 GOLDEN_PACKET = bytes.fromhex("F1 F9 1C C0 F8 22 00 00 00 00 00 00" + "F3 82" * 24 + "00 00")  # 0 V everywhere
-CAL = """<?xml version="1.0"?><FTSensor Serial="SIM00003" BodyStyle="Nano43" Family="DAQ" NumGages="6"
-CalFileVersion="1.0"><Calibration PartNumber="SIMULATED SI-36-0.5" CalDate="12/14/2020" ForceUnits="N"
-TorqueUnits="N-mm" DistUnits="mm" OutputMode="Ground Referenced Differential" OutputRange="20">{axes}
-</Calibration></FTSensor>"""
 
 
 @pytest.fixture
 def cal(tmp_path):
     """The calibration file of the simulated gauges."""
-    axes = "".join(
-        f'<Axis Name="{name}" values="{" ".join(map(repr, row))}" max="{rated}" scale="1"/>'
-        for name, row, rated in zip(("Fx", "Fy", "Fz", "Tx", "Ty", "Tz"), FT32831.tolist(), RATED, strict=True)
-    )
-    path = tmp_path / "SIM00003.cal"
-    path.write_text(CAL.format(axes=axes))
-    return path
+    return calibration_file(tmp_path, "SIM00003")
 
 
 @pytest.fixture
@@ -209,26 +199,15 @@ def test_an_undisturbed_stream_is_whole_evenly_timed_and_feels_what_the_bench_ex
     assert wrench[:, 0].max() == pytest.approx(planted.mu * planted.peak_normal_force, abs=0.05)
 
 
-@pytest.mark.parametrize("kind", ["lose", "corrupt", "shorten", "saturate", "unplug"])
-def test_it_survives_each_fault_and_accounts_for_every_reading(plugged, cal, kind):
+def test_one_saturated_gauge_invalidates_the_reading_and_is_named_in_its_status(plugged, cal):
     clock = PacedClock(2.0)
-    whole = kind in ("saturate", "unplug")
-    device = plugged(box(clock, Fault(kind, 0.5, 1.0, share=1.0 if whole else 0.3)))
+    device = plugged(box(clock, Fault("saturate", 0.1, 0.3)))
     transducer = open_transducer(f"labjack-u6://?cal={cal}&rate=300", clock)
     transducer.start()
-    block = readings(transducer, device, 3.0 if kind == "unplug" else 1.6)
-    health = transducer.health
+    block = readings(transducer, device, 0.5)
     transducer.close()
-    assert health.received == len(block)
-    assert health.received + health.lost == block.sequence[-1]
-    assert np.all(np.diff(block.time) > 0)
-    assert block.time[-1] > 1.2, "it did not go on after the fault"
-    assert (health.saturated > 0) == (kind == "saturate")
-    assert (health.malformed > 0) == (kind in ("corrupt", "shorten"))
-    assert kind == "saturate" or health.lost > 0
-    assert health.restarted == (kind == "unplug")
-    if kind == "saturate":
-        assert set(block.status[block.status > 0].tolist()) == {1 << 10}, "gauge 2, and no other"
+    assert 0 < transducer.health.saturated < transducer.health.received == len(block)
+    assert set(block.status[block.status > 0].tolist()) == {1 << 10}, "gauge 2, and no other"
 
 
 def test_what_an_overflow_cost_is_told_by_the_converter_and_counted(plugged, cal, monkeypatch):
@@ -267,19 +246,6 @@ def test_two_converters_are_told_apart_by_serial_number_and_neither_is_taken_una
     assert "serial number 22" in info.settings["converter"]
     with pytest.raises(LinkLost, match="no LabJack U6 33 is plugged in"):
         open_transducer(f"labjack-u6://?cal={cal}&serial=33", RealClock())
-
-
-def test_a_converter_in_use_is_not_disturbed(plugged, cal):
-    device = plugged(box(RealClock()))
-    uri = f"labjack-u6://?cal={cal}"
-    transducer = open_transducer(uri, RealClock())
-    transducer.start()
-    (found,) = [one for one in reachable([uri], patience=1.0) if one.uri == uri]
-    assert found.info is None
-    assert "another program has it" in str(found.problem)
-    block = readings(transducer, device, device.now() + 0.3)
-    assert len(block)
-    assert transducer.health.lost == transducer.health.restarted == 0
 
 
 def test_a_missing_calibration_is_asked_for_in_one_sentence(plugged):

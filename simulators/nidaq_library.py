@@ -1,0 +1,129 @@
+"""As much of NI's library as a driver uses, with a simulated bench on the device's inputs. No hardware, no NI driver.
+
+Names and behaviour are those of the public package nidaqmx; the device's clock is wrong by half a thousandth.
+"""
+
+import sys
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from drivers.clock import Clock
+from simulators.bench import Bench
+from simulators.faults import Faults
+from simulators.gauges import FT32831
+
+ACTUAL = 1.0005  # rate of the device's clock over the one asked for [-]
+OVERFLOW = "The application is not able to keep up with the hardware acquisition.\n\nTask Name: _unnamedTask<0>"
+ABSENT = "Device identifier is invalid, or the device was removed.\n\nTask Name: _unnamedTask<0>"
+_MODULES = ("nidaqmx", "nidaqmx.constants", "nidaqmx.system")
+
+
+class DaqError(Exception):
+    """What NI's library raises."""
+
+
+class SimulatedNidaqmx(ModuleType):
+    """The library on a computer with one simulated device, Dev1. Its time, and the bench's, begins when it is made."""
+
+    DaqError = DaqError
+
+    def __init__(self, bench: Bench, clock: Clock, faults: Faults | None = None) -> None:
+        """Put six gauges on Dev1."""
+        super().__init__("nidaqmx")
+        self.constants = SimpleNamespace(
+            READ_ALL_AVAILABLE=-1,
+            TerminalConfiguration=SimpleNamespace(DIFF="diff"),
+            AcquisitionType=SimpleNamespace(CONTINUOUS="continuous"),
+        )
+        device = SimpleNamespace(name="Dev1", product_type="USB-6218", serial_num=0x1A2B3C, is_simulated=True)
+        local = SimpleNamespace(devices=[device])
+        self.system = SimpleNamespace(System=SimpleNamespace(local=lambda: local))
+        self.bench = bench
+        self.faults = faults or Faults()
+        self.gauges = np.linalg.inv(FT32831)  # V for one N or N mm
+        self.open = 0  # tasks not closed
+        self.begun: list[float] = []  # when acquisitions began [s]
+        self.range = (-10.0, 10.0)  # that the device takes, whatever is asked [V]
+        self.asked: list[tuple[Any, ...]] = []  # channels, terminals and limits
+        self._clock = clock
+        self._origin_ns = clock.now_ns()
+        self._before: dict[str, ModuleType | None] = {}
+
+    def now(self) -> float:
+        """Return the device's and the bench's time [s]."""
+        return (self._clock.now_ns() - self._origin_ns) * 1e-9
+
+    def install(self) -> None:
+        """Let it be what `import nidaqmx` gives."""
+        parts = {name: self if "." not in name else ModuleType(name) for name in _MODULES}
+        self._before = {name: sys.modules.get(name) for name in _MODULES}
+        sys.modules.update(parts)
+
+    def remove(self) -> None:
+        """Undo `install`."""
+        for name, module in self._before.items():
+            if module is None:
+                sys.modules.pop(name, None)
+            else:
+                sys.modules[name] = module
+        self._before = {}
+
+    def Task(self) -> "_Task":  # noqa: N802 - NI's name
+        """Return a new acquisition."""
+        return _Task(self)
+
+
+class _Task:
+    def __init__(self, library: SimulatedNidaqmx) -> None:
+        self._library = library
+        self._begun: float | None = None
+        self._given = 0
+        self._last = np.zeros(6)
+        library.open += 1
+        self.ai_channels = SimpleNamespace(add_ai_voltage_chan=self._channels)
+        self.timing = SimpleNamespace(cfg_samp_clk_timing=self._timing, samp_clk_rate=0.0)
+
+    def _channels(self, name: str, terminal_config: str, min_val: float, max_val: float) -> SimpleNamespace:
+        self._refuse_without_device()
+        self._library.asked.append((name, terminal_config, min_val, max_val))
+        low, high = self._library.range
+        return SimpleNamespace(ai_min=low, ai_max=high, ai_term_cfg=terminal_config)
+
+    def _timing(self, rate: float, **_: object) -> None:
+        self.timing.samp_clk_rate = rate * ACTUAL
+
+    def start(self) -> None:
+        self._refuse_without_device()
+        self._begun, self._given = self._library.now(), 0
+        self._library.begun.append(self._begun)
+
+    def stop(self) -> None:
+        self._begun = None
+
+    def close(self) -> None:
+        self._library.open -= 1
+
+    def read(self, number_of_samples_per_channel: int) -> list[list[float]]:
+        assert number_of_samples_per_channel == -1
+        self._refuse_without_device()
+        library, faults = self._library, self._library.faults
+        if self._begun is None or faults.active("lose", library.now()):
+            raise DaqError(OVERFLOW)
+        since, age = faults.aged(np.array([self._begun, library.now()])).tolist()
+        due = int((age - since) * self.timing.samp_clk_rate)
+        times = faults.instants(since + np.arange(self._given, due) / self.timing.samp_clk_rate)
+        self._given = due
+        volts = faults.felt(library.bench.wrench(times), times, library.bench.settings.rated) @ library.gauges.T
+        for time, six in zip(times.tolist(), volts, strict=True):
+            if faults.active("stall", time):
+                six[:] = self._last
+            if faults.active("saturate", time):
+                six[2] = 10.0
+            self._last = six
+        return volts.T.tolist()
+
+    def _refuse_without_device(self) -> None:
+        if any(self._library.faults.active(kind, self._library.now()) for kind in ("unplug", "reboot")):
+            raise DaqError(ABSENT)
