@@ -13,27 +13,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers import usb_link
 from drivers.catalog import open_transducer
 from drivers.clock import Clock, PacedClock, RealClock
 from drivers.transducer import LinkLost, SetupError, Transducer
-from simulators.bench import RATED, Bench
-from simulators.digital_ft_box import DigitalFtBox
-from simulators.faults import KINDS, Fault, Faults
-from simulators.gauges import FT32831
-from simulators.labjack_u6_box import LabJackU6Box
-from simulators.net_ft_box import NetFtBox
-from simulators.serial_ft_box import SerialFtBox
-from simulators.usb_backend import SimulatedBus
+from simulators.bench import Bench
+from simulators.boxes import SIMULATORS, Simulated, Simulator
+from simulators.faults import Fault, Faults
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")]
 
 CYCLES = 500
 AWAY, CYCLE = (1.2, 1.6), 2.0  # the plug is out between these, in each cycle [s]
 TOLD = 600.0  # of random faults [s]
-CAL = """<FTSensor Serial="SIM00003" BodyStyle="Nano43" Family="DAQ" NumGages="6" CalFileVersion="1.0"><Calibration
-PartNumber="SIMULATED" CalDate="1/1/2026" ForceUnits="N" TorqueUnits="N-mm" DistUnits="mm">{axes}</Calibration>
-</FTSensor>"""
 
 
 @dataclass
@@ -47,30 +38,9 @@ class Run:
     error: str = ""
 
 
-def cal_file(folder: Path) -> Path:
-    axes = "".join(
-        f'<Axis Name="{name}" values="{" ".join(map(repr, row))}" max="{rated}" scale="1"/>'
-        for name, row, rated in zip(("Fx", "Fy", "Fz", "Tx", "Ty", "Tz"), FT32831.tolist(), RATED, strict=True)
-    )
-    path = folder / "SIM.cal"
-    path.write_text(CAL.format(axes=axes))
-    return path
-
-
-def boxes(clock: Clock, faults: Callable[[], Faults], cal: Path):
-    """Return address and closing of every simulated device, started."""
-    net, serial = NetFtBox(Bench(3), clock, faults=faults()), SerialFtBox(Bench(3), clock, faults=faults())
-    digital, labjack = DigitalFtBox(Bench(3), clock, faults=faults()), LabJackU6Box(Bench(3), clock, faults=faults())
-    for box in (net, serial, digital):
-        box.start()
-    usb_link.BACKEND = SimulatedBus([labjack])
-    usb = f"labjack-u6://?cal={cal}&rate=500"
-    return {
-        "net-ft": (net.uri, net.close),
-        "serial-ft": (serial.uri, serial.close),
-        "digital-ft": (digital.uri, digital.close),
-        "labjack-u6": (usb, lambda: None),
-    }
+def boxes(clock: Clock, faults: Callable[[Simulator], Faults], folder: Path) -> dict[str, Simulated]:
+    """Return every simulated device in the list, started."""
+    return {name: one.start(Bench(3), clock, faults(one), folder) for name, one in SIMULATORS.items()}
 
 
 def started(transducer: Transducer) -> None:
@@ -114,9 +84,9 @@ def followed(transducer: Transducer, clock: Clock, until: float, begun_ns: int) 
     return run
 
 
-def together(clock: Clock, faults: Callable[[], Faults], cal: Path, until: float) -> dict[str, Run]:
+def together(clock: Clock, faults: Callable[[Simulator], Faults], folder: Path, until: float) -> dict[str, Run]:
     """Follow all drivers at once, each in a thread of its own."""
-    devices = boxes(clock, faults, cal)
+    devices = boxes(clock, faults, folder)
     runs = {name: Run(error="never ended") for name in devices}
     begun_ns = clock.now_ns()
 
@@ -134,14 +104,14 @@ def together(clock: Clock, faults: Callable[[], Faults], cal: Path, until: float
         except BaseException as error:  # noqa: BLE001 - told by the test
             runs[name] = Run(error=f"{type(error).__name__}: {error}")
 
-    threads = [threading.Thread(target=follow, args=(name, uri)) for name, (uri, _) in devices.items()]
+    threads = [threading.Thread(target=follow, args=(name, device.uri)) for name, device in devices.items()]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    for _, close in devices.values():
-        close()
-    usb_link.BACKEND = None
+    for device in devices.values():
+        device.close()
+        device.forget()
     return runs
 
 
@@ -154,12 +124,11 @@ def held() -> tuple[int, int, float]:
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="memory is read from Linux's /proc")
 def test_hundreds_of_pulled_plugs_leave_nothing_behind_and_every_reading_counted(tmp_path):
-    cal = cal_file(tmp_path)
-    faults = lambda: Faults([Fault("unplug", *AWAY)], seed=1, repeat=CYCLE)  # noqa: E731
-    together(RealClock(), faults, cal, 3 * CYCLE)
+    faults = lambda _: Faults([Fault("unplug", *AWAY)], seed=1, repeat=CYCLE)  # noqa: E731
+    together(RealClock(), faults, tmp_path, 3 * CYCLE)
     threads, files, memory = held()
     begun = time.monotonic()
-    runs = together(RealClock(), faults, cal, CYCLES * CYCLE)
+    runs = together(RealClock(), faults, tmp_path, CYCLES * CYCLE)
     after = held()
     for name, run in runs.items():
         assert not run.error, f"{name}: {run.error}"
@@ -174,8 +143,8 @@ def test_hundreds_of_pulled_plugs_leave_nothing_behind_and_every_reading_counted
 def test_ten_told_minutes_of_random_faults_leave_every_reading_received_or_lost(tmp_path):
     chance = random.Random(5)
 
-    def faults() -> Faults:
-        kinds = [kind for kind in KINDS if kind not in ("steal", "reboot", "unplug", "drift", "miscalibrate")]
+    def faults(device: Simulator) -> Faults:
+        kinds = [kind for kind in (*device.tells, *device.hides) if kind not in ("reboot", "unplug")]
         begins = np.arange(2.0, TOLD - 10.0, 6.0)
         return Faults(
             [
@@ -185,7 +154,7 @@ def test_ten_told_minutes_of_random_faults_leave_every_reading_received_or_lost(
             seed=chance.randrange(1000),
         )
 
-    runs = together(PacedClock(4.0), faults, cal_file(tmp_path), TOLD)
+    runs = together(PacedClock(4.0), faults, tmp_path, TOLD)
     for name, run in runs.items():
         assert not run.error, f"{name}: {run.error}"
         assert run.readings > 0
