@@ -14,12 +14,14 @@ from sessions.decisions import Decision
 from sessions.plan import DISTAL_TO_PROXIMAL, PROXIMAL_TO_DISTAL, Block, SessionPlan, Stimulus, Trial
 from solver.failures import SolveFailure
 from solver.fields import Fields, fields_of
+from solver.finger import FingerModel
 from solver.matching import matching_depths
 from solver.prediction import History, Prediction, Skin
 from solver.reference import SCALE
 from solver.reference import Reading as TauReading
 from solver.scene import Friction, Loading, Scene, Slide, Solve
 from solver.solution import answers
+from solver.stepping import March
 
 SLIDES: dict[int, Slide] = {PROXIMAL_TO_DISTAL: "+x", DISTAL_TO_PROXIMAL: "-x"}
 DEFAULT_SPEED = 20.0  # where none was measured [mm/s]; rescales the time of a course and nothing else
@@ -117,43 +119,80 @@ class SessionPrediction:
         }
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Way:
+    """How the model came to its answer for one trial, for pictures of it."""
+
+    scene: Scene
+    finger: FingerModel
+    march: March | None  # None where it has none that can be drawn
+
+
+Watch = Callable[[int, TrialPrediction, Way | None], None]  # position of the row, the row, how it was found
+
+
 def predict(
     analysis: Analysis,
     plan: SessionPlan,
     options: PredictionOptions | None = None,
     progress: Progress | None = None,
+    watch: Watch | None = None,
+    first: int | None = None,
 ) -> SessionPrediction:
     """Return what the model predicts for every trial of `plan`, or for every stroke where it plans none.
 
     The finger is the one asked for, or else the published one with what the plan knows of the subject's own. A trial
-    without friction, without depth or without a settled state keeps its row, with the reason. Raises SceneError
-    where the options make no scene, Cancelled where `progress` (told the part done) returns False.
+    without friction, without depth or without a settled state keeps its row, with the reason. The row at position
+    `first` is solved before the others; `watch` is told each row as soon as it is known. Raises SceneError where the
+    options make no scene, Cancelled where `progress` (told the part done) returns False.
     """
     asked = with_own_finger(options or PredictionOptions(), plan)
-    rows = [_prepared(case, asked) for case in _cases(analysis, plan)]
-    scenes = [row.scene for row in rows if row.scene is not None]
-    opposite = [_opposite(scene) for scene in scenes]
-    found = answers([*scenes, *opposite], progress)
+    prepared = [_prepared(case, asked) for case in _cases(analysis, plan)]
+    rows = [one.row for one in prepared]
+    told = watch or _unseen
+    for number, one in enumerate(prepared):
+        if one.scene is None:
+            told(number, one.row, None)
+    solved = sorted((n for n, one in enumerate(prepared) if one.scene is not None), key=lambda n: (n != first, n))
+    scenes = [scene for n in solved if (scene := prepared[n].scene) is not None]
     # A depth is matched on the small-strain finger, whose answer at finite strain would be another one.
     matches = asked.kinematics == "small"
-    forces = [_force_per_mm(row) if matches else None for row in rows if row.scene is not None]
-    depths = matching_depths(
-        [scene for scene, force in zip(scenes, forces, strict=True) if force is not None],
-        [force for force in forces if force is not None],
-    )
-    matched = iter(depths)
-    depth = iter([None if force is None else next(matched) for force in forces])
-    answered = zip(found[: len(scenes)], found[len(scenes) :], depth, strict=True)
+    forces = [_force_per_mm(prepared[n]) if matches else None for n in solved]
+    wanted = [(scene, force) for scene, force in zip(scenes, forces, strict=True) if force is not None]
+    matched = iter(matching_depths([scene for scene, _ in wanted], [force for _, force in wanted]))
+    depths = [None if force is None else next(matched) for force in forces]
+    ways: dict[int, Way] = {}
+    found: dict[int, Prediction | SolveFailure] = {}
+
+    def known(at: int) -> TrialPrediction:
+        return _filled(prepared[solved[at]], found[2 * at], found[2 * at + 1], depths[at])
+
+    def seen(number: int, answer: Prediction | SolveFailure, finger: FingerModel, march: March | None) -> None:
+        found[number] = answer
+        at, opposite = divmod(number, 2)
+        if not opposite:
+            ways[at] = Way(scenes[at], finger, march)
+        elif 2 * at in found:
+            told(solved[at], known(at), ways.get(at))
+
+    both = [one for scene in scenes for one in (scene, _opposite(scene))]
+    found |= dict(enumerate(answers(both, progress, seen if watch else None)))
+    for at, number in enumerate(solved):
+        rows[number] = known(at)
     base = asked.scene
     return SessionPrediction(
         simulated=analysis.simulated,
-        trials=tuple(row.row if row.scene is None else _filled(row, *next(answered)) for row in rows),
+        trials=tuple(rows),
         width=_template(asked).width,
         width_origin="assumed" if base is None or base.width == _template(PredictionOptions()).width else "set",
         options=asked,
         decisions=analysis.decisions,
         area=analysis.settings.area,
     )
+
+
+def _unseen(_number: int, _row: TrialPrediction, _way: Way | None) -> None:
+    """Tell nobody."""
 
 
 def seds_with(

@@ -10,6 +10,7 @@ from solver.mesh import Array, Indices, Mesh
 from solver.outline import Outline
 from solver.prediction import Prediction
 from solver.receptor import Endings
+from solver.scene import Scene
 from solver.stiffness import Elastic, Probes, local_coordinates
 from solver.tissues import finite_laws, settled_moduli
 
@@ -28,63 +29,96 @@ class Fields:
     patch: Array  # (m, 2) outline of the reference ending, deformed [mm]
 
 
-def fields_of(prediction: Prediction) -> Fields:
-    """Return the picture of `prediction`."""
-    mesh, scene = prediction.mesh, prediction.scene
-    count = len(mesh.elements)
-    sed = _energies(prediction)
-    # one node for each pair of node and layer
-    pairs = mesh.elements + len(mesh.nodes) * mesh.region[:, None]
-    kept, place = np.unique(pairs, return_inverse=True)
-    place = place.reshape(count, 9)
-    mean = np.bincount(place.ravel(), sed) / np.bincount(place.ravel())
-    lowered = mesh.nodes + prediction.displacement - [0.0, prediction.indentation]
-    outline = Outline.of(scene.finger)
-    arcs = np.linspace(outline.palmar_cut, outline.dorsal_cut, 241)
-    depths = {"skin": 0.0, "epidermis": scene.finger.epidermis, "dermis": scene.finger.epidermis + scene.finger.dermis}
-    lines = {name: outline.tissue(arcs, np.asarray(depth)) for name, depth in depths.items()}
-    drawn = {name: _moved(prediction, lowered, line) for name, line in lines.items()}
-    return Fields(
-        nodes=lowered[kept % len(mesh.nodes)],
-        triangles=place[:, _SPLIT].reshape(-1, 3),
-        sed=mean,
-        outlines=drawn | {"bone": outline.bone(arcs) - [0.0, prediction.indentation]},
-        patch=_moved(prediction, lowered, _patch(outline, prediction)),
-    )
+@dataclass(frozen=True, slots=True, eq=False)
+class Sketch:
+    """What all pictures of one finger on one mesh share."""
+
+    mesh: Mesh
+    triangles: Indices  # (t, 3) of the nodes that are drawn
+    probes: Probes  # at the nodes of every element, one element after the other
+    elastic: Elastic
+    _kept: Indices  # (n,) node of the mesh behind each node that is drawn
+    _place: Indices  # (e, 9) node that is drawn for each of an element
+    _lines: Mapping[str, tuple[Indices, Array]]  # element (m,) and shape functions (m, 9) of the lines that move
+    _bone: Array  # (m, 2) undeformed [mm]
+
+    @staticmethod
+    def of(mesh: Mesh, scene: Scene) -> "Sketch":
+        """Prepare to draw the finger of `scene`."""
+        count = len(mesh.elements)
+        # one node for each pair of node and layer
+        pairs = mesh.elements + len(mesh.nodes) * mesh.region[:, None]
+        kept, place = np.unique(pairs, return_inverse=True)
+        place = place.reshape(count, 9)
+        elastic = Elastic.of(mesh, settled_moduli(scene.materials))
+        outline = Outline.of(scene.finger)
+        arcs = np.linspace(outline.palmar_cut, outline.dorsal_cut, 241)
+        skin = scene.finger.epidermis
+        depths = {"skin": 0.0, "epidermis": skin, "dermis": skin + scene.finger.dermis}
+        lines = {name: outline.tissue(arcs, np.asarray(depth)) for name, depth in depths.items()}
+        lines["patch"] = _patch(outline, scene)
+        return Sketch(
+            mesh=mesh,
+            triangles=place[:, _SPLIT].reshape(-1, 3),
+            probes=Probes.at(mesh, elastic, np.repeat(np.arange(count), 9), np.tile(Q2P1.positions, (count, 1))),
+            elastic=elastic,
+            _kept=kept % len(mesh.nodes),
+            _place=place,
+            _lines={name: _followed(mesh, line) for name, line in lines.items()},
+            _bone=outline.bone(arcs),
+        )
+
+    def energies(self, displacement: Array) -> Array:
+        """Return the SED at the nodes of every element (9 e, m) [MPa] of displacements (nodes, 2, m), small strain."""
+        return self.probes.energy(self.mesh, self.elastic, displacement)
+
+    def fields(self, displacement: Array, indentation: float, energies: Array) -> Fields:
+        """Return the picture of displacements (nodes, 2) [mm] relative to the bone, with their `energies` (9 e,)."""
+        lowered = self.mesh.nodes + displacement - [0.0, indentation]
+        mean = np.bincount(self._place.ravel(), energies) / np.bincount(self._place.ravel())
+        drawn = {
+            name: (shape[:, None] @ lowered[self.mesh.elements[element]])[:, 0]
+            for name, (element, shape) in self._lines.items()
+        }
+        patch = drawn.pop("patch")
+        bone = self._bone - [0.0, indentation]
+        return Fields(lowered[self._kept], self.triangles, mean, drawn | {"bone": bone}, patch)
 
 
-def _energies(prediction: Prediction) -> Array:
+def fields_of(prediction: Prediction, sketch: Sketch | None = None) -> Fields:
+    """Return the picture of `prediction`; `sketch` is that of its mesh, where it was made before."""
+    drawn = sketch or Sketch.of(prediction.mesh, prediction.scene)
+    return drawn.fields(prediction.displacement, prediction.indentation, _energies(prediction, drawn))
+
+
+def _energies(prediction: Prediction, sketch: Sketch) -> Array:
     """Return the SED at the nodes of every element, one element after the other (9 e,) [MPa]."""
-    mesh, scene = prediction.mesh, prediction.scene
-    elastic = Elastic.of(mesh, settled_moduli(scene.materials))
-    count = len(mesh.elements)
-    probes = Probes.at(mesh, elastic, np.repeat(np.arange(count), 9), np.tile(Q2P1.positions, (count, 1)))
+    scene = prediction.scene
     if scene.solve.kinematics == "small":
-        return probes.energy(mesh, elastic, prediction.displacement[:, :, None])[:, 0]
+        return sketch.energies(prediction.displacement[:, :, None])[:, 0]
     # Imported here: a picture at small strain need not wait for the compiled loops to be loaded.
     from solver.finite_body import FiniteBody, FiniteProbes
 
-    body = FiniteBody.of(mesh, finite_laws(scene.materials))
-    places = Endings(probes, np.ones(9 * count), np.arange(9 * count), 9 * count)
+    body = FiniteBody.of(prediction.mesh, finite_laws(scene.materials))
+    count = len(sketch.probes.element)
+    places = Endings(sketch.probes, np.ones(count), np.arange(count), count)
     return FiniteProbes.of(body, places).energy(body, prediction.displacement)
 
 
-def _patch(outline: Outline, prediction: Prediction) -> Array:
+def _patch(outline: Outline, scene: Scene) -> Array:
     """Return the undeformed outline of the reference ending (m, 2) [mm]."""
-    receptor = prediction.scene.receptor
+    receptor = scene.receptor
     across, along = receptor.ending
     arc = outline.along(0.0, receptor.depth, np.linspace(-along / 2, along / 2, 11))
     near, far = (outline.tissue(arc, np.asarray(receptor.depth + side * across / 2)) for side in (-1, 1))
     return np.concatenate([near, far[::-1], near[:1]])
 
 
-def _moved(prediction: Prediction, lowered: Array, points: Array) -> Array:
-    """Return where undeformed `points` (m, 2) are after deformation."""
-    mesh = prediction.mesh
+def _followed(mesh: Mesh, points: Array) -> tuple[Indices, Array]:
+    """Return the element (m,) that holds each undeformed point (m, 2), and its shape functions there (m, 9)."""
     element = _holding(mesh, points)
-    corners = mesh.nodes[mesh.elements[element]]
-    local = local_coordinates(corners, points, np.zeros(points.shape))
-    return (Q2P1.shape(local)[0][:, None] @ lowered[mesh.elements[element]])[:, 0]
+    local = local_coordinates(mesh.nodes[mesh.elements[element]], points, np.zeros(points.shape))
+    return element, Q2P1.shape(local)[0]
 
 
 def _holding(mesh: Mesh, points: Array) -> Indices:

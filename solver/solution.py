@@ -36,6 +36,7 @@ SAME = 1e-6  # relative difference of normal forces up to which two states under
 ROUGH = 1e-10  # and from which round-off is taken out of the displacements
 
 _Answer = Prediction | SolveFailure
+Watch = Callable[[int, _Answer, FingerModel, March | None], None]  # told each answer as it is found, and how
 Progress = Callable[[float], bool]  # told the part done, 0 to 1; returns False to stop the work (Cancelled is raised)
 
 
@@ -62,14 +63,18 @@ def solve_together(scenes: Sequence[Scene], progress: Progress | None = None) ->
     return tuple(done)
 
 
-def answers(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | SolveFailure, ...]:
+def answers(
+    scenes: Sequence[Scene], progress: Progress | None = None, watch: Watch | None = None
+) -> tuple[Prediction | SolveFailure, ...]:
     """Return the prediction of each scene or why it has none, as `solve_together` does.
 
-    Raises SceneError where a finger cannot be meshed, Cancelled where `progress` says so.
+    At small strain `watch` is told each answer, by the position of its scene, as soon as it is found, with the finger
+    and the way that led to it; where another mesh is needed it is told once more. Raises SceneError where a finger
+    cannot be meshed, Cancelled where `progress` says so.
     """
     out: dict[int, Prediction | SolveFailure] = {}
     for group in _groups(scenes):
-        out |= dict(zip(group, _solve_group([scenes[i] for i in group], progress), strict=True))
+        out |= dict(zip(group, _solve_group([scenes[i] for i in group], progress, _within(watch, group)), strict=True))
     told = {i: answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer for i, answer in out.items()}
     return tuple(_with_evidence(told[i], progress) for i in range(len(scenes)))
 
@@ -88,7 +93,14 @@ def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
     return list(groups.values())
 
 
-def _solve_group(scenes: list[Scene], progress: Progress | None) -> list[_Answer]:
+def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
+    """Return what is told of a group's scenes by their positions in it."""
+    if watch is None:
+        return None
+    return lambda number, answer, finger, way: watch(group[number], answer, finger, way)
+
+
+def _solve_group(scenes: list[Scene], progress: Progress | None, watch: Watch | None) -> list[_Answer]:
     """Refine until every scene's estimate meets its tolerance, or the finest mesh is reached."""
     asked = [s.solve.tolerance for s in scenes]
     kind = scenes[0].solve.kinematics
@@ -96,7 +108,7 @@ def _solve_group(scenes: list[Scene], progress: Progress | None) -> list[_Answer
     depth = max(expected_depth(scene) for scene in scenes)
     fineness = DEFAULT[kind] if strictest is None else coarsest_for(scenes[0].driven(depth), strictest)
     while True:
-        done = _on_mesh(scenes, depth, fineness, progress)
+        done = _on_mesh(scenes, depth, fineness, progress, watch)
         missed = [_misses(answer, tolerance) for answer, tolerance in zip(done, asked, strict=True)]
         finer = [n for n in FINENESS[kind] if n > fineness]
         if not finer or not any(missed):
@@ -109,13 +121,15 @@ def _solve_group(scenes: list[Scene], progress: Progress | None) -> list[_Answer
     ]
 
 
-def _on_mesh(scenes: list[Scene], depth: float, fineness: float, progress: Progress | None) -> list[_Answer]:
+def _on_mesh(
+    scenes: list[Scene], depth: float, fineness: float, progress: Progress | None, watch: Watch | None
+) -> list[_Answer]:
     if scenes[0].solve.kinematics == "finite":
         # Imported here: small strain, the default, need not wait for the compiled loops to be loaded.
         from solver.finite_solution import answers as finite_answers
 
         return finite_answers(scenes, depth, fineness, progress)
-    return _solve_on(scenes, depth, fineness, progress)
+    return _solve_on(scenes, depth, fineness, progress, watch)
 
 
 def _misses(answer: _Answer, tolerance: float | None) -> bool:
@@ -135,7 +149,9 @@ class _Shared:
     widest: bool  # whether contact was looked for wherever it can be
 
 
-def _solve_on(scenes: list[Scene], depth: float, fineness: float, progress: Progress | None) -> list[_Answer]:
+def _solve_on(
+    scenes: list[Scene], depth: float, fineness: float, progress: Progress | None, watch: Watch | None
+) -> list[_Answer]:
     """Solve all scenes on one mesh, and on two coarser ones for the estimate; look wider where contact reaches out."""
     done: list[_Answer | None] = []
     for margin in (1.0, 4.0, WIDE):
@@ -151,18 +167,27 @@ def _solve_on(scenes: list[Scene], depth: float, fineness: float, progress: Prog
         done = []
         for number, scene in enumerate(scenes):
             _report(progress, number / len(scenes))
-            done.append(_answer(scene, shared, progress))
+            answer, way = _answer(scene, shared, _of_all(progress, number, len(scenes)))
+            if watch is not None and answer is not None:
+                watch(number, answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer, fine, way)
+            done.append(answer)
         if all(answer is not None for answer in done):
             break
     lost = NotConverged("The skin touched the surface beyond every part of it where contact was looked for.")
     return [lost if answer is None else answer for answer in done]
 
 
-def _answer(scene: Scene, shared: _Shared, progress: Progress | None) -> _Answer | None:
+def _of_all(progress: Progress | None, number: int, count: int) -> Progress | None:
+    """Return what is told the part done of one of `count` scenes."""
+    return None if progress is None else lambda part: progress((number + part) / count)
+
+
+def _answer(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[_Answer | None, March | None]:
+    """Return the answer, None where contact must be looked for on more of the skin; and the way where it has one."""
     try:
-        return _predicted(scene, shared, progress)
+        return _predicted(scene, shared, progress) or (None, None)
     except SolveFailure as failure:
-        return failure
+        return failure, None
 
 
 def _report(progress: Progress | None, part: float) -> None:
@@ -245,8 +270,11 @@ def _direct(scene: Scene, shared: _Shared) -> Contact | None:
     return reached
 
 
-def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Prediction | None:
-    """Return the prediction of one scene; None where contact must be looked for on more of the skin."""
+def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[Prediction, March | None] | None:
+    """Return the prediction of one scene, and its way where it has one that can be drawn from forces alone.
+
+    None where contact must be looked for on more of the skin.
+    """
     finger, law = shared.fine, _law(scene)
     begun = perf_counter()
     contact = _direct(scene, shared)
@@ -287,7 +315,7 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Pred
     solved = perf_counter()
     numbers = np.array([sed, contact.normal.sum(), contact.tangential.sum()])
     of_sed, of_normal, of_tangential = _error_estimates(scene, shared, contact, numbers)
-    return Prediction(
+    found = Prediction(
         scene=scene,
         sed_ending=sed,
         sed_point=finger.sed_point(displacement),
@@ -307,12 +335,13 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> Pred
         row=row,
         model=left,
         audits=checks,
-        skin=_skin(finger, contact, skin[:, 0]),
+        skin=skin_of(finger, contact, skin[:, 0]),
         mesh=finger.geometry.mesh,
         displacement=displacement,
         history=history,
         warnings=(*warnings(scene, left["left_out"]), *_doubts(unbalanced, checks["penetration"])),
     )
+    return found, way if over_time is None else None
 
 
 def _unbalanced(checks: dict[str, float]) -> float:
@@ -368,7 +397,8 @@ def numbers_on(finger: FingerModel, contacts: Sequence[Contact]) -> Array:
     return np.column_stack([finger.sed_endings(contacts), forces])
 
 
-def _skin(finger: FingerModel, contact: Contact, skin: Array) -> Skin:
+def skin_of(finger: FingerModel, contact: Contact, skin: Array) -> Skin:
+    """Return the skin that may touch, in a state of contact with its displacement (2 k,), normal first [mm]."""
     mesh, k = finger.geometry.mesh, len(contact.state)
     length = finger.body.touchable.length
     return Skin(

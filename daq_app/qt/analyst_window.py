@@ -1,16 +1,14 @@
 """The analyst's window: trials, the stroke of the chosen one, and what the model says of it."""
 
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
-import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
 from PySide6.QtCore import QSize, Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent
+from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QFileDialog,
-    QGridLayout,
+    QFrame,
     QHBoxLayout,
-    QListWidget,
     QMainWindow,
     QProgressBar,
     QScrollArea,
@@ -20,32 +18,36 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app import analyst as a
-from daq_app.analyst_process import Analyst
+from daq_app.analyst import messages as m
+from daq_app.analyst.lineage import lineage
+from daq_app.analyst.process import Analyst
+from daq_app.analyst.shown import progress_words
+from daq_app.analyst.state import AnalystState, fold, rows
+from daq_app.qt.lineage_label import LineageLabel
+from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
 from daq_app.qt.parts import button, choice, label, panel, say
-from daq_app.qt.picture_view import PictureView
-from daq_app.qt.stroke_view import StrokeView
-from daq_app.qt.tokens import GRID, MODEL, Tokens
+from daq_app.qt.stroke_column import StrokeColumn
+from daq_app.qt.tokens import GRID, Tokens, font_scale
+from daq_app.qt.trials_column import TrialsColumn
 from sessions.exports import FORMATS
-from sessions.exports.figures.style import Panel
 
-pg: Any = pyqtgraph  # it has no types
-LOOK = 50  # between two looks at the work [ms]
+LOOK = 30  # between two looks at the work [ms]
+LEAST = (480, 320)  # the window can be made as small as that [px]
 
 
 class Work(Protocol):
-    """What is done for the window, as `daq_app.analyst_process.Analyst` does it."""
+    """What is done for the window, as `daq_app.analyst.process.Analyst` does it."""
 
-    def poll(self) -> tuple[a.Message, ...]:
+    def poll(self) -> tuple[m.Said, ...]:
         """Return what came since the last call."""
         ...
 
-    def write(self, asked: a.Write) -> None:
-        """Begin to write a file."""
+    def ask(self, asked: m.Ask) -> None:
+        """Ask for something; nothing is waited for."""
         ...
 
-    def cancel(self) -> a.Cancelled:
-        """Stop what is being done, at once."""
+    def close(self) -> None:
+        """End the work."""
         ...
 
 
@@ -57,30 +59,34 @@ class AnalystWindow(QMainWindow):
         super().__init__()
         self.setWindowTitle(f"{folder.name} – daq-app")
         self.setAccessibleName("analyst's window")
-        self.state = a.AnalystState(folder)
-        self._shown: a.AnalystState | None = None
+        self.state = AnalystState(folder)
         self._work: Work = work or Analyst(folder)
-        self._tokens = tokens
         self._head = label("", "simulated")
-        self._way = label("", "quiet", wrap=True)
-        self._way.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.trials = QListWidget()
-        self.trials.setAccessibleName("trials")
-        self.trials.currentRowChanged.connect(self._row_chosen)
-        self.stroke = StrokeView(tokens)
-        self._numbers = QGridLayout()
-        self.fingers = (PictureView(), PictureView())
-        self.picture, self.which = PictureView(), choice("picture of the session")
-        self.which.activated.connect(self._show_picture)
-        self.relation, self._points = self._relation()
+        self.way = LineageLabel(tokens)
+        self.way.followed.connect(self._follow)
+        self.trials = TrialsColumn(tokens)
+        self.stroke = StrokeColumn(tokens)
+        self.stroke.replayed.connect(self._replay_next)
+        self.model = ModelColumn(tokens, font_scale())
+        self.model.other_wanted.connect(self._choose_other)
+        for column in (self.trials, self.stroke, self.model):
+            column.asked.connect(self.ask)
         self.progress = QProgressBar()
         self.progress.setAccessibleName("progress")
         self._words = label("", "quiet", wrap=True)
-        self.stop = button("Stop  Esc", "stop what is being done", self._cancel)
+        self.stop = button("Stop  Esc", "stop what is being done", lambda: self.ask(m.Stop()))
+        self.go_on = button("Go on", "have the model answer the trials that are left", lambda: self.ask(m.GoOn()))
         self.report = button("Report…", "write the report", self._report)
         self.format, self.export = choice("format of the export"), button("Export…", "write an export", self._export)
         self.format.addItems(sorted(FORMATS))
+        self._parts = [self._panel(name, column) for name, column in self._named()]
+        self._pages = QTabWidget()
+        self._pages.setAccessibleName("trials, stroke or model")
+        self._row = QHBoxLayout()
+        self._row.setSpacing(GRID)
+        self._narrow: bool | None = None
         self.setCentralWidget(self._placed())
+        self._place_columns()
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._look)
         self._timer.start(LOOK)
@@ -90,34 +96,49 @@ class AnalystWindow(QMainWindow):
         """Return the size the window opens with."""
         return QSize(1440, 860)
 
-    def take(self, message: a.Message) -> None:
+    def take(self, message: m.Message) -> None:
         """Fold a message, and show what is known then."""
-        self.state = a.fold(self.state, message)
+        self.state = fold(self.state, message)
         self._show()
 
+    def ask(self, asked: m.Ask) -> None:
+        """Ask the work for something."""
+        if isinstance(asked, m.Choose) and asked.row == self.state.row:
+            return
+        self._work.ask(asked)
+        self.take(asked)
+
+    def write(self, what: str, path: str) -> None:
+        """Have a report, an export or a picture written."""
+        self.ask(m.Write(what, path))
+
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
-        """Stop the work with Esc."""
+        """Stop the work with Esc, undo with Ctrl+Z and redo with Ctrl+Shift+Z."""
+        held = event.modifiers() & Qt.KeyboardModifier.ControlModifier
         if event.key() == Qt.Key.Key_Escape and self.stop.isEnabled():
-            self._cancel()
+            self.ask(m.Stop())
+        elif held and event.key() == Qt.Key.Key_Z:
+            self.stroke.decisions.take_back(again=bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier))
         else:
             super().keyPressEvent(event)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Put the columns beside each other, or on pages where there is little room."""
+        super().resizeEvent(event)
+        self._place_columns()
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802  Qt's name
         """End the work with the window."""
         self._timer.stop()
-        self._work.cancel()
+        self._work.close()
         super().closeEvent(event)
 
     def _look(self) -> None:
-        for message in self._work.poll():
-            self.take(message)
-
-    def _cancel(self) -> None:
-        self.take(self._work.cancel())
-
-    def _row_chosen(self, row: int) -> None:
-        if row >= 0 and row != self.state.row:
-            self.take(a.Choose(row))
+        said = self._work.poll()
+        for message in said:
+            self.state = fold(self.state, message)
+        if said:
+            self._show()
 
     def _report(self) -> None:
         name, _ = QFileDialog.getSaveFileName(self, "Report", str(self.state.folder / "report.html"), "*.html")
@@ -130,151 +151,99 @@ class AnalystWindow(QMainWindow):
         if name:
             self.write(what, name)
 
-    def write(self, what: str, path: str) -> None:
-        """Have a report or an export written."""
-        asked = a.Write(what, path)
-        self._work.write(asked)
-        self.take(asked)
+    def _choose_other(self) -> None:
+        name = QFileDialog.getExistingDirectory(self, "Session to compare with", str(self.state.folder.parent))
+        if name:
+            self.ask(m.Compare(name))
+
+    def _follow(self, place: str) -> None:
+        """Go to where an element of the way leads."""
+        at = {"session": 2, "prediction": 2, "trial": 0}.get(place, 1)
+        self._pages.setCurrentIndex(at)
+        match place:
+            case "session" | "prediction":
+                self.model.tabs.setCurrentIndex(SESSION if place == "session" else FINGER)
+                self.model.tabs.setFocus()
+            case "trial":
+                self.trials.list.setFocus()
+            case "friction":
+                self.stroke.go_to_numbers()
+            case "window":
+                self.stroke.go_to_window()
+            case _:
+                self.stroke.go_to_readings()
+
+    def _replay_next(self) -> None:
+        """Go on with the next trial when one was replayed to its end."""
+        if self.state.row + 1 < len(rows(self.state)):
+            self.stroke.play()
+            self.ask(m.Choose(self.state.row + 1))
 
     def _show(self) -> None:
-        state, before = self.state, self._shown
-        self._shown = state
+        state = self.state
         busy = state.step is not None
         self.progress.setVisible(busy)
         self.progress.setValue(0 if state.step is None else round(100 * state.step.part))
-        say(self._words, a.progress_words(state.step) or state.told)
+        say(self._words, progress_words(state.step) or state.told)
         self.stop.setEnabled(busy)
+        self.go_on.setVisible(state.halted and not busy)
         for made in (self.report, self.export):
             made.setEnabled(not busy and state.report is not None)
-        if before is None or before.report is not state.report:
-            self._show_session()
-        if before is None or before.report is not state.report or before.row != state.row:
-            self._show_chosen()
-
-    def _show_session(self) -> None:
-        state = self.state
         head = "" if state.report is None else state.report.head
         self._head.setVisible(bool(head))
         self._head.setText("SIMULATED")
         self._head.setToolTip(head)
-        self.trials.blockSignals(True)
-        self.trials.clear()
-        self.trials.addItems([row.words for row in a.rows(state)])
-        self.trials.blockSignals(False)
-        kept = self.which.currentText()
-        self.which.clear()
-        self.which.addItems([picture.title for picture in a.pictures(state)])
-        self.which.setCurrentIndex(max(self.which.findText(kept), 0))
-        self._show_picture()
+        self.way.show_links(lineage(state))
+        for column in (self.trials, self.stroke, self.model):
+            column.show_state(state)
 
-    def _show_chosen(self) -> None:
-        state = self.state
-        row = a.chosen(state)
-        self.trials.setCurrentRow(state.row if row is not None else -1)
-        self.stroke.show_stroke(None if row is None else row.stroke)
-        while (item := self._numbers.takeAt(0)) is not None:
-            if (old := item.widget()) is not None:
-                old.hide()
-                old.deleteLater()
-        for at, (name, value) in enumerate(a.numbers(state)[:-1]):
-            self._numbers.addWidget(label(name, "quiet"), at, 0)
-            self._numbers.addWidget(label(value, wrap=True), at, 1)
-        say(self._way, a.lineage(state))
-        ring = pg.mkPen(QColor(self._tokens.text))
-        self._points.setData(
-            [
-                {
-                    "pos": (p.score, p.sed_kpa),
-                    "data": p.row,
-                    "size": 18 if p.row == state.row else 11,
-                    "symbol": "s" if p.row == state.row else "o",
-                    "brush": MODEL,
-                    "pen": ring,
-                }
-                for p in a.points(state)
-            ]
-        )
-        head = "" if state.report is None else state.report.head
-        pictures = a.finger_pictures(state)
-        for view, picture in zip(self.fingers, (*pictures, None, None), strict=False):
-            view.show_panel(picture, self._pixels(picture), head)
+    def _named(self) -> tuple[tuple[str, QWidget], ...]:
+        return ("Trials", self.trials), ("Stroke", self.stroke), ("Model", self.model)
 
-    def _show_picture(self) -> None:
-        pictures, at = a.pictures(self.state), self.which.currentIndex()
-        head = "" if self.state.report is None else self.state.report.head
-        picture = pictures[at] if 0 <= at < len(pictures) else None
-        self.picture.show_panel(picture, self._pixels(picture), head)
+    def _panel(self, name: str, column: QWidget) -> QFrame:
+        frame, layout = panel(name.lower())
+        layout.setContentsMargins(GRID, GRID, GRID, GRID)
+        scrolled = QScrollArea()  # where a column is too high for the window it is scrolled, never cut
+        scrolled.setWidgetResizable(True)
+        scrolled.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        column.setObjectName("column")
+        scrolled.setStyleSheet("QScrollArea, QWidget#column { background: transparent; border: none; }")
+        scrolled.setWidget(column)
+        layout.addWidget(scrolled)
+        return frame
 
-    def _pixels(self, picture: Panel | None) -> bytes:
-        return b"" if picture is None else self.state.pixels.get(picture.name, b"")
-
-    def _relation(self) -> tuple[Any, Any]:
-        plot = pg.PlotWidget(background=self._tokens.surface)
-        plot.setMinimumSize(120, 100)
-        plot.setAccessibleName("prediction against score: a point chooses its trial")
-        plot.getPlotItem().setMenuEnabled(False)
-        plot.setLabel("bottom", "mean score")
-        plot.setLabel("left", "SED [kPa]")
-        plot.getAxis("left").enableAutoSIPrefix(False)
-        points = pg.ScatterPlotItem()
-        points.sigClicked.connect(self._point_clicked)
-        plot.addItem(points)
-        return plot, points
-
-    def _point_clicked(self, _item: object, points: Any, *_: object) -> None:  # noqa: ANN401  pyqtgraph has no types
-        if len(points) and points[0].data() is not None:
-            self.take(a.Choose(int(points[0].data())))
+    def _place_columns(self) -> None:
+        needed = sum(column.minimumSizeHint().width() + 4 * GRID for _, column in self._named()) + 4 * GRID
+        narrow = self.width() < needed
+        if narrow == self._narrow:
+            return
+        self._narrow = narrow
+        self._pages.setVisible(narrow)
+        for (name, _), part, stretch in zip(self._named(), self._parts, (3, 6, 6), strict=True):
+            if narrow:
+                self._pages.addTab(part, name)
+            else:
+                self._row.addWidget(part, stretch)
+                part.show()
 
     def _placed(self) -> QWidget:
-        left, left_layout = panel("trials")
-        left_layout.addWidget(label("Trials", "section"))
-        left_layout.addWidget(self.trials, 3)
-        left_layout.addWidget(label("Prediction against score", "section"))
-        left_layout.addWidget(self.relation, 2)
-        middle, middle_layout = panel("stroke")
-        middle_layout.addWidget(self.stroke, 3)
-        told = QWidget()
-        told.setLayout(self._numbers)
-        self._numbers.setColumnStretch(1, 1)
-        self._numbers.setContentsMargins(0, 0, 0, 0)
-        scrolled = QScrollArea()  # where there is little room the numbers are scrolled, never cut
-        scrolled.setWidget(told)
-        scrolled.setWidgetResizable(True)
-        scrolled.setAccessibleName("numbers of the stroke and its prediction")
-        middle_layout.addWidget(scrolled, 2)
-        tabs = QTabWidget()
-        tabs.setAccessibleName("pictures")
-        for name, view in (("Finger", self.fingers[0]), ("Contact", self.fingers[1]), ("Session", self._session())):
-            tabs.addTab(view, name)
-        right, right_layout = panel("prediction")
-        right_layout.addWidget(tabs, 1)
-        columns = QHBoxLayout()
-        columns.setSpacing(GRID)
-        for part, stretch in ((left, 3), (middle, 5), (right, 5)):
-            columns.addWidget(part, stretch)
         foot = QHBoxLayout()
         foot.addWidget(self._words, 1)
-        self.progress.setFixedWidth(200)
+        self.progress.setFixedWidth(140)
         self.format.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.format.setFixedWidth(110)
-        for part in (self.progress, self.stop, self.report, self.format, self.export):
+        self.format.setFixedWidth(90)
+        for part in (self.progress, self.stop, self.go_on, self.report, self.format, self.export):
             foot.addWidget(part)
         top = QHBoxLayout()
-        top.addWidget(self._way, 1)
+        top.addWidget(self.way, 1)
         top.addWidget(self._head)
         window = QWidget()
         window.setObjectName("window")
+        window.setMinimumSize(*LEAST)  # the columns find room in less than they would like
         layout = QVBoxLayout(window)
         layout.setContentsMargins(GRID, GRID, GRID, GRID)
         layout.addLayout(top)
-        layout.addLayout(columns, 1)
+        layout.addLayout(self._row, 1)
+        layout.addWidget(self._pages, 1)
         layout.addLayout(foot)
         return window
-
-    def _session(self) -> QWidget:
-        page = QWidget()
-        layout = QVBoxLayout(page)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.which)
-        layout.addWidget(self.picture, 1)
-        return page

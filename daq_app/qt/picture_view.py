@@ -1,68 +1,69 @@
-"""One picture of the analysis, saved as SVG, PNG, or its numbers as CSV."""
+"""One picture of the analysis with its buttons: saved as SVG, PNG, or its numbers as CSV."""
 
-from pathlib import Path
+from collections.abc import Callable
 
 from PySide6.QtCore import QRectF
 from PySide6.QtGui import QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from daq_app.qt.parts import button
-from sessions.exports.figures.style import Panel
-from sessions.exports.html import panel_csv, swap_in
+from daq_app.qt.tokens import GRID
+
+KINDS = ("SVG", "PNG", "CSV")
+Save = Callable[[str, str], object]  # name of a picture, and the path to write it to
+
+
+class SaveButtons(QWidget):
+    """Saves a picture by its name."""
+
+    def __init__(self, what: str, save: Save) -> None:
+        """Offer to save `what`; nothing is shown yet."""
+        super().__init__()
+        self._name, self._save = "", save
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID // 2)
+        layout.addStretch(1)
+        self.buttons = [
+            button(kind, f"save {what} as {kind}", lambda kind=kind: self._ask(kind), "small") for kind in KINDS
+        ]
+        for made in self.buttons:
+            layout.addWidget(made)
+        self.set_name("")
+
+    def set_name(self, name: str) -> None:
+        """Take the name of what is shown; "" for nothing."""
+        self._name = name
+        for made in self.buttons:
+            made.setEnabled(bool(name))
+
+    def _ask(self, kind: str) -> None:
+        proposed = f"{self._name.replace(' ', '-')}.{kind.lower()}"
+        path, _ = QFileDialog.getSaveFileName(self, f"Save as {kind}", proposed)
+        if path:
+            ending = f".{kind.lower()}"
+            self._save(self._name, path if path.lower().endswith(ending) else path + ending)
 
 
 class PictureView(QWidget):
-    """A picture with its buttons."""
+    """A picture made for paper."""
 
-    def __init__(self) -> None:
+    def __init__(self, what: str, save: Save) -> None:
         """Show nothing yet."""
         super().__init__()
-        self._panel: Panel | None = None
-        self._pixels, self._head = b"", ""
         self._canvas = _Canvas()
-        bar = QHBoxLayout()
-        bar.addStretch(1)
-        self.buttons = [
-            button(kind, f"save the picture as {kind}", lambda kind=kind: self._ask(kind), "small")
-            for kind in ("SVG", "PNG", "CSV")
-        ]
-        for made in self.buttons:
-            bar.addWidget(made)
+        self.save = SaveButtons(what, save)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self._canvas, 1)
-        layout.addLayout(bar)
-        self.show_panel(None, b"", "")
+        layout.addWidget(self.save)
 
-    def show_panel(self, panel: Panel | None, pixels: bytes, head: str) -> None:
-        """Show a picture by its PNG `pixels`; `head` is the first line of whatever is made of a simulated one."""
-        if panel is self._panel and panel is not None:
-            return
-        self._panel, self._pixels, self._head = panel, pixels, head
-        self._canvas.show_png(pixels)
-        self.setAccessibleName("no picture" if panel is None else panel.title)
-        for made in self.buttons:
-            made.setEnabled(panel is not None)
-
-    def save(self, path: Path) -> None:
-        """Save the picture in the format of the file's ending. Raises OSError."""
-        panel = self._panel
-        if panel is None:
-            return
-        match path.suffix.lower():
-            case ".svg":
-                swap_in(path, panel.svg)
-            case ".csv":
-                swap_in(path, panel_csv(panel, self._head))
-            case _:
-                path.write_bytes(self._pixels)
-
-    def _ask(self, kind: str) -> None:
-        if self._panel is None:
-            return
-        name, _ = QFileDialog.getSaveFileName(self, f"Save as {kind}", f"{self._panel.name}.{kind.lower()}")
-        if name:
-            self.save(Path(name).with_suffix(f".{kind.lower()}"))
+    def show_picture(self, name: str, title: str, png: bytes) -> None:
+        """Show a picture by its PNG; where that is empty, `title` says why."""
+        self._canvas.show_png(png, title)
+        self._canvas.setAccessibleName(title)
+        self.setAccessibleName(title)
+        self.save.set_name(name if png else "")
 
 
 class _Canvas(QWidget):
@@ -70,20 +71,22 @@ class _Canvas(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._image = QImage()
+        self._image, self._words = QImage(), ""
         self.setMinimumSize(160, 120)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
-    def show_png(self, content: bytes) -> None:
-        """Show a picture, or nothing."""
+    def show_png(self, content: bytes, words: str) -> None:
+        """Show a picture, or words in its place."""
         self._image = QImage.fromData(content) if content else QImage()
+        self._words = words
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint it."""
-        if self._image.isNull():
-            return
         painter = QPainter(self)
+        if self._image.isNull():
+            painter.drawText(self.rect(), self._words)
+            return
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         size = self._image.size()
         scale = min(self.width() / size.width(), self.height() / size.height())

@@ -1,63 +1,174 @@
-"""A stroke as it was felt: forces and their ratio over time, with its steady window."""
+"""A stroke as it was felt: forces and their ratio over time, with the edges of its windows as handles."""
 
 from typing import Any
 
 import numpy as np
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from daq_app.qt.tokens import MU, N, T, Tokens
+from daq_app.analyst.edges import edges_of, within
+from daq_app.analyst.messages import EDGES, Edge
+from daq_app.analyst.raw import RawReadings
+from daq_app.qt.edge_handle import EdgeHandle
+from daq_app.qt.tokens import GRID, MU, N, T, Tokens
 from sessions.report.contents import StrokeFinding
 
 pg: Any = pyqtgraph  # it has no types
 
 
 class StrokeView(QWidget):
-    """Two plots above each other; the time is since contact onset."""
+    """Two plots above each other, and a handle for each edge; the time is since contact onset."""
+
+    moved = Signal(str, float)  # an edge, and the instant it was moved to [s, device time]
 
     def __init__(self, tokens: Tokens) -> None:
         """Show nothing yet."""
         super().__init__()
+        self._tokens = tokens
+        self._stroke: StrokeFinding | None = None
+        self._origin = 0.0
+        self._time = np.empty(0)
+        self._columns = [np.empty(0)] * 3
+        self._raw: RawReadings | None = None
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID // 2)
         self._plots = [_plot(tokens, name) for name in ("N and T [N]", "µ = T/N [-]")]
         for plot in self._plots:
-            layout.addWidget(plot)
+            layout.addWidget(plot, 1)
+        self._plots[0].getPlotItem().getAxis("bottom").setLabel("")
         self._plots[1].setXLink(self._plots[0])
         fill = QColor(tokens.act)
         fill.setAlpha(36)
-        pen = pg.mkPen(tokens.act, style=Qt.PenStyle.DotLine)
-        self._windows = [pg.LinearRegionItem(brush=fill, pen=pen, movable=False) for _ in self._plots]
-        self._curves = [pg.PlotCurveItem(pen=pg.mkPen(colour), connect="finite") for colour in (N, T, MU)]
-        for item in (*self._curves[:2], self._windows[0]):
+        self._windows = [
+            pg.LinearRegionItem(brush=fill, pen=pg.mkPen(None), movable=False, span=(0, 1)) for _ in self._plots
+        ]
+        quiet = QColor(tokens.quiet)
+        quiet.setAlpha(110)
+        self._recorded = [pg.PlotCurveItem(pen=pg.mkPen(quiet, width=1), connect="finite") for _ in range(2)]
+        self._curves = [pg.PlotCurveItem(pen=pg.mkPen(c, width=2), connect="finite") for c in (N, T, MU)]
+        for item in (*self._recorded, *self._curves[:2], self._windows[0]):
             self._plots[0].addItem(item)
         for item in (self._curves[2], self._windows[1]):
             self._plots[1].addItem(item)
+        self._now = [pg.InfiniteLine(angle=90, pen=pg.mkPen(tokens.text, width=2)) for _ in self._plots]
+        for plot, line in zip(self._plots, self._now, strict=True):
+            plot.addItem(line, ignoreBounds=True)
+            line.hide()
+        self._lines = {edge: [self._line(edge, plot) for plot in self._plots] for edge in EDGES}
+        self.handles: dict[Edge, EdgeHandle] = {edge: EdgeHandle(edge) for edge in EDGES}
+        strip = QHBoxLayout()
+        strip.setSpacing(GRID // 2)
+        for handle in self.handles.values():
+            handle.moved.connect(self._try)
+            handle.recorded.connect(self.moved.emit)
+            strip.addWidget(handle, 1)
+        layout.addLayout(strip)
         self.show_stroke(None)
 
     def show_stroke(self, stroke: StrokeFinding | None) -> None:
         """Show a stroke, or nothing."""
         trace = None if stroke is None else stroke.trace
-        steady = None if stroke is None else stroke.steady
-        name = "no stroke" if stroke is None else f"stroke {stroke.number}"
-        self.setAccessibleName(f"forces and friction of {name}")
+        other = self._stroke is None or stroke is None or stroke.number != self._stroke.number
+        self._stroke = stroke
+        self._origin = 0.0 if trace is None else trace.origin
+        self.setAccessibleName(f"forces and friction of {'no stroke' if stroke is None else f'stroke {stroke.number}'}")
         values = ((), (), ()) if trace is None else (trace.normal, trace.tangential, trace.mu)
-        time = np.array(() if trace is None else trace.time, np.float64)
-        for curve, column in zip(self._curves, values, strict=True):
-            curve.setData(time, np.array([np.nan if v is None else v for v in column], np.float64))
-        for window in self._windows:
-            window.setVisible(steady is not None and trace is not None)
-            if steady is not None and trace is not None:
-                window.setRegion((steady[0] - trace.origin, steady[1] - trace.origin))
+        self._time = np.array(() if trace is None else trace.time, np.float64)
+        self._columns = [np.array([np.nan if v is None else v for v in column], np.float64) for column in values]
+        self._show_edges()
+        if other:
+            self.show_readings(None)
+        self._draw(None)
         for plot in self._plots:
+            plot.enableAutoRange()
             plot.autoRange()
+            plot.disableAutoRange()
+        if len(self._time):
+            self._plots[0].setXRange(self._time[0], self._time[-1], padding=0.09)
+
+    def show_readings(self, readings: RawReadings | None) -> None:
+        """Show the readings as they were recorded, thin, behind the stroke."""
+        self._raw = readings
+        self._draw(None)
+
+    def show_moment(self, at: int | None) -> None:
+        """Show the readings up to one of them, as if they came now; None shows the stroke as a whole."""
+        if self._raw is not None or at is None:
+            self._draw(at)
+
+    def _draw(self, at: int | None) -> None:
+        raw = self._raw
+        now = None if at is None or raw is None else float(raw.time[at]) - self._origin
+        until = len(self._time) if now is None else int(np.searchsorted(self._time, now, side="right"))
+        for curve, column in zip(self._curves, self._columns, strict=True):
+            curve.setData(self._time[:until], column[:until])
+        stop = 0 if raw is None else len(raw) if at is None else at + 1
+        for curve, name in zip(self._recorded, ("normal", "tangential"), strict=True):
+            if raw is None:
+                curve.setData([], [])
+            else:
+                curve.setData(raw.time[:stop] - self._origin, getattr(raw, name)[:stop])
+        for line in self._now:
+            line.setVisible(now is not None)
+            if now is not None:
+                line.setPos(now)
+
+    def _show_edges(self) -> None:
+        placed = {} if self._stroke is None else {one.edge: one for one in edges_of(self._stroke)}
+        for edge in EDGES:
+            one = placed.get(edge)
+            self.handles[edge].show_edge(one, self._origin)
+            for line in self._lines[edge]:
+                line.setVisible(one is not None)
+                if one is not None:
+                    style = Qt.PenStyle.DashDotLine if one.decided else Qt.PenStyle.SolidLine
+                    style = style if one.found else Qt.PenStyle.DotLine
+                    line.setPen(pg.mkPen(self._tokens.act, width=3 if one.decided else 1.5, style=style))
+                    line.setPos(one.time - self._origin)
+            label: Any = self._lines[edge][0].label
+            label.setFormat(f"✎ {edge}" if one is not None and one.decided else edge)
+        self._fill()
+
+    def _fill(self) -> None:
+        """Fill the steady window between its edges as they are drawn."""
+        there = self._stroke is not None and self._stroke.steady is not None
+        ends = [float(self._lines[edge][0].value()) for edge in ("steady begin", "steady end")]
+        for window in self._windows:
+            window.setVisible(there)
+            window.setRegion(ends)
+
+    def _try(self, edge: Edge, time: float) -> None:
+        """Show an edge where it is being moved to, as far as it may be."""
+        if self._stroke is None:
+            return
+        inside = within(self._stroke, edge, time)
+        for line in self._lines[edge]:
+            line.setPos(inside - self._origin)
+        self.handles[edge].show_at(inside)
+        self._fill()
+
+    def _line(self, edge: Edge, plot: Any) -> Any:  # noqa: ANN401  pyqtgraph has no types
+        first = plot is self._plots[0]
+        options = {"position": 0.92 if edge in ("onset", "lift") else 0.8, "color": QColor(self._tokens.act)}
+        line: Any = pg.InfiniteLine(
+            angle=90,
+            movable=True,
+            hoverPen=pg.mkPen(self._tokens.text, width=3),
+            label=edge if first else None,
+            labelOpts=options if first else None,
+        )
+        line.sigDragged.connect(lambda: self._try(edge, float(line.value()) + self._origin))
+        line.sigPositionChangeFinished.connect(lambda: self.moved.emit(edge, float(line.value()) + self._origin))
+        plot.addItem(line, ignoreBounds=True)
+        return line
 
 
 def _plot(tokens: Tokens, name: str) -> Any:  # noqa: ANN401  pyqtgraph has no types
     plot = pg.PlotWidget(background=tokens.surface)
-    plot.setMinimumSize(120, 80)
+    plot.setMinimumSize(120, 70)
     plot.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     item = plot.getPlotItem()
     item.setMenuEnabled(False)
@@ -67,6 +178,7 @@ def _plot(tokens: Tokens, name: str) -> Any:  # noqa: ANN401  pyqtgraph has no t
         item.getAxis(side).setPen(QColor(tokens.line))
         item.getAxis(side).setTextPen(QColor(tokens.quiet))
     item.getAxis("left").enableAutoSIPrefix(False)
+    item.getAxis("bottom").enableAutoSIPrefix(False)
     item.setLabel("left", name)
     item.setLabel("bottom", "time since contact [s]")
     return plot

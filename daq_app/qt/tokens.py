@@ -158,6 +158,7 @@ QPushButton[role="primary"]:focus {{ border: 3px solid {t.text}; }}
 QPushButton[role="primary"]:disabled {{ background: {t.ground}; color: {t.quiet}; border: 2px dashed {t.line}; }}
 QPushButton:checked {{ border: 2px solid {t.act}; font-weight: 600; }}
 QPushButton[role="small"] {{ padding: 4px 4px; }}
+QPushButton[role="handle"] {{ padding: 4px 2px; font-size: {px(SMALL)}; }}
 QLineEdit, QPlainTextEdit {{ background: {t.raised}; border: 1px solid {t.line};
   border-radius: 4px; padding: 4px 8px; min-height: {TARGET - 12}px; selection-background-color: {t.act};
   selection-color: {t.on_act}; }}

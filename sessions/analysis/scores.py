@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
 
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording
@@ -158,6 +157,8 @@ def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> R
     slope, intercept = np.polyfit(x, y, 1)
     low, high = _fisher_interval(x, y)
     why = None if low is not None else f"no interval of r from {n} points" if n < 4 else "no interval of a perfect r"
+    from scipy import stats  # slow to load, and a window that opens waits for it
+
     rho = float(stats.spearmanr(x, y).statistic)
     return Relation(n, r, low, high, rho, _exact_p(x, y, rho), float(slope), float(intercept), without, why)
 
@@ -187,6 +188,8 @@ def _mean(descriptor: str, index: int, values: Sequence[float]) -> MeanScore:
     n, mean = len(values), float(np.mean(values))
     if n < 2:
         return MeanScore(descriptor, index, n, mean, None, None, None, None, "one subject alone has no interval")
+    from scipy import stats
+
     sd = float(np.std(values, ddof=1))
     half = float(stats.t.ppf((1 + CONFIDENCE) / 2, n - 1)) * sd / math.sqrt(n)
     low, high = mean - half, mean + half
@@ -210,11 +213,15 @@ def _pearson(x: Sequence[float], y: Sequence[float]) -> float | None:
     """Return Pearson's r, None for fewer than three points or where one of the two does not vary."""
     if len(x) < 3 or not _varies(x) or not _varies(y):
         return None
+    from scipy import stats
+
     return float(stats.pearsonr(x, y).statistic)
 
 
 def _fisher_interval(x: Sequence[float], y: Sequence[float]) -> tuple[float | None, float | None]:
     """Return the 95 % interval of Pearson's r by Fisher's z; None where it has none."""
+    from scipy import stats
+
     result = stats.pearsonr(x, y)
     if len(x) < 4 or abs(float(result.statistic)) > 1 - 1e-12:
         return None, None
@@ -227,6 +234,8 @@ def _exact_p(x: Sequence[float], y: Sequence[float], rho: float) -> float | None
     n = len(x)
     if n > _EXACT_UP_TO:
         return None
+    from scipy import stats
+
     rank_x, rank_y = stats.rankdata(x) - (n + 1) / 2, stats.rankdata(y) - (n + 1) / 2
     orders = rank_y[np.array(list(itertools.permutations(range(n))))]  # (n!, n)
     rhos = orders @ rank_x / math.sqrt(float(rank_x @ rank_x) * float(rank_y @ rank_y))

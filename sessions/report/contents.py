@@ -1,6 +1,6 @@
 """What a report holds: plain data, ready for any export. Null numbers carry their reason."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
 from sessions.analysis.scores import MeanScore, Relation
 from sessions.paths import PathFinding
@@ -82,6 +82,8 @@ class StrokeFinding:
     reasons: dict[str, str]
     trace: Trace | None
     bootstrap: dict[str, tuple[float, float]]  # intervals by the number's name; see `Report.interval_kind`
+    within: int = 1  # its number within its trial, from 1; without trials within the recording
+    decided: dict[str, str] = field(default_factory=dict[str, str])  # what a person decided of it, with who and why
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,7 @@ def predictions(
     rates = {one.trial: one for one in firing}
     told = list(intervals) or [None] * len(found.trials)
     return tuple(
-        _with_more(_finding(row), interval, rates.get(row.trial))
+        _with_more(finding_of(row), interval, rates.get(row.trial))
         for row, interval in zip(found.trials, told, strict=True)
     )
 
@@ -114,7 +114,8 @@ def _worst(audit: str, told: Sequence[Mapping[str, float]]) -> float:
     return (min(values) if "least" in audit or "smallest" in audit else max(values, key=abs)) + 0.0  # no minus zero
 
 
-def _finding(row: TrialPrediction) -> PredictionFinding:
+def finding_of(row: TrialPrediction) -> PredictionFinding:
+    """Return the finding of one trial."""
     history = row.history
     reasons = dict(row.reasons)
     for name, other in _FROM_ROW.items():

@@ -49,6 +49,8 @@ def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ..
                 reasons=_reasons(stroke, position, analysis.flaws),
                 trace=_trace(stroke),
                 bootstrap=_bootstrap(stroke, position),
+                within=stroke.number,
+                decided=dict(stroke.decided),
             )
         )
     return tuple(found)

@@ -1,73 +1,79 @@
 """The analyst's window knows a session folder without Qt."""
 
+import itertools
+import shutil
 import time
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from daq_app.analyst import (
-    AnalystState,
-    Cancelled,
-    Choose,
-    Found,
-    Problem,
-    Step,
-    Write,
-    Written,
-    chosen,
-    finger_pictures,
-    fold,
-    lineage,
-    numbers,
-    pictures,
-    points,
-    progress_words,
-    rows,
-)
-from daq_app.analyst_process import Analyst
-from sessions.exports.figures.style import Panel, Plate
+from daq_app.analyst import messages as m
+from daq_app.analyst.compared import compared
+from daq_app.analyst.edges import APART, brought_back, decision_of, edges_of, taken_back, within
+from daq_app.analyst.frame import Contact, Finger, Frame
+from daq_app.analyst.lineage import lineage
+from daq_app.analyst.messages import EDGES
+from daq_app.analyst.process import Analyst
+from daq_app.analyst.seen import finger_words
+from daq_app.analyst.shown import numbers, points, progress_words, row_words, session_pictures
+from daq_app.analyst.state import AnalystState, chosen, fold, rows
+from daq_app.analyst.transport import Transport
+from daq_app.analyst.work import Work
+from sessions.decisions import Decision, Decisions, read
 from tests.sessions.report_example import example
 
-FINGER = tuple(Panel(f"finger-{i}", "", "<svg/>", (), ()) for i in range(40))
+SESSION = Path(__file__).parents[1] / "data" / "sessions" / "version-1" / "sealed"
+NOTHING = np.empty(0)
+FINGER = Finger(
+    np.empty((0, 3), np.int64),
+    Frame(np.zeros((1, 2)), np.zeros(1), {}, np.zeros((1, 2)), Contact(*[NOTHING] * 4, ()), NOTHING),
+    NOTHING,
+)
 
 
 @pytest.fixture(scope="module")
 def state():
-    told = example()
-    plates = (Plate("finger", "", FINGER), Plate("friction", "", (Panel("friction", "", "<svg/>", (), ()),)))
-    return fold(AnalystState(Path("recordings/P07")), Found("predicted", told, plates))
+    return fold(AnalystState(Path("recordings/P07")), m.Found("predicted", example()))
+
+
+@pytest.fixture(scope="module")
+def steady(state):
+    return next(stroke for stroke in state.report.strokes if stroke.steady and stroke.onset is not None)
 
 
 def test_every_stroke_has_a_line_that_names_its_trial(state):
     listed = rows(state)
     assert [row.stroke for row in listed if row.stroke] == list(state.report.strokes)
-    for row in listed:
+    for row, words in zip(listed, row_words(state), strict=True):
         assert row.prediction is None or row.stroke is None or row.prediction.stroke == row.stroke.number
-        assert row.trial is None or row.words.startswith(str(row.trial))
+        assert row.trial is None or words.startswith(str(row.trial))
 
 
 def test_a_point_of_prediction_against_score_chooses_its_trial_everywhere(state):
     found = points(state)
     assert found
     for point in found:
-        after = fold(state, Choose(point.row))
+        after = fold(state, m.Choose(point.row))
         said = chosen(after).prediction
         assert (said.experiment, said.index) == (point.experiment, point.index)
         assert 1000.0 * said.sed == pytest.approx(point.sed_kpa)
 
 
 def test_a_choice_beyond_the_list_is_its_end(state):
-    assert fold(state, Choose(1000)).row == len(rows(state)) - 1
-    assert fold(state, Choose(-3)).row == 0
+    assert fold(state, m.Choose(1000)).row == len(rows(state)) - 1
+    assert fold(state, m.Choose(-3)).row == 0
 
 
-def test_numbers_are_walked_back_to_the_window_of_readings_they_came_from(state):
-    at = next(i for i, row in enumerate(rows(state)) if row.stroke and row.stroke.steady)
-    after = fold(state, Choose(at))
-    stroke = chosen(after).stroke
-    assert f"{stroke.steady[0]:.3f} to {stroke.steady[1]:.3f} s" in lineage(after)
-    assert numbers(after)[-1] == ("from", lineage(after))
+def test_a_number_is_walked_back_to_its_readings_link_by_link(state, steady):
+    at = next(i for i, row in enumerate(rows(state)) if row.stroke is steady)
+    links = lineage(fold(state, m.Choose(at)))
+    assert [link.place for link in links] == ["session", "trial", "prediction", "friction", "window", "readings"]
+    assert f"{steady.steady[0]:.3f} to {steady.steady[1]:.3f} s" in links[4].words
 
 
 def test_a_number_that_is_withheld_says_why(state):
@@ -77,39 +83,194 @@ def test_a_number_that_is_withheld_says_why(state):
     assert dict(numbers(told))["µ at its greatest"] == "–  the zero drifted"
 
 
-def test_the_finger_shown_is_that_of_the_chosen_trial(state):
-    for number, field in enumerate(state.report.fields):
-        at = next(
-            i
-            for i, row in enumerate(rows(state))
-            if row.prediction and (row.prediction.experiment, row.prediction.index) == (field.experiment, field.index)
-        )
-        if rows(state)[at].prediction.sed is not None:
-            assert finger_pictures(fold(state, Choose(at))) == FINGER[2 * number : 2 * number + 2]
-    assert [panel.name for panel in pictures(state)] == ["friction"]
-
-
 @pytest.mark.parametrize(
     ("message", "going_on", "told"),
     [
-        (Step(0.3, "predicting"), True, ""),
-        (Write("csv", "out"), True, ""),
-        (Written("out"), False, "Written: out"),
-        (Problem("No."), False, "No."),
-        (Cancelled(), False, "Stopped. What was done before is kept."),
+        (m.Step(0.3, "predicting"), True, ""),
+        (m.Write("csv", "out"), True, ""),
+        (m.Idle(), False, ""),
+        (m.Problem("No."), False, "No."),
+        (m.Cancelled(), False, "Stopped. What was done before is kept."),
     ],
 )
 def test_what_was_found_stays_whatever_comes_after(state, message, going_on, told):
     after = fold(state, message)
-    assert (after.report, after.plates) == (state.report, state.plates)
+    assert after.report == state.report
     assert (after.step is not None, after.told) == (going_on, told)
 
 
 def test_nothing_is_shown_of_a_session_before_it_is_open():
     empty = AnalystState(Path("x"))
-    assert (rows(empty), numbers(empty), points(empty), pictures(empty)) == ((), (), (), ())
-    assert chosen(fold(empty, Choose(2))) is None
+    assert (rows(empty), numbers(empty), points(empty), session_pictures(empty.report)) == ((), (), (), ())
+    assert chosen(fold(empty, m.Choose(2))) is None
     assert progress_words(empty.step) == "opening  0 %"
+
+
+# ---- the model's answers come one by one
+
+
+def test_answers_are_shown_as_they_come_and_stay_when_the_work_is_stopped(state):
+    bare = fold(AnalystState(Path("x")), m.Found("analysed", replace(state.report, predictions=())))
+    said = state.report.predictions[1]
+    after = fold(fold(bare, m.Answered(said, FINGER)), m.Cancelled())
+    assert after.report.predictions == (said,)
+    assert after.fingers == {(said.trial, said.stroke): FINGER}
+    assert after.halted
+    assert "stopped" in finger_words(fold(after, m.Choose(0)))
+
+
+def test_a_moved_window_takes_back_the_answer_to_its_stroke_alone(state, steady):
+    with_fingers = state
+    for said in state.report.predictions:
+        with_fingers = fold(with_fingers, m.Answered(said, FINGER))
+    moved = replace(steady, mu_dynamic=steady.mu_dynamic + 0.01)
+    strokes = tuple(moved if s is steady else s for s in state.report.strokes)
+    after = fold(with_fingers, m.Found("analysed", replace(state.report, strokes=strokes, predictions=())))
+    left = {s.number for s in strokes} - {p.stroke for p in after.report.predictions}
+    assert left == {steady.number}
+    assert {stroke for _, stroke in after.fingers} == {s.number for s in strokes} - {steady.number}
+
+
+# ---- edges and decisions
+
+
+def test_edges_stand_in_order_of_time_and_say_who_moved_them(steady):
+    decided = replace(steady, decided={"steady": "decision 1 by E02"})
+    placed = edges_of(decided)
+    assert [one.edge for one in placed] == list(EDGES)
+    assert [one.time for one in placed] == sorted(one.time for one in placed)
+    assert [bool(one.decided) for one in placed] == [False, True, True, False]
+
+
+def test_a_stroke_without_a_steady_window_is_offered_one(steady):
+    placed = edges_of(replace(steady, steady=None))
+    assert [one.found for one in placed] == [True, False, False, True]
+    assert placed[0].time < placed[1].time < placed[2].time < placed[3].time
+
+
+@given(at=st.sampled_from(EDGES), time=st.floats(-10.0, 1000.0))
+def test_an_edge_never_passes_its_neighbours(steady, at, time):
+    moved = within(steady, at, time)
+    times = {one.edge: one.time for one in edges_of(steady)} | {at: moved}
+    ordered = [times[edge] for edge in EDGES]
+    assert all(b - a >= APART * (1 - 1e-6) for a, b in itertools.pairwise(ordered))
+
+
+def test_a_moved_edge_is_a_decision_with_who_why_and_what_stood_there(steady):
+    begin, end = steady.steady
+    made = decision_of(steady, "steady begin", begin + 0.1, "E02", "a ramp")
+    assert (made.by, made.why, made.what, made.old) == ("E02", "a ramp", "steady", (begin, end))
+    assert made.new == pytest.approx((begin + 0.1, end))
+    assert (made.trial, made.stroke) == (steady.trial, steady.within)
+    lifted = decision_of(steady, "lift", steady.lift + 0.05, "E02", "late")
+    assert (lifted.what, lifted.old) == ("lift", steady.lift)
+    assert lifted.new == pytest.approx(steady.lift + 0.05)
+
+
+def test_undo_and_redo_go_back_and_forth_over_every_decision_and_all_of_it_stays_written():
+    def value(kept):
+        return [one.new for one in kept.in_force]
+
+    kept = Decisions()
+    for new in (1.0, 2.0):
+        kept = kept.with_line(Decision("E02", "dragged", "onset", 1, 1, 0.5, new))
+    seen = [value(kept)]
+    for step in (taken_back, taken_back, brought_back, brought_back, taken_back):
+        kept = kept.with_line(step(kept, "E03"))
+        seen.append(value(kept))
+    assert seen == [[2.0], [1.0], [], [1.0], [2.0], [1.0]]
+    assert len(kept.lines) == 7
+    assert taken_back(Decisions(), "E03") is None
+    again = kept.with_line(Decision("E02", "dragged", "onset", 1, 1, 1.0, 3.0))
+    assert brought_back(again, "E03") is None
+
+
+# ---- replay
+
+
+@given(steps=st.lists(st.tuples(st.sampled_from(["play", "pause", "seek", "speed"]), st.floats(0.0, 2.0)), max_size=12))
+def test_a_replay_never_leaves_its_recording_and_stands_still_when_paused(steps):
+    now, transport = 0.0, Transport(1.0, 4.0, 1.0)
+    for what, by in steps:
+        before = transport.at(now)
+        match what:
+            case "play":
+                transport = transport.played(now)
+            case "pause":
+                transport = transport.paused(now)
+                assert transport.at(now + by) == pytest.approx(before)
+            case "seek":
+                transport = transport.sought(by * 3.0, now)
+            case "speed":
+                transport = transport.at_speed(0.1 + by, now)
+                assert transport.at(now) == pytest.approx(before)
+        now += by
+        assert 1.0 <= transport.at(now) <= 4.0
+
+
+# ---- two sessions
+
+
+def test_two_sessions_are_held_against_each_other_stimulus_by_stimulus(state):
+    report = state.report
+    first = report.predictions[0]
+    higher = replace(first, mu=first.mu + 0.1, sed=first.sed + 0.001)
+    other = replace(report, predictions=(higher, *report.predictions[1:]))
+    found = {(row.experiment, row.index): row.pairs for row in compared(report, other)}
+    assert len(found) == len({(p.experiment, p.index) for p in report.predictions})
+    for key, (mu, sed, score) in found.items():
+        same = key != (first.experiment, first.index)
+        assert mu.difference == pytest.approx(0.0 if same else 0.1)
+        assert sed.difference == pytest.approx(0.0 if same else 1.0)
+        assert score.difference == 0.0
+
+
+def test_a_stimulus_that_one_session_lacks_has_no_difference(state):
+    report = state.report
+    rest = replace(report, predictions=report.predictions[1:])
+    gone = report.predictions[0]
+    row = next(r for r in compared(report, rest) if (r.experiment, r.index) == (gone.experiment, gone.index))
+    assert row.pairs[0].second is None
+    assert row.pairs[0].difference is None
+
+
+# ---- the work
+
+
+@pytest.fixture
+def at_work(tmp_path):
+    """A recorded session, opened, and how its window's state follows what is done with it."""
+    said = [AnalystState(tmp_path / "session")]
+    shutil.copytree(SESSION, tmp_path / "session")
+    work = Work(tmp_path / "session", lambda message: said.append(fold(said[-1], message)))
+    return work, said
+
+
+def test_a_window_moved_in_a_session_is_a_decision_beside_it_and_its_numbers_follow(at_work, tmp_path):
+    work, said = at_work
+    before = said[-1].report.strokes[0]
+    work.do(m.Move(1, "steady begin", before.steady[0] + 0.1, "E02", "a ramp"))
+    after = said[-1].report.strokes[0]
+    assert after.steady == pytest.approx((before.steady[0] + 0.1, before.steady[1]))
+    assert "E02" in after.decided["steady"]
+    assert "a ramp" in after.decided["steady"]
+    assert after.normal_force != before.normal_force
+    work.do(m.Undo("E03"))
+    assert said[-1].report.strokes[0].steady == before.steady
+    work.do(m.Undo("E03", again=True))
+    assert said[-1].report.strokes[0].steady == after.steady
+    assert len(read(tmp_path / "session").lines) == 3
+
+
+def test_the_readings_shown_are_those_of_the_file_and_their_rows_are_told(at_work):
+    work, said = at_work
+    work.do(m.ShowReadings(1))
+    shown = said[-1].read.readings
+    with h5py.File(SESSION / "session.h5") as file:
+        first, last = map(int, shown.place.split("rows ")[1].split(" to "))
+        np.testing.assert_array_equal(file["readings/raw"][first : last + 1], shown.raw)
+        np.testing.assert_array_equal(file["readings/sequence"][first : last + 1], shown.sequence)
+        np.testing.assert_array_equal(file["readings/counter"][first : last + 1], shown.counter)
 
 
 def wait(analyst, wanted):
@@ -125,6 +286,6 @@ def wait(analyst, wanted):
 def test_a_folder_that_is_no_session_is_told_in_a_sentence(tmp_path):
     analyst = Analyst(tmp_path)
     try:
-        assert str(tmp_path) in wait(analyst, Problem)[-1].sentence
+        assert str(tmp_path) in wait(analyst, m.Problem)[-1].sentence
     finally:
         analyst.close()

@@ -10,6 +10,9 @@ from sessions.analysis import Analysis, AnalysisSettings, FrictionParameters, St
 from sessions.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.plan import Finger as OwnFinger
 from sessions.prediction import PredictionOptions, predict, with_own_finger
+from solver.failures import SolveFailure
+from solver.fields import Sketch
+from solver.film import most_squeezed, stills, way_until
 from solver.reference import INDENTATION, SLIPPERINESS, STICKINESS
 from solver.scene import Finger, Friction, Loading, Scene, SceneError
 from solver.solution import solve
@@ -68,8 +71,56 @@ def tables():
 
 
 @pytest.fixture(scope="module")
-def predicted(tables):
-    return predict(tables, PLAN)
+def watched(tables):
+    """The prediction, and what was told on the way to it when the seventh trial was wanted first."""
+    told = []
+    return predict(tables, PLAN, watch=lambda *one: told.append(one), first=6), told
+
+
+@pytest.fixture(scope="module")
+def predicted(watched):
+    return watched[0]
+
+
+def test_the_trial_that_is_wanted_first_is_told_first_and_each_as_it_stays(watched):
+    found, told = watched
+    assert [number for number, _, _ in told] == [6, 0, 1, 2, 3, 4, 5, 7, 8, 9]
+    for number, row, _ in told:
+        assert row.to_dict() == found.trials[number].to_dict()
+
+
+def test_the_pictures_of_the_way_end_at_the_settled_finger_and_show_the_history(watched):
+    _, row, way = watched[1][0]
+    instants = [way.march.instants[at] for at in (5, 30, -1)]
+    pressed, dragged, last = stills(way.finger, instants, Sketch.of(way.finger.geometry.mesh, way.scene))
+    history = row.history
+    for still, at in ((pressed, 5), (dragged, 30), (last, -1)):
+        assert still.sed == pytest.approx(history.sed_ending[at], rel=1e-9)
+    settled, skin = row.picture()
+    np.testing.assert_allclose(last.fields.nodes, settled.nodes, atol=1e-9)
+    np.testing.assert_allclose(last.fields.sed, settled.sed, rtol=1e-6)
+    assert last.skin.state == skin.state
+    np.testing.assert_allclose(last.row, row.prediction.row.sed, rtol=1e-6)
+    lowest = pressed.fields.outlines["skin"][:, 1].min()
+    assert lowest == pytest.approx(0.0, abs=0.01)  # the skin lies on the surface
+
+
+def test_a_solve_without_an_answer_is_followed_to_its_last_good_state(watched):
+    _, _, way = watched[1][0]
+    slippery = replace(way.scene, friction=Friction(3.0, None))
+    with pytest.raises(SolveFailure):
+        solve(slippery)
+    instants, why = way_until(slippery, way.finger)
+    assert why is not None
+    assert "mm" in str(why)
+    times = [instant.time for instant in instants]
+    assert times == sorted(times)
+    assert times[-1] >= 1.0  # it was pressed, and lost while it slid
+    last = instants[-1]
+    x, y = most_squeezed(way.finger, last.contact, last.depth)
+    nodes = way.finger.geometry.mesh.nodes + way.finger.displacement(last.contact)
+    assert nodes[:, 0].min() <= x <= nodes[:, 0].max()
+    assert y <= nodes[:, 1].max()
 
 
 def test_every_trial_has_its_row_in_the_order_of_the_plan(predicted):

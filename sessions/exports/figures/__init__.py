@@ -1,6 +1,7 @@
 """The figures of a report: every picture with its caption and its numbers."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 from sessions.exports.figures.course import course_panel
 from sessions.exports.figures.finger import common_levels, finger_panels
@@ -12,22 +13,27 @@ from sessions.exports.figures.strokes import friction_panel, speed_panel
 from sessions.exports.figures.style import Panel, Plate, look
 from sessions.report import Report, StrokeFinding
 
-__all__ = ["Panel", "Plate", "plates"]
+__all__ = ["Panel", "Plate", "picture", "plates"]
 
 
 def plates(report: Report) -> tuple[Plate, ...]:
     """Return the figures that a report has numbers for, in their order."""
     with look():
-        made = (
-            _course(report),
-            _scores(report),
-            _friction(report),
-            _speed(report),
-            _fingers(report),
-            _responses(report),
-        )
-        made += (_relations(report), _paths(report))
+        made = tuple(draw(report) for draw in _PLATES.values())
     return tuple(plate for plate in made if plate.panels)
+
+
+def picture(report: Report, plate: str, experiment: str | None = None) -> Panel | None:
+    """Return the first panel of a plate, of one experiment where it is named; None where it has no numbers."""
+    if experiment is not None:
+        report = replace(
+            report,
+            experiments=tuple(e for e in report.experiments if e.name == experiment),
+            strokes=tuple(s for s in report.strokes if s.experiment == experiment),
+            predictions=tuple(p for p in report.predictions if p.experiment == experiment),
+        )
+    with look():
+        return next(iter(_PLATES[plate](report).panels), None)
 
 
 def _course(report: Report) -> Plate:
@@ -120,3 +126,15 @@ def _grouped(report: Report) -> list[tuple[str, Sequence[StrokeFinding]]]:
     groups = [(name, [s for s in report.strokes if s.experiment == name]) for name in names]
     others = [s for s in report.strokes if s.experiment not in names]
     return [group for group in [*groups, ("", others)] if group[1]]
+
+
+_PLATES: Mapping[str, Callable[[Report], Plate]] = {
+    "course": _course,
+    "scores": _scores,
+    "friction": _friction,
+    "speed": _speed,
+    "finger": _fingers,
+    "response": _responses,
+    "relation": _relations,
+    "paths": _paths,
+}

@@ -3,33 +3,45 @@
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLineEdit, QListWidget, QSlider
 
-from daq_app import analyst as a
+from daq_app.analyst import messages as m
+from daq_app.analyst.frame import Contact, Film, Frame, Instant
+from daq_app.analyst.lineage import lineage
+from daq_app.analyst.raw import RawReadings
+from daq_app.analyst.shown import points
+from daq_app.analyst.state import AnalystState, chosen, rows
 from daq_app.qt.analyst_window import AnalystWindow
+from daq_app.qt.lineage_label import LineageLabel
 from daq_app.qt.tokens import LIGHT
-from sessions.exports.figures.course import course_panel
-from sessions.exports.figures.style import Plate, in_pixels, look
 from tests.sessions.report_example import example
 
 SESSION = Path(__file__).parents[2] / "data" / "sessions" / "version-1" / "sealed"
+CONTROLS = (QAbstractButton, QComboBox, QLineEdit, QListWidget, QSlider)
 
 
 class Nobody:
-    """Work that never ends by itself."""
+    """Work that is never done; what was asked for is kept."""
+
+    def __init__(self):
+        self.asked = []
 
     def poll(self):
         return ()
 
-    def write(self, asked):
+    def ask(self, asked):
+        self.asked.append(asked)
+
+    def close(self):
         """Do nothing."""
 
-    def cancel(self):
-        return a.Cancelled()
 
-
-@pytest.fixture
-def window(application):
+@pytest.fixture(scope="module")
+def one_window(application):
     made = AnalystWindow(SESSION, LIGHT, Nobody())
     made.show()
     yield made
@@ -37,12 +49,16 @@ def window(application):
     application.processEvents()
 
 
-@pytest.fixture(scope="module")
-def found():
-    report = example()
-    with look(), in_pixels() as pixels:
-        panel = course_panel(report.course, report.strokes, simulated=True)
-    return a.Found("predicted", report, (Plate("course", "", (panel,)),), pixels)
+@pytest.fixture
+def window(one_window):
+    """The window as it is when a session was just opened and predicted."""
+    one_window.resize(1440, 900)
+    one_window.state = AnalystState(SESSION)
+    one_window.model.tabs.setCurrentIndex(0)
+    one_window.take(m.Found("predicted", example()))
+    one_window.take(m.Idle())
+    one_window._work.asked.clear()
+    return one_window
 
 
 def until(application, condition):
@@ -53,37 +69,210 @@ def until(application, condition):
         time.sleep(0.005)
 
 
-def test_a_point_of_prediction_against_score_chooses_its_trial_in_every_column(window, found):
-    window.take(found)
-    point = a.points(window.state)[-1]
-    spot = next(s for s in window._points.points() if s.data() == point.row)
-    window._point_clicked(None, [spot])
-    assert window.trials.currentRow() == point.row
-    assert window.stroke.accessibleName().endswith(f"stroke {a.chosen(window.state).stroke.number}")
+def frame(sed):
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    contact = Contact(np.array([0.0, 1.0]), np.zeros(2), np.ones(2), np.ones(2), ("stick", "slip"))
+    return Frame(square, np.full(3, sed), {"skin": square}, square, contact, np.array([sed, sed]))
 
 
-def test_stopping_answers_at_once_and_keeps_what_was_found(window, found):
-    window.take(found)
-    window.take(a.Step(0.5, "predicting"))
+TRIANGLE, ARCS = np.array([[0, 1, 2]]), np.array([0.0, 1.0])
+
+
+def film(**more):
+    told = [Instant(0.1 * i, 1.0, 0.0 if i < 2 else 0.5, 0.001 * i, 1.0, 0.1, 3, i) for i in range(4)]
+    return Film(TRIANGLE, tuple(frame(0.001 * i) for i in range(4)), tuple(told), ARCS, **more)
+
+
+def raw(stroke, n=50):
+    time_s = np.linspace(stroke.onset - 0.1, stroke.lift + 0.1, n)
+    whole = np.arange(n)
+    return RawReadings(
+        "here", "counts", whole + 7, whole, whole, whole, time_s, np.ones((n, 6)), time_s, time_s, "zero"
+    )
+
+
+def test_a_point_of_prediction_against_score_chooses_its_trial_in_every_column(window):
+    point = points(window.state)[-1]
+    spot = next(s for s in window.trials.points.points() if s.data() == point.row)
+    window.trials._point_clicked(None, [spot])
+    assert window.trials.list.currentRow() == point.row
+    assert window.stroke.stroke.accessibleName().endswith(f"stroke {chosen(window.state).stroke.number}")
+    assert m.Choose(point.row) in window._work.asked
+
+
+def test_stopping_is_answered_at_once_and_keeps_what_was_found(window):
+    window.take(m.Step(0.5, "predicting"))
     window.stop.click()
-    assert window.state.step is None
+    assert window._work.asked[-1] == m.Stop()
+    window.take(m.Cancelled())
     assert "kept" in window.state.told
-    assert window.trials.count() == len(a.rows(window.state))
+    assert window.trials.list.count() == len(rows(window.state))
 
 
-def test_every_picture_is_saved_as_svg_png_and_csv(window, found, tmp_path):
-    window.take(found)
-    for ending in ("svg", "png", "csv"):
-        window.picture.save(tmp_path / f"picture.{ending}")
-    assert (tmp_path / "picture.svg").read_text().lstrip().startswith("<?xml")
-    assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
-    panel = a.pictures(window.state)[0]
-    assert (tmp_path / "picture.csv").read_text().count("\n") >= len(panel.rows)
+def test_an_edge_is_moved_by_keys_and_recorded_with_enter(window):
+    stroke = chosen(window.state).stroke
+    handle = window.stroke.stroke.handles["steady begin"]
+    window.stroke.decisions.by.setText("E02")
+    window.stroke.decisions.why.setText("a ramp")
+    handle.setFocus()
+    QTest.keyClick(handle, Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
+    QTest.keyClick(handle, Qt.Key.Key_Left)
+    assert not any(isinstance(asked, m.Move) for asked in window._work.asked)
+    QTest.keyClick(handle, Qt.Key.Key_Return)
+    moved = window._work.asked[-1]
+    assert (moved.stroke, moved.edge, moved.by, moved.why) == (stroke.number, "steady begin", "E02", "a ramp")
+    assert moved.time == pytest.approx(stroke.steady[0] + 0.045)
+
+
+def test_an_edge_that_is_dragged_is_recorded_where_it_is_let_go_and_escape_takes_a_key_back(window):
+    stroke = chosen(window.state).stroke
+    view = window.stroke.stroke
+    line = view._lines["lift"][0]
+    line.setValue(stroke.lift - stroke.trace.origin + 0.2)
+    line.sigDragged.emit(line)
+    line.sigPositionChangeFinished.emit(line)
+    assert window._work.asked[-1].time == pytest.approx(stroke.lift + 0.2)
+    handle = view.handles["onset"]
+    before = handle.text()
+    QTest.keyClick(handle, Qt.Key.Key_Left)
+    assert handle.text() != before
+    QTest.keyClick(handle, Qt.Key.Key_Escape)
+    assert handle.text() == before
+
+
+def test_ctrl_z_undoes_and_ctrl_shift_z_redoes(window):
+    held = Qt.KeyboardModifier.ControlModifier
+    QTest.keyClick(window, Qt.Key.Key_Z, held)
+    QTest.keyClick(window, Qt.Key.Key_Z, held | Qt.KeyboardModifier.ShiftModifier)
+    assert [asked.again for asked in window._work.asked if isinstance(asked, m.Undo)] == [False, True]
+
+
+def test_history_is_stepped_by_keys_and_says_what_the_finger_does(window):
+    key = chosen(window.state).key
+    window.model.history.click()
+    assert window._work.asked[-1] == m.ShowHistory(key)
+    window.take(m.Filmed(key, film()))
+    player, canvas = window.model.player, window.model.finger
+    assert "Step 4 of 4" in canvas.accessibleName()
+    for _ in range(3):
+        QTest.keyClick(player, Qt.Key.Key_Left)
+    assert "pressing down" in canvas.accessibleName()
+    QTest.keyClick(player, Qt.Key.Key_Space)
+    assert player.playing
+    QTest.keyClick(player, Qt.Key.Key_Space)
+    assert not player.playing
+    window.model.near.click()
+    assert not canvas.grab().isNull()
+
+
+def test_a_failed_solve_says_where_when_and_why_and_its_last_good_state_stays(window):
+    key = chosen(window.state).key
+    window.take(m.Filmed(key, film(lost=(0.5, 0.5)), "The drag wedges it."))
+    words = window.model.why.text()
+    assert "last good one is shown, at 0.300 s" in words
+    assert words.endswith("The drag wedges it.")
+    assert window.model.finger._lost == (0.5, 0.5)
+    window.model.player.step(-1)
+    assert window.model.finger._lost is None
+
+
+def test_readings_are_replayed_with_play_pause_speed_seek_and_step(window):
+    stroke = chosen(window.state).stroke
+    window.take(m.Read(stroke.number, raw(stroke)))
+    player, view = window.stroke.player, window.stroke.stroke
+    player.seek(20)
+    assert len(view._recorded[0].getData()[0]) == 21
+    QTest.keyClick(player, Qt.Key.Key_Right)
+    assert len(view._recorded[0].getData()[0]) == 22
+    player.speed.setCurrentIndex(0)
+    player.speed.activated.emit(0)
+    player.toggle()
+    assert player.playing
+    player.toggle()
+    QTest.keyClick(player, Qt.Key.Key_End)
+    assert len(view._recorded[0].getData()[0]) == 50
+
+
+def test_every_link_of_the_way_back_is_followed_by_keys(application, window):
+    way = LineageLabel(LIGHT)
+    way.show_links(lineage(window.state))
+    way.show()
+    way.activateWindow()
+    way.setFocus()
+    application.processEvents()
+    followed = []
+    way.followed.connect(followed.append)
+    for _ in range(6):
+        QTest.keyClick(way, Qt.Key.Key_Tab)
+        QTest.keyClick(way, Qt.Key.Key_Return)
+    way.close()
+    assert followed == ["session", "trial", "prediction", "friction", "window", "readings"]
+
+
+def test_the_way_back_ends_at_the_first_raw_reading_of_the_steady_window(window):
+    stroke = chosen(window.state).stroke
+    window.take(m.Read(stroke.number, raw(stroke)))
+    window._follow("readings")
+    table = window.stroke.readings.table
+    row = table.currentIndex().row()
+    assert [table.model().index(at, 0).data() for at in (row - 1, row)] == ["", "steady"]
+    assert table.model().index(row, 1).data() == str(row + 7)
+
+
+def test_pictures_are_drawn_only_when_they_are_looked_at_and_saved_in_three_formats(window, monkeypatch):
+    assert not any(isinstance(asked, m.Draw) for asked in window._work.asked)
+    window.model.tabs.setCurrentIndex(1)
+    assert [asked.name for asked in window._work.asked if isinstance(asked, m.Draw)] == ["course"]
+    window.take(m.Drawn("course", "forces", window.grab().toImage() and b"\x89PNG"))
+    monkeypatch.setattr("daq_app.qt.picture_view.QFileDialog.getSaveFileName", lambda *_: ("out/picture", ""))
+    for made in window.model.picture.save.buttons:
+        made.click()
+    written = [asked for asked in window._work.asked if isinstance(asked, m.Write)]
+    assert [(one.what, one.path) for one in written] == [
+        ("picture course", f"out/picture.{ending}") for ending in ("svg", "png", "csv")
+    ]
+
+
+def test_a_second_session_is_shown_beside_the_first(window):
+    window.take(m.Compared("other", example()))
+    table = window.model.compared.table
+    assert table.rowCount() == len({(p.experiment, p.index) for p in window.state.report.predictions})
+    assert {table.item(row, 3).text() for row in range(table.rowCount())} == {"+0.000"}
+    assert m.Draw("compared") in window._work.asked
+
+
+def test_every_control_has_a_name_and_tab_reaches_it(window):
+    window.take(m.Filmed(chosen(window.state).key, film()))
+    found = [w for kind in CONTROLS for w in window.findChildren(kind)]
+    controls = [w for w in found if not isinstance(w.parent(), QComboBox | QAbstractScrollArea)]
+    ours = [w for w in controls if w.parent().metaObject().className() != "QTabBar"]
+    assert [w for w in ours if not w.accessibleName().strip()] == []
+    window.activateWindow()
+    window.trials.list.setFocus()
+    seen = set()
+    for _ in range(80):
+        focused = window.focusWidget()
+        seen.add(focused)
+        window.focusNextChild()
+    reachable = [w for w in ours if w.isVisible() and w.isEnabled() and w.focusPolicy() & Qt.FocusPolicy.TabFocus]
+    assert [w.accessibleName() for w in reachable if w not in seen] == []
+
+
+@pytest.mark.parametrize("size", [(1366, 768), (911, 512), (683, 384), (3840, 2160)])
+def test_the_window_fits_every_screen_and_nothing_is_laid_over_anything_else(application, window, size):
+    window.resize(*size)
+    application.processEvents()
+    assert (window.width(), window.height()) == size
+    parts = [w for w in (window.way, *window._parts, window.report, window.stop, window.export) if w.isVisible()]
+    boxes = [w.rect().translated(w.mapTo(window, w.rect().topLeft())) for w in parts]
+    for i, box in enumerate(boxes):
+        assert window.rect().contains(box)
+        assert not any(box.intersects(other) for other in boxes[i + 1 :])
 
 
 def test_a_recorded_session_is_opened_and_analysed_while_the_window_stays_alive(application):
     window = AnalystWindow(SESSION, LIGHT)
-    until(application, lambda: window.state.step is None or window.state.stage != "opening")
+    until(application, lambda: window.state.stage != "opening" or window.state.step is None)
     assert window.state.report is not None, window.state.told
     assert window.state.report.session == SESSION.name
     window.close()

@@ -1,0 +1,102 @@
+"""One state of the model's finger as arrays, ready to be painted."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Phase = Literal["pressing", "sticking", "slipping in part", "sliding"]
+
+TOP = 0.97  # of the corners' SED lies below the end of the colour scale
+STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contact:
+    """The skin that may touch, from proximal to distal; k points."""
+
+    x: Array  # (k,) along the surface [mm]
+    gap: Array  # (k,) height over the surface [mm]
+    pressure: Array  # (k,) [MPa]
+    traction: Array  # (k,) along +x, on the skin [MPa]
+    state: tuple[str, ...]  # (k,) "open", "stick", "slip" or "cap"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """A finger in the world: the surface is y = 0, the finger above it, lengths true [mm]."""
+
+    nodes: Array  # (n, 2) deformed
+    sed: Array  # (n,) [MPa]
+    outlines: Mapping[str, Array]  # deformed borders of layers by name, each (m, 2)
+    patch: Array  # (m, 2) outline of the ending
+    contact: Contact
+    row: Array  # (r,) SED of the receptors along the skin [MPa]; nan where there is none
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Finger:
+    """A finger's settled state, or the last good one where there is none."""
+
+    triangles: Indices  # (t, 3) of the frame's nodes
+    frame: Frame
+    arcs: Array  # (r,) where the receptors of the row lie along the skin [mm]
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """What is told of a state on the way."""
+
+    time: float  # [s]
+    depth: float  # of the bone [mm]
+    travel: float  # of the bone along the surface [mm]
+    sed: float  # averaged over the ending [MPa]
+    normal: float  # [N/mm]
+    drag: float  # along +x, on the skin [N/mm]
+    sticking: int  # points that stick
+    slipping: int  # points that slip
+
+    @property
+    def phase(self) -> Phase:
+        """What the finger does.
+
+        >>> Instant(1.2, 2.0, 0.3, 0.008, 0.2, 0.1, sticking=3, slipping=9).phase
+        'slipping in part'
+        """
+        if self.travel == 0.0:
+            return "pressing"
+        if not self.slipping:
+            return "sticking"
+        return "slipping in part" if self.sticking else "sliding"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Film:
+    """A finger from first touch to its last state; where there is no settled one, as far as it was found."""
+
+    triangles: Indices
+    frames: tuple[Frame, ...]
+    instants: tuple[Instant, ...]
+    arcs: Array
+    lost: tuple[float, float] | None = None  # the most squeezed place of the last good state [mm], where none settled
+
+
+def step_above(value: float) -> float:
+    """Return the smallest of `STEPS` times a power of ten that is not below a value.
+
+    >>> step_above(0.013), step_above(0.5), step_above(0.0), step_above(9.0)
+    (0.015, 0.5, 1.0, 10.0)
+    """
+    if not value > 0.0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(next((s * power for s in STEPS if s * power >= value * (1.0 - 1e-9)), 10.0 * power))
+
+
+def top(frame: Frame) -> float:
+    """Return the SED [kPa] at which the colours of a frame alone would end: few nodes lie above."""
+    return step_above(1000.0 * float(np.quantile(frame.sed, TOP)))

@@ -1,0 +1,55 @@
+"""The way from a number back to the raw readings, each element a place that can be gone to."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from daq_app.analyst.state import AnalystState, chosen
+from sessions.report.contents import StrokeFinding
+
+Place = Literal["session", "trial", "prediction", "friction", "window", "readings"]
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """One element of the way: what it says, where it leads, and more of it for who asks."""
+
+    words: str
+    place: Place
+    more: str = ""
+
+
+def lineage(state: AnalystState) -> tuple[Link, ...]:
+    """Return the way from the chosen trial's SED, or its friction where it has none, to its readings."""
+    row = chosen(state)
+    if row is None:
+        return ()
+    made = [Link(state.folder.name, "session", str(state.folder))]
+    if row.trial is not None:
+        made.append(Link(f"trial {row.trial}", "trial"))
+    said, stroke = row.prediction, row.stroke
+    if said is not None and said.sed is not None:
+        made.append(Link(f"SED {1000.0 * said.sed:.3f} kPa", "prediction", "averaged over the ending, settled"))
+    if stroke is None:
+        return tuple(made)
+    made.append(_friction(stroke, None if said is None or said.mu is None else (said.mu, said.mu_rule)))
+    if stroke.steady is not None:
+        begin, end = stroke.steady
+        made.append(
+            Link(f"steady window {begin:.3f} to {end:.3f} s", "window", f"of stroke {stroke.number}, device's clock")
+        )
+    read = state.read
+    if read is not None and read.stroke == stroke.number:
+        made.append(Link(f"{len(read.readings)} readings", "readings", read.readings.place))
+    else:
+        made.append(Link("raw readings", "readings", "counts, sequence and device counter, as they were recorded"))
+    return tuple(made)
+
+
+def _friction(stroke: StrokeFinding, given: tuple[float, str] | None) -> Link:
+    if given is not None:
+        mu, rule = given
+        tau = "" if stroke.tau_max is None else f", τ max {1000.0 * stroke.tau_max:.1f} kPa"
+        return Link(f"µ {mu:.3f}{tau}", "friction", f"the model was given the {rule}")
+    if stroke.mu_dynamic is None:
+        return Link("µ –", "friction", stroke.reasons.get("mu_dynamic", ""))
+    return Link(f"µ {stroke.mu_dynamic:.3f}", "friction", "mean over the steady window")

@@ -1,0 +1,157 @@
+"""The analyst's work in a process of its own, and its client in the window."""
+
+import os
+import signal
+import sys
+import time
+from collections import deque
+from contextlib import suppress
+from multiprocessing import get_context
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Any
+
+from daq_app.analyst import messages as m
+
+Connection = Any  # one end of a pipe; its type is another one on each system
+PATIENCE = 0.15  # work that has not stopped by itself after so long is ended [s]
+URGENT = (m.Stop, m.Move, m.Undo)  # asks for which the model's answers are left, and begun anew
+
+
+def run(connection: Connection, folder: str) -> None:
+    """Analyse and predict the session in `folder`, and do what is asked for until the window is gone."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # What is half written is taken back before the end.
+    signal.signal(signal.SIGTERM, _leave)
+    with suppress(EOFError, OSError):
+        _Server(connection).serve(Path(folder))
+
+
+def _leave(_signal: int, _frame: object) -> None:
+    sys.exit(0)
+
+
+class _Server:
+    """Does what is asked, one thing after the other, and the model's answers in between."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._asked: deque[m.Ask] = deque()
+        self._halted = False  # somebody stopped the model's answers
+
+    def serve(self, folder: Path) -> None:
+        """Work until the window is gone: then EOFError or OSError is raised."""
+        from daq_app.analyst.work import Work, sentence_of
+
+        try:
+            work = Work(folder, self._say, self._urgent)
+        except Exception as error:  # noqa: BLE001  whatever it is, the window is told and stays
+            self._say(m.Problem(sentence_of(error)))
+            return
+        while True:
+            self._take()
+            going_on = work.unfinished and not self._halted
+            if not self._asked and not going_on:
+                self._say(m.Idle())
+                self._asked.append(self._connection.recv())
+            asked = self._asked.popleft() if self._asked else None
+            try:
+                if asked is None:
+                    work.go_on()
+                elif isinstance(asked, m.Stop):
+                    self._halted = True
+                    self._say(m.Cancelled())
+                else:
+                    self._halted = self._halted and not isinstance(asked, m.GoOn | m.Move | m.Undo)
+                    work.do(asked)
+            except _cancelled():
+                pass  # what it was left for is the next that is asked
+            except Exception as error:  # noqa: BLE001  likewise
+                self._halted = self._halted or asked is None
+                self._say(m.Problem(sentence_of(error)))
+
+    def _say(self, message: m.Said) -> None:
+        self._connection.send(message)
+
+    def _take(self) -> None:
+        while self._connection.poll():
+            self._asked.append(self._connection.recv())
+
+    def _urgent(self) -> bool:
+        """Say whether something waits that does not bear to; it comes first then."""
+        self._take()
+        stops = [asked for asked in self._asked if isinstance(asked, m.Stop)]
+        if stops:
+            self._asked.clear()
+            self._asked.append(stops[0])
+        return any(isinstance(asked, URGENT) for asked in self._asked)
+
+
+def _cancelled() -> type[Exception]:
+    from solver.failures import Cancelled
+
+    return Cancelled
+
+
+class Analyst:
+    """The work as the window sees it: nothing here waits."""
+
+    def __init__(self, folder: Path) -> None:
+        """Begin with a session."""
+        self._folder = folder
+        self._process: BaseProcess | None = None
+        self._connection: Connection | None = None
+        self._stopped: float | None = None  # when it was asked to stop and has not yet
+        self._start()
+
+    def poll(self) -> tuple[m.Said, ...]:
+        """Return what came since the last call."""
+        said: list[m.Said] = []
+        while self._connection is not None:
+            try:
+                if not self._connection.poll():
+                    break
+                said.append(self._connection.recv())
+            except (EOFError, OSError):
+                self._gone()
+                if not said or not isinstance(said[-1], m.Problem):
+                    said.append(m.Problem("The work has stopped without a word; what is asked next begins it anew."))
+        if any(isinstance(one, m.Cancelled) for one in said):
+            self._stopped = None
+        if self._stopped is not None and time.monotonic() - self._stopped > PATIENCE:
+            self.close()
+            said.append(m.Cancelled())
+        return tuple(said)
+
+    def ask(self, asked: m.Ask) -> None:
+        """Ask for something; where the work was ended before, it begins anew and does that first."""
+        if isinstance(asked, m.Stop):
+            self._stopped = time.monotonic()
+        if self._connection is None:
+            if isinstance(asked, m.Stop):
+                return
+            self._start()
+        assert self._connection is not None
+        with suppress(OSError):  # `poll` finds that it is gone
+            self._connection.send(asked)
+
+    def close(self) -> None:
+        """End the work."""
+        if self._process is not None:
+            self._process.terminate()
+        self._gone()
+
+    def _start(self) -> None:
+        context = get_context("spawn")
+        ours, theirs = context.Pipe()
+        self._process = context.Process(target=run, args=(theirs, str(self._folder)), daemon=True, name="analyst")
+        self._process.start()
+        theirs.close()
+        self._connection = ours
+
+    def _gone(self) -> None:
+        if self._connection is not None:
+            self._connection.close()
+        self._process = self._connection = None
+        self._stopped = None

@@ -1,0 +1,125 @@
+"""What the analyst's window shows of its state: words, numbers, points, names of pictures."""
+
+from dataclasses import dataclass
+
+from daq_app.analyst.messages import Step
+from daq_app.analyst.state import AnalystState, Row, chosen, rows
+from sessions.report.contents import PredictionFinding, Report, StrokeFinding
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A stimulus in prediction against score."""
+
+    experiment: str
+    index: int
+    score: float
+    sed_kpa: float
+    row: int  # that is chosen by it
+
+
+def words_of(row: Row) -> str:
+    """Return a line of the list of trials; "!" marks flaws, "✎" that somebody decided something."""
+    if row.stroke is None:
+        assert row.prediction is not None  # a row has at least one of them
+        return _named(row.prediction) + "  no stroke"
+    mu = "µ –" if row.stroke.mu_dynamic is None else f"µ {row.stroke.mu_dynamic:.2f}"
+    mark = "  !" if row.stroke.flaws else ""
+    failed = "  no SED" if row.prediction is not None and row.prediction.sed is None else ""
+    return f"{_named(row.stroke)}  {mu}{mark}{failed}"
+
+
+def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
+    """Return names and values of the chosen line."""
+    row = chosen(state)
+    if row is None:
+        return ()
+    told: list[tuple[str, str]] = []
+    if (stroke := row.stroke) is not None:
+        why = stroke.reasons
+        interval = "" if stroke.mu_interval is None else f"  [{stroke.mu_interval[0]:.3f}, {stroke.mu_interval[1]:.3f}]"
+        told += [
+            ("µ over the steady window", _value(stroke.mu_dynamic, "{:.3f}" + interval, why, "mu_dynamic")),
+            ("µ at its greatest", _value(stroke.mu_max, "{:.3f}", why, "mu_max")),
+            ("traction bound", _value(_kpa(stroke.tau_max), "{:.1f} kPa", why, "tau_max")),
+            ("speed", _value(stroke.speed, "{:.1f} mm/s", why, "speed")),
+            ("normal force", _value(stroke.normal_force, "{:.2f} N", why, "normal_force")),
+            ("flaws", ", ".join(flaw.replace("_", " ") for flaw in stroke.flaws) or "none"),
+        ]
+    if (said := row.prediction) is not None:
+        error = "" if said.error_estimate is None else f" ± {100 * said.error_estimate:.1f} %"
+        told += [
+            ("SED, averaged over the ending", _value(_kpa(said.sed), "{:.3f} kPa" + error, said.reasons, "sed")),
+            ("model: µ", _value(said.mu, "{:.3f} (" + said.mu_rule + ")", said.reasons, "mu")),
+            ("model: indentation", _value(said.indentation, "{:.2f} mm", said.reasons, "indentation")),
+            ("model: normal force", _value(said.normal_force, "{:.2f} N", said.reasons, "normal_force")),
+        ]
+    elif state.stage == "analysed":
+        told.append(("SED", "– stopped before this trial" if state.halted else "not predicted yet"))
+    return tuple(told)
+
+
+def row_words(state: AnalystState) -> tuple[str, ...]:
+    """Return every line of the list."""
+    return tuple(words_of(row) for row in rows(state))
+
+
+def session_pictures(report: Report | None) -> tuple[tuple[str, str], ...]:
+    """Return names and words of the pictures of a whole session, whether or not there are numbers for them."""
+    if report is None:
+        return ()
+    experiments = [experiment.name for experiment in report.experiments] or [""]
+    kinds = {
+        "relation": "SED against score",
+        "scores": "scores",
+        "friction": "friction over time",
+        "speed": "speed over time",
+        "response": "response over time",
+    }
+    made = [("course", "forces over the whole recording")]
+    for kind, words in kinds.items():
+        made += [(f"{kind} {name}".rstrip(), f"{words}, {name}" if name else words) for name in experiments]
+    return tuple(made)
+
+
+def points(state: AnalystState) -> tuple[Point, ...]:
+    """Return prediction against score, a point for each stimulus that has both."""
+    report = state.report
+    if report is None:
+        return ()
+    listed = rows(state)
+    made: list[Point] = []
+    for experiment in report.experiments:
+        scores = {score.index: score.mean for score in experiment.scores}
+        for number, row in enumerate(listed):
+            said = row.prediction
+            if said is None or said.sed is None or said.experiment != experiment.name or said.index not in scores:
+                continue
+            made.append(Point(experiment.name, said.index, scores[said.index], 1000.0 * said.sed, number))
+    return tuple(made)
+
+
+def progress_words(step: Step | None) -> str:
+    """Return what is being done, and how long it will still take.
+
+    >>> progress_words(Step(0.5, "predicting", 3.2))
+    'predicting  50 %, about 4 s left'
+    """
+    if step is None:
+        return ""
+    left = "" if step.left is None else f", about {int(step.left) + 1} s left"
+    return f"{step.words}  {100 * step.part:.0f} %{left}"
+
+
+def _named(of: StrokeFinding | PredictionFinding) -> str:
+    if of.trial is None:
+        return f"stroke {of.number}" if isinstance(of, StrokeFinding) else "stroke –"
+    return f"{of.trial}  {of.experiment} {of.code if of.index is None else of.index}"
+
+
+def _kpa(mpa: float | None) -> float | None:
+    return None if mpa is None else 1000.0 * mpa
+
+
+def _value(value: float | None, form: str, reasons: dict[str, str], name: str) -> str:
+    return form.format(value) if value is not None else f"–  {reasons.get(name, '')}".rstrip()

@@ -1,0 +1,291 @@
+"""What is made of a session for the analyst: first its strokes, then the model's answers, then what is asked for."""
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from daq_app.analyst import messages as m
+from daq_app.analyst.compared import NAMES, compared
+from daq_app.analyst.edges import brought_back, decision_of, taken_back
+from daq_app.analyst.pictures import film_of, finger_of, lost_film
+from daq_app.analyst.raw import raw_readings
+from sessions.analysis import analyse
+from sessions.blinding import revealed
+from sessions.decisions import DecisionError, append, read
+from sessions.exports import ExportError, ExportSource, export
+from sessions.plan import Blinded
+from sessions.prediction import TrialPrediction, Way, predict
+from sessions.recording import Recording, RecordingError
+from sessions.recording.provenance import software_versions
+from sessions.report import Field, Report, findings
+from sessions.report.predictions import field_of, finding_of
+from solver.failures import Cancelled
+from solver.fields import Sketch
+from solver.scene import SceneError
+
+if TYPE_CHECKING:
+    from sessions.exports.figures import Panel
+
+Say = Callable[[m.Said], None]
+Urgent = Callable[[], bool]  # whether what is being done must be left for something else
+
+
+class Work:
+    """A session, opened and analysed; the model's answers follow when `go_on` is called."""
+
+    def __init__(self, folder: Path, say: Say, urgent: Urgent = lambda: False) -> None:
+        """Open and analyse it, and say what is found."""
+        self._say, self._urgent = say, urgent
+        say(m.Step(0.0, "opening"))
+        self._recording = _opened(folder)
+        self._chosen = 0
+        self._ways: dict[m.Key, tuple[TrialPrediction, Way]] = {}
+        self._sketches: dict[int, Sketch] = {}
+        self._other: Report | None = None  # that is compared
+        self._analyse()
+
+    @property
+    def unfinished(self) -> bool:
+        """Say whether the model has not answered to all strokes as they are now."""
+        return self._prediction is None
+
+    def go_on(self) -> None:
+        """Have the model answer, the chosen trial first. Raises Cancelled, and keeps what was answered."""
+        told = self.timed("predicting")
+        self._prediction = predict(
+            self._analysis, self._recording.plan, progress=told, watch=self._answered, first=self._first()
+        )
+        self._report = findings(self._recording, self._analysis, self._prediction)
+        self._say(m.Found("predicted", self._report))
+
+    def do(self, asked: m.Ask) -> None:
+        """Do what was asked, and say what came of it. Raises Cancelled and whatever `sentence_of` knows."""
+        match asked:
+            case m.Choose(row):
+                self._chosen = row
+            case m.Move():
+                self._move(asked)
+            case m.Undo(by, again):
+                self._undo(by, again=again)
+            case m.Draw(name):
+                self._draw(name)
+            case m.ShowHistory(key):
+                self._film(key)
+            case m.ShowReadings(stroke):
+                self._read(stroke)
+            case m.Compare(folder):
+                self._compare(Path(folder))
+            case m.Write():
+                self._say(m.Written(self._write(asked)))
+            case _:
+                pass
+
+    def timed(self, words: str) -> Callable[[float], bool]:
+        """Return a listener to progress that says part done and time left, and stops for what is urgent."""
+        began = said = time.monotonic()
+
+        def told(part: float) -> bool:
+            nonlocal said
+            now = time.monotonic()
+            if now - said > 0.05:
+                said, took = now, now - began
+                self._say(m.Step(part, words, took * (1.0 - part) / part if part > 0.05 and took > 1.0 else None))
+            return not self._urgent()
+
+        return told
+
+    def _analyse(self) -> None:
+        self._say(m.Step(0.0, "analysing"))
+        self._analysis = analyse(self._recording)
+        self._prediction = None
+        self._report = findings(self._recording, self._analysis)
+        self._say(m.Found("analysed", self._report))
+
+    def _move(self, asked: m.Move) -> None:
+        stroke = self._report.strokes[asked.stroke - 1]
+        append(self._recording, decision_of(stroke, asked.edge, asked.time, asked.by, asked.why))
+        self._analyse()
+
+    def _undo(self, by: str, *, again: bool) -> None:
+        decisions = read(self._recording.folder)
+        line = brought_back(decisions, by) if again else taken_back(decisions, by)
+        if line is None:
+            raise NothingToShow("There is nothing to redo." if again else "There is no decision to undo.")
+        append(self._recording, line)
+        self._analyse()
+
+    def _first(self) -> int | None:
+        """Return the position among predicted rows of the trial that is chosen."""
+        strokes = self._report.strokes
+        if not self._chosen < len(strokes):
+            return None
+        chosen, plan = strokes[self._chosen], self._recording.plan
+        if not plan.blocks:
+            return self._chosen
+        main = [trial.number for block in plan.blocks if block.phase == "main" for trial in block.trials]
+        return main.index(chosen.trial) if chosen.trial in main else None
+
+    def _answered(self, _number: int, row: TrialPrediction, way: Way | None) -> None:
+        finding = finding_of(row)
+        finger = None
+        if way is not None:
+            self._ways[finding.trial, finding.stroke] = row, way
+            if row.prediction is not None:
+                finger = finger_of(row.prediction, self._sketch(way))
+        self._say(m.Answered(finding, finger))
+
+    def _sketch(self, way: Way) -> Sketch:
+        mesh = way.finger.geometry.mesh
+        if id(mesh) not in self._sketches:
+            self._sketches = {id(mesh): Sketch.of(mesh, way.scene)}
+        return self._sketches[id(mesh)]
+
+    def _draw(self, name: str) -> None:
+        self._say(m.Step(0.0, "drawing"))
+        panel, png = self._panel(name)
+        self._say(m.Drawn(name, "" if panel is None else panel.title, png))
+
+    def _panel(self, name: str) -> "tuple[Panel | None, bytes]":
+        """Return a picture and its PNG; `shown.session_pictures` and `shown.row_pictures` tell the names."""
+        from sessions.exports.figures import picture  # slow to load, and many never look at one
+        from sessions.exports.figures.finger import common_levels, finger_panels
+        from sessions.exports.figures.style import in_pixels, look
+
+        what, _, of = name.partition(" ")
+        report = self._report
+        with in_pixels() as pixels:
+            if what in ("finger", "contact"):
+                every = self._fields()
+                field = every.get(int(of))
+                with look():
+                    levels = common_levels(tuple(every.values())) if every else ()
+                    pair = None if field is None else finger_panels(field, levels, simulated=report.simulated)
+                panel = None if pair is None else pair[what == "contact"]
+            elif what == "compared":
+                panel = self._compared_panel()
+            elif what == "stroke":
+                only = tuple(s for s in report.strokes if s.number == int(of))
+                panel = picture(replace(report, strokes=only), "friction")
+            else:
+                panel = picture(report, what, of or None)
+        return panel, b"" if panel is None else pixels[panel.name]
+
+    def _compared_panel(self) -> "Panel | None":
+        from sessions.exports.figures.compared import compared_panel
+        from sessions.exports.figures.style import look
+
+        other = self._other
+        if other is None:
+            return None
+        rows = [
+            (f"{row.experiment} {row.index}", [(pair.first, pair.second) for pair in row.pairs])
+            for row in compared(self._report, other)
+        ]
+        names = (self._report.session, other.session)
+        with look():
+            return compared_panel(NAMES, names, rows, simulated=self._report.simulated or other.simulated)
+
+    def _fields(self) -> dict[int, Field]:
+        """Return the finger of every trial that was answered, by the number of its stroke."""
+        made: dict[int, Field] = {}
+        for (_, stroke), (row, _) in self._ways.items():
+            field = field_of(row.block or "", row)
+            if field is not None and stroke is not None:
+                made[stroke] = field
+        return made
+
+    def _film(self, key: m.Key) -> None:
+        found = self._ways.get(key)
+        if found is None:
+            raise NothingToShow("The model has no way to show for this trial: it was not solved.")
+        prediction, way = found
+        told = self.timed("drawing the history")
+        if way.march is not None:
+            self._say(m.Filmed(key, film_of(way, way.march.instants, self._sketch(way), told)))
+            return
+        film, why = lost_film(way, self._sketch(way), told)
+        self._say(m.Filmed(key, film, why or prediction.reasons.get("sed", "")))
+
+    def _read(self, number: int) -> None:
+        stroke = self._report.strokes[number - 1]
+        self._say(m.Read(number, raw_readings(self._recording, stroke)))
+
+    def _compare(self, folder: Path) -> None:
+        self._say(m.Step(0.0, f"opening {folder.name}"))
+        recording = _opened(folder)
+        analysis = analyse(recording)
+        told = self.timed(f"predicting {folder.name}")
+        self._other = findings(recording, analysis, predict(analysis, recording.plan, progress=told))
+        self._say(m.Compared(str(folder), self._other))
+
+    def _write(self, asked: m.Write) -> str:
+        """Write the report, a picture or an export, and return where it is."""
+        path = Path(asked.path)
+        if asked.what.startswith("picture "):
+            return self._write_picture(asked.what.removeprefix("picture "), path)
+        self._say(m.Step(0.0, f"writing {asked.what}"))
+        if self._prediction is None:
+            self.go_on()
+        assert self._prediction is not None  # it was just made
+        if asked.what == "report":
+            from sessions.exports import html
+
+            html.write_report(self._report, path)
+            return str(path)
+        made_by = {"made_by": software_versions()}
+        source = ExportSource(self._recording, made_by | self._analysis.to_dict(), made_by | self._prediction.to_dict())
+        told = self.timed(f"writing {asked.what}")
+
+        def shown(part: float) -> None:
+            if not told(part):
+                raise Cancelled
+
+        return str(export(source, asked.what, path, shown))
+
+    def _write_picture(self, name: str, path: Path) -> str:
+        from sessions.exports.html import panel_csv, swap_in
+        from sessions.recording.whole_file import write_whole
+
+        self._say(m.Step(0.0, f"writing {path.name}"))
+        panel, png = self._panel(name)
+        if panel is None:
+            raise NothingToShow("There are no numbers for this picture.")
+        match path.suffix.lower():
+            case ".svg":
+                swap_in(path, panel.svg)
+            case ".csv":
+                swap_in(path, panel_csv(panel, self._report.head))
+            case _:
+                write_whole(path, png)
+        return str(path)
+
+
+class NothingToShow(Exception):
+    """What was asked for is not there; one sentence says why."""
+
+
+def _opened(folder: Path) -> Recording:
+    recording = revealed(Recording.open(folder))
+    if recording.plan.blinded:
+        raise Blinded(f"{folder} is blinded: its results are told by index; 'daq-app unblind' opens the key")
+    return recording
+
+
+def sentence_of(error: Exception) -> str:
+    """Return a failure in a sentence."""
+    known: tuple[type[Exception], ...] = (
+        RecordingError,
+        ExportError,
+        DecisionError,
+        Blinded,
+        SceneError,
+        NothingToShow,
+    )
+    with suppress(ImportError):
+        from sessions.exports.html import ReportError
+
+        known = (*known, ReportError)
+    return str(error) if isinstance(error, known) else f"{type(error).__name__}: {error}"

@@ -1,0 +1,65 @@
+"""Two sessions side by side: a table of their numbers, and a picture of them."""
+
+from collections.abc import Callable, Sequence
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QAbstractItemView, QHBoxLayout, QTableWidget, QTableWidgetItem, QVBoxLayout, QWidget
+
+from daq_app.analyst.compared import NAMES, ComparedRow
+from daq_app.qt.parts import Shortened, button
+from daq_app.qt.picture_view import PictureView, Save
+
+PICTURE = "compared"  # its name
+
+
+class ComparedView(QWidget):
+    """Offers to open a second session, and shows what came of it."""
+
+    def __init__(self, choose: Callable[[], object], save: Save) -> None:
+        """Show nothing yet."""
+        super().__init__()
+        self.words = Shortened("quiet")
+        self.choose = button("Compare with…", "compare with another session", choose)
+        self.table = QTableWidget(0, 1 + 3 * len(NAMES))
+        self.table.setAccessibleName("two sessions compared")
+        self.table.setTabKeyNavigation(False)
+        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.table.verticalHeader().hide()
+        self.picture = PictureView("the picture of both sessions", save)
+        top = QHBoxLayout()
+        top.addWidget(self.words, 1)
+        top.addWidget(self.choose)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addLayout(top)
+        layout.addWidget(self.table, 1)
+        layout.addWidget(self.picture, 2)
+        self.show_rows((), ("", ""))
+
+    def show_rows(self, rows: Sequence[ComparedRow], sessions: tuple[str, str]) -> None:
+        """Show the stimuli of two sessions, by their names."""
+        there = bool(sessions[1])
+        self.words.show_whole(f"A: {sessions[0]}   B: {sessions[1]}" if there else "No second session is open.")
+        self.table.setVisible(there)
+        self.picture.setVisible(there)
+        head = ["stimulus", *(f"{name} {part}" for name in NAMES for part in ("A", "B", "B − A"))]
+        self.table.setHorizontalHeaderLabels(head)
+        self.table.setRowCount(len(rows))
+        for at, row in enumerate(rows):
+            cells = [f"{row.experiment} {row.index}"]
+            for name, pair in zip(NAMES, row.pairs, strict=True):
+                digits = 1 if name == "score" else 3
+                cells += [_number(value, digits) for value in (pair.first, pair.second)]
+                cells.append(_number(pair.difference, digits, sign=True))
+            for column, words in enumerate(cells):
+                item = QTableWidgetItem(words)
+                if column:
+                    item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+                self.table.setItem(at, column, item)
+        self.table.resizeColumnsToContents()
+
+
+def _number(value: float | None, digits: int, *, sign: bool = False) -> str:
+    if value is None:
+        return "–"
+    return f"{value:+.{digits}f}".replace("-", "−") if sign else f"{value:.{digits}f}"

@@ -1,0 +1,179 @@
+"""What the model says of the chosen trial: its finger, its history, the pictures of the session, another session."""
+
+import numpy as np
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QTabWidget, QVBoxLayout, QWidget
+
+from daq_app.analyst import messages as m
+from daq_app.analyst.compared import compared
+from daq_app.analyst.frame import top
+from daq_app.analyst.seen import common_top, film_words, finger_words, shown_film
+from daq_app.analyst.shown import session_pictures
+from daq_app.analyst.state import AnalystState, chosen
+from daq_app.qt.compared_view import PICTURE, ComparedView
+from daq_app.qt.finger_canvas import FingerCanvas
+from daq_app.qt.parts import button, choice, label, say
+from daq_app.qt.picture_view import PictureView, SaveButtons
+from daq_app.qt.tokens import GRID, Tokens
+from daq_app.qt.transport_bar import TransportBar
+
+FINGER, SESSION, COMPARISON = range(3)  # tabs
+STEPS_A_SECOND = 10.0  # of a history that plays: its steps are told, for pressing takes long and sliding little time
+
+
+class ModelColumn(QWidget):
+    """Three tabs; `asked` tells what the work is to do."""
+
+    asked = Signal(object)
+    other_wanted = Signal()
+
+    def __init__(self, tokens: Tokens, scale: float) -> None:
+        """Show nothing yet."""
+        super().__init__()
+        self._state: AnalystState | None = None
+        self._film: m.Filmed | None = None
+        self._at: int | None = None  # of the film; None: the settled state
+        self.finger = FingerCanvas(tokens, scale)
+        self.near = button("Contact", "show the contact alone, with its tractions", self._paint, "small")
+        self.free = button("Own scale", "colours that fit this trial alone", self._paint, "small")
+        for made in (self.near, self.free):
+            made.setCheckable(True)
+            made.setMinimumWidth(made.sizeHint().width() + 2 * GRID)  # bold while it is on
+        self.history = button("History", "show the finger from first touch on", self._ask_history, "small")
+        self.save = SaveButtons("the finger", self._save)
+        self.player = TransportBar("the history", tells_time=False)
+        self.player.moved.connect(self._moved)
+        self.why = label("", "value", wrap=True)
+        self.why.setProperty("grade", "look")
+        self.which, self.picture = choice("picture of the session"), PictureView("the picture", self._save)
+        self.which.activated.connect(lambda: self._show_session())
+        self.compared = ComparedView(self.other_wanted.emit, self._save)
+        self.tabs = QTabWidget()
+        self.tabs.setAccessibleName("pictures")
+        session = QWidget()
+        inside = QVBoxLayout(session)
+        inside.setContentsMargins(0, 0, 0, 0)
+        inside.addWidget(self.which)
+        inside.addWidget(self.picture, 1)
+        for name, page in (("Finger", self._finger_page()), ("Session", session), ("Comparison", self.compared)):
+            self.tabs.addTab(page, name)
+        self.tabs.currentChanged.connect(lambda: self._show_session())
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self.tabs)
+
+    def show_state(self, state: AnalystState) -> None:
+        """Show what is known now."""
+        before, self._state = self._state, state
+        film = shown_film(state)
+        if film is not self._film:
+            self._film = film
+            self._at = None if film is None else len(film.film.instants) - 1
+            count = 0 if film is None else len(film.film.instants)
+            self.player.set_times([number / STEPS_A_SECOND for number in range(count)], max(count - 1, 0))
+        row = chosen(state)
+        said = None if row is None else row.prediction
+        self.history.setEnabled(film is None and said is not None and said.mu is not None)
+        say(self.why, film_words(film))
+        self.why.setVisible(bool(self.why.text()))
+        drawable = row is not None and row.stroke is not None and row.key in state.fingers
+        self._name = f" {row.stroke.number}" if drawable and row is not None and row.stroke is not None else ""
+        self._name_saves()
+        self._paint()
+        if before is None or before.version != state.version or before.report is None:
+            names = [words for _, words in session_pictures(state.report)]
+            if names != [self.which.itemText(i) for i in range(self.which.count())]:
+                self.which.clear()
+                self.which.addItems(names)
+        self._show_session()
+        if state.compared is not None and (before is None or before.compared is not state.compared):
+            self._show_compared(state, state.compared)
+
+    def _show_compared(self, state: AnalystState, other: m.Compared) -> None:
+        assert state.report is not None  # nothing is compared before this session is open
+        self.compared.show_rows(compared(state.report, other.report), (state.report.session, other.report.session))
+        self.tabs.setCurrentIndex(COMPARISON)
+        self.asked.emit(m.Draw(PICTURE))
+
+    def _show_session(self) -> None:
+        """Show the picture that is chosen; what is not drawn is asked for only when it is looked at."""
+        state = self._state
+        if state is None:
+            return
+        if self.tabs.currentIndex() == COMPARISON:
+            drawn = state.drawn.get(PICTURE)
+            if drawn is not None:
+                self.compared.picture.show_picture(PICTURE, drawn.title, drawn.png)
+            return
+        names = session_pictures(state.report)
+        if self.tabs.currentIndex() != SESSION or not 0 <= self.which.currentIndex() < len(names):
+            return
+        name, words = names[self.which.currentIndex()]
+        drawn = state.drawn.get(name)
+        if drawn is None:
+            self.picture.show_picture("", f"Drawing: {words}", b"")
+            self._draw(name, state.version)
+        else:
+            self.picture.show_picture(name, drawn.title or f"There are no numbers yet for: {words}", drawn.png)
+
+    def _draw(self, name: str, version: int) -> None:
+        if self._drawing != (name, version):
+            self._drawing = (name, version)
+            self.asked.emit(m.Draw(name))
+
+    _drawing = ("", -1)
+    _name = ""
+
+    def _paint(self) -> None:
+        state = self._state
+        row = None if state is None else chosen(state)
+        film = self._film
+        near, free = self.near.isChecked(), self.free.isChecked()
+        if film is not None and self._at is not None:
+            frame, lost = film.film.frames[self._at], film.film.lost
+            high = top(frame) if free else max(common_top(state), top(film.film.frames[-1]) if lost else 0.0)
+            words = film_words(film, self._at)
+            last = self._at == len(film.film.frames) - 1
+            self.finger.show_frame(
+                frame, film.film.triangles, film.film.arcs, high, words, near=near, lost=lost if last else None
+            )
+            return
+        finger = None if state is None or row is None else state.fingers.get(row.key)
+        if finger is None:
+            empty = np.empty((0, 3), np.int64)
+            self.finger.show_frame(None, empty, np.empty(0), 1.0, finger_words(state), near=near)
+            return
+        high = top(finger.frame) if free else common_top(state)
+        self.finger.show_frame(finger.frame, finger.triangles, finger.arcs, high, finger_words(state), near=near)
+
+    def _moved(self, at: int) -> None:
+        self._at = at
+        self._paint()
+
+    def _ask_history(self) -> None:
+        row = None if self._state is None else chosen(self._state)
+        if row is not None:
+            self.asked.emit(m.ShowHistory(row.key))
+            self.player.slider.setFocus()
+
+    def _name_saves(self) -> None:
+        kind = "contact" if self.near.isChecked() else "finger"
+        self.save.set_name(f"{kind}{self._name}" if self._name else "")
+
+    def _save(self, name: str, path: str) -> None:
+        self.asked.emit(m.Write(f"picture {name}", path))
+
+    def _finger_page(self) -> QWidget:
+        page = QWidget()
+        bar = QHBoxLayout()
+        for part in (self.near, self.free, self.history):
+            bar.addWidget(part)
+        bar.addWidget(self.save, 1)
+        self.near.clicked.connect(lambda: self._name_saves())
+        layout = QVBoxLayout(page)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self.finger, 1)
+        layout.addWidget(self.why)
+        layout.addWidget(self.player)
+        layout.addLayout(bar)
+        return page

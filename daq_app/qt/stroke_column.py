@@ -1,0 +1,157 @@
+"""The chosen stroke: its curves and edges, its replay, what was decided about it, its numbers and its readings."""
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QTabWidget, QVBoxLayout, QWidget
+
+from daq_app.analyst import messages as m
+from daq_app.analyst.messages import Edge
+from daq_app.analyst.shown import numbers
+from daq_app.analyst.state import AnalystState, chosen
+from daq_app.qt.decisions_bar import DecisionsBar
+from daq_app.qt.parts import label
+from daq_app.qt.picture_view import SaveButtons
+from daq_app.qt.readings_table import ReadingsTable
+from daq_app.qt.stroke_view import StrokeView
+from daq_app.qt.tokens import GRID, Tokens
+from daq_app.qt.transport_bar import TransportBar
+from sessions.report.contents import StrokeFinding
+
+NUMBERS, READINGS = range(2)  # tabs
+
+
+class StrokeColumn(QWidget):
+    """`asked` tells what the work is to do."""
+
+    asked = Signal(object)
+    replayed = Signal()  # to the end of the trial
+
+    def __init__(self, tokens: Tokens) -> None:
+        """Show nothing yet."""
+        super().__init__()
+        self._stroke: StrokeFinding | None = None
+        self._read: m.Read | None = None
+        self._wanted: tuple[int, int] | None = None  # readings that were asked for: stroke, and version of the report
+        self.stroke = StrokeView(tokens)
+        self.stroke.moved.connect(self._dragged)
+        self.player = TransportBar("the recorded readings")
+        self.player.moved.connect(self._moved)
+        self.player.ended.connect(self.replayed.emit)
+        self.decisions = DecisionsBar()
+        self.decisions.asked.connect(self.asked.emit)
+        self.save = SaveButtons("the stroke", self._save)
+        self._numbers = QGridLayout()
+        self._told: tuple[tuple[str, str], ...] = ()
+        self.readings = ReadingsTable()
+        self.tabs = QTabWidget()
+        self.tabs.setAccessibleName("numbers and readings")
+        self._scroll = self._scrolled()
+        self.tabs.addTab(self._scroll, "Numbers")
+        self.tabs.addTab(self.readings, "Readings")
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID // 2)
+        layout.addWidget(self.stroke, 4)
+        bar = QHBoxLayout()
+        bar.addWidget(self.player, 1)
+        bar.addWidget(self.save)
+        layout.addLayout(bar)
+        layout.addWidget(self.decisions)
+        layout.addWidget(self.tabs, 3)
+
+    def show_state(self, state: AnalystState) -> None:
+        """Show what is known now."""
+        row = chosen(state)
+        stroke = None if row is None else row.stroke
+        if stroke is not self._stroke:
+            self._stroke = stroke
+            self.stroke.show_stroke(stroke)
+            self.save.set_name("" if stroke is None else f"stroke {stroke.number}")
+            self.decisions.show_decided(() if stroke is None else tuple(stroke.decided.values()))
+            self._read = None
+        self._show_readings(state)
+        told = numbers(state)
+        if told != self._told:
+            self._told = told
+            self._show_numbers()
+
+    def go_to_window(self) -> None:
+        """Go to the handle where the steady window begins."""
+        self.stroke.handles["steady begin"].setFocus()
+
+    def go_to_readings(self) -> None:
+        """Go to the first reading of the steady window."""
+        self.tabs.setCurrentIndex(READINGS)
+        self.readings.table.setFocus()
+        if self._read is not None and self._stroke is not None and self._stroke.steady is not None:
+            readings = self._read.readings
+            self.readings.go_to(int(readings.time.searchsorted(self._stroke.steady[0])))
+
+    def go_to_numbers(self) -> None:
+        """Go to the numbers."""
+        self.tabs.setCurrentIndex(NUMBERS)
+        self._scroll.setFocus()
+
+    def play(self) -> None:
+        """Play the readings from their beginning as soon as they are there."""
+        self._play_next = True
+
+    _play_next = False
+
+    def _show_readings(self, state: AnalystState) -> None:
+        stroke, read = self._stroke, state.read
+        wanted = None if stroke is None else (stroke.number, state.version)
+        if wanted != self._wanted:
+            self._wanted = wanted  # first, for asking comes back here
+            if stroke is not None:
+                self.asked.emit(m.ShowReadings(stroke.number))
+        if read is not None and (stroke is None or read.stroke != stroke.number):
+            read = None
+        if read is self._read and not (read is None and self.player.slider.maximum()):
+            return
+        self._read = read
+        readings = None if read is None else read.readings
+        self.stroke.show_readings(readings)
+        self.readings.show_readings(readings, None if stroke is None else stroke.steady)
+        times: list[float] = [] if readings is None else readings.time.tolist()
+        self.player.blockSignals(True)
+        self.player.set_times(times, max(len(times) - 1, 0))
+        self.player.blockSignals(False)
+        if times and self._play_next:
+            self._play_next = False
+            self.player.toggle()
+
+    def _show_numbers(self) -> None:
+        while (item := self._numbers.takeAt(0)) is not None:
+            if (old := item.widget()) is not None:
+                old.hide()
+                old.deleteLater()
+        for at, (name, value) in enumerate(self._told):
+            self._numbers.addWidget(label(name, "quiet"), at, 0)
+            self._numbers.addWidget(label(value, wrap=True), at, 1)
+        self._numbers.setRowStretch(len(self._told), 1)
+
+    def _dragged(self, edge: Edge, time: float) -> None:
+        if self._stroke is not None:
+            by, why = self.decisions.who(), self.decisions.reason()
+            self.asked.emit(m.Move(self._stroke.number, edge, time, by, why))
+
+    def _moved(self, at: int) -> None:
+        self.stroke.show_moment(at)
+        if not self.player.playing:
+            self.readings.go_to(at)
+
+    def _save(self, name: str, path: str) -> None:
+        self.asked.emit(m.Write(f"picture {name}", path))
+
+    def _scrolled(self) -> QScrollArea:
+        told = QWidget()
+        told.setLayout(self._numbers)
+        self._numbers.setColumnStretch(1, 1)
+        self._numbers.setContentsMargins(0, 0, 0, 0)
+        scrolled = QScrollArea()  # where there is little room the numbers are scrolled, never cut
+        scrolled.setWidget(told)
+        scrolled.setWidgetResizable(True)
+        told.setObjectName("inside")
+        scrolled.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")
+        scrolled.setAccessibleName("numbers of the stroke and its prediction")
+        return scrolled

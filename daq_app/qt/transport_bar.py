@@ -1,0 +1,156 @@
+"""Play, pause, step, seek and speed: for the replay of readings and for the history of a finger."""
+
+import time
+from bisect import bisect_right
+from collections.abc import Sequence
+
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QSizePolicy, QSlider, QWidget
+
+from daq_app.analyst.transport import SPEEDS, Transport
+from daq_app.qt.parts import button, label, say
+from daq_app.qt.tokens import GRID, TARGET
+
+TICK = 33  # between two pictures while it plays [ms]
+
+
+class TransportBar(QWidget):
+    """Moves through instants; `moved` tells the position of the one that is shown."""
+
+    moved = Signal(int)
+    ended = Signal()
+
+    def __init__(self, what: str, *, tells_time: bool = True) -> None:
+        """Offer to play `what`, which is not there yet; without `tells_time` the instants are no times of it."""
+        super().__init__()
+        self._what = what
+        self._times: Sequence[float] = ()
+        self._transport = Transport(0.0, 0.0, 0.0)
+        self._shown = -1
+        self.play = button("▶", f"play {what}", self.toggle, "small")
+        self.back = button("◀|", f"one step back in {what}", lambda: self.step(-1), "small")
+        self.forward = button("|▶", f"one step forward in {what}", lambda: self.step(+1), "small")
+        for made in (self.play, self.back, self.forward):
+            made.setMinimumWidth(TARGET)
+        self.slider = QSlider(Qt.Orientation.Horizontal)
+        self.slider.setAccessibleName(f"place in {what}")
+        self.slider.setMinimumHeight(TARGET)
+        self.slider.setMinimumWidth(60)
+        self.slider.valueChanged.connect(self._slid)
+        self.speed = QComboBox()
+        self.speed.setAccessibleName(f"speed of {what}")
+        self.speed.setMinimumHeight(TARGET)
+        self.speed.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.speed.addItems([f"× {value:g}" for value in SPEEDS])
+        self.speed.setCurrentIndex(SPEEDS.index(1.0))
+        self.speed.activated.connect(self._at_speed)
+        self.place = label("", "quiet")
+        self.place.setVisible(tells_time)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        for part in (self.play, self.back, self.forward):
+            layout.addWidget(part)
+        layout.addWidget(self.slider, 1)
+        layout.addWidget(self.place)
+        layout.addWidget(self.speed)
+        self._timer = QTimer(self)
+        self._timer.setInterval(TICK)
+        self._timer.timeout.connect(self._tick)
+        self._enable()
+
+    @property
+    def playing(self) -> bool:
+        """Say whether it plays."""
+        return self._transport.playing
+
+    def set_times(self, times: Sequence[float], at: int = 0) -> None:
+        """Take the instants [s], rising, and stand at one of them; none of them: nothing can be played."""
+        self._times = times
+        ends = (times[0], times[-1]) if len(times) else (0.0, 0.0)
+        place = times[at] if len(times) else 0.0
+        self._transport = Transport(*ends, place, self._transport.speed)
+        self._timer.stop()
+        self.slider.blockSignals(True)
+        self.slider.setRange(0, max(len(times) - 1, 0))
+        self.slider.setPageStep(max(len(times) // 20, 1))
+        self.slider.blockSignals(False)
+        self._shown = -1
+        self._enable()
+        if len(times):
+            self._show(place)
+        else:
+            say(self.place, "")
+
+    def toggle(self) -> None:
+        """Play, or pause."""
+        if not len(self._times):
+            return
+        now = time.monotonic()
+        self._transport = self._transport.paused(now) if self.playing else self._transport.played(now)
+        if self.playing:
+            self._timer.start()
+        else:
+            self._timer.stop()
+        self._enable()
+
+    def step(self, by: int) -> None:
+        """Go some instants on or back; what plays is paused."""
+        if len(self._times):
+            if self.playing:
+                self.toggle()
+            self.seek(min(max(self._shown + by, 0), len(self._times) - 1))
+
+    def seek(self, at: int) -> None:
+        """Go to an instant."""
+        self._transport = self._transport.sought(self._times[at], time.monotonic())
+        self._show(self._times[at])
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
+        """Obey Space, the arrows, Home and End."""
+        match event.key():
+            case Qt.Key.Key_Space:
+                self.toggle()
+            case Qt.Key.Key_Left:
+                self.step(-1)
+            case Qt.Key.Key_Right:
+                self.step(+1)
+            case Qt.Key.Key_Home:
+                self.step(-len(self._times))
+            case Qt.Key.Key_End:
+                self.step(+len(self._times))
+            case _:
+                super().keyPressEvent(event)
+
+    def _slid(self, at: int) -> None:
+        if at != self._shown and len(self._times):
+            self.seek(at)
+
+    def _at_speed(self, at: int) -> None:
+        self._transport = self._transport.at_speed(SPEEDS[at], time.monotonic())
+
+    def _tick(self) -> None:
+        now = time.monotonic()
+        self._show(self._transport.at(now))
+        if self._transport.ended(now):
+            self.toggle()
+            self.ended.emit()
+
+    def _show(self, place: float) -> None:
+        at = max(bisect_right(self._times, place) - 1, 0)
+        if at == self._shown:
+            return
+        self._shown = at
+        self.slider.blockSignals(True)
+        self.slider.setValue(at)
+        self.slider.blockSignals(False)
+        say(self.place, f"{self._times[at] - self._times[0]:.3f} s")
+        self.moved.emit(at)
+
+    def _enable(self) -> None:
+        there = len(self._times) > 0
+        for part in (self.play, self.back, self.forward, self.slider, self.speed):
+            part.setEnabled(there)
+        self.play.setText("❚❚" if self.playing else "▶")
+        self.play.setAccessibleName(f"pause {self._what}" if self.playing else f"play {self._what}")

@@ -1,0 +1,88 @@
+"""The trials of a session, and prediction against score: choosing in one chooses everywhere."""
+
+from typing import Any
+
+import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import QListWidget, QVBoxLayout, QWidget
+
+from daq_app.analyst import messages as m
+from daq_app.analyst.shown import points, row_words
+from daq_app.analyst.state import AnalystState, chosen
+from daq_app.qt.parts import label
+from daq_app.qt.tokens import MODEL, Tokens
+
+pg: Any = pyqtgraph  # it has no types
+
+
+class TrialsColumn(QWidget):
+    """`asked` tells which row was chosen."""
+
+    asked = Signal(object)
+
+    def __init__(self, tokens: Tokens) -> None:
+        """Show nothing yet."""
+        super().__init__()
+        self._tokens = tokens
+        self._listed: tuple[str, ...] = ()
+        self.list = QListWidget()
+        self.list.setAccessibleName("trials")
+        self.list.currentRowChanged.connect(self._chosen)
+        self.relation, self.points = self._relation()
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(label("Trials", "section"))
+        layout.addWidget(self.list, 3)
+        layout.addWidget(label("Prediction against score", "section"))
+        layout.addWidget(self.relation, 2)
+
+    def show_state(self, state: AnalystState) -> None:
+        """Show what is known now."""
+        listed = row_words(state)
+        self.list.blockSignals(True)
+        if len(listed) != self.list.count():
+            self.list.clear()
+            self.list.addItems(listed)
+        elif listed != self._listed:
+            for at, words in enumerate(listed):
+                self.list.item(at).setText(words)
+        self._listed = listed
+        self.list.setCurrentRow(state.row if chosen(state) is not None else -1)
+        self.list.blockSignals(False)
+        ring = pg.mkPen(QColor(self._tokens.text))
+        self.points.setData(
+            [
+                {
+                    "pos": (p.score, p.sed_kpa),
+                    "data": p.row,
+                    "size": 18 if p.row == state.row else 11,
+                    "symbol": "s" if p.row == state.row else "o",
+                    "brush": MODEL,
+                    "pen": ring,
+                }
+                for p in points(state)
+            ]
+        )
+
+    def _chosen(self, row: int) -> None:
+        if row >= 0:
+            self.asked.emit(m.Choose(row))
+
+    def _relation(self) -> tuple[Any, Any]:
+        plot = pg.PlotWidget(background=self._tokens.surface)
+        plot.setMinimumSize(120, 100)
+        plot.setAccessibleName("prediction against score: a point chooses its trial")
+        plot.getPlotItem().setMenuEnabled(False)
+        plot.getPlotItem().hideButtons()
+        plot.setLabel("bottom", "mean score")
+        plot.setLabel("left", "SED [kPa]")
+        plot.getAxis("left").enableAutoSIPrefix(False)
+        made = pg.ScatterPlotItem()
+        made.sigClicked.connect(self._point_clicked)
+        plot.addItem(made)
+        return plot, made
+
+    def _point_clicked(self, _item: object, clicked: Any, *_: object) -> None:  # noqa: ANN401  pyqtgraph has no types
+        if len(clicked) and clicked[0].data() is not None:
+            self.asked.emit(m.Choose(int(clicked[0].data())))
