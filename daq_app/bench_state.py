@@ -6,8 +6,9 @@ from typing import Any, Literal
 import numpy as np
 
 from daq_app.bench_load import Load
+from daq_app.life import Life
 from daq_app.recorder import messages as m
-from daq_app.window_messages import DevicesFound, Loaded, Message, Searching
+from daq_app.window_messages import DevicesFound, LifeKnown, Loaded, Message, Searching
 from drivers.catalog import Found
 from drivers.transducer import Health, TransducerInfo
 from sessions.plan import Frame
@@ -46,6 +47,7 @@ class BenchState:
     taring: bool = False
     zero: Zero | None = None  # the latest
     first_zero: Zero | None = None  # the first since the bench was connected
+    life: Life | None = None  # of its serial number, where anything is kept of it
 
 
 def bench_after(bench: BenchState, message: Message) -> BenchState:
@@ -56,10 +58,13 @@ def bench_after(bench: BenchState, message: Message) -> BenchState:
         case m.Tare() | m.Tared() | LoggedEvent(kind="zeroed"):
             return _tared(bench, message)
         case m.HealthReport():
-            peak = bench.peak.latched(Load(tuple(message.peak), message.combined_peak))
+            # The recorder's is complete: latching it would bring back what was acknowledged while it was on its way.
+            peak = Load(tuple(message.peak), message.combined_peak)
             return replace(bench, health=message.health, rate=message.rate, saturated=message.saturated, peak=peak)
         case Loaded(load):
             return replace(bench, load=load, peak=bench.peak.latched(load))
+        case LifeKnown(serial, life) if bench.info is not None and bench.info.serial == serial:
+            return replace(bench, life=life)
         case m.AcknowledgeOverloads():
             return replace(bench, peak=Load(), saturated=0)
         case Searching():
@@ -77,7 +82,7 @@ def _linked(
         case m.Connect(uri):
             return BenchState(link="connecting", uri=uri, found=bench.found)
         case m.Device(info, frame):
-            return replace(bench, link="open", info=info, frame=frame, uri=info.uri, problem=None)
+            return replace(bench, link="open", info=info, frame=frame, uri=info.uri, problem=None, life=None)
         case m.NoDevice():
             return BenchState(found=bench.found, problem=bench.problem)
         case m.LinkDown(sentence):

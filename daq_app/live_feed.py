@@ -31,6 +31,7 @@ class LiveFeed:
         self._stream: int | None = None
         self._take: deque[Live] = deque()
         self._tail = _Tail.empty()
+        self._sequence: int | None = None  # of the newest reading
 
     def device(self, info: TransducerInfo | None) -> None:
         """Begin anew with another transducer, or none."""
@@ -52,9 +53,12 @@ class LiveFeed:
             self._stream = live.stream
             self._take.clear()
             self._tail = _Tail.empty()
+            self._sequence = None
             self.trace.clear()
+        time, drawn = _with_gaps(live.time, self._channels(live, frame), live.sequence, self._sequence)
+        self._sequence = int(live.sequence[-1])
         self._keep(live)
-        self.trace.add(live.time, self._channels(live, frame))
+        self.trace.add(time, drawn)
         felt = live.wrench + info.calibration.wrench(np.array([live.zero]), np.zeros(6))
         return load_of(info.calibration.own(felt), info.calibration.rated)
 
@@ -93,6 +97,16 @@ class LiveFeed:
         drawn[6], drawn[7], drawn[8], drawn[9] = normal, tangential, ratio, speed
         drawn[10:] = position.T
         return np.where(live.status == 0, drawn, np.nan)
+
+
+def _with_gaps(time: Array, drawn: Array, sequence: NDArray[np.int64], before: int | None) -> tuple[Array, Array]:
+    """Return times (n,) and what is drawn (channels, n), with nan where readings are missing: a line is no reading."""
+    first = sequence[0] - 1 if before is None else before
+    gaps = np.flatnonzero(np.diff(sequence, prepend=first) > 1)
+    if not len(gaps):
+        return time, drawn
+    times: Array = np.insert(time, gaps, time[gaps])
+    return times, np.insert(drawn, gaps, np.nan, axis=1)
 
 
 class _Tail:

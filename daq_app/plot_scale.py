@@ -63,11 +63,11 @@ def ticks(low: float, high: float, room: float) -> tuple[float, ...]:
 def times(seconds: float, room: float) -> tuple[float, ...]:
     """Return the instants [s] before now that get a number, where `room` of them find room along the axis.
 
-    >>> times(10.0, 12.0), times(60.0, 3.5)
+    >>> times(10.0, 12.0), times(60.0, 4.5)
     ((-10.0, -8.0, -6.0, -4.0, -2.0, 0.0), (-60.0, -40.0, -20.0, 0.0))
     """
     steps = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
-    step = next((step for step in steps if seconds / step < min(room, 8.0)), seconds)
+    step = next((step for step in steps if seconds / step + 1.0 <= min(room, 8.0)), seconds)
     return tuple(-step * n + 0.0 for n in range(int(seconds / step + 1e-9), -1, -1))
 
 

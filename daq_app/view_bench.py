@@ -7,6 +7,7 @@ from typing import Literal
 from daq_app.bench_load import AXES
 from daq_app.bench_state import BenchState
 from daq_app.recorder import messages as m
+from daq_app.view_life import life_rows
 from daq_app.window_messages import Message
 
 UNITS = ("N", "N", "N", "N mm", "N mm", "N mm")
@@ -31,7 +32,7 @@ class Bar:
     share: float | None  # now; 1 is the rated load; None where no range is stated
     peak: float | None  # since somebody acknowledged
     over: bool
-    noise: str  # standard deviation with its unit
+    noise: str  # standard deviation with its unit; a dash where no zero was measured
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +49,7 @@ class BenchView:
     bars: tuple[Bar, ...]
     tare: str  # its figures
     drift: str
+    life: tuple[tuple[str, str], ...]  # of its serial number
     devices: tuple[DeviceRow, ...]
     searching: bool
     uri: str
@@ -73,6 +75,7 @@ def bench_view(bench: BenchState, *, recording: bool) -> BenchView:
         bars=_bars(bench),
         tare=_tare(bench),
         drift=_drift(bench) if noted else "–",
+        life=life_rows(info, bench.life),
         devices=_devices(bench),
         searching=bench.searching,
         uri=bench.uri,
@@ -125,7 +128,7 @@ def _counters(bench: BenchState) -> tuple[tuple[str, str], ...]:
 
 def _bars(bench: BenchState) -> tuple[Bar, ...]:
     over = set(bench.peak.over)
-    noise = [""] * 6 if bench.zero is None else [_noise(n, u) for n, u in zip(bench.zero.noise, UNITS, strict=True)]
+    noise = ["–"] * 6 if bench.zero is None else [_noise(n, u) for n, u in zip(bench.zero.noise, UNITS, strict=True)]
     rows = zip(AXES, bench.load.axes, bench.peak.axes, noise, strict=True)
     bars = [Bar(name, _share(now), _share(peak), name in over, text) for name, now, peak, text in rows]
     all_together = Bar("combined", _share(bench.load.combined), _share(bench.peak.combined), "combined" in over, "")
@@ -150,8 +153,11 @@ def _tare(bench: BenchState) -> str:
         return "being measured: hands off"
     if bench.zero is None:
         return "not measured"
-    fx, fy, fz = bench.zero.mean[:3]
-    return f"Fx {_mn(fx)}, Fy {_mn(fy)}, Fz {_mn(fz)} mN"
+    zero = bench.zero
+    fx, fy, fz, tx, ty, tz = zero.mean
+    forces = f"Fx {_mn(fx)}, Fy {_mn(fy)}, Fz {_mn(fz)} mN"
+    torques = f"Tx {_nmm(tx)}, Ty {_nmm(ty)}, Tz {_nmm(tz)} N mm"
+    return f"{forces}\n{torques}\n{zero.readings} readings in {zero.duration:.1f} s"
 
 
 def _drift(bench: BenchState) -> str:
@@ -164,7 +170,11 @@ def _drift(bench: BenchState) -> str:
 
 
 def _mn(newtons: float) -> str:
-    return f"{1000 * newtons:.0f}".replace("-", "−")
+    return f"{round(1000 * newtons) + 0:d}".replace("-", "−")
+
+
+def _nmm(torque: float) -> str:
+    return f"{torque + 0.0:.1f}".replace("-0.0", "0.0").replace("-", "−")
 
 
 def _devices(bench: BenchState) -> tuple[DeviceRow, ...]:

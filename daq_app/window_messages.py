@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from daq_app.bench_load import Load
+from daq_app.life import Life
 from daq_app.recorder import messages as m
 from daq_app.stroke_quality import Quality
 from drivers.catalog import Found
@@ -35,6 +36,14 @@ class Loaded:
 
 
 @dataclass(frozen=True, slots=True)
+class LifeKnown:
+    """What a serial number has been through was looked up."""
+
+    serial: str
+    life: Life | None
+
+
+@dataclass(frozen=True, slots=True)
 class Judged:
     """The last stroke was looked at."""
 
@@ -60,5 +69,5 @@ class DrawingFailed:
     sentence: str
 
 
-Own = Tick | Searching | DevicesFound | Loaded | Judged | Dismissed | NewSession | DrawingFailed
+Own = Tick | Searching | DevicesFound | Loaded | LifeKnown | Judged | Dismissed | NewSession | DrawingFailed
 Message = m.Request | m.Report | Own  # what `fold` takes

@@ -19,6 +19,7 @@ from daq_app.qt.parts import Shortened, button, choice, label, regrade, say
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.view_bench import BenchView
+from daq_app.view_life import NAMES
 from daq_app.window_messages import Message
 
 SHOWN_COUNTERS = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated", "lag")
@@ -39,6 +40,8 @@ class BenchPanel(QFrame):
         self._lamp = Lamp(tokens, "transducer")
         self._lamp_words = label("not connected", wrap=True)
         self._fields = {name: label("–", wrap=True) for name in ("serial", "calibration", "rate", "tare", "drift")}
+        self._fields["tare"].setProperty("role", "quiet")  # three lines that nobody reads from afar
+        self._life = {name: label("–", wrap=True) for name in NAMES}
         self._name = Shortened("title")
         self._counters = {name: label("0") for name in SHOWN_COUNTERS}
         self._bars = {name: LoadBar(tokens, name, scale) for name in (*AXES, "combined")}
@@ -72,6 +75,8 @@ class BenchPanel(QFrame):
             ("drift", view.drift),
         ):
             say(self._fields[name], text)
+        for name, text in view.life:
+            say(self._life[name], text)
         for name, text in view.counters:
             if name in self._counters:
                 say(self._counters[name], text)
@@ -139,9 +144,12 @@ class BenchPanel(QFrame):
         acts.addWidget(self.tare, 2)
         acts.addWidget(self.acknowledge, 3)
         layout.addLayout(acts)
-        layout.addLayout(_rows([("zero", self._fields["tare"]), ("drift", self._fields["drift"])]))
         layout.addWidget(label("Readings since the stream began", "section", wrap=True))
         layout.addLayout(_counters([(name, self._counters[name]) for name in SHOWN_COUNTERS]))
+        layout.addWidget(label("Zero", "section"))
+        layout.addLayout(_rows([("mean", self._fields["tare"]), ("drift", self._fields["drift"])]))
+        layout.addWidget(label("This serial number, over its life here", "section", wrap=True))
+        layout.addLayout(_rows([(name, self._life[name]) for name in NAMES]))
         layout.addStretch(1)
         layout.addWidget(self._choice)
         row = QHBoxLayout()

@@ -1,5 +1,6 @@
 """The one crossing between the recorder and the window: what comes is folded, what is done is sent."""
 
+import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -9,6 +10,7 @@ from typing import Protocol
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from daq_app.bench_load import Load
+from daq_app.life import life_of
 from daq_app.live_feed import LiveFeed
 from daq_app.live_model import Settle
 from daq_app.live_model_process import LiveModel
@@ -17,7 +19,7 @@ from daq_app.recorder.messages import REQUESTS, Report, Request
 from daq_app.state import AppState, fold
 from daq_app.take_watch import Judge
 from daq_app.view import View, derive_view
-from daq_app.window_messages import DrawingFailed, Judged, Loaded, Message, Tick
+from daq_app.window_messages import DrawingFailed, Judged, LifeKnown, Loaded, Message, Tick
 from sessions.plan import Frame
 
 FRAME = 16  # between two looks at the recorder [ms]: 60 a second
@@ -121,8 +123,7 @@ class Bridge(QObject):
         if now - self._ticked >= TICK:
             self._ticked = now
             self._fold(Tick(now))
-            self._fold(Loaded(self._load))  # no sooner than it can be read
-            self._load = Load()
+            self._tell_load()
         for report in self._client.poll():
             try:
                 self._take(report)
@@ -151,6 +152,9 @@ class Bridge(QObject):
                 return
             case m.Device(info):
                 self.feed.device(info)
+                self._look_up_life(info.serial)
+            case m.Tared() if self.state.bench.info is not None:
+                self._look_up_life(self.state.bench.info.serial)
             case m.NoDevice():
                 self.feed.device(None)
             case m.SessionBegun(plan=plan, clock_offset_ns=offset):
@@ -160,6 +164,18 @@ class Bridge(QObject):
                 pass
         self._fold(report)
         self._judge.heard(report, self.feed)
+
+    def _tell_load(self) -> None:
+        """Tell the load, no more often than it can be read; an overload is kept by the recorder: look it up."""
+        before, bench = self.state.bench.peak.over, self.state.bench
+        self._fold(Loaded(self._load))
+        self._load = Load()
+        if self.state.bench.peak.over != before and bench.info is not None:
+            self._look_up_life(bench.info.serial)
+
+    def _look_up_life(self, serial: str) -> None:
+        """Look up what a serial number has been through, without holding up the window: its file grows for years."""
+        threading.Thread(target=lambda: self.post(LifeKnown(serial, life_of(serial))), daemon=True).start()
 
     def _settle(self, judged: Judged) -> None:
         """Ask for the full solve of a stroke that was looked at."""

@@ -12,6 +12,7 @@ from daq_app.qt.tokens import MU, SMALL, Tokens, font
 Array = NDArray[np.float64]
 
 ALONG, ACROSS = 60.0, 40.0  # what is drawn of the face [mm]
+MARGIN = 4  # [pixels]
 TOO_SMALL = 0.2  # a picture with fewer pixels to the millimetre is left out
 
 
@@ -87,8 +88,7 @@ class ContactMap(QWidget):
 
     def _per_mm(self) -> float:
         """Return how many pixels a millimetre has."""
-        margin = round(24 * self._scale)
-        return min((self.height() - 2 * margin) / ALONG, (self.width() - 2 * margin) / ACROSS)
+        return min((self.height() - 2 * MARGIN) / ALONG, (self.width() - 2 * MARGIN) / ACROSS)
 
     def _painted_ground(self, ratio: float) -> QPixmap:
         """Return sample, grid, words and arrow."""
@@ -109,10 +109,11 @@ class ContactMap(QWidget):
         painter.drawRoundedRect(box, 4, 4)
         painter.setFont(font(SMALL, self._scale))
         painter.setPen(QColor(t.quiet))
-        words = QRectF(0, 0, self.width(), round(24 * self._scale))
-        painter.drawText(words, Qt.AlignmentFlag.AlignCenter, "distal")
-        words.moveBottom(self.height())
-        painter.drawText(words, Qt.AlignmentFlag.AlignCenter, "proximal · 10 mm grid")
+        beside = QRectF(0, box.top(), box.left() - 2 * MARGIN, box.height())
+        for edge, text in ((Qt.AlignmentFlag.AlignTop, "distal"), (Qt.AlignmentFlag.AlignBottom, "proximal")):
+            painter.drawText(beside, Qt.AlignmentFlag.AlignRight | edge, text)
+        beside.moveLeft(box.right() + 2 * MARGIN)
+        painter.drawText(beside, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom, "10 mm grid")
         painter.setPen(QPen(QColor(t.line), 1, Qt.PenStyle.DotLine))
         for mm in range(-20, 30, 10):
             y = middle.y() - mm * per_mm

@@ -120,7 +120,7 @@ class LoadBar(QWidget):
             painter.fillRect(QRectF(at - 1.5, track.top() - 3, 3, track.height() + 6), colour)
         if right:
             painter.setPen(QColor(t.wrong if bar.over else t.quiet))
-            words = "OVERLOAD" if bar.over else bar.noise or "–"
+            words = "OVERLOAD" if bar.over else bar.noise
             place = QRectF(self.width() - right + 4, 0, right - 4, self.height())
             painter.drawText(place, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, words)
 

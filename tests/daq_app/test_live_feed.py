@@ -91,6 +91,17 @@ def test_the_take_holds_every_reading_since_it_began_with_its_number_and_time():
     assert take.raw[0] == pytest.approx(sliding(300)[0])
 
 
+def test_readings_that_are_missing_leave_a_gap_however_few_they_are():
+    feed = LiveFeed()
+    feed.device(INFO)
+    feed.add(live(0, sliding(100)), FRAME)
+    feed.add(live(103, sliding(100)), FRAME)
+    drawn = feed.trace.columns(0.0, 0.05, 500)
+    [gap] = np.flatnonzero(np.isnan(drawn.values[CHANNELS.index("N")]))
+    assert drawn.time[gap - 1] == 99 / RATE
+    assert drawn.time[gap + 1] == 103 / RATE
+
+
 def test_a_new_stream_begins_a_new_picture():
     feed = LiveFeed()
     feed.device(INFO)

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from daq_app.bench_load import Load
+from daq_app.life import Life
 from daq_app.recorder import messages as m
 from daq_app.state import AppState, fold
 from daq_app.stroke_quality import Quality
 from daq_app.view import derive_view
-from daq_app.window_messages import Dismissed, DrawingFailed, Judged, Loaded, NewSession, Tick
+from daq_app.window_messages import Dismissed, DrawingFailed, Judged, LifeKnown, Loaded, NewSession, Tick
 from drivers.calibration import Calibration
 from drivers.transducer import Health, TransducerInfo
 from sessions import steps
@@ -274,10 +275,27 @@ def test_an_overload_stays_until_somebody_acknowledges_it():
     assert bench.bars[-1].peak == 0.0
 
 
+def test_what_was_acknowledged_does_not_come_back_with_a_report_that_was_on_its_way():
+    loaded = m.HealthReport(Health(), 7000.0, (0.0,) * 6, (1.4,) * 6, 0, 0.0, 1.4)
+    eased = m.HealthReport(Health(), 7000.0, (0.0,) * 6, (0.2,) * 6, 0, 0.0, 0.2)
+    state = after(m.Device(INFO, None), loaded, m.AcknowledgeOverloads(), loaded, eased)
+    assert not derive_view(state).bench.can_acknowledge
+
+
+def test_the_bench_tells_what_a_serial_number_has_been_through():
+    life = Life(12, "2026-03-02", (0.041, 0, 0, 1.3, 0, 0), (0.0042,) * 3 + (0.052,) * 3, 2, "2026-10-01")
+    state = after(m.Device(INFO, None), LifeKnown("another", None), LifeKnown(INFO.serial, life))
+    rows = dict(derive_view(state).bench.life)
+    assert rows["zeros"] == "12 since 2026-03-02"
+    assert rows["noise"] == "4.2 mN, 0.052 N mm usually"
+    assert rows["overloads"] == "2, the last on 2026-10-01"
+    assert set(dict(derive_view(after(m.Device(INFO, None), state=state)).bench.life).values()) == {"–"}
+
+
 def test_a_tare_shows_its_figures_in_newtons_and_how_far_the_zero_has_moved_since_the_first():
     first = m.Tared((8e3, -7e3, -1e3, 0.0, 0.0, 0.0), (4e3,) * 3 + (50.0,) * 3, (0.0,) * 6, 200, 1.0)
     bench = derive_view(after(m.Device(INFO, None), first)).bench
-    assert bench.tare == "Fx 8, Fy −7, Fz −1 mN"
+    assert bench.tare == "Fx 8, Fy −7, Fz −1 mN\nTx 0.0, Ty 0.0, Tz 0.0 N mm\n200 readings in 1.0 s"
     assert bench.drift == "first zero"
     assert bench.bars[0].noise == "4 mN"
     assert bench.bars[3].noise == "0.05 N mm"

@@ -1,0 +1,36 @@
+"""What a serial number has been through, as the bench shows it: zeros, how far they moved, its noise, its overloads."""
+
+from daq_app.life import Life
+from drivers.transducer import TransducerInfo
+
+NAMES = ("zeros", "moved", "noise", "overloads")
+
+
+def life_rows(info: TransducerInfo | None, life: Life | None) -> tuple[tuple[str, str], ...]:
+    """Return a line for each of `NAMES`.
+
+    >>> life = Life(12, "2026-03-02", (0.0412, 0, -0.003, 1.26, 0, 0), (0.0042,) * 3 + (0.052,) * 3, 2, "2026-10-01")
+    >>> dict(life_rows(None, life))["moved"], dict(life_rows(None, life))["overloads"]
+    ('41 mN, 1.3 N mm since the first', '2, the last on 2026-10-01')
+    """
+    if life is None or not life.zeros:
+        why = "none kept of a simulated one" if info is not None and info.simulated else "–"
+        overloads = "–" if life is None else _overloads(life)
+        return tuple(zip(NAMES, (why, "–", "–", overloads), strict=True))
+    told = (
+        f"{life.zeros} since {life.since}",
+        "–" if life.zeros == 1 else f"{_greatest(life.drift)} since the first",
+        f"{_greatest(life.noise)} usually",
+        _overloads(life),
+    )
+    return tuple(zip(NAMES, told, strict=True))
+
+
+def _overloads(life: Life) -> str:
+    return f"{life.overloads}, the last on {life.last_overload}" if life.overloads else "none"
+
+
+def _greatest(six: tuple[float, ...]) -> str:
+    """Return the greatest force and the greatest torque of six."""
+    force, torque = max(map(abs, six[:3])), max(map(abs, six[3:]))
+    return f"{1000 * force:.2g} mN, {torque:.2g} N mm"
