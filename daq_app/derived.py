@@ -14,6 +14,7 @@ from sessions.decisions import Decisions
 from sessions.prediction import PredictionOptions, SessionPrediction, predict
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import store_derived
+from sessions.side_by_side import with_alternatives
 from sessions.study_file import is_study
 from sessions.toml_file import from_table
 from sessions.visits import force_visit
@@ -38,7 +39,9 @@ def predicted(
         console.progress(part, "predicting")
         return True
 
-    prediction = predict(analysis, recording.plan, options, shown)
+    asked = options or PredictionOptions(beside="small")
+    prediction = predict(analysis, recording.plan, asked, lambda part: shown(0.5 * part))
+    prediction = with_alternatives(prediction, lambda part: shown(0.5 + 0.5 * part))
     _keep(recording, PREDICTION, prediction.to_dict(), console)
     return prediction
 
@@ -51,7 +54,7 @@ def predicted_again(recording: Recording, analysis: Analysis, stored: Mapping[st
     options = from_table(stored.get("options", {}), PredictionOptions, PREDICTION)
     stimuli: list[Mapping[str, Any]] = [row.get("stimulus") or {} for row in stored.get("trials", ())]
     blind = all(stimulus.get("index") is None for stimulus in stimuli)
-    return predict(analysis, (recording if blind else revealed(recording)).plan, options).to_dict()
+    return with_alternatives(predict(analysis, (recording if blind else revealed(recording)).plan, options)).to_dict()
 
 
 def settings_of(stored: Mapping[str, Any]) -> AnalysisSettings:

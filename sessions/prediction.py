@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Literal
 
+from sessions.alternative import Alternative, Way
 from sessions.analysis import Analysis, FrictionParameters, Stroke
 from sessions.analysis.area import FIXED, AreaLaw
 from sessions.decisions import Decision
@@ -19,7 +20,7 @@ from solver.matching import matching_depths
 from solver.prediction import History, Prediction, Skin
 from solver.reference import SCALE
 from solver.reference import Reading as TauReading
-from solver.scene import Friction, Loading, Scene, Slide, Solve
+from solver.scene import Friction, Loading, Scene, SceneError, Slide, Solve
 from solver.solution import answers
 from solver.stepping import March
 
@@ -27,6 +28,8 @@ SLIDES: dict[int, Slide] = {PROXIMAL_TO_DISTAL: "+x", DISTAL_TO_PROXIMAL: "-x"}
 DEFAULT_SPEED = 20.0  # where none was measured [mm/s]; rescales the time of a course and nothing else
 
 Progress = Callable[[float], bool]
+
+_LEFT_OUT = ("prediction", "stimulus", "alternatives")  # of a row as plain data: told in words of their own
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +41,7 @@ class PredictionOptions:
     indentation: float | None = None  # [mm], instead of each block's own
     course: Literal["steady", "history"] = "history"
     kinematics: Literal["small", "finite"] = "small"
+    beside: Literal["none", "small", "both"] = "none"  # also otherwise, see `sessions.side_by_side`; at which strain
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,6 +74,7 @@ class TrialPrediction:
     wall_s: float | None  # the solve [s]
     prediction: Prediction | None  # all that the solver found
     reasons: Mapping[str, str]
+    alternatives: tuple[Alternative, ...] = ()  # the same trial predicted otherwise, where that was asked for
 
     @property
     def history(self) -> History | None:
@@ -82,9 +87,10 @@ class TrialPrediction:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        row = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("prediction", "stimulus")}
+        row = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _LEFT_OUT}
         row["stimulus"] = None if self.stimulus is None else asdict(self.stimulus)
         row["reasons"] = dict(self.reasons)
+        row["alternatives"] = [asdict(one) for one in self.alternatives]
         row["solver"] = None if self.prediction is None else self.prediction.to_dict()
         return row
 
@@ -218,6 +224,32 @@ def seds_with(
 def settled(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | None, ...]:
     """Return what the solver finds of each scene, None where it finds no settled state. Raises Cancelled."""
     return tuple(None if isinstance(one, SolveFailure) else one for one in answers(scenes, progress))
+
+
+def solved(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | str, ...]:
+    """Return what the solver finds of each scene, or why it finds no settled state. Raises Cancelled."""
+    return tuple(str(one) if isinstance(one, SolveFailure) else one for one in answers(scenes, progress))
+
+
+def scene_along(row: TrialPrediction, way: Way, options: PredictionOptions) -> Scene | str:
+    """Return the settled scene of a predicted trial along a way, or why there is none."""
+    if row.mu is None or row.tau_max is None or row.direction is None or row.indentation is None:
+        return row.reasons.get("sed", "The trial gives no scene.")
+    if way.driven == "force" and (row.measured_normal is None or row.measured_normal <= 0.0):
+        return "The stroke gives no steady normal force."
+    try:
+        scene = _scene(row, replace(options, kinematics=way.kinematics, course="steady"))
+    except SceneError as unfit:  # a finger whose tissues have no law at that strain
+        return str(unfit)
+    tau_max = row.tau_max / SCALE[options.tau_reading] * SCALE[way.tau_reading]
+    scene = replace(scene, friction=replace(scene.friction, tau_max=tau_max))
+    if way.driven == "other way":
+        return _opposite(scene)
+    if way.driven == "force":
+        slide, speed = scene.loading.slide, scene.loading.speed
+        force = Loading(slide=slide, speed=speed, normal_force=row.measured_normal, force_unit="N")
+        return replace(scene, loading=force)
+    return scene
 
 
 def scenes_of(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> Mapping[int, Scene]:

@@ -5,6 +5,7 @@ the same press slid the other way.
 """
 
 import argparse
+from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,9 @@ from daq_app.cli import WrongValue
 from daq_app.console import Console, number, table
 from daq_app.derived import analysed, predicted, visit
 from sessions.afferent import AfferentSettings, parameters, session_firing
+from sessions.alternative import Alternative
 from sessions.analysis import Analysis
-from sessions.prediction import PredictionOptions, SessionPrediction
+from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction
 from sessions.sealing import SEAL, seal_prediction
 from sessions.toml_file import load_toml
 from sessions.uncertainty import SedInterval, sed_intervals
@@ -45,6 +47,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scene", type=Path, metavar="FILE", help="scene file with another finger")
     parser.add_argument("--indentation", type=float, metavar="MM", help="instead of each block's own")
     parser.add_argument(
+        "--beside",
+        choices=["none", "small", "both"],
+        default="small",
+        help="also with tau_max as printed, at the measured force, and slid the other way: at small strain (about a "
+        "second), or at finite strain too (about a minute: limits are looked for where a surface has no settled slide)",
+    )
+    parser.add_argument(
         "--intervals", action="store_true", help="also what the uncertainty of friction makes of each SED (more solves)"
     )
     parser.add_argument(
@@ -70,6 +79,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         scene=None if options.scene is None else load_toml(options.scene, Scene),
         indentation=options.indentation,
         kinematics=options.kinematics,
+        beside=options.beside,
     )
     recording = visit(options.session, options.subject)
     analysis = analysed(recording, console, area_law(options))
@@ -96,6 +106,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         for row in prediction.trials
     ]
     console.say(table(rows, head=HEAD) if rows else "nothing to predict: no forces were recorded")
+    _print_beside(prediction, console)
     if intervals:
         console.say("\n95 % interval of SED from the uncertainty of friction alone, not the model's own error:")
         console.say(table([_row(one) for one in intervals], head=INTERVALS))
@@ -108,6 +119,36 @@ def run(options: argparse.Namespace, console: Console) -> int:
             missing = ", ".join(name for name, why in row.reasons.items() if why == reason)
             console.say(f"{row.trial or (row.stroke or 0) + 1}: no {missing.replace('_', ' ')}: {reason}")
     return 3 if any(row.sed is None for row in prediction.trials) else 0
+
+
+def _print_beside(prediction: SessionPrediction, console: Console) -> None:
+    """Print the SED of each trial along every way it was predicted, and why it has none."""
+    rows = [row for row in prediction.trials if row.alternatives]
+    if not rows:
+        return
+    console.say("\nthe same trials side by side, SED [kPa] with model N [N], or the depth [mm] found under a force:")
+    head = ["trial", *(f"({n})" for n, _ in enumerate(rows[0].alternatives, 1))]
+    console.say(table([[_called(row), *map(_cell, row.alternatives)] for row in rows], head=head))
+    for number_of, one in enumerate(rows[0].alternatives, 1):
+        console.say(f"  ({number_of}) {one.way.sentence}")
+    missing: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
+    for row in rows:
+        for one in row.alternatives:
+            if one.sed is None:
+                missing[one.way.sentence, one.reason].append(_called(row))
+    for (way, reason), trials in missing.items():
+        console.say(f"{', '.join(trials)}: none for {way}: {reason}")
+
+
+def _called(row: TrialPrediction) -> str:
+    return str(row.trial or (row.stroke or 0) + 1)
+
+
+def _cell(one: Alternative) -> str:
+    if one.sed is None:
+        return "–"
+    beside = one.indentation if one.way.driven == "force" else one.normal_force
+    return f"{number(one.sed * 1e3, 4)} ({number(beside)})"
 
 
 def _intervals(analysis: Analysis, prediction: SessionPrediction, console: Console) -> tuple[SedInterval, ...]:

@@ -62,7 +62,7 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     made.mkdir(parents=True)
     write_json(derived / "dataset_description.json", _dataset(recording, "derivative", source.analysis["made_by"]))
     (derived / "README.md").write_text(_readme(recording), encoding="utf-8")
-    for name in ("answers", "positions", "strokes", "friction", "flaws", "decisions", "predictions"):
+    for name in ("answers", "positions", "strokes", "friction", "flaws", "decisions", "predictions", "alternatives"):
         if name in found:
             _write_table(made / f"{names.stem}_desc-{name}_beh", found[name], recording, task)
 

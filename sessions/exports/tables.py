@@ -66,8 +66,17 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
         made = (*made, _of("decisions", "what people decided, in force", analysis["decisions"], _DECISION))
     if prediction is None:
         return made
-    rows = [{key: value for key, value in row.items() if key != "solver"} for row in prediction["trials"]]
-    return (*made, _of("predictions", "what the finite-element finger predicts for each trial", rows, _PREDICTION))
+    rows = [{k: v for k, v in row.items() if k not in ("solver", "alternatives")} for row in prediction["trials"]]
+    predicted = _of("predictions", "what the finite-element finger predicts for each trial", rows, _PREDICTION)
+    otherwise = [
+        {"trial": row["trial"], **one["way"], **{k: v for k, v in one.items() if k != "way"}}
+        for row in prediction["trials"]
+        for one in row.get("alternatives", ())
+    ]
+    if not otherwise:
+        return (*made, predicted)
+    meaning = "the same trials predicted otherwise: another reading of tau_max, another strain, by the measured force"
+    return (*made, predicted, _of("alternatives", meaning, otherwise, _ALTERNATIVE))
 
 
 def trials(recording: Recording) -> Table:
@@ -260,6 +269,19 @@ _POSITION = {
     "trial": ("", "number of the trial"),
     "instant": ("s", "session clock"),
     "position": ("", "on the line, 0 to 100"),
+}
+_ALTERNATIVE = {
+    "trial": ("", "number of the trial"),
+    "kinematics": ("", "small or finite strain"),
+    "tau_reading": ("", "of tau_max: computed, or as-printed (a hundredth)"),
+    "driven": ("", "by depth, by force (measured), or by depth the other way"),
+    "tau_max": ("MPa", "traction bound the model was given"),
+    "indentation": ("mm", "given, or found under the force"),
+    "sed": ("MPa", "strain-energy density averaged over the ending"),
+    "error_estimate": ("", "relative, of sed"),
+    "normal_force": ("N", "the model's, times the finger's width"),
+    "tangential_force": ("N", "likewise"),
+    "reason": ("", "why there is no number"),
 }
 _PREDICTION = {
     "trial": ("", "number of the trial"),

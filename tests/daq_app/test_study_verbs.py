@@ -38,7 +38,7 @@ def test_a_blinded_study_is_run_predicted_unblinded_and_reported(study, capsys):
     assert (plan.finger.tip_radius, plan.contact_angle, plan.blocks[0].indentation) == (5.5, 40.0, 1.8)
     assert plan.trials == Recording.open(study / "P01_scores").plan.trials
 
-    code, blind = said(capsys, "predict", study, "--subject", "P01")
+    code, blind = said(capsys, "predict", study, "--subject", "P01", "--beside", "none")
     assert code in (0, 3)
     assert {row["stimulus"]["index"] for row in blind["trials"]} == {None}
     assert blind["options"]["scene"]["finger"]["tip_radius"] == 5.5
@@ -54,7 +54,7 @@ def test_a_blinded_study_is_run_predicted_unblinded_and_reported(study, capsys):
     assert said(capsys, "verify", study / "P01_forces")[0] in (0, 3)
     assert said(capsys, "replay", study / "P01_scores", "--fast")[1]["differences"] == []
 
-    code, clear = said(capsys, "predict", study, "--subject", "P01")
+    code, clear = said(capsys, "predict", study, "--subject", "P01", "--beside", "none")
     assert sorted(row["stimulus"]["index"] for row in clear["trials"])[:2] == [0, 0]
     assert [row["sed"] for row in clear["trials"]] == [row["sed"] for row in blind["trials"]]
     assert run(["unblind", str(study), "--by", "E02"]) == 1

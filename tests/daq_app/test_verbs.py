@@ -56,7 +56,7 @@ def test_a_simulated_session_analyses_without_a_flaw_and_says_simulated(session,
 
 
 def test_every_file_of_a_simulated_session_says_simulated(session, capsys):
-    run(["predict", str(session)])
+    run(["predict", str(session), "--beside", "none"])
     capsys.readouterr()
     for name in ("session.json", "analysis.json", "prediction.json", "MANIFEST.json"):
         assert "SIMULATED" in (session / name).read_text()[:200], name
@@ -72,9 +72,9 @@ def test_predict_gives_a_row_a_trial_and_verify_makes_it_again(session, capsys):
 
 
 def test_the_reading_of_tau_as_printed_is_asked_for_by_name_and_is_a_hundredth(session, capsys):
-    run(["predict", str(session), "--json"])
+    run(["predict", str(session), "--beside", "none", "--json"])
     computed = printed(capsys)["trials"]
-    run(["predict", str(session), "--json", "--tau", "as-printed"])
+    run(["predict", str(session), "--beside", "none", "--json", "--tau", "as-printed"])
     document = printed(capsys)
     assert document["options"]["tau_reading"] == "as-printed"
     for row, other in zip(document["trials"], computed, strict=True):
@@ -177,7 +177,7 @@ def test_verify_names_a_document_beside_the_recording_that_cannot_be_read(sessio
 
 
 def test_a_session_goes_out_and_comes_back_by_the_command_line(session, tmp_path, capsys):
-    run(["predict", str(session)])
+    run(["predict", str(session), "--beside", "none"])
     capsys.readouterr()
     out = tmp_path / "out"
     assert run(["export", str(session), "--format", "csv", "--out", str(out), "--json"]) == 0

@@ -1,0 +1,109 @@
+"""The same trials under both readings, by depth and by force, and at both strains: each held against its own solve."""
+
+import json
+from dataclasses import replace
+
+import pytest
+from test_prediction import MEASURED, PLAN, analysis, parameters, stroke
+
+from sessions import side_by_side
+from sessions.alternative import Way
+from sessions.prediction import PredictionOptions, predict
+from sessions.side_by_side import with_alternatives
+from solver.reference import STICKINESS
+from solver.scene import Friction, Loading, Scene, Solve
+from solver.solution import solve
+
+TRIALS = (2, 4)  # stickiness 20 and 80: with and without a settled slide at finite strain
+SMALL = [("computed", "depth"), ("as-printed", "depth"), ("computed", "force"), ("computed", "other way")]
+
+
+def given(trials=TRIALS):
+    surfaces = {number: STICKINESS[number - 1] for number in trials}
+    friction = [parameters(n, s.mu, s.printed_bound * 1e-2, 1, s.speed) for n, s in surfaces.items()]
+    friction = [replace(one, stroke=at) for at, one in enumerate(friction)]
+    block = replace(PLAN.blocks[0], trials=tuple(PLAN.blocks[0].trials[n - 1] for n in trials))
+    return analysis(friction, [stroke(n) for n in trials]), replace(PLAN, blocks=(block,))
+
+
+@pytest.fixture(scope="module")
+def beside():
+    return with_alternatives(predict(*given(), PredictionOptions(course="steady", beside="small")))
+
+
+def of(row, reading, driven, kinematics="small"):
+    return next(one for one in row.alternatives if one.way == Way(kinematics, reading, driven))
+
+
+def test_every_trial_is_told_along_the_same_named_ways(beside):
+    for row in beside.trials:
+        assert [(one.way.tau_reading, one.way.driven) for one in row.alternatives] == SMALL
+        assert all(one.sed > 0 and one.error_estimate < 0.01 and one.reason == "" for one in row.alternatives)
+
+
+def test_the_way_of_the_prediction_itself_is_not_solved_again(beside):
+    for row in beside.trials:
+        assert of(row, "computed", "depth").sed == row.sed
+
+
+def test_the_reading_as_printed_is_that_of_a_scene_with_a_hundredth_of_the_bound(beside):
+    for row, number in zip(beside.trials, TRIALS, strict=True):
+        bound = STICKINESS[number - 1].printed_bound * 1e-4
+        scene = Scene(friction=Friction(row.mu, bound), loading=Loading(2.0), solve=Solve("small", "steady"))
+        found = of(row, "as-printed", "depth")
+        assert found.tau_max == pytest.approx(bound)
+        assert found.sed == pytest.approx(solve(scene).sed_ending, rel=2e-3)
+
+
+def test_pressed_with_the_force_measured_the_model_has_that_force_at_the_depth_that_matches(beside):
+    for row in beside.trials:
+        found = of(row, "computed", "force")
+        assert found.normal_force == pytest.approx(MEASURED, rel=1e-6)
+        assert found.indentation == pytest.approx(row.matching_depth, rel=5e-3)
+        assert found.tangential_force <= row.mu * MEASURED * (1 + 1e-9)
+
+
+def test_the_other_way_is_the_same_depth_slid_back(beside):
+    for row in beside.trials:
+        found = of(row, "computed", "other way")
+        assert found.indentation == row.indentation
+        assert found.sed == pytest.approx(row.opposite_sed, rel=5e-3)
+
+
+def test_it_is_plain_data_for_files_and_reports(beside):
+    rows = json.loads(json.dumps(beside.to_dict()))["trials"]
+    assert rows[0]["alternatives"][1]["way"] == {"kinematics": "small", "tau_reading": "as-printed", "driven": "depth"}
+
+
+def test_a_trial_without_friction_or_force_says_why_along_each_way():
+    found, plan = given((2,))
+    without = replace(found, strokes=(stroke(2, normal_force=None),))
+    options = PredictionOptions(course="steady", beside="small")
+    (row,) = with_alternatives(predict(without, plan, options)).trials
+    assert of(row, "computed", "force").reason == "The stroke gives no steady normal force."
+    (row,) = with_alternatives(predict(replace(found, friction=(), strokes=()), plan, options)).trials
+    assert {one.reason for one in row.alternatives} == {"No stroke was found in this trial."}
+
+
+def test_where_a_strain_has_no_settled_slide_the_solver_s_sentence_stands_in_its_place(monkeypatch):
+    asked = []
+
+    def none(scenes, _progress):
+        asked.extend(scene.solve.kinematics for scene in scenes)
+        return tuple("There is none." for _ in scenes)
+
+    monkeypatch.setattr(side_by_side, "solved", none)
+    (row,) = with_alternatives(predict(*given((4,)), PredictionOptions(course="steady", beside="both"))).trials
+    assert asked == ["small"] * 3 + ["finite"] * 4
+    assert of(row, "computed", "depth", "finite").sed is None
+    assert of(row, "computed", "depth", "finite").reason == "There is none."
+    assert of(row, "computed", "depth").sed == row.sed
+
+
+@pytest.mark.slow
+def test_at_finite_strain_a_sticky_surface_has_no_settled_slide_at_its_depth_and_says_so():
+    (row,) = with_alternatives(predict(*given((4,)), PredictionOptions(course="steady", beside="both"))).trials
+    found = of(row, "computed", "depth", "finite")
+    assert found.sed is None
+    assert "settled sliding up to mu" in found.reason
+    assert of(row, "as-printed", "depth", "finite").sed > 0
