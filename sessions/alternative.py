@@ -8,7 +8,7 @@ Driven = Literal["depth", "force", "other way"]
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class Variant:
     """How a trial is predicted."""
 
     kinematics: Literal["small", "finite"]
@@ -17,9 +17,9 @@ class Way:
 
     @property
     def sentence(self) -> str:
-        """The way, for people.
+        """It, for people.
 
-        >>> Way("finite", "as-printed", "depth").sentence
+        >>> Variant("finite", "as-printed", "depth").sentence
         'finite strain, tau_max as printed, at the planned depth'
         """
         reading = "tau_max as printed, " if self.tau_reading == "as-printed" else ""
@@ -42,9 +42,9 @@ _KINDS: Mapping[str, tuple[Literal["small", "finite"], ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class Alternative:
-    """The settled state of a trial along one way. A number is None where `reason` says why."""
+    """The settled state of a trial in one variant. A number is None where `reason` says why."""
 
-    way: Way
+    variant: Variant
     tau_max: float | None  # that the model got [MPa]
     indentation: float | None  # given, or found under the force [mm]
     sed: float | None  # averaged over the ending [MPa]
@@ -54,10 +54,10 @@ class Alternative:
     reason: str = ""
 
 
-def ways(beside: Literal["none", "small", "both"]) -> Iterator[Way]:
-    """Yield the ways asked for: those at small strain, or those at finite strain too."""
+def variants(beside: Literal["none", "small", "both"]) -> Iterator[Variant]:
+    """Yield the variants asked for: those at small strain, or those at finite strain too."""
     for kinematics in _KINDS[beside]:
-        yield Way(kinematics, "computed", "depth")
-        yield Way(kinematics, "as-printed", "depth")
-        yield Way(kinematics, "computed", "force")
-        yield Way(kinematics, "computed", "other way")
+        yield Variant(kinematics, "computed", "depth")
+        yield Variant(kinematics, "as-printed", "depth")
+        yield Variant(kinematics, "computed", "force")
+        yield Variant(kinematics, "computed", "other way")

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Literal
 
-from sessions.alternative import Alternative, Way
+from sessions.alternative import Alternative, Variant
 from sessions.analysis import Analysis, FrictionParameters, Stroke
 from sessions.analysis.area import FIXED, AreaLaw
 from sessions.decisions import Decision
@@ -231,21 +231,21 @@ def solved(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[P
     return tuple(str(one) if isinstance(one, SolveFailure) else one for one in answers(scenes, progress))
 
 
-def scene_along(row: TrialPrediction, way: Way, options: PredictionOptions) -> Scene | str:
-    """Return the settled scene of a predicted trial along a way, or why there is none."""
+def scene_along(row: TrialPrediction, variant: Variant, options: PredictionOptions) -> Scene | str:
+    """Return the settled scene of a predicted trial in a variant, or why there is none."""
     if row.mu is None or row.tau_max is None or row.direction is None or row.indentation is None:
         return row.reasons.get("sed", "The trial gives no scene.")
-    if way.driven == "force" and (row.measured_normal is None or row.measured_normal <= 0.0):
+    if variant.driven == "force" and (row.measured_normal is None or row.measured_normal <= 0.0):
         return "The stroke gives no steady normal force."
     try:
-        scene = _scene(row, replace(options, kinematics=way.kinematics, course="steady"))
+        scene = _scene(row, replace(options, kinematics=variant.kinematics, course="steady"))
     except SceneError as unfit:  # a finger whose tissues have no law at that strain
         return str(unfit)
-    tau_max = row.tau_max / SCALE[options.tau_reading] * SCALE[way.tau_reading]
+    tau_max = row.tau_max / SCALE[options.tau_reading] * SCALE[variant.tau_reading]
     scene = replace(scene, friction=replace(scene.friction, tau_max=tau_max))
-    if way.driven == "other way":
+    if variant.driven == "other way":
         return _opposite(scene)
-    if way.driven == "force":
+    if variant.driven == "force":
         slide, speed = scene.loading.slide, scene.loading.speed
         force = Loading(slide=slide, speed=speed, normal_force=row.measured_normal, force_unit="N")
         return replace(scene, loading=force)

@@ -122,7 +122,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _print_beside(prediction: SessionPrediction, console: Console) -> None:
-    """Print the SED of each trial along every way it was predicted, and why it has none."""
+    """Print the SED of each trial in every variant it was predicted, and why it has none."""
     rows = [row for row in prediction.trials if row.alternatives]
     if not rows:
         return
@@ -130,14 +130,14 @@ def _print_beside(prediction: SessionPrediction, console: Console) -> None:
     head = ["trial", *(f"({n})" for n, _ in enumerate(rows[0].alternatives, 1))]
     console.say(table([[_called(row), *map(_cell, row.alternatives)] for row in rows], head=head))
     for number_of, one in enumerate(rows[0].alternatives, 1):
-        console.say(f"  ({number_of}) {one.way.sentence}")
+        console.say(f"  ({number_of}) {one.variant.sentence}")
     missing: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
     for row in rows:
         for one in row.alternatives:
             if one.sed is None:
-                missing[one.way.sentence, one.reason].append(_called(row))
-    for (way, reason), trials in missing.items():
-        console.say(f"{', '.join(trials)}: none for {way}: {reason}")
+                missing[one.variant.sentence, one.reason].append(_called(row))
+    for (variant, reason), trials in missing.items():
+        console.say(f"{', '.join(trials)}: none for {variant}: {reason}")
 
 
 def _called(row: TrialPrediction) -> str:
@@ -147,7 +147,7 @@ def _called(row: TrialPrediction) -> str:
 def _cell(one: Alternative) -> str:
     if one.sed is None:
         return "–"
-    beside = one.indentation if one.way.driven == "force" else one.normal_force
+    beside = one.indentation if one.variant.driven == "force" else one.normal_force
     return f"{number(one.sed * 1e3, 4)} ({number(beside)})"
 
 

@@ -69,7 +69,7 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
     rows = [{k: v for k, v in row.items() if k not in ("solver", "alternatives")} for row in prediction["trials"]]
     predicted = _of("predictions", "what the finite-element finger predicts for each trial", rows, _PREDICTION)
     otherwise = [
-        {"trial": row["trial"], **one["way"], **{k: v for k, v in one.items() if k != "way"}}
+        {"trial": row["trial"], **one["variant"], **{k: v for k, v in one.items() if k != "variant"}}
         for row in prediction["trials"]
         for one in row.get("alternatives", ())
     ]

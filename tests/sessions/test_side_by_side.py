@@ -7,7 +7,7 @@ import pytest
 from test_prediction import MEASURED, PLAN, analysis, parameters, stroke
 
 from sessions import side_by_side
-from sessions.alternative import Way
+from sessions.alternative import Variant
 from sessions.prediction import PredictionOptions, predict
 from sessions.side_by_side import with_alternatives
 from solver.reference import STICKINESS
@@ -32,16 +32,16 @@ def beside():
 
 
 def of(row, reading, driven, kinematics="small"):
-    return next(one for one in row.alternatives if one.way == Way(kinematics, reading, driven))
+    return next(one for one in row.alternatives if one.variant == Variant(kinematics, reading, driven))
 
 
 def test_every_trial_is_told_along_the_same_named_ways(beside):
     for row in beside.trials:
-        assert [(one.way.tau_reading, one.way.driven) for one in row.alternatives] == SMALL
+        assert [(one.variant.tau_reading, one.variant.driven) for one in row.alternatives] == SMALL
         assert all(one.sed > 0 and one.error_estimate < 0.01 and one.reason == "" for one in row.alternatives)
 
 
-def test_the_way_of_the_prediction_itself_is_not_solved_again(beside):
+def test_the_variant_of_the_prediction_itself_is_not_solved_again(beside):
     for row in beside.trials:
         assert of(row, "computed", "depth").sed == row.sed
 
@@ -72,10 +72,14 @@ def test_the_other_way_is_the_same_depth_slid_back(beside):
 
 def test_it_is_plain_data_for_files_and_reports(beside):
     rows = json.loads(json.dumps(beside.to_dict()))["trials"]
-    assert rows[0]["alternatives"][1]["way"] == {"kinematics": "small", "tau_reading": "as-printed", "driven": "depth"}
+    assert rows[0]["alternatives"][1]["variant"] == {
+        "kinematics": "small",
+        "tau_reading": "as-printed",
+        "driven": "depth",
+    }
 
 
-def test_a_trial_without_friction_or_force_says_why_along_each_way():
+def test_a_trial_without_friction_or_force_says_why_in_each_variant():
     found, plan = given((2,))
     without = replace(found, strokes=(stroke(2, normal_force=None),))
     options = PredictionOptions(course="steady", beside="small")
