@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 
@@ -33,6 +36,14 @@ class TransducerInfo:
     counter_rate: float  # ticks a second of the device's own counter [Hz]; nan where it has none
     calibration: Calibration
     settings: Mapping[str, str] = field(default_factory=dict[str, str])  # each setting as read back: filter, bias
+    harmless: int = 0  # bits of a reading's status that say nothing against its six values
+    summary: int = 0  # bit of the status that is set beside any other, and says nothing beside a harmless one
+
+    def doubtful(self, status: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Tell of each status (n,) whether it speaks against the reading's six values."""
+        rest = status & ~np.int64(self.harmless)
+        told = (status & np.int64(self.harmless)) != 0
+        return np.where(told, rest & ~np.int64(self.summary), rest) != 0
 
 
 @dataclass(frozen=True, slots=True)

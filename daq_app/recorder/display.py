@@ -102,7 +102,7 @@ class Display:
                 block.time,
                 block.received_ns,
                 felt - calibration.wrench(np.array([self._zero]), np.zeros(6)),
-                block.status,
+                np.where(info.doubtful(block.status), block.status, 0),
                 self._zero,
             )
         )

@@ -134,7 +134,7 @@ class Live:
     time: Array  # (n,) [s, device clock]
     received_ns: NDArray[np.int64]  # (n,) session clock [ns]
     wrench: Array  # (n, 6) [N, N mm] of the finger on the stimulus, transducer axes, zero subtracted
-    status: NDArray[np.int64]  # (n,) 0 = healthy
+    status: NDArray[np.int64]  # (n,) 0: nothing speaks against the reading
     zero: Six  # raw units, that was subtracted: of the last tare or take; zeros where nothing was measured
     left_out: int = 0  # readings before these that were not sent, because the client did not fetch them
 

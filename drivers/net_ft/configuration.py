@@ -89,7 +89,10 @@ def parse_configuration(page: bytes) -> Configuration:
         "records in a datagram, when buffered": _optional(found, "comrdtbsiz"),
     }
     if family is AXIA:
-        settings["time"] = "its counter is taken to tick at its converter's rate, which is not verified"
+        settings["time"] = (
+            "its counter is taken to tick at its converter's rate, which no manual says: held against this computer's "
+            "clock while it streams"
+        )
     return Configuration(
         product=product,
         family=family,

@@ -159,6 +159,8 @@ def _info(place: Where, found: Configuration) -> TransducerInfo:
         counter_rate=found.ticks,
         calibration=found.calibration(),
         settings=found.settings,
+        harmless=found.family.harmless,
+        summary=wire.SUMMARY,
     )
 
 

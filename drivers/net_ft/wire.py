@@ -34,7 +34,7 @@ RECORD = np.dtype(
 )
 COUNTER_RATE = 7000.0  # ticks a second, good to 0.5 % [Hz]
 
-_SUMMARY = 1 << 31
+SUMMARY = 1 << 31  # some bit is an error
 
 _NET_FT = {
     30: "processor or memory fault",
@@ -90,6 +90,7 @@ class Family:
 
     name: str
     invalid: int  # status bits that make the six values of a record invalid
+    harmless: int  # status bits that say nothing against the six values
     meaning: Mapping[int, str]  # of each status bit
 
     def words(self, status: int) -> tuple[str, ...]:
@@ -100,11 +101,12 @@ class Family:
         """
         bits = [bit for bit in range(30, -1, -1) if status >> bit & 1]
         words = tuple(self.meaning.get(bit, f"unknown bit {bit}") for bit in bits)
-        return words or (("unnamed error",) if status & _SUMMARY else ())
+        return words or (("unnamed error",) if status & SUMMARY else ())
 
 
-NET_FT = Family("Net F/T", 1 << 17, _NET_FT)
-AXIA = Family("Ethernet Axia", 1 << 30 | 1 << 27 | 1 << 2, _AXIA)
+# Whether the summary bit comes with a latched condition is not agreed on: both forms are taken to mean no harm.
+NET_FT = Family("Net F/T", 1 << 17, 1 << 16, _NET_FT)
+AXIA = Family("Ethernet Axia", 1 << 30 | 1 << 27 | 1 << 2, 1 << 28 | 1 << 16 | 1 << 3, _AXIA)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -184,7 +184,7 @@ def _of_part(
     if len(block) < settings.detector.baseline_readings:
         sentence = f"Only {len(block)} readings: too few for a stroke."
         return _Part((), (Flaw(FlawName.NO_STROKE, sentence, "refused"),), "")
-    sound = soundness(block, info.calibration, settings)
+    sound = soundness(block, info, settings)
     flaws = [Flaw(name, sentence, grade) for name, sentence, grade in sound.flaws]
     if sound.refused:
         return _Part((), tuple(flaws), "")

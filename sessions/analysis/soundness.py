@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
+from drivers.transducer import TransducerInfo
 from sessions.analysis.flaws import FlawName, Grade
 from sessions.analysis.settings import AnalysisSettings
 
@@ -46,13 +46,13 @@ class Soundness:
         return any(grade == "refused" for _, _, grade in self.flaws)
 
 
-def soundness(block: ReadingBlock, calibration: Calibration, settings: AnalysisSettings) -> Soundness:
+def soundness(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSettings) -> Soundness:
     """Judge a block of at least two readings."""
     steps = np.diff(block.time)
     forward = steps[steps > 0.0]
     step = float(np.median(forward)) if len(forward) else np.nan
     frozen = _frozen(block, settings)
-    saturated = _saturated(block, calibration)
+    saturated = _saturated(block, info)
     stalled = np.concatenate([[False], steps <= 0.0])
     good = ~(frozen | saturated | stalled)
     broken = (np.diff(block.sequence) != 1) | (steps > 1.8 * step) | (steps <= 0.0)
@@ -100,12 +100,13 @@ def _frozen(block: ReadingBlock, settings: AnalysisSettings) -> Mask:
     return frozen
 
 
-def _saturated(block: ReadingBlock, calibration: Calibration) -> Mask:
+def _saturated(block: ReadingBlock, info: TransducerInfo) -> Mask:
     """Mark readings the device called invalid, and those outside the rated range, where one is stated."""
-    wrench = calibration.wrench(block.raw, np.zeros(6))
+    calibration = info.calibration
+    wrench = calibration.own(calibration.wrench(block.raw, np.zeros(6)))
     with np.errstate(invalid="ignore"):
         beyond = (np.abs(wrench) > calibration.rated).any(axis=1)
-    return (block.status != 0) | beyond
+    return info.doubtful(block.status) | beyond
 
 
 def _segments(good: Mask, broken: Mask) -> tuple[slice, ...]:

@@ -56,6 +56,8 @@ def info_to_dict(info: TransducerInfo) -> dict[str, Any]:
         "rate": _known(info.rate),
         "counter_rate": _known(info.counter_rate),
         "settings": dict(info.settings),
+        "harmless": info.harmless,
+        "summary": info.summary,
         "calibration": {
             "serial": calibration.serial,
             "raw_unit": calibration.raw_unit,
@@ -94,6 +96,8 @@ def info_from_dict(data: Mapping[str, Any]) -> TransducerInfo:
         counter_rate=_number(data["counter_rate"]),
         calibration=calibration,
         settings=dict(data["settings"]),
+        harmless=data.get("harmless", 0),
+        summary=data.get("summary", 0),
     )
 
 

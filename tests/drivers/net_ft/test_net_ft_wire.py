@@ -5,7 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.net_ft.wire import NET_FT, RECORD, START, STOP, decode
+from drivers.calibration import Calibration
+from drivers.net_ft.wire import AXIA, NET_FT, RECORD, START, STOP, SUMMARY, decode
+from drivers.transducer import TransducerInfo
+from sessions.recording.head import info_from_dict, info_to_dict
 
 RECORD_BYTES = bytes.fromhex("00000001 00000023 00000000 000F4240 FFE17B80 004C4B40 0001E848 FFFFFFFF 00000000")
 
@@ -59,6 +62,29 @@ def test_a_record_is_36_bytes():
 )
 def test_a_status_word_is_told_in_words(status, words):
     assert NET_FT.words(status) == words
+
+
+@pytest.mark.parametrize(
+    ("family", "status", "doubtful"),
+    [
+        (NET_FT, 0, False),
+        (NET_FT, 0x00010000, False),  # a latched condition, with and without the summary bit
+        (NET_FT, 0x80010000, False),
+        (NET_FT, 0x80020000, True),
+        (NET_FT, 0x80030000, True),  # latched and saturated
+        (NET_FT, 0x80000000, True),  # an error that is not named
+        (AXIA, 0x00010000, False),
+        (AXIA, 0x00000008, False),  # busy
+        (AXIA, 0x88000000, True),
+        (AXIA, 0x80000005, True),
+    ],
+)
+def test_a_latched_condition_does_not_make_a_reading_doubtful(family, status, doubtful):
+    calibration = Calibration("FT1", "counts", np.eye(6), np.full(6, np.nan), "a test")
+    info = TransducerInfo(
+        "", "net-ft", "", "FT1", False, 1.0, 1.0, calibration, harmless=family.harmless, summary=SUMMARY
+    )
+    assert info_from_dict(info_to_dict(info)).doubtful(np.array([status])).tolist() == [doubtful]
 
 
 @given(st.integers(0, 2**32 - 1))
