@@ -26,7 +26,7 @@ from solver.tissues import relaxing_laws
 RELAXED = 14.0  # times after which tissue counts as relaxed: e^-14 is 8e-7
 EQUAL_STEPS = 6  # steps of equal length while nothing but relaxation goes on, before they are doubled
 FIRST, LARGEST = 0.02, 0.1  # steps of a slide, by the indentation; each a fifth longer than the one before
-TOLERANCE = 1e-8  # of displacements [mm]
+GOOD, CLOSE = 1e-8, 1e-7  # tolerance of displacements [mm], and by the indentation where that is less
 
 
 class RelaxingNewton(Newton):
@@ -188,6 +188,7 @@ class RelaxingCourse:
         last = self.shapes[-1]
         last = replace(last, pull=last.pull._replace(sense=self._sense))
         if self._scene.normal_force is None:
-            return self.newton.settle(last, last.pull._replace(depth=aim.press, travel=-aim.along), TOLERANCE)
+            good = min(GOOD, CLOSE * self._scene.loading.depth)
+            return self.newton.settle(last, last.pull._replace(depth=aim.press, travel=-aim.along), good)
         given = Given(aim.press, aim.along) if self._scene.loading.dragged else Given(aim.press, None, -aim.along)
         return finite_forced.balanced(self.newton, finite_forced.lowered(self.newton, last), given)

@@ -17,6 +17,7 @@ from solver.newton import Pull, Shape
 from solver.scene import Scene
 
 LEADING = 1e-3  # tolerance of states that only lead to others [mm]
+GOOD, CLOSE = 1e-7, 1e-7  # tolerance of the states of a course [mm], and by the indentation where that is less
 PRESSES = 40  # steps of the pre-indentation, and of a drag that grows
 SEARCHES = 60  # steps of a search for the depth at which a force is met
 MET = 1e-9  # relative difference within which it is
@@ -162,12 +163,13 @@ class _Driven:
         self.finger, self._stop = finger, stop
         self._pull = pull_of(scene)
         pulls = [self._pull._replace(depth=self._pull.depth * (i + 1) / PRESSES) for i in range(PRESSES)]
-        self.shapes = list(march(self.finger.newton, pulls, stop=self._stop))
+        self._good = min(GOOD, CLOSE * self._pull.depth)
+        self.shapes = list(march(self.finger.newton, pulls, None, self._good, self._stop))
 
     def slide(self, distance: float) -> None:
         """Move the bone by `distance` along +x [mm]."""
         self._pull = self._pull._replace(travel=self._pull.travel - distance)
-        self.shapes += march(self.finger.newton, [self._pull], self.shapes[-1], stop=self._stop)
+        self.shapes += march(self.finger.newton, [self._pull], self.shapes[-1], self._good, self._stop)
 
 
 class _Forced:

@@ -33,7 +33,8 @@ DOUBTED = 1e-8  # and from which it is told
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
 PIERCED = 1e-7  # part of the indentation by which skin may lie too low without it being told [-]
 SAME = 1e-6  # relative difference of normal forces up to which two states under a given force are one
-ROUGH = 1e-10  # and from which round-off is taken out of the displacements
+ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements
+LOW = 1e-8  # part of the indentation by which skin may lie too low before it is laid on the surface again [-]
 
 _Answer = Prediction | SolveFailure
 Watch = Callable[[int, _Answer, FingerModel, March | None], None]  # told each answer as it is found, and how
@@ -296,6 +297,10 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
         forces = np.concatenate([contact.normal, contact.tangential])[:, None]
         displacement = finger.body.balanced(displacement[:, :, None], forces)[:, :, 0]
         checks = audits(finger, law, contact, depth, displacement)
+        slides = way is None and scene.normal_force is None and not (contact.state == STICK).any()
+        if slides and checks["penetration"] > LOW:
+            contact, displacement = _laid(finger, law, contact, depth, displacement)
+            checks = audits(finger, law, contact, depth, displacement)
     unbalanced = _unbalanced(checks)
     sed = finger.sed_ending(displacement)
     if unbalanced > UNSOUND:
@@ -344,6 +349,28 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
     return found, way if over_time is None else None
 
 
+def _laid(
+    finger: FingerModel, law: FrictionLaw, contact: Contact, depth: float, displacement: Array
+) -> tuple[Contact, Array]:
+    """Return a settled slide once more, the skin on the surface where its refined `displacement` puts it.
+
+    What refinement has moved the skin by is taken as displaced before any contact; the states stay if they can.
+    """
+    body = finger.body
+    normal, tangential = np.split(finger.skin_displacement(contact)[:, 0], 2)
+    skin, touch = displacement[finger.geometry.mesh.skin], body.touchable
+    free = {"normal_free": skin[:, 1] - normal, "tangential_free": skin[:, 0] - tangential}
+    direction = -int(np.sign(contact.sense[contact.touching][0]))
+    try:
+        again = Course(replace(touch, **free), law).sliding(depth, direction, contact.state)
+    except ContactLost:
+        return contact, displacement
+    change = np.concatenate([again.normal - contact.normal, again.tangential - contact.tangential])[:, None]
+    moved = displacement[:, :, None] + body.displacement(body.skin_displacement(change))
+    forces = np.concatenate([again.normal, again.tangential])[:, None]
+    return again, body.balanced(moved, forces)[:, :, 0]
+
+
 def _unbalanced(checks: dict[str, float]) -> float:
     return max(checks[name] for name in ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance"))
 
@@ -382,13 +409,24 @@ def _error_estimates(scene: Scene, shared: _Shared, contact: Contact, numbers: A
 
 
 def _nearest(scene: Scene, finger: FingerModel) -> Contact:
-    """Return the settled state on a coarser mesh, whose friction limit may lie just below the drag asked for."""
+    """Return the settled state on a coarser mesh, whose friction limit may lie just below the drag asked for.
+
+    Where no guess leads to it, as with large coefficients, it is followed from mu = 0. Raises as `settled`.
+    """
     try:
         return settled(scene, finger)
     except NoSteadyState:
         if not scene.loading.dragged:
             raise
         return settled(scene.undragged(), finger)
+    except ContactLost:
+        if scene.normal_force is not None or scene.loading.direction == 0:
+            raise
+        touch, loading = finger.body.touchable, scene.loading
+        reached, _ = followed(touch, _law(scene), loading.depth, loading.direction)
+        if reached is None:
+            raise
+        return reached
 
 
 def numbers_on(finger: FingerModel, contacts: Sequence[Contact]) -> Array:
