@@ -40,11 +40,11 @@ class NetFtTransducer(ThreadedTransducer):
         self,
         info: TransducerInfo,
         connect: Callable[[], Link],
-        still_there: Callable[[], bool],
+        who: Callable[[], TransducerInfo | None],
         clock: Clock,
         request: bytes = START,
     ) -> None:
-        """Take an identified box. `still_there` tells whether it answers at all, to explain a silence.
+        """Take an identified box. `who` tells who answers there now, soon, None when nobody does: asked in a silence.
 
         `request` asks for the stream.
         """
@@ -52,7 +52,7 @@ class NetFtTransducer(ThreadedTransducer):
         self._invalid = (AXIA if "axia" in info.model.lower() else NET_FT).invalid
         super().__init__(info, clock)
         self._connect = connect
-        self._still_there = still_there
+        self._who = who
         self._step = round(info.counter_rate / info.rate) if info.rate > 0.0 else None  # nan: learn it
         self._period = 1.0 / info.rate / clock.factor if info.rate > 0.0 else 0.0  # between two readings [real s]
         self._pending: deque[tuple[bytes, int]] = deque()  # datagrams with their arrival [ns], from the thread
@@ -124,7 +124,7 @@ class NetFtTransducer(ThreadedTransducer):
         """Be the receiving thread: ask for the stream, take what comes, ask again when it falls silent, and end it."""
         try:
             self._listen(link)
-        except LinkLost as error:
+        except (LinkLost, DeviceFault) as error:
             self._ended = error
         finally:
             try:
@@ -143,7 +143,7 @@ class NetFtTransducer(ThreadedTransducer):
         link.send(self._request)
         # Silence is counted in waits that brought nothing, so that a computer too busy to look is not taken for it.
         silence = asked = 0.0
-        streaming = False
+        streaming = ever = False
         returns: deque[float] = deque(maxlen=_THEFTS)
         while not self._stopping.is_set():
             datagram = receive(_TICK)
@@ -151,7 +151,7 @@ class NetFtTransducer(ThreadedTransducer):
                 keep((datagram, now_ns()))
                 if not self._arrived.is_set():
                     self._arrived.set()
-                silence, asked, streaming = 0.0, 0.0, True
+                silence, asked, streaming, ever = 0.0, 0.0, True, True
                 continue
             silence += _TICK
             if silence > _SILENCE + 4.0 * self._period:
@@ -165,8 +165,25 @@ class NetFtTransducer(ThreadedTransducer):
                         f"{self._info.uri} stopped sending {_THEFTS} times within {_THEFT_SPAN:g} s; "
                         "another program on the network probably takes its stream: end that program"
                     )
-            link.send(self._request)
+            if not ever or self._is_the_same():
+                link.send(self._request)
             asked, streaming = silence, False
+
+    def _is_the_same(self) -> bool:
+        """Tell whether the box answers again. Raises DeviceFault when another one does, or when it is set anew."""
+        found = self._who()
+        if found is None:
+            return False
+        if found.serial != self._info.serial:
+            raise DeviceFault(
+                f"{self._info.uri}: transducer {found.serial} answers where {self._info.serial} was; "
+                "connect that one again, or open it anew"
+            )
+        if not np.array_equal(found.calibration.matrix, self._info.calibration.matrix):
+            raise DeviceFault(
+                f"{self._info.uri}: transducer {found.serial} counts in other units than before; open it anew"
+            )
+        return True
 
     def _digest(self, *, end: bool = False) -> None:
         """Turn pending datagrams into accounted readings. The lock is held."""
@@ -221,7 +238,7 @@ class NetFtTransducer(ThreadedTransducer):
 
     def _never_came(self, patience: float) -> str:
         """Return why a start failed."""
-        if self._still_there():
+        if self._who() is not None:
             return (
                 f"{self._info.uri} answers on its web page but sent no reading within {patience:.1f} s; "
                 "check that no firewall holds back its UDP datagrams"
@@ -230,7 +247,7 @@ class NetFtTransducer(ThreadedTransducer):
 
     def _fell_silent(self, seconds: float) -> str:
         """Return why a running stream was given up."""
-        if self._still_there():
+        if self._who() is not None:
             return (
                 f"{self._info.uri} has sent nothing for {seconds:.1f} s though its web page still answers; "
                 "end any other program that reads it, and check for a firewall"

@@ -16,6 +16,7 @@ from drivers.net_ft.wire import COUNTER_RATE
 from drivers.transducer import LinkLost, SetupError, TransducerInfo
 
 PATIENCE = 3.0  # for one web page [real s]; a healthy box answers within 0.1 s
+_AT_ONCE = 0.18  # for one web page while a stream is silent, and so for a stop [real s]
 _SETTLING = 0.05  # after a bias was asked for [real s]
 _OPTIONS = frozenset({"rdt", "tcp", "http", "rate", "mode", "bias", "latch"})
 _WORDS = {"mode": ("single", "buffered"), "bias": ("keep", "set"), "latch": ("keep", "reset")}  # the first: untold
@@ -41,7 +42,7 @@ def open_net_ft(address: Address, clock: Clock) -> NetFtTransducer:
     return NetFtTransducer(
         prepare(place),
         connect=lambda: UdpLink(address.host, place.rdt_port),
-        still_there=lambda: answers(place),
+        who=lambda: who(place),
         clock=clock,
         request=start_request(place),
     )
@@ -140,12 +141,12 @@ def _tcp(place: Where, command: bytes, size: int) -> bytes:
     return tcp_answer(place.address.host, place.tcp_port, command, size, PATIENCE)
 
 
-def answers(place: Where) -> bool:
-    """Tell whether the box's web page can be read now."""
+def who(place: Where) -> TransducerInfo | None:
+    """Return who answers at once, None when nobody does."""
     try:
-        return http_get(place.address.host, place.http_port, "/netftapi2.xml", 0.5).status == 200
+        return identify(place, _AT_ONCE)
     except (LinkLost, SetupError):
-        return False
+        return None
 
 
 def _info(place: Where, found: Configuration) -> TransducerInfo:

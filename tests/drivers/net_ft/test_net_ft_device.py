@@ -4,6 +4,7 @@ import struct
 import threading
 import time
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -63,10 +64,11 @@ class MemoryLink:
         return not self._coming and not self._answers
 
 
-def opened(link, *, rate=200.0, clock=None, still_there=lambda: False):
+def opened(link, *, rate=200.0, clock=None, there=True, serial="FT1"):
     calibration = Calibration("FT1", "counts", np.diag([1e-6] * 3 + [1e-3] * 3), np.full(6, np.nan), "a test")
     info = TransducerInfo("net-ft://box", "net-ft", "Net F/T", "FT1", False, rate, 7000.0, calibration)
-    return NetFtTransducer(info, lambda: link, still_there, clock or RealClock())
+    answering = replace(info, serial=serial) if there else None
+    return NetFtTransducer(info, lambda: link, lambda: answering, clock or RealClock())
 
 
 def all_readings(transducer, link):
@@ -191,7 +193,7 @@ def test_a_box_that_never_answers_is_given_up_with_a_reason():
     for there, reason in ((False, "check its power"), (True, "firewall")):
         link = MemoryLink()
         with pytest.raises(LinkLost, match=reason):
-            opened(link, still_there=lambda there=there: there).start()
+            opened(link, there=there).start()
         assert link.sent.count(START) > 2
         assert link.closed
 
@@ -208,11 +210,21 @@ def test_a_box_that_falls_silent_is_asked_again_and_goes_on_behind_a_gap():
 def test_a_box_that_stays_silent_is_given_up_after_all_it_sent_was_read():
     for there, reason in ((False, "check its power"), (True, "other program")):
         link = MemoryLink(line(0, 10))
-        transducer = opened(link, still_there=lambda there=there: there)
+        transducer = opened(link, there=there)
         transducer.start()
         assert readings_until_lost(transducer, reason) == 10
         assert link.closed
         transducer.close()
+
+
+@pytest.mark.usefixtures("hasty")
+def test_another_transducer_that_answers_after_a_silence_is_named_and_not_read():
+    link = MemoryLink(line(0, 10), line(0, 5, counter=50))
+    transducer = opened(link, serial="FT2")
+    transducer.start()
+    assert readings_until_lost(transducer, "transducer FT2 answers where FT1 was") == 10
+    assert link.sent.count(START) == 1
+    transducer.close()
 
 
 @pytest.mark.usefixtures("hasty")

@@ -11,6 +11,7 @@ import pytest
 
 from drivers.catalog import open_transducer, reachable
 from drivers.clock import PacedClock, RealClock
+from drivers.links import http_get
 from drivers.readings import ReadingBlock
 from drivers.transducer import LinkLost, SetupError
 from simulators.bench import Bench
@@ -82,6 +83,22 @@ def test_the_rate_asked_for_is_set_and_read_back(box):
     block = read_until(transducer, lambda: transducer.health.received > 20)
     transducer.close()
     assert np.diff(block.counter).tolist() == [46] * (len(block) - 1)
+
+
+def test_a_rate_that_somebody_changes_on_the_web_page_is_told_in_words_and_times_stay_true(box):
+    one = box()
+    transducer = open_transducer(one.uri, PacedClock(10.0))
+    transducer.start()
+    while transducer.health.received < 50:
+        time.sleep(0.001)
+    before = transducer.read(0.0)
+    assert http_get("127.0.0.1", port(one.uri, "http"), "/comm.cgi?comrdtrate=100", 3.0).status == 302
+    block = read_until(transducer, lambda: transducer.health.off_rate)
+    transducer.close()
+    block = ReadingBlock.joined([before, block])
+    assert transducer.health.rate_words == "it sends at 100 Hz, not at 200 Hz"
+    assert (transducer.health.lost, transducer.health.received) == (0, len(block))
+    assert set(np.round(np.diff(block.time), 9)) <= {0.005, 0.01, 0.015}
 
 
 def test_without_a_rate_the_box_is_left_as_it_is(box):
