@@ -24,9 +24,10 @@ from sessions.recording import Recording
 from sessions.recording.provenance import software_versions
 from sessions.recording.schema import LIVE_FILE
 from sessions.recording.whole_file import write_whole
+from sessions.sealing import SEAL
 
 LOOK = 0.1  # between two looks whether something is done [s]
-CONTENT = (LIVE_FILE, f"{LIVE_FILE}-wal", UNBLINDING, DECISIONS)  # all that a visit's numbers come from
+CONTENT = (LIVE_FILE, f"{LIVE_FILE}-wal", UNBLINDING, SEAL, DECISIONS)  # all that a visit's numbers come from
 
 Answer = tuple[str, dict[str, Any] | str]  # session, and what it brings or why it brings nothing
 

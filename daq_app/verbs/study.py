@@ -105,8 +105,8 @@ def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
     """Write page, table and numbers and return where they are."""
     # Imported here: drawing is slow to load.
     from sessions.exports.html import swap_in
+    from sessions.exports.study_csv import paths_csv, trials_csv
     from sessions.exports.study_page import study_page
-    from sessions.exports.study_tables import paths_csv, trials_csv
 
     files = {"page": out / "study.html", "table": out / "trials.csv", "numbers": out / "study.json"}
     swap_in(files["page"], study_page(study, name))
@@ -119,7 +119,7 @@ def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
 
 
 def _print(study: StudyFindings, files: dict[str, str], console: Console) -> None:
-    from sessions.exports.study_page import excluded, summary
+    from sessions.exports.study_prose import excluded, summary
 
     if study.simulated:
         console.say(study.simulated)

@@ -1,8 +1,9 @@
 """What subjects tell beside their own level: intervals within subjects, correlation within subjects, agreement."""
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,6 +112,49 @@ def agreement(table: Table) -> Agreement | None:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """How much higher one stimulus was scored than another, within subjects."""
+
+    low_index: int
+    high_index: int
+    n: int  # subjects who scored both
+    mean: float  # score of `high_index` less that of `low_index`
+    low: float  # 95 % t interval
+    high: float
+    p: float  # paired t test, two-sided
+    p_holm: float  # for all pairs together (Holm 1979, Scand. J. Stat. 6:65)
+
+
+def differences(table: Table) -> tuple[Difference, ...]:
+    """Return the difference of each pair of stimuli, of the subjects who scored both; at least three of them."""
+    indices = sorted({index for row in table.values() for index in row})
+    found: list[Difference] = []
+    for a, b in itertools.combinations(indices, 2):
+        steps = np.array([row[b] - row[a] for row in table.values() if a in row and b in row])
+        if len(steps) < 3 or float(np.ptp(steps)) == 0.0:
+            continue
+        test = stats.ttest_1samp(steps, 0.0)
+        low, high = test.confidence_interval(CONFIDENCE)
+        p = float(test.pvalue)
+        found.append(Difference(a, b, len(steps), float(steps.mean()), float(low), float(high), p, p))
+    adjusted = holm([one.p for one in found])
+    return tuple(replace(one, p_holm=p) for one, p in zip(found, adjusted, strict=True))
+
+
+def holm(ps: Sequence[float]) -> tuple[float, ...]:
+    """Return p values that allow for there being several (Holm 1979, Scand. J. Stat. 6:65).
+
+    >>> holm([0.01, 0.04, 0.03])
+    (0.03, 0.06, 0.06)
+    """
+    adjusted, greatest = [0.0] * len(ps), 0.0
+    for rank, place in enumerate(sorted(range(len(ps)), key=lambda i: ps[i])):
+        greatest = max(greatest, min(1.0, (len(ps) - rank) * ps[place]))
+        adjusted[place] = greatest
+    return tuple(adjusted)
+
+
 def standardised(table: Table) -> dict[str, dict[int, float]]:
     """Return scores as each subject's own z-scores, which takes away the part of the scale a subject uses.
 
@@ -127,7 +171,8 @@ def standardised(table: Table) -> dict[str, dict[int, float]]:
 def equal_moduli(table: Table) -> dict[str, dict[int, float]]:
     """Return free-modulus estimates brought to one modulus: divided by the subject's geometric mean, times that of all.
 
-    Raises ValueError for an estimate that is not above 0: a free modulus has no zero.
+    With a free modulus each subject chooses its own unit (Stevens 1957, Psychol. Rev. 64:153). Raises ValueError for an
+    estimate that is not above 0: a free modulus has no zero.
     """
     logs = {subject: {index: _log(subject, value) for index, value in row.items()} for subject, row in table.items()}
     means = {subject: float(np.mean(list(row.values()))) for subject, row in logs.items() if row}

@@ -1,85 +1,34 @@
-"""Tables of a study's page, and the table of all its trials as CSV."""
+"""Tables of a study's page."""
 
-import csv
-import io
-from collections.abc import Iterable
-from dataclasses import fields
+import math
+from collections.abc import Callable, Iterable, Sequence
 
 from sessions.analysis.mixed import MixedModel
+from sessions.analysis.scores import Relation
+from sessions.analysis.within import RepeatedCorrelation
 from sessions.exports.report_tables.cells import Cell, Column, Group, Notes, Table
 from sessions.exports.report_tables.paths import paths_table
+from sessions.exports.study_trials import trials_table
 from sessions.exports.wording import NONE, correlation, digits, significant
-from sessions.paths import Path
-from sessions.pooling.exclusions import decided
+from sessions.pooling.averages import Average
 from sessions.pooling.pooled import DescriptorFindings, StudyFindings
-from sessions.pooling.visit import TrialRow, Visit
-
-SIMULATED = "SIMULATED"
-_UNITS = {
-    "tau_max": "MPa",
-    "speed": "mm_per_s",
-    "normal_force": "N",
-    "sed": "MPa",
-    "model_normal_force": "N",
-    "matching_depth": "mm",
-}
+from sessions.pooling.visit import Visit
 
 
 def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
     """Return the tables a study has numbers for, by section."""
     sections = {
         "visits": (_visits(study),),
-        "scores": (_scores(study), _agreement(study)),
-        "surfaces": (_surfaces(study),),
+        "scores": (_scores(study), _normalised(study), _differences(study), _agreement(study), _estimates(study)),
+        "surfaces": (_surfaces(study), _forces(study)),
         "relation": (_relation(study), _models(study)),
         "paths": (paths_table((one.descriptor, one.paths) for one in study.descriptors),),
         "planted": (_planted(study),),
+        "trials": (trials_table(study),),
     }
     return {
         name: tuple(table for table in made if table is not None and table.groups) for name, made in sections.items()
     }
-
-
-def paths_csv(study: StudyFindings) -> str:
-    """Return a row for each path and descriptor, for R and pandas as `trials_csv`."""
-    mark = [SIMULATED] if study.simulated else []
-    names = [field.name for field in fields(Path)]
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    heads = ("usual", "surfaces", "trials", "r_of_means", "r_within_subjects", "low", "high")
-    writer.writerow([*mark, "descriptor", *names, *heads])
-    for one in study.descriptors:
-        for found in one.paths:
-            numbers = (found.surfaces, found.trials, found.r, found.within, found.low, found.high)
-            told = [*(["yes"] if mark else []), one.descriptor, *(getattr(found.path, name) for name in names)]
-            writer.writerow([*told, "yes" if found.usual else "no", *(_plain(number) for number in numbers)])
-    return out.getvalue()
-
-
-def trials_csv(study: StudyFindings) -> str:
-    """Return a row for each trial of each visit: one header line, a point in decimals, empty where there is no number.
-
-    R's read.csv and pandas' read_csv open it as it is. Of a simulated study the first column is called SIMULATED.
-    """
-    names = [field.name for field in fields(TrialRow) if field.name != "paths"]  # these have a table of their own
-    heads = [f"{name}_{_UNITS[name]}" if name in _UNITS else name for name in names]
-    mark = [SIMULATED] if study.simulated else []
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*mark, "session", "subject", *heads, "excluded"])
-    for visit in study.visits:
-        for row in visit.rows:
-            decision = decided(study.excluded, visit.subject, row.descriptor)
-            why = "" if decision is None else decision.why
-            told = ["yes" if visit.simulated else "no"] if mark else []
-            writer.writerow([*told, visit.session, visit.subject, *(_plain(getattr(row, n)) for n in names), why])
-    return out.getvalue()
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, tuple):
-        return " ".join(str(one) for one in value)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
-    return "" if value is None else value
 
 
 def _visits(study: StudyFindings) -> Table:
@@ -125,7 +74,7 @@ def _scores(study: StudyFindings) -> Table:
         "Scores: t interval of the mean over subjects; and interval within subjects (Cousineau 2005, Morey 2008), for "
         f"comparing surfaces with one another, of the subjects who scored every surface ({complete or 'none'})."
     )
-    groups = [(one.descriptor, tuple(rows(one))) for one in study.descriptors]
+    groups = _by_descriptor(study, rows)
     return _table("table-scores", caption, columns, groups, notes)
 
 
@@ -148,43 +97,221 @@ def _agreement(study: StudyFindings) -> Table:
     return _table("table-agreement", caption, columns, [("", rows)])
 
 
+def _normalised(study: StudyFindings) -> Table:
+    def rows(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
+        raw = {mean.index: mean for mean in one.scores}
+        for index, mean in one.normalised.means.items():
+            given = raw[index]
+            yield (
+                Cell(str(index)),
+                Cell(str(given.n)),
+                Cell(digits(given.mean, 1)),
+                _interval(given.low, given.high, 1),
+                Cell(str(mean.n)),
+                Cell(digits(mean.mean, 2)),
+                _interval(mean.low, mean.high, 2),
+            )
+
+    columns = ("index", "subjects", "as given", "95 % interval", "subjects", "standardised", "95 % interval")
+    caption = (
+        "Scores as they were given and standardised: each subject's own mean taken away and the rest divided by its "
+        "own standard deviation over the surfaces it scored, which takes away what part of the scale a subject uses. "
+        "t intervals of the mean over subjects."
+    )
+    return _table("table-normalised", caption, columns, _by_descriptor(study, rows))
+
+
+def _differences(study: StudyFindings) -> Table:
+    def rows(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
+        for pair in one.differences:
+            yield (
+                Cell(f"{pair.high_index} − {pair.low_index}"),
+                Cell(str(pair.n)),
+                Cell(digits(pair.mean, 1)),
+                _interval(pair.low, pair.high, 1),
+                Cell(_p(pair.p)),
+                Cell(_p(pair.p_holm)),
+            )
+
+    columns = ("index", "subjects", "difference of scores", "95 % interval", "p", "p, Holm")
+    caption = (
+        "How much higher one surface was scored than another, within subjects: mean and t interval of the differences, "
+        "paired t test, and its p corrected for all pairs of the descriptor (Holm 1979)."
+    )
+    return _table("table-differences", caption, columns, _by_descriptor(study, rows))
+
+
+def _estimates(study: StudyFindings) -> Table:
+    notes = Notes()
+
+    def rows(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
+        if one.estimates is None:
+            return
+        for index, given in one.estimates.geometric.items():
+            level = one.estimates.equal_moduli[index]
+            cells = [Cell(str(index)), Cell(str(given.n))]
+            for mean in (given, level):
+                cells.append(Cell(significant(math.exp(mean.mean), 3)))
+                if mean.low is None or mean.high is None:
+                    cells.append(notes.number(None, str, "one subject alone has no interval"))
+                else:
+                    cells.append(Cell(_to(math.exp(mean.low), math.exp(mean.high))))
+            yield tuple(cells)
+
+    columns = ("index", "subjects", "geometric mean", "95 % interval", "at one modulus", "95 % interval")
+    out = [f"{name}: {', '.join(s)}" for name, s in _without_logarithm(study)]
+    left = f" Left out for an estimate that is not above 0: {'; '.join(out)}." if out else ""
+    caption = (
+        "Magnitude estimates, each subject on a scale of its own: geometric means over subjects with t intervals of "
+        f"the logarithms, as they were given and with every subject's own modulus taken away (Stevens 1957).{left}"
+    )
+    groups = _by_descriptor(study, rows)
+    return _table("table-estimates", caption, columns, groups, notes)
+
+
+def _without_logarithm(study: StudyFindings) -> list[tuple[str, tuple[str, ...]]]:
+    return [(o.descriptor, o.estimates.left_out) for o in study.descriptors if o.estimates and o.estimates.left_out]
+
+
 def _surfaces(study: StudyFindings) -> Table:
+    notes = Notes()
+
     def row(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
         for s in one.surfaces:
+            kilopascal = None if s.sed is None else _scaled(s.sed, 1e3)
             yield (
                 Cell(str(s.index)),
                 Cell(str(s.subjects)),
-                Cell(NONE if s.mu is None else digits(s.mu, 3)),
-                Cell(NONE if s.sed is None else significant(1e3 * s.sed, 4)),
-                Cell(NONE if s.sed_sd is None else significant(1e3 * s.sed_sd, 2)),
+                *_mean(s.mu, 3, notes),
+                *_mean(kilopascal, 3, notes),
+                Cell(NONE if kilopascal is None or kilopascal.sd is None else significant(kilopascal.sd, 2)),
             )
 
-    columns = ("index", "subjects", "µ", "SED [kPa]", "standard deviation of SED [kPa]")
-    caption = "Friction that the model got, and predicted SED: means over subjects, each from its own strokes."
+    columns = (
+        Column("index"),
+        Column("subjects"),
+        Column("µ"),
+        Column("95 % interval"),
+        Column("SED", "kPa"),
+        Column("95 % interval", "kPa"),
+        Column("standard deviation", "kPa"),
+    )
+    caption = (
+        "Friction that the model got, and predicted SED: means over subjects, each from its own strokes, with t "
+        f"intervals. Model: {_model_in_short(study)}."
+    )
     groups = [(one.descriptor, tuple(row(one))) for one in study.descriptors if any(s.subjects for s in one.surfaces)]
-    return _table("table-surfaces", caption, columns, groups)
+    return _table("table-surfaces", caption, columns, groups, notes)
+
+
+def _model_in_short(study: StudyFindings) -> str:
+    """Return which solver model the SEDs are of."""
+    model = study.options.prediction
+    return (
+        f"{model.kinematics} strain, settled sliding, τ max {model.tau_reading}, contact area {study.options.area.law}"
+    )
+
+
+def _forces(study: StudyFindings) -> Table:
+    notes = Notes()
+
+    def row(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
+        for s in one.surfaces:
+            if s.normal_force is not None or s.model_normal_force is not None:
+                numbers = (s.normal_force, s.model_normal_force, s.matching_depth)
+                yield (Cell(str(s.index)), *(cell for number in numbers for cell in _mean(number, 2, notes)))
+
+    columns = (
+        Column("index"),
+        Column("measured N", "N"),
+        Column("95 % interval", "N"),
+        Column("model N", "N"),
+        Column("95 % interval", "N"),
+        Column("depth to match", "mm"),
+        Column("95 % interval", "mm"),
+    )
+    caption = (
+        "Model against measurement: normal force over the steady window, the force of the model pressed to the depth "
+        "of its block (times the finger's width, assumed unless it was measured), and the depth at which the model "
+        "would press as hard as the subject did. Means over subjects with t intervals."
+    )
+    return _table(
+        "table-forces", caption, columns, [(one.descriptor, tuple(row(one))) for one in study.descriptors], notes
+    )
+
+
+def _scaled(mean: Average, by: float) -> Average:
+    def times(value: float | None) -> float | None:
+        return None if value is None else by * value
+
+    return Average(mean.n, by * mean.mean, times(mean.sd), times(mean.low), times(mean.high))
+
+
+def _mean(mean: Average | None, decimals: int, notes: Notes) -> tuple[Cell, Cell]:
+    """Return a mean and its interval, or dashes with the reason."""
+    if mean is None:
+        missing = notes.number(None, str, "no subject's stroke gives this number")
+        return missing, missing
+    if mean.low is None or mean.high is None:
+        return Cell(digits(mean.mean, decimals)), notes.number(None, str, "one subject alone has no interval")
+    return Cell(digits(mean.mean, decimals)), _interval(mean.low, mean.high, decimals)
 
 
 def _relation(study: StudyFindings) -> Table:
-    def rows(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
-        related, within = one.mean_relation, one.repeated
+    def means(name: str, related: Relation | None) -> Iterable[tuple[Cell, ...]]:
         if related is not None and related.pearson is not None:
-            p = NONE if related.spearman_p is None else _p(related.spearman_p)
-            rho = NONE if related.spearman is None else f"{correlation(related.spearman)} (p {p})"
-            r = Cell(correlation(related.pearson))
-            yield Cell("means"), Cell(f"{related.n} surfaces"), r, _correlations(related.low, related.high), Cell(rho)
-        if within is not None:
-            n = Cell(f"{within.dof} degrees of freedom")
-            interval = _correlations(within.low, within.high)
-            yield Cell("within subjects"), n, Cell(correlation(within.r)), interval, Cell(f"{NONE} (p {_p(within.p)})")
+            rho = NONE if related.spearman is None else correlation(related.spearman)
+            yield (
+                Cell(name),
+                Cell(f"{related.n} surfaces"),
+                Cell(correlation(related.pearson)),
+                _correlations(related.low, related.high),
+                Cell(rho),
+                Cell(NONE if related.spearman_p is None else _p(related.spearman_p)),
+                Cell(NONE),
+                _without([(f"index {label}", r) for label, r in related.without if r is not None]),
+            )
 
-    columns = ("of", "n", "r", "95 % interval", "Spearman's rho")
+    def within(
+        name: str, found: RepeatedCorrelation | None, adjusted: float | None, without: Sequence[tuple[str, float]]
+    ) -> Iterable[tuple[Cell, ...]]:
+        if found is not None:
+            yield (
+                Cell(name),
+                Cell(f"{found.dof} d.f."),
+                Cell(correlation(found.r)),
+                _correlations(found.low, found.high),
+                Cell(NONE),
+                Cell(_p(found.p)),
+                Cell(NONE if adjusted is None else _p(adjusted)),
+                _without(without),
+            )
+
+    def rows(one: DescriptorFindings) -> tuple[tuple[Cell, ...], ...]:
+        estimated = None if one.estimates is None else one.estimates.repeated
+        return (
+            *means("means", one.mean_relation),
+            *means("means, standardised", one.normalised.mean_relation),
+            *within("within subjects", one.repeated, one.repeated_holm, one.without_subject),
+            *within("within, standardised", one.normalised.repeated, None, ()),
+            *within("within, log estimates", estimated, None, ()),
+        )
+
+    columns = ("scores", "n", "r", "95 % interval", "rho", "p", "p, Holm", "r with one left out")
     caption = (
-        "Predicted SED with scores. Means: Pearson's r of means over subjects, interval by Fisher's z, p of rho exact. "
-        "Within subjects: repeated-measures correlation of each subject's scores with the SEDs of its own strokes "
-        "(Bakdash and Marusich 2017)."
+        "Predicted SED with scores. Means: Pearson's r of means over subjects, interval by Fisher's z, p of Spearman's "
+        "rho exact. Within subjects: repeated-measures correlation of each subject's scores with the SEDs of its own "
+        "strokes (Bakdash and Marusich 2017), and its p corrected for the descriptors that have one (Holm 1979). Last "
+        "column: least and greatest r when one surface, or one subject, is left out, and which."
     )
-    return _table("table-relation", caption, columns, [(one.descriptor, tuple(rows(one))) for one in study.descriptors])
+    return _table("table-relation", caption, columns, [(one.descriptor, rows(one)) for one in study.descriptors])
+
+
+def _without(left_out: Sequence[tuple[str, float]]) -> Cell:
+    if not left_out:
+        return Cell(NONE)
+    least, greatest = min(left_out, key=lambda one: one[1]), max(left_out, key=lambda one: one[1])
+    return Cell(", ".join(f"{correlation(r)} ({name})" for name, r in (least, greatest)))
 
 
 def _models(study: StudyFindings) -> Table:
@@ -227,15 +354,22 @@ def _planted(study: StudyFindings) -> Table:
     return _table("table-planted", caption, columns, [("", rows)])
 
 
+def _by_descriptor(
+    study: StudyFindings, rows: Callable[[DescriptorFindings], Iterable[tuple[Cell, ...]]]
+) -> list[tuple[str, tuple[tuple[Cell, ...], ...]]]:
+    return [(one.descriptor, tuple(rows(one))) for one in study.descriptors]
+
+
 def _table(
     name: str,
     caption: str,
-    columns: Iterable[str],
+    columns: Iterable[str | Column],
     groups: Iterable[tuple[str, tuple[tuple[Cell, ...], ...]]],
     notes: Notes | None = None,
 ) -> Table:
     kept = tuple(Group(head, rows) for head, rows in groups if rows)
-    return Table(name, caption, tuple(Column(c) for c in columns), kept, () if notes is None else notes.listed())
+    heads = tuple(column if isinstance(column, Column) else Column(column) for column in columns)
+    return Table(name, caption, heads, kept, () if notes is None else notes.listed())
 
 
 def _interval(low: float | None, high: float | None, decimals: int) -> Cell:

@@ -1,8 +1,7 @@
 """What the visits of a study say together: means, agreement, and how predictions go with scores. Plain data."""
 
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,13 +19,18 @@ from sessions.analysis.scores import (
 )
 from sessions.analysis.within import (
     Agreement,
+    Difference,
     RepeatedCorrelation,
     WithinMean,
     agreement,
+    differences,
+    holm,
     repeated_correlation,
+    standardised,
     within_means,
 )
 from sessions.paths import PathFinding, PathTrial, path_findings
+from sessions.pooling.averages import Average, Estimates, average, averages, by_subject, estimates
 from sessions.pooling.exclusions import Exclusion, decided
 from sessions.pooling.visit import TrialRow, Visit, VisitOptions
 
@@ -37,14 +41,25 @@ CARRY_OVER = "index stroked before − 50"
 
 
 @dataclass(frozen=True, slots=True)
+class Normalised:
+    """What is told of scores when each subject's use of the scale is taken away: own mean 0, own spread 1."""
+
+    means: Mapping[int, Average]  # by index
+    mean_relation: Relation | None
+    repeated: RepeatedCorrelation | None
+
+
+@dataclass(frozen=True, slots=True)
 class SurfaceMean:
-    """Means over subjects of one surface; None where there is no subject's."""
+    """Means over subjects of one surface; None where there is no subject's number."""
 
     index: int
     subjects: int  # whose stroke gave an SED
-    mu: float | None
-    sed: float | None  # [MPa]
-    sed_sd: float | None  # between subjects [MPa]
+    mu: Average | None
+    sed: Average | None  # [MPa]
+    normal_force: Average | None  # measured [N]
+    model_normal_force: Average | None  # of the model, pressed to its depth [N]
+    matching_depth: Average | None  # at which the model would press as hard as the subject did [mm]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +76,11 @@ class DescriptorFindings:
     points: tuple[tuple[str, int, float, float], ...]  # subject, index, SED [MPa], score: all of its own strokes
     mean_relation: Relation | None  # mean SED [MPa] against mean score
     repeated: RepeatedCorrelation | None  # of a subject's scores with the SEDs of its own strokes
+    repeated_holm: float | None  # its p, allowing for as many descriptors as have one
+    without_subject: tuple[tuple[str, float], ...]  # subject left out, r within the others
+    normalised: Normalised
+    differences: tuple[Difference, ...]
+    estimates: Estimates | None
     on_sed: MixedModel | None  # score on SED [kPa], drift and carry-over
     on_index: MixedModel | None  # score on the maker's index, drift and carry-over
     paths: tuple[PathFinding, ...]  # () where they were not asked for
@@ -133,6 +153,7 @@ def pooled(
         _descriptor(name, asked, tables, [(v, row) for v, row in kept if row.descriptor == name])
         for name in dict.fromkeys(row.descriptor for _, row in kept)
     )
+    found = _with_holm(found)
     return StudyFindings(
         simulated=_simulated(ordered),
         options=asked,
@@ -144,6 +165,12 @@ def pooled(
         effects=() if planted is None else _recovered(found, planted["score"]),
         friction=None if planted is None else _friction(ordered, planted["strokes"]),
     )
+
+
+def _with_holm(found: Sequence[DescriptorFindings]) -> tuple[DescriptorFindings, ...]:
+    tested = [one.descriptor for one in found if one.repeated is not None]
+    adjusted = dict(zip(tested, holm([one.repeated.p for one in found if one.repeated is not None]), strict=True))
+    return tuple(replace(one, repeated_holm=adjusted.get(one.descriptor)) for one in found)
 
 
 def _simulated(visits: Sequence[Visit]) -> str:
@@ -165,10 +192,11 @@ def _descriptor(
     means = tuple(mean for mean in mean_scores(tables) if mean.descriptor == name)
     matrix = score_matrix(tables, name)
     surfaces = tuple(_surface(index, [(v, r) for v, r in trials if r.index == index]) for index in indices)
+    level = standardised(matrix)
     points = [(v.subject, r, r.sed, r.score) for v, r in trials if r.sed is not None and r.score is not None]
     scored = [(v.subject, r, r.score) for v, r in trials if r.score is not None]
     score_of = {mean.index: mean.mean for mean in means}
-    both = [s for s in surfaces if s.sed is not None and s.index in score_of]
+    both = {s.index: s.sed.mean for s in surfaces if s.sed is not None and s.index in score_of}
     return DescriptorFindings(
         descriptor=name,
         indices=indices,
@@ -178,10 +206,13 @@ def _descriptor(
         surfaces=surfaces,
         answers={subject: tuple(row.get(index) for index in indices) for subject, row in matrix.items()},
         points=tuple((subject, row.index, sed, score) for subject, row, sed, score in points),
-        mean_relation=relation([s.sed or 0.0 for s in both], [score_of[s.index] for s in both], [s.index for s in both])
-        if both
-        else None,
+        mean_relation=_related(both, score_of),
         repeated=repeated_correlation([p[0] for p in points], [p[2] for p in points], [p[3] for p in points]),
+        repeated_holm=None,
+        without_subject=_without_subject([(p[0], p[2], p[3]) for p in points]),
+        normalised=_normalised(level, both, [(p[0], p[1].index, p[2]) for p in points]),
+        differences=differences(matrix),
+        estimates=estimates(trials),
         on_sed=_model([p[0] for p in points], [p[1] for p in points], [p[3] for p in points], SED),
         on_index=_model([p[0] for p in scored], [p[1] for p in scored], [p[2] for p in scored], INDEX),
         paths=path_findings(
@@ -209,24 +240,43 @@ def _model(subjects: Sequence[str], rows: Sequence[TrialRow], scores: Sequence[f
 
 def _surface(index: int, trials: Sequence[tuple[Visit, TrialRow]]) -> SurfaceMean:
     """Return means over subjects, each subject's own repeats averaged first."""
-    mus, seds = (
-        _by_subject([(v.subject, getattr(row, name)) for v, row in trials if getattr(row, name) is not None])
-        for name in ("mu", "sed")
-    )
-    return SurfaceMean(
-        index,
-        len(seds),
-        float(np.mean(mus)) if mus else None,
-        float(np.mean(seds)) if seds else None,
-        float(np.std(seds, ddof=1)) if len(seds) > 1 else None,
-    )
+
+    def over_subjects(name: str) -> Average | None:
+        return average(by_subject([(v.subject, getattr(row, name)) for v, row in trials]))
+
+    names = ("mu", "sed", "normal_force", "model_normal_force", "matching_depth")
+    mu, sed, normal, model, depth = map(over_subjects, names)
+    return SurfaceMean(index, 0 if sed is None else sed.n, mu, sed, normal, model, depth)
 
 
-def _by_subject(values: Sequence[tuple[str, float]]) -> list[float]:
-    own: defaultdict[str, list[float]] = defaultdict(list)
-    for subject, value in values:
-        own[subject].append(value)
-    return [float(np.mean(all_of)) for all_of in own.values()]
+def _related(seds: Mapping[int, float], scores: Mapping[int, float]) -> Relation | None:
+    """Return how mean scores go with mean SEDs, by index."""
+    both = [index for index in seds if index in scores]
+    return relation([seds[i] for i in both], [scores[i] for i in both], both) if both else None
+
+
+def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[str, float], ...]:
+    """Return the correlation within subjects when each subject in turn is left out."""
+    told: list[tuple[str, float]] = []
+    for subject in dict.fromkeys(point[0] for point in points):
+        others = [point for point in points if point[0] != subject]
+        found = repeated_correlation(*zip(*others, strict=True)) if others else None
+        if found is not None:
+            told.append((subject, found.r))
+    return tuple(told)
+
+
+def _normalised(
+    table: Mapping[str, Mapping[int, float]], seds: Mapping[int, float], points: Sequence[tuple[str, int, float]]
+) -> Normalised:
+    """Return what scores say that were standardised; `points` are subject, index and SED [MPa] of its own stroke."""
+    means = averages(table)
+    pairs = [(subject, sed, table[subject][i]) for subject, i, sed in points if i in table.get(subject, {})]
+    return Normalised(
+        means,
+        _related(seds, {index: mean.mean for index, mean in means.items()}),
+        repeated_correlation(*zip(*pairs, strict=True)) if pairs else None,
+    )
 
 
 def _recovered(found: Sequence[DescriptorFindings], score: Mapping[str, float]) -> tuple[Recovered, ...]:

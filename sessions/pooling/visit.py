@@ -15,8 +15,12 @@ from sessions.plan import Block
 from sessions.prediction import PredictionOptions, SessionPrediction, predict
 from sessions.recording import Recording
 from sessions.recording.log import TrialRecord
+from sessions.recording.manifest import file_sha256
+from sessions.recording.schema import LIVE_FILE
+from sessions.report.predictions import modelled
+from sessions.sealing import NUMBERS, sealed_sentence
 
-FORM = 5  # raised when a row holds something else: what was stored before is then computed anew
+FORM = 6  # raised when a row holds something else: what was stored before is then computed anew
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +47,7 @@ class TrialRow:
     before: int | None  # index stroked just before, in the same block
     outcome: str
     score: float | None
+    estimate: float | None = None  # on a scale of the subject's own
     rule: str = ""  # which mu the model got
     mu: float | None = None
     mu_low: float | None = None  # bootstrap interval of mu, see `BootstrapSettings.kind`
@@ -74,6 +79,10 @@ class Visit:
     rows: tuple[TrialRow, ...]
     losses: tuple[str, ...]
     made_by: Mapping[str, str]  # versions
+    sha256: str = ""  # of its `session.sqlite`
+    sealed: str = ""  # whether its predictions were sealed before its scores, "" where it predicts nothing
+    decisions: tuple[str, ...] = ()  # of people about its strokes, in force
+    model: tuple[tuple[str, str, str], ...] = ()  # what was modelled: name, value, remark
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -114,7 +123,15 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
         rows=rows,
         losses=(*known.losses, *known.flaws),
         made_by=dict(made_by),
+        sha256=file_sha256(known.folder / LIVE_FILE),
+        sealed="" if prediction is None else _sealed(known, prediction),
+        decisions=tuple(decision.sentence for decision in analysis.decisions),
+        model=tuple((fact.name, fact.value, fact.remark) for fact in modelled(prediction) if fact.name != "audits"),
     )
+
+
+def _sealed(recording: Recording, prediction: SessionPrediction) -> str:
+    return sealed_sentence(recording, [{name: getattr(row, name) for name in NUMBERS} for row in prediction.trials])
 
 
 def _row(
@@ -133,6 +150,7 @@ def _row(
         before=block.trials[place - 1].stimulus.known_index if place else None,
         outcome=record.outcome,
         score=record.score,
+        estimate=record.number,
     )
     told = {flaw.name: None for flaw in analysis.flaws if flaw.trial == trial.number and flaw.grade != "note"}
     flaws = tuple(str(name) for name in told)

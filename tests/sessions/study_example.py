@@ -1,5 +1,6 @@
 """A made-up study: ten subjects, five surfaces of one descriptor, every section of the page filled."""
 
+import hashlib
 from dataclasses import replace
 
 import numpy as np
@@ -67,4 +68,12 @@ def _full(made):
         )
         for row in made.rows
     ]
-    return replace(made, rows=tuple(rows))
+    return replace(
+        made,
+        rows=tuple(rows),
+        sha256=hashlib.sha256(made.session.encode()).hexdigest(),
+        sealed="The predictions were made after the scores had been given, and had not been sealed before.",
+        decisions=("decision 1 by E02: stroke 1 of trial 2 is kept: it was good",) if made.session == "S04" else (),
+        model=(("kinematics", "small strain, plane strain", ""),),
+        made_by={"daq-app": "0.1.0"},
+    )

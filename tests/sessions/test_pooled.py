@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from study_example import visit
+from study_example import study, visit
 
+from sessions.exports.study_csv import trials_csv
 from sessions.exports.study_page import study_page
-from sessions.exports.study_tables import trials_csv
+from sessions.exports.study_prose import excluded
 from sessions.pooling.exclusions import Exclusion, exclusions_in
 from sessions.pooling.pooled import CARRY_OVER, DRIFT, INDEX, pooled
 from sessions.pooling.visit import Visit
@@ -106,3 +107,44 @@ def covering(repeats):
 def test_intervals_of_planted_effects_cover_them_90_to_98_times_in_a_hundred():
     for effect, held in covering(400).items():
         assert 0.90 <= held / 400 <= 0.985, (effect, held)
+
+
+def test_scores_stand_raw_and_standardised_side_by_side():
+    found = pooled([*VISITS[:9], visit(10, gain=0.2)]).descriptors[0]
+    # The tenth subject uses a quarter of the scale: standardised it agrees with the others.
+    spread = [found.normalised.means[index].sd for index in (0, 100)]
+    assert all(sd < 0.15 for sd in spread)
+    assert [mean.sd for mean in found.scores if mean.index in (0, 100)] > [10.0, 10.0]
+    assert found.normalised.repeated.r > found.repeated.r
+
+
+def test_leaving_out_the_one_subject_who_differs_raises_the_correlation_most():
+    found = pooled([*VISITS[:9], visit(10, gain=-0.8)]).descriptors[0]
+    assert max(found.without_subject, key=lambda one: one[1])[0] == "S10"
+    assert len(found.without_subject) == 10
+
+
+def test_magnitude_estimates_of_any_modulus_come_to_the_same_means_at_one_modulus():
+    def estimated(number, modulus):
+        made = visit(number)
+        rows = [replace(row, score=None, estimate=modulus * 2.0 ** (row.index / 50)) for row in made.rows]
+        return replace(made, rows=tuple(rows))
+
+    found = pooled([estimated(1, 1.0), estimated(2, 100.0), estimated(3, 10.0)]).descriptors[0]
+    means = found.estimates.equal_moduli
+    assert [np.exp(means[i].mean) for i in (0, 50, 100)] == pytest.approx([10.0, 20.0, 40.0])
+    assert all(mean.sd == pytest.approx(0.0, abs=1e-9) for mean in means.values())
+    assert found.estimates.geometric[0].sd > 2.0  # of the logarithms, as they were given
+    assert found.estimates.repeated.r > 0.9
+    none = replace(VISITS[3], rows=tuple(replace(r, score=None, estimate=0.0) for r in VISITS[3].rows))
+    assert pooled([estimated(1, 1.0), none]).descriptors[0].estimates.left_out == ("S04",)
+
+
+def test_what_was_excluded_is_told_with_who_and_why_and_trials_alike_together():
+    told = " ".join(excluded(study()))
+    assert "Subject S03: every trial left out by E02: used the scale backwards" in told
+    assert "Session S04: decision 1 by E02: stroke 1 of trial 2 is kept: it was good." in told
+    rows = [replace(row, sed=None, why=f"No settled sliding at mu = 0.{row.trial}.") for row in VISITS[0].rows]
+    (one,) = excluded(pooled([replace(VISITS[0], rows=tuple(rows))]))
+    assert one.startswith("The model gives no SED for 5 trials (S01 trial 1, S01 trial 2,")
+    assert one.endswith("of the first: No settled sliding at mu = 0.1.")

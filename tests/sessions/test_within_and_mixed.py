@@ -10,7 +10,9 @@ from scipy import stats
 from sessions.analysis.mixed import mixed_model
 from sessions.analysis.within import (
     agreement,
+    differences,
     equal_moduli,
+    holm,
     repeated_correlation,
     standardised,
     within_means,
@@ -129,3 +131,18 @@ def test_standardised_scores_have_no_level_and_equal_moduli_keep_ratios():
     assert equal["a"][2] / equal["a"][0] == pytest.approx(4.0)
     with pytest.raises(ValueError, match="b gave the estimate 0"):
         equal_moduli({"b": {0: 0.0}})
+
+
+def test_p_values_of_several_comparisons_are_those_of_r_p_adjust_holm():
+    # R 4.2: p.adjust(c(0.01, 0.02, 0.03, 0.04, 0.05), "holm"); and c(0.04, 0.001, 0.9, 0.02)
+    assert holm([0.01, 0.02, 0.03, 0.04, 0.05]) == pytest.approx([0.05, 0.08, 0.09, 0.09, 0.09])
+    assert holm([0.04, 0.001, 0.9, 0.02]) == pytest.approx([0.08, 0.004, 0.9, 0.06])
+
+
+def test_differences_between_stimuli_are_paired_and_leave_each_subjects_level_out():
+    table = {"A": {0: 10.0, 50: 14.0}, "B": {0: 60.0, 50: 66.0}, "C": {0: 30.0, 50: 38.0}, "D": {0: 99.0}}
+    (one,) = differences(table)
+    assert (one.low_index, one.high_index, one.n, one.mean) == (0, 50, 3, 6.0)
+    # t(0.975, 2) = 4.302653 times 2 / sqrt(3), by tables
+    assert (one.low, one.high) == pytest.approx((6.0 - 4.968275, 6.0 + 4.968275), abs=1e-5)
+    assert one.p_holm == one.p

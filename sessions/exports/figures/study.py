@@ -29,9 +29,12 @@ SCORES = (
     "score equal to index."
 )
 RELATION = (
-    "Score against the SED predicted from the same subject's own stroke. Grey: a line for each subject; green: means "
-    "over subjects, with the surface's index."
+    "Score against the SED predicted from the same subject's own stroke. Small dots and thin lines: each subject; "
+    "large dots: means over subjects with the surface's index, bars their 95 % t intervals."
 )
+
+
+MOST = 400  # points that tell their values each on their own
 
 
 def _experiment(one: DescriptorFindings) -> Experiment:
@@ -45,22 +48,28 @@ def _experiment(one: DescriptorFindings) -> Experiment:
 def _relation(one: DescriptorFindings, *, simulated: bool) -> Panel:
     drawn = sheet(328, 280)
     (axes,) = drawn.axes
+    each = len(one.points) <= MOST  # of more points hovering tells the subject alone
     for subject in dict.fromkeys(point[0] for point in one.points):
-        own = sorted((1e3 * sed, score) for of, _, sed, score in one.points if of == subject)
-        axes.plot([x for x, _ in own], [y for _, y in own], "-", color=GREY, alpha=0.35, linewidth=0.7)
-        axes.plot(
-            [x for x, _ in own],
-            [y for _, y in own],
-            "o",
-            color=GREY,
-            markersize=2,
-            gid=drawn.note(f"subject {subject}"),
-        )
+        own = sorted((1e3 * sed, score, index) for of, index, sed, score in one.points if of == subject)
+        axes.plot([x for x, _, _ in own], [y for _, y, _ in own], "-", color=GREY, alpha=0.35, linewidth=0.7)
+        for x, y, index in own if each else ():
+            words = f"subject {subject}, index {index}: SED {x:.3f} kPa, score {y:.1f}"
+            axes.plot(x, y, "o", color=GREY, markersize=2, gid=drawn.note(words))
+        if not each:
+            dots = [x for x, _, _ in own], [y for _, y, _ in own]
+            axes.plot(*dots, "o", color=GREY, markersize=2, gid=drawn.note(f"subject {subject}"))
     means = {mean.index: mean.mean for mean in one.scores}
+    bars = {mean.index: (mean.low, mean.high) for mean in one.scores}
     for surface in one.surfaces:
         if surface.sed is not None and surface.index in means:
-            x, y = 1e3 * surface.sed, means[surface.index]
-            axes.plot(x, y, "o", color=GREEN, markersize=5, zorder=3)
+            x, y = 1e3 * surface.sed.mean, means[surface.index]
+            words = f"index {surface.index}: mean SED {x:.3f} kPa, mean score {y:.1f}"
+            axes.plot(x, y, "o", color=GREEN, markersize=5, zorder=3, gid=drawn.note(words))
+            low, high = bars[surface.index]
+            if surface.sed.low is not None and surface.sed.high is not None:
+                axes.plot([1e3 * surface.sed.low, 1e3 * surface.sed.high], [y, y], color=GREEN, linewidth=0.9, zorder=2)
+            if low is not None and high is not None:
+                axes.plot([x, x], [low, high], color=GREEN, linewidth=0.9, zorder=2)
             axes.annotate(str(surface.index), (x, y), xytext=(5, 4), textcoords="offset points", zorder=4)
     axes.set_ylim(-4, 109)
     axes.set_yticks([0, 20, 40, 60, 80, 100])

@@ -1,0 +1,161 @@
+"""What a study's page says in sentences and facts: its answer in short, who, what was excluded, what made it."""
+
+import re
+from collections import defaultdict
+from collections.abc import Sequence
+
+from sessions.analysis.area import PLANNED_AT
+from sessions.exports.report_tables.paths import paths_sentence
+from sessions.exports.wording import correlation, digits, plural
+from sessions.pooling.pooled import DescriptorFindings, StudyFindings
+from sessions.recording.provenance import software_versions
+from sessions.report import Fact
+
+_FEW = 12  # trials named one by one
+
+
+def summary(study: StudyFindings) -> list[str]:
+    """Return the findings in short, a sentence each."""
+    subjects = {visit.subject for visit in study.visits}
+    said = [f"{plural(len(study.visits), 'session')} of {plural(len(subjects), 'subject')} were read."]
+    for one in study.descriptors:
+        said += _related(one)
+        said += [paths_sentence(one.descriptor, one.paths)] if one.paths else []
+    if study.friction is not None:
+        f = study.friction
+        said.append(
+            f"Of {f.strokes} strokes the planted µ came back with a median error of "
+            f"{digits(100 * f.median_error, 2)} %, {digits(100 * f.worst_error, 2)} % at worst; "
+            f"{f.covered} of {f.intervals} intervals of µ hold it."
+        )
+    return said
+
+
+def _related(one: DescriptorFindings) -> list[str]:
+    name = one.descriptor[:1].upper() + one.descriptor[1:]
+    if one.repeated is None:
+        return [f"{name}: too few subjects with scores and strokes of their own for a correlation within subjects."]
+    r = one.repeated
+    interval = f"95 % interval {correlation(r.low)} to {correlation(r.high)}"
+    return [f"{name}: within subjects, score and predicted SED go together by r = {correlation(r.r)}, {interval}."]
+
+
+def who(study: StudyFindings) -> list[Fact]:
+    """Return who took part."""
+    subjects = sorted({visit.subject for visit in study.visits})
+    stroked = sorted({visit.subject for visit in study.visits if visit.forces})
+    protocols = sorted({visit.protocol for visit in study.visits})
+    return [
+        Fact("subjects", f"{len(subjects)}: {', '.join(subjects)}"),
+        Fact("of them with forces", f"{len(stroked)}: {', '.join(stroked)}" if stroked else "none"),
+        Fact("protocol", ", ".join(protocols)),
+    ]
+
+
+def excluded(study: StudyFindings) -> list[str]:
+    """Return a sentence for all that does not count, by whom and why, and for each doubt about what does."""
+    said = [f"Session {folder} could not be read, and nothing of it counts: {why}." for folder, why in study.failed]
+    for one in study.excluded:
+        what = f"trials on {one.descriptor}" if one.descriptor else "every trial"
+        said.append(f"Subject {one.subject}: {what} left out by {one.who}: {one.why}.")
+    said += [f"Session {visit.session}: {_stopped(decision)}" for visit in study.visits for decision in visit.decisions]
+    said += [
+        f"Session {visit.session} ended before its last trial; what it holds counts."
+        for visit in study.visits
+        if not visit.complete
+    ]
+    said += [f"Session {visit.session}: {loss}." for visit in study.visits for loss in visit.losses]
+    said += _missing(study)
+    said += [
+        f"Nothing, but a doubt: the {descriptor} scores of {subject} fall as the index rises (r = {correlation(r)}); "
+        "the scale may have been used backwards."
+        for subject, descriptor, r in study.reversed
+    ]
+    return said
+
+
+def _stopped(sentence: str) -> str:
+    return sentence if sentence.endswith(".") else f"{sentence}."
+
+
+def _missing(study: StudyFindings) -> list[str]:
+    """Return which trials have no score or no SED, those that differ in numbers alone together."""
+    silent = [f"{v.session} trial {r.trial}" for v in study.visits for r in v.rows if r.outcome == "not answered"]
+    said = [f"No score, for the subject did not answer: {_listed(silent)}."] if silent else []
+    alike: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
+    for visit in study.visits:
+        for row in visit.rows if visit.forces else ():
+            if row.sed is None and row.why:
+                alike[re.sub(r"[\d.]+", "#", row.why)].append((f"{visit.session} trial {row.trial}", row.why))
+    for places in alike.values():
+        first = "" if len({told for _, told in places}) == 1 else "of the first: "
+        named = _listed([place for place, _ in places])
+        why = f"{first}{_stopped(places[0][1])}"
+        said.append(f"The model gives no SED for {plural(len(places), 'trial')} ({named}): {why}")
+    return said
+
+
+def _listed(places: Sequence[str]) -> str:
+    return ", ".join(places[:_FEW]) + (f" and {len(places) - _FEW} more" if len(places) > _FEW else "")
+
+
+def sealed(study: StudyFindings) -> str:
+    """Return whether predictions were sealed before scores."""
+    told = [(visit.session, visit.sealed) for visit in study.visits if visit.sealed]
+    if not told:
+        return ""
+    alike: defaultdict[str, list[str]] = defaultdict(list)
+    for session, sentence in told:
+        alike[sentence].append(session)
+    if len(alike) == 1:
+        return f"In {'each' if len(told) > 1 else 'the one'} of {plural(len(told), 'session')}: {told[0][1]}"
+    return " ".join(f"{', '.join(sessions)}: {sentence}" for sentence, sessions in alike.items())
+
+
+def modelled(study: StudyFindings) -> list[Fact]:
+    """Return what was modelled; where sessions differ, each of the first few that do."""
+    told: defaultdict[str, dict[tuple[str, str], list[str]]] = defaultdict(dict)
+    for visit in study.visits:
+        for name, value, remark in visit.model:
+            told[name].setdefault((value, remark), []).append(visit.session)
+    facts: list[Fact] = []
+    for name, values in told.items():
+        for (value, remark), sessions in list(values.items())[:_FEW]:
+            whose = "" if len(values) == 1 else f"in {_listed(sessions)}"
+            facts.append(Fact(name, value, "; ".join(part for part in (remark, whose) if part)))
+    return facts
+
+
+def versions() -> list[Fact]:
+    """Return the versions that made the page."""
+    return [Fact(name, version) for name, version in software_versions().items()]
+
+
+def again(study: StudyFindings) -> list[Fact]:
+    """Return what the numbers were made with: options, versions, and the hash of each recording."""
+    model = study.options.prediction
+    facts = [
+        Fact("strain of the model", model.kinematics),
+        Fact("τ max", model.tau_reading),
+        Fact("contact area", study.options.area.sentence),
+        Fact("many paths", study.options.paths),
+    ]
+    made: defaultdict[str, list[str]] = defaultdict(list)
+    for visit in study.visits:
+        made[", ".join(f"{name} {version}" for name, version in visit.made_by.items())].append(visit.session)
+    facts += [Fact("computed with", text, f"{plural(len(sessions), 'session')}") for text, sessions in made.items()]
+    facts += [Fact(visit.session, f"SHA-256 {visit.sha256}", "session.sqlite") for visit in study.visits]
+    return [fact for fact in facts if fact.value]
+
+
+def command(study: StudyFindings, name: str) -> str:
+    """Return what to type to get the same numbers."""
+    options = study.options
+    words = ["daq-app study", name]
+    words += ["--kinematics finite"] if options.prediction.kinematics == "finite" else []
+    words += ["--tau as-printed"] if options.prediction.tau_reading != "computed" else []
+    area = options.area
+    words += [f"--area {area.law}"] if area.law == "hertz" else [f"--area {area.exponent:g}"] if area.exponent else []
+    words += [f"--area-force {area.force:g}"] if area.force != PLANNED_AT else []
+    words += {"none": [], "small": ["--paths"], "finite": ["--paths finite"]}[options.paths]
+    return " ".join(words)
