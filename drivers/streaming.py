@@ -153,14 +153,23 @@ class StreamingTransducer(ThreadedTransducer):
     _tick = _TICK
 
     def __init__(
-        self, info: TransducerInfo, connect: Callable[[], Link], conversation: Conversation, clock: Clock
+        self,
+        info: TransducerInfo,
+        connect: Callable[[], Link],
+        conversation: Conversation,
+        clock: Clock,
+        *,
+        gathers: bool = True,
     ) -> None:
-        """Take an identified device whose `info.rate` [Hz] is known within a few per cent."""
+        """Take an identified device whose `info.rate` [Hz] is known within a few per cent.
+
+        `gathers`: the link hands over all that has arrived at one go, as lines do, and not a datagram at a time.
+        """
         super().__init__(info, clock)
         self._connect = connect
         self._conversation = conversation
         self._period = 1.0 / info.rate / clock.factor  # between two records [real s]
-        self._gather = _GATHER if self._period < _GATHER else 0.0
+        self._gather = _GATHER if gathers and self._period < _GATHER else 0.0
         self._pending: deque[_Arrived] = deque()
         self._reset()
 
