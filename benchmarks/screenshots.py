@@ -6,8 +6,10 @@ Sizes are those of the screen in its own pixels; a scaling of 2 leaves half as m
 import argparse
 import itertools
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -22,16 +24,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--setting", help="one setting alone, such as 1366x768-1.5-dark-de_DE")
+    parser.add_argument("--session", type=Path, help="a session folder: then the analyst's places too")
     parser.add_argument("--take", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.take:
-        _take(options.setting, options.out)
+        _take(options.setting, options.out, options.session)
         return
     settings = [options.setting] if options.setting else list(_settings())
     for setting in settings:
         scale = setting.split("-")[1]
         environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "QT_SCALE_FACTOR": scale}
         command = [sys.executable, "-m", "benchmarks.screenshots", "--take", "--setting", setting]
+        command += ["--session", str(options.session)] if options.session else []
         subprocess.run([*command, "--out", str(options.out)], env=environment, check=True)
         print(setting)
     print(f"{len(list(options.out.glob('*.png')))} pictures in {options.out}")
@@ -44,7 +48,7 @@ def _settings() -> list[str]:
     return made
 
 
-def _take(setting: str, out: Path) -> None:
+def _take(setting: str, out: Path, session: Path | None) -> None:
     """Take the pictures of one setting."""
     from PySide6.QtCore import QLocale, QSettings
     from PySide6.QtWidgets import QApplication
@@ -62,6 +66,59 @@ def _take(setting: str, out: Path) -> None:
     places = _Places(application, (width, height), chosen, lambda name: out / f"{name}-{setting}.png")
     places.all()
     places.window.bridge.end()
+    if session is not None:
+        _take_analyst(application, session, (width, height), chosen, lambda name: out / f"{name}-{setting}.png")
+
+
+def _take_analyst(application, session: Path, size, theme, path) -> None:  # noqa: ANN001
+    """Take a picture of each of the analyst's places, on a copy of a session."""
+    from daq_app.analyst import messages as m
+    from daq_app.qt.analyst_window import AnalystWindow
+
+    def until(condition) -> None:  # noqa: ANN001
+        end = time.monotonic() + 120.0
+        while not condition() and time.monotonic() < end:
+            application.processEvents()
+            time.sleep(0.005)
+
+    def picture(name: str, page: int) -> None:
+        until(lambda: window.state.step is None)
+        window._pages.setCurrentIndex(page)
+        for _ in range(5):
+            application.processEvents()
+            time.sleep(0.02)
+        window.grab().save(str(path(name)))
+
+    folder = Path(tempfile.mkdtemp()) / session.name
+    shutil.copytree(session, folder)
+    window = AnalystWindow(folder, theme)
+    window.resize(*size)
+    window.show()
+    picture("19-opening", 0)
+    until(lambda: window.state.stage == "predicted")
+    picture("20-analyst-trials", 0)
+    picture("21-analyst-finger", 2)
+    steady = window.state.report.strokes[0].steady
+    window.ask(m.Move(1, "steady begin", steady[0] + 0.1, "E02", "the finger still stuck there"))
+    picture("22-analyst-window-moved", 1)
+    window._follow("readings")
+    window.stroke.player.step(-300)
+    picture("23-analyst-replay", 1)
+    window.model.near.click()
+    window.model.history.click()
+    until(lambda: window.state.film is not None)
+    window.model.player.seek(30)
+    picture("24-analyst-history", 2)
+    window.model.tabs.setCurrentIndex(1)
+    until(lambda: window.state.drawn)
+    picture("25-analyst-session", 2)
+    window.ask(m.Compare(str(session)))
+    until(lambda: "compared" in window.state.drawn)
+    picture("26-analyst-comparison", 2)
+    window._show_keys()
+    picture("27-analyst-keys", 2)
+    window.close()
+    shutil.rmtree(folder.parent)
 
 
 class _Places:

@@ -100,3 +100,32 @@ def step_above(value: float) -> float:
 def top(frame: Frame) -> float:
     """Return the SED [kPa] at which the colours of a frame alone would end: few nodes lie above."""
     return step_above(1000.0 * float(np.quantile(frame.sed, TOP)))
+
+
+def seen(
+    nodes: Array, sed: Array, triangles: Indices, box: tuple[float, float, float, float]
+) -> tuple[Array, Array, Indices]:
+    """Return nodes (n, 2), their SED and those of the triangles (t, 3) that reach into left, right, below, above."""
+    left, right, below, above = box
+    x, y = nodes[triangles, 0], nodes[triangles, 1]
+    inside = (x.max(axis=1) >= left) & (x.min(axis=1) <= right) & (y.max(axis=1) >= below) & (y.min(axis=1) <= above)
+    return nodes, sed, triangles[inside]
+
+
+def halved(nodes: Array, sed: Array, triangles: Indices) -> tuple[Array, Array, Indices]:
+    """Return each triangle (t, 3) as four, cut at the middles of its sides, where the SED is the mean of its ends.
+
+    >>> corners = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]])
+    >>> _, sed, four = halved(corners, np.array([0.0, 2.0, 4.0]), np.array([[0, 1, 2]]))
+    >>> sed[four].mean(axis=1).tolist()
+    [1.0, 2.0, 3.0, 2.0]
+    """
+    count, first = len(triangles), len(nodes)
+    ends = (triangles, triangles[:, [1, 2, 0]])
+    middles = [
+        (values[ends[0]] + values[ends[1]]).reshape(3 * count, *values.shape[1:]) / 2.0 for values in (nodes, sed)
+    ]
+    ab, bc, ca = (first + np.arange(count) * 3 + side for side in range(3))
+    a, b, c = triangles.T
+    four = np.stack([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]).transpose(2, 0, 1).reshape(-1, 3)
+    return np.concatenate([nodes, middles[0]]), np.concatenate([sed, middles[1]]), four

@@ -3,6 +3,7 @@
 from daq_app.analyst import messages as m
 from daq_app.analyst.frame import Frame, step_above, top
 from daq_app.analyst.state import AnalystState, chosen
+from sessions.report.contents import PredictionFinding
 
 PHASES = {
     "pressing": "pressing down",
@@ -22,6 +23,11 @@ def shown_film(state: AnalystState) -> m.Filmed | None:
     """Return the history that was asked for, where it is that of the chosen trial."""
     row = chosen(state)
     return state.film if row is not None and state.film is not None and state.film.key == row.key else None
+
+
+def was_tried(said: PredictionFinding) -> bool:
+    """Say whether a trial was given to the solver: all that it needs is known."""
+    return None not in (said.mu, said.tau_max, said.indentation, said.direction)
 
 
 def finger_words(state: AnalystState | None) -> str:

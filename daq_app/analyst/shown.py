@@ -24,7 +24,7 @@ def words_of(row: Row) -> str:
         assert row.prediction is not None  # a row has at least one of them
         return _named(row.prediction) + "  no stroke"
     mu = "µ –" if row.stroke.mu_dynamic is None else f"µ {row.stroke.mu_dynamic:.2f}"
-    mark = "  !" if row.stroke.flaws else ""
+    mark = ("  !" if row.stroke.flaws else "") + ("  ✎" if row.stroke.decided else "")
     failed = "  no SED" if row.prediction is not None and row.prediction.sed is None else ""
     return f"{_named(row.stroke)}  {mu}{mark}{failed}"
 

@@ -20,8 +20,9 @@ from sessions.plan import Blinded
 from sessions.prediction import TrialPrediction, Way, predict
 from sessions.recording import Recording, RecordingError
 from sessions.recording.provenance import software_versions
-from sessions.report import Field, Report, findings
+from sessions.report import Field, Further, Report, findings
 from sessions.report.predictions import field_of, finding_of
+from sessions.uncertainty import sed_intervals
 from solver.failures import Cancelled
 from solver.fields import Sketch
 from solver.scene import SceneError
@@ -233,7 +234,9 @@ class Work:
         if asked.what == "report":
             from sessions.exports import html
 
-            html.write_report(self._report, path)
+            told = self.timed("carrying the uncertainty of friction through")
+            further = Further(sed_intervals(self._analysis, self._prediction, progress=told))
+            html.write_report(findings(self._recording, self._analysis, self._prediction, further=further), path)
             return str(path)
         made_by = {"made_by": software_versions()}
         source = ExportSource(self._recording, made_by | self._analysis.to_dict(), made_by | self._prediction.to_dict())

@@ -23,6 +23,7 @@ from daq_app.analyst.lineage import lineage
 from daq_app.analyst.process import Analyst
 from daq_app.analyst.shown import progress_words
 from daq_app.analyst.state import AnalystState, fold, rows
+from daq_app.qt.keys import ANALYST_KEYS, KeysPage
 from daq_app.qt.lineage_label import LineageLabel
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
 from daq_app.qt.parts import button, choice, label, panel, say
@@ -61,6 +62,7 @@ class AnalystWindow(QMainWindow):
         self.setAccessibleName("analyst's window")
         self.state = AnalystState(folder)
         self._work: Work = work or Analyst(folder)
+        self.keys: KeysPage | None = None  # made when somebody asks for it
         self._head = label("", "simulated")
         self.way = LineageLabel(tokens)
         self.way.followed.connect(self._follow)
@@ -82,7 +84,9 @@ class AnalystWindow(QMainWindow):
         self._parts = [self._panel(name, column) for name, column in self._named()]
         self._pages = QTabWidget()
         self._pages.setAccessibleName("trials, stroke or model")
-        self._row = QHBoxLayout()
+        self._beside = QWidget()
+        self._row = QHBoxLayout(self._beside)
+        self._row.setContentsMargins(0, 0, 0, 0)
         self._row.setSpacing(GRID)
         self._narrow: bool | None = None
         self.setCentralWidget(self._placed())
@@ -115,23 +119,44 @@ class AnalystWindow(QMainWindow):
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Stop the work with Esc, undo with Ctrl+Z and redo with Ctrl+Shift+Z."""
         held = event.modifiers() & Qt.KeyboardModifier.ControlModifier
-        if event.key() == Qt.Key.Key_Escape and self.stop.isEnabled():
-            self.ask(m.Stop())
-        elif held and event.key() == Qt.Key.Key_Z:
-            self.stroke.decisions.take_back(again=bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier))
-        else:
-            super().keyPressEvent(event)
+        match event.key():
+            case Qt.Key.Key_F1:
+                self._show_keys()
+            case Qt.Key.Key_Escape if self.keys is not None and self.keys.isVisible():
+                self.keys.hide()
+            case Qt.Key.Key_Escape if self.stop.isEnabled():
+                self.ask(m.Stop())
+            case Qt.Key.Key_Z if held:
+                self.stroke.decisions.take_back(again=bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier))
+            case Qt.Key.Key_1 | Qt.Key.Key_2 | Qt.Key.Key_3 if held:
+                self._go_to(event.key() - Qt.Key.Key_1)
+            case _:
+                super().keyPressEvent(event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Put the columns beside each other, or on pages where there is little room."""
         super().resizeEvent(event)
         self._place_columns()
+        if self.keys is not None:
+            self.keys.fit(self.size(), font_scale())
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802  Qt's name
         """End the work with the window."""
         self._timer.stop()
         self._work.close()
         super().closeEvent(event)
+
+    def _show_keys(self) -> None:
+        if self.keys is None:
+            self.keys = KeysPage(self, ANALYST_KEYS)
+        self.keys.fit(self.size(), font_scale())
+        self.keys.setVisible(not self.keys.isVisible())
+        self.keys.raise_()
+
+    def _go_to(self, column: int) -> None:
+        """Go to one of the columns, on its page where they are pages."""
+        self._pages.setCurrentIndex(column)
+        (self.trials.list, self.stroke.stroke.handles["onset"], self.model.tabs)[column].setFocus()
 
     def _look(self) -> None:
         said = self._work.poll()
@@ -219,6 +244,7 @@ class AnalystWindow(QMainWindow):
             return
         self._narrow = narrow
         self._pages.setVisible(narrow)
+        self._beside.setVisible(not narrow)
         for (name, _), part, stretch in zip(self._named(), self._parts, (3, 6, 6), strict=True):
             if narrow:
                 self._pages.addTab(part, name)
@@ -243,7 +269,7 @@ class AnalystWindow(QMainWindow):
         layout = QVBoxLayout(window)
         layout.setContentsMargins(GRID, GRID, GRID, GRID)
         layout.addLayout(top)
-        layout.addLayout(self._row, 1)
+        layout.addWidget(self._beside, 1)
         layout.addWidget(self._pages, 1)
         layout.addLayout(foot)
         return window

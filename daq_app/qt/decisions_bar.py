@@ -4,7 +4,7 @@ from PySide6.QtCore import QSettings, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 
 from daq_app.analyst import messages as m
-from daq_app.qt.parts import button, label
+from daq_app.qt.parts import Wrapped, button, label
 from daq_app.qt.tokens import GRID
 
 BY = "analyst/by"  # where the code is remembered
@@ -30,8 +30,7 @@ class DecisionsBar(QWidget):
         self.why.setAccessibleName("why an edge is moved")
         self.undo = button("Undo", "undo the last decision, Ctrl+Z", lambda: self.take_back(again=False), "small")
         self.redo = button("Redo", "redo what was undone, Ctrl+Shift+Z", lambda: self.take_back(again=True), "small")
-        self.told = label("", "value", wrap=True)
-        self.told.setProperty("grade", "look")
+        self.told = Wrapped("value", "look")
         line = QHBoxLayout()
         line.setSpacing(GRID // 2)
         line.addWidget(label("by", "quiet"))
@@ -60,5 +59,4 @@ class DecisionsBar(QWidget):
 
     def show_decided(self, sentences: tuple[str, ...]) -> None:
         """Show what was decided about a stroke."""
-        self.told.setText("\n".join(f"✎ {sentence}" for sentence in sentences))
-        self.told.setVisible(bool(sentences))
+        self.told.show_text("\n".join(f"✎ {sentence}" for sentence in sentences))

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QPushButton, QSizePolicy
 from daq_app.analyst.edges import LEAP, STEP, Placed
 from daq_app.analyst.messages import Edge
 
-NAMES: dict[Edge, str] = {"onset": "onset", "steady begin": "steady from", "steady end": "to", "lift": "lift"}
+NAMES: dict[Edge, str] = {"onset": "onset", "steady begin": "steady", "steady end": "to", "lift": "lift"}
 
 
 class EdgeHandle(QPushButton):
@@ -79,5 +79,5 @@ class EdgeHandle(QPushButton):
         self.setText(f"{mark}{name} {at}{' ⏎' if self._away else ''}")
         state = placed.decided or ("as found" if placed.found else "not found; where it could be")
         self.setToolTip(f"{state}\nDrag the line, or: ← → move (Shift further), Enter records, Esc goes back")
-        spoken = "steady to" if name == "to" else name
+        spoken = {"steady begin": "steady from", "steady end": "steady to"}.get(self.edge, name)
         self.setAccessibleName(f"{spoken} {at} s, {state}{', Enter records' if self._away else ''}")

@@ -1,6 +1,7 @@
 """Paints a state of the model's finger: SED in colour, layers, contact with its tractions, the row of receptors."""
 
 import itertools
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,14 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QLinearGradient, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from daq_app.analyst.frame import Frame, step_above
+from daq_app.analyst.frame import Frame, halved, seen, step_above
 from daq_app.qt.tokens import MODEL, SMALL, Tokens, font
 
 pg: Any = pyqtgraph  # it has no types
 Array = NDArray[np.float64]
+
+Placed = Callable[[Array], list[QPointF]]  # where points (n, 2) [mm] are drawn
+Box = tuple[float, float, float, float]  # left, right, below, above [mm]
 
 SHADES = 64
 ARROWS, LONGEST = 22, 1.5  # tractions at most, and the longest of them [mm]
@@ -114,7 +118,7 @@ class FingerCanvas(QWidget):
         painter.setClipRect(box)
         ink = QColor(self._tokens.text)
         painter.fillRect(QRectF(box.left(), origin.y(), box.width(), box.bottom() - origin.y()), self._ground())
-        self._paint_tissue(painter, placed(frame.nodes), frame)
+        self._paint_tissue(painter, placed, frame, (left, right, below, above))
         for name, outline in frame.outlines.items():
             painter.setPen(QPen(ink, 1.4 if name == "skin" else 0.7))
             painter.setBrush(QColor(self._tokens.surface) if name == "bone" else Qt.BrushStyle.NoBrush)
@@ -134,7 +138,7 @@ class FingerCanvas(QWidget):
             self._paint_lost(painter, placed(np.array([self._lost]))[0])
         painter.restore()
 
-    def _shown(self, frame: Frame) -> tuple[float, float, float, float]:
+    def _shown(self, frame: Frame) -> Box:
         """Return left, right, below and above of what is drawn [mm]."""
         if not self._near:
             x, y = frame.nodes[:, 0], frame.nodes[:, 1]
@@ -150,13 +154,17 @@ class FingerCanvas(QWidget):
         made.setAlpha(40)
         return made
 
-    def _paint_tissue(self, painter: QPainter, points: list[QPointF], frame: Frame) -> None:
-        part = 1000.0 * frame.sed[self._triangles].mean(axis=1) / self._top
+    def _paint_tissue(self, painter: QPainter, placed: Placed, frame: Frame, shown: Box) -> None:
+        nodes, sed, triangles = seen(frame.nodes, frame.sed, self._triangles, shown)
+        if self._near:
+            nodes, sed, triangles = halved(nodes, sed, triangles)
+        points = placed(nodes)
+        part = 1000.0 * sed[triangles].mean(axis=1) / self._top
         wanted = (np.clip(np.nan_to_num(part), 0.0, 1.0) * (SHADES - 1)).astype(np.int64)
         order = np.argsort(wanted, kind="stable")
         shades: list[int] = wanted[order].tolist()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-        corners: list[list[int]] = self._triangles[order].tolist()
+        corners: list[list[int]] = triangles[order].tolist()
         last = -1
         for shade, (a, b, c) in zip(shades, corners, strict=True):
             if shade != last:

@@ -1,4 +1,4 @@
-"""The keys of the experimenter's window: one list that the window obeys and F1 shows."""
+"""The keys of the windows: the experimenter's, one list that the window obeys, and the analyst's; F1 shows them."""
 
 from dataclasses import dataclass
 
@@ -44,6 +44,22 @@ KEYS = (
     Key("Esc", "leave", "leave what is being typed, or these keys"),
 )
 
+ANALYST_KEYS = (
+    Key("Tab", "next", "go to the next control; in the line at the top to the next element of the way to the readings"),
+    Key("Enter", "follow", "follow that element: to the trial, the prediction, the friction, the window, the readings"),
+    Key("Up  Down", "trial", "choose another trial, in the list"),
+    Key("Left  Right", "edge", "move the edge whose button has the focus by 5 ms; with Shift by 50 ms"),
+    Key("Enter", "record", "record where the edge is now, as a decision with who and why"),
+    Key("Esc", "back", "put the edge back where it was"),
+    Key("Ctrl+Z", "undo", "undo the last decision; that too is recorded"),
+    Key("Ctrl+Shift+Z", "redo", "redo what was undone last"),
+    Key("Space", "play", "play and pause, in the replay or in the history"),
+    Key("Left  Right", "step", "one reading, or one state of the history, back and on; Home and End: to its ends"),
+    Key("Ctrl+1 2 3", "pages", "go to the trials, the stroke, the model"),
+    Key("Esc", "stop", "stop what is being done; what was done is kept"),
+    Key("F1", "keys", "show or hide these keys"),
+)
+
 _NAMED = {
     Qt.Key.Key_Space: "Space",
     Qt.Key.Key_Return: "Space",
@@ -73,8 +89,8 @@ def act_of(event: QKeyEvent) -> str | None:
 class KeysPage(QWidget):
     """Every key, over the window."""
 
-    def __init__(self, parent: QWidget) -> None:
-        """Build the page, hidden."""
+    def __init__(self, parent: QWidget, keys: tuple[Key, ...] = KEYS) -> None:
+        """Build the page of these keys, hidden."""
         super().__init__(parent)
         self.setAccessibleName("keys")
         frame, inside = panel("keys of this window")
@@ -88,7 +104,7 @@ class KeysPage(QWidget):
         grid.setContentsMargins(0, 0, GRID, 0)
         grid.setHorizontalSpacing(3 * GRID)
         grid.setVerticalSpacing(4)
-        for row, known in enumerate(KEYS):
+        for row, known in enumerate(keys):
             grid.addWidget(label(known.key, "value"), row, 0, Qt.AlignmentFlag.AlignTop)
             grid.addWidget(label(known.words, "value", wrap=True), row, 1)
         grid.setColumnStretch(1, 1)

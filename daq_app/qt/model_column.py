@@ -7,12 +7,12 @@ from PySide6.QtWidgets import QHBoxLayout, QTabWidget, QVBoxLayout, QWidget
 from daq_app.analyst import messages as m
 from daq_app.analyst.compared import compared
 from daq_app.analyst.frame import top
-from daq_app.analyst.seen import common_top, film_words, finger_words, shown_film
+from daq_app.analyst.seen import common_top, film_words, finger_words, shown_film, was_tried
 from daq_app.analyst.shown import session_pictures
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.qt.compared_view import PICTURE, ComparedView
 from daq_app.qt.finger_canvas import FingerCanvas
-from daq_app.qt.parts import button, choice, label, say
+from daq_app.qt.parts import Wrapped, button, choice
 from daq_app.qt.picture_view import PictureView, SaveButtons
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.transport_bar import TransportBar
@@ -32,6 +32,9 @@ class ModelColumn(QWidget):
         super().__init__()
         self._state: AnalystState | None = None
         self._film: m.Filmed | None = None
+        self._name = ""  # of the finger's pictures, after their kind
+        self._drawing = ("", -1)  # picture that was asked for, and version of the report
+        self._followed: tuple[m.Key, int] | None = None  # solve without an answer that was asked after, and version
         self._at: int | None = None  # of the film; None: the settled state
         self.finger = FingerCanvas(tokens, scale)
         self.near = button("Contact", "show the contact alone, with its tractions", self._paint, "small")
@@ -43,8 +46,7 @@ class ModelColumn(QWidget):
         self.save = SaveButtons("the finger", self._save)
         self.player = TransportBar("the history", tells_time=False)
         self.player.moved.connect(self._moved)
-        self.why = label("", "value", wrap=True)
-        self.why.setProperty("grade", "look")
+        self.why = Wrapped("value", "look")
         self.which, self.picture = choice("picture of the session"), PictureView("the picture", self._save)
         self.which.activated.connect(lambda: self._show_session())
         self.compared = ComparedView(self.other_wanted.emit, self._save)
@@ -74,8 +76,8 @@ class ModelColumn(QWidget):
         row = chosen(state)
         said = None if row is None else row.prediction
         self.history.setEnabled(film is None and said is not None and said.mu is not None)
-        say(self.why, film_words(film))
-        self.why.setVisible(bool(self.why.text()))
+        self.why.show_text(film_words(film))
+        self._ask_where(state, film)
         drawable = row is not None and row.stroke is not None and row.key in state.fingers
         self._name = f" {row.stroke.number}" if drawable and row is not None and row.stroke is not None else ""
         self._name_saves()
@@ -121,9 +123,6 @@ class ModelColumn(QWidget):
             self._drawing = (name, version)
             self.asked.emit(m.Draw(name))
 
-    _drawing = ("", -1)
-    _name = ""
-
     def _paint(self) -> None:
         state = self._state
         row = None if state is None else chosen(state)
@@ -155,6 +154,17 @@ class ModelColumn(QWidget):
         if row is not None:
             self.asked.emit(m.ShowHistory(row.key))
             self.player.slider.setFocus()
+
+    def _ask_where(self, state: AnalystState, film: m.Filmed | None) -> None:
+        """Ask how far a solve without an answer came, once."""
+        row = chosen(state)
+        said = None if row is None else row.prediction
+        if row is None or said is None or film is not None or said.sed is not None or not was_tried(said):
+            return
+        wanted = (row.key, state.version)
+        if wanted != self._followed:
+            self._followed = wanted
+            self.asked.emit(m.ShowHistory(row.key))
 
     def _name_saves(self) -> None:
         kind = "contact" if self.near.isChecked() else "finger"

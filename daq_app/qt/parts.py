@@ -46,6 +46,42 @@ class Shortened(QLabel):
         self.setText(self.fontMetrics().elidedText(self._whole, Qt.TextElideMode.ElideRight, max(self.width(), 1)))
 
 
+class Wrapped(QLabel):
+    """A label of as many lines as its text needs at the width it has.
+
+    What it stands in is not asked for a height by its width: where that is scrolled it would be made as high as it
+    would like to be, not as there is room.
+    """
+
+    def __init__(self, role: str, grade: str = "") -> None:
+        """Show nothing."""
+        super().__init__()
+        self.setProperty("role", role)
+        self.setProperty("grade", grade)
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setWordWrap(True)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+
+    def show_text(self, text: str) -> None:
+        """Show a text; none of it takes no room."""
+        if text != self.text():
+            self.setText(text)
+            self._fit()
+        self.setVisible(bool(text))
+
+    def hasHeightForWidth(self) -> bool:  # noqa: N802  Qt's name
+        """Say that its height is its own affair."""
+        return False
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Take the height for another width."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        self.setFixedHeight(max(self.heightForWidth(max(self.width(), 60)), 1))
+
+
 def button(text: str, name: str, does: Callable[[], object], role: str = "") -> QPushButton:
     """Return a button that says `name` to screen readers."""
     made = QPushButton(text)

@@ -7,7 +7,7 @@ from PySide6.QtGui import QFont
 from PySide6.QtWidgets import QHeaderView, QTableView, QVBoxLayout, QWidget
 
 from daq_app.analyst.raw import RawReadings
-from daq_app.qt.parts import label
+from daq_app.qt.parts import Wrapped
 
 HEAD = ("window", "sequence", "counter", "status", "time [s]", "received [ns]")
 Index = QModelIndex | QPersistentModelIndex
@@ -19,7 +19,7 @@ class ReadingsTable(QWidget):
     def __init__(self) -> None:
         """Show nothing yet."""
         super().__init__()
-        self.place = label("", "quiet", wrap=True)
+        self.place = Wrapped("quiet")
         self.table = QTableView()
         self.table.setAccessibleName("raw readings")
         self.table.setTabKeyNavigation(False)
@@ -37,9 +37,9 @@ class ReadingsTable(QWidget):
         """Show readings, those of the steady window marked by a word and by bold type."""
         self._model.show_readings(readings, steady)
         if readings is None:
-            self.place.setText("Not read yet.")
+            self.place.show_text("Not read yet.")
             return
-        self.place.setText(
+        self.place.show_text(
             f"{readings.place}. raw 1 to 6 as the device sent them [{readings.unit}]; "
             f"N and T unfiltered, zero taken off: {readings.zero}."
         )

@@ -128,7 +128,8 @@ class StrokeColumn(QWidget):
         for at, (name, value) in enumerate(self._told):
             self._numbers.addWidget(label(name, "quiet"), at, 0)
             self._numbers.addWidget(label(value, wrap=True), at, 1)
-        self._numbers.setRowStretch(len(self._told), 1)
+        for at in range(self._numbers.rowCount() + 1):
+            self._numbers.setRowStretch(at, int(at >= len(self._told)))
 
     def _dragged(self, edge: Edge, time: float) -> None:
         if self._stroke is not None:

@@ -1,6 +1,7 @@
 """The analyst's window, driven as a person does, on a recorded session that is analysed by the real work."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -176,6 +177,16 @@ def test_a_failed_solve_says_where_when_and_why_and_its_last_good_state_stays(wi
     assert window.model.finger._lost is None
 
 
+def test_how_far_a_failed_solve_came_is_asked_for_without_being_told(window):
+    report = example()
+    first = replace(report.predictions[0], sed=None, reasons={"sed": "It wedges."})
+    window.take(m.Found("predicted", replace(report, predictions=(first, *report.predictions[1:]))))
+    at = next(i for i, row in enumerate(rows(window.state)) if row.prediction is first)
+    window.ask(m.Choose(at))
+    assert m.ShowHistory(rows(window.state)[at].key) in window._work.asked
+    assert "It wedges." in window.model.finger.accessibleName()
+
+
 def test_readings_are_replayed_with_play_pause_speed_seek_and_step(window):
     stroke = chosen(window.state).stroke
     window.take(m.Read(stroke.number, raw(stroke)))
@@ -254,6 +265,10 @@ def test_every_control_has_a_name_and_tab_reaches_it(window):
         focused = window.focusWidget()
         seen.add(focused)
         window.focusNextChild()
+    QTest.keyClick(window, Qt.Key.Key_F1)
+    assert window.keys.isVisible()
+    QTest.keyClick(window, Qt.Key.Key_Escape)
+    assert not window.keys.isVisible()
     reachable = [w for w in ours if w.isVisible() and w.isEnabled() and w.focusPolicy() & Qt.FocusPolicy.TabFocus]
     assert [w.accessibleName() for w in reachable if w not in seen] == []
 
