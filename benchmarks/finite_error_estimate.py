@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.climbing import COARSER, MARGIN, Climbed, climbed, foot
+from solver.climbing import COARSER, MARGIN, Climbed, climbed, felt_of_bound, foot
 from solver.estimate import FINENESS, coarsest_for, estimates
 from solver.failures import SolveFailure
 from solver.finite_finger import FiniteFinger
@@ -78,10 +78,10 @@ def measured(number: int) -> dict[str, Any]:
             at = climbed(scene, fineness, below, going_on)
             try:
                 coarse = climbed(scene, COARSER * fineness, at, going_on)
-                other = coarse.finger.numbers(coarse.shape).tolist()
+                other = [coarse.finger.numbers(coarse.shape).tolist(), felt_of_bound(coarse).tolist()]
             except SolveFailure:
-                other = None
-            meshes[f"{fineness:g}"] = [at.finger.numbers(at.shape).tolist(), other]
+                other = [None, None]
+            meshes[f"{fineness:g}"] = [at.finger.numbers(at.shape).tolist(), *other]
     except SolveFailure:
         return {"number": number}
     return {"number": number, "meshes": meshes, "truth": truth}
@@ -92,7 +92,7 @@ class Case:
     """One scene solved."""
 
     scene: Scene
-    meshes: dict[str, list[list[float] | None]]  # the answer's numbers and those of the coarser mesh, by fineness
+    meshes: dict[str, list[list[float] | None]]  # by fineness: numbers of answer and coarser mesh, `felt`
     truth: np.ndarray  # (3,)
     doubt: np.ndarray  # (3,) how far the overkill solves lie from it, relative
 
@@ -105,11 +105,11 @@ class Case:
 
     def on(self, fineness: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the estimates and the true errors (3,), relative, of the solver's answer on a mesh."""
-        own, coarse = self.meshes[f"{fineness:g}"]
+        own, coarse, felt = self.meshes[f"{fineness:g}"]
         error = np.abs(np.array(own) / self.truth - 1.0)
-        return (
-            np.ones(3) if coarse is None else estimates(self.scene, fineness, np.array(own), np.array([coarse]))
-        ), error
+        if coarse is None or felt is None:
+            return np.ones(3), error
+        return estimates(self.scene, fineness, np.array(own), np.array([coarse]), np.array(felt)), error
 
     def asked(self, tolerance: float) -> float:
         """Return the mesh that the solver ends on when asked for this tolerance."""

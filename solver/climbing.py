@@ -9,17 +9,22 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 
+import numpy as np
+
 from solver.estimate import estimates
 from solver.existence import sound
-from solver.failures import NoSteadyState, SolveFailure
+from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.finite_finger import FiniteFinger
 from solver.finite_states import roughly, settled
+from solver.kernels import CAP
+from solver.mesh import Array
 from solver.mesher import Sizing
 from solver.newton import Shape
 from solver.scene import Scene
 
 ROUGH = 3.0  # fineness of the mesh that finds the edges
 COARSER = 0.6  # fineness of the mesh that the error is estimated from, by that of the answer
+NUDGE = 1e-3  # of the traction bound, to see what it does
 MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
 
 
@@ -98,5 +103,27 @@ def error_estimates(scene: Scene, fineness: float, at: Climbed, stop: Callable[[
     except SolveFailure:
         return 1.0, 1.0, 1.0  # so near a limit that a coarser mesh has no state: nothing is known of the error
     others = coarse.finger.numbers(coarse.shape)[None]
-    found = estimates(scene.driven(at.shape.pull.depth), fineness, at.finger.numbers(at.shape), others)
+    driven, numbers = scene.driven(at.shape.pull.depth), at.finger.numbers(at.shape)
+    found = estimates(driven, fineness, numbers, others, felt_of_bound(coarse))
     return float(found[0]), float(found[1]), float(found[2])
+
+
+def felt_of_bound(at: Climbed) -> Array:
+    """Return how SED, normal and tangential force (3,) answer to the traction bound: relative change by its own.
+
+    Zero where nothing slips at the bound, and where no state lies beside this one.
+    """
+    newton, shape = at.finger.newton, at.shape
+    if not (shape.state == CAP).any():
+        return np.zeros(3)
+    more = shape.pull._replace(tau=(1.0 + NUDGE) * shape.pull.tau, sense=shape.pull.sense or _sense(shape))
+    try:
+        beside = newton.settle(shape, more)
+    except NotConverged:
+        return np.zeros(3)
+    before = at.finger.numbers(shape)
+    return (at.finger.numbers(beside) / before - 1.0) / NUDGE
+
+
+def _sense(shape: Shape) -> int:
+    return 1 if shape.force[0] > 0.0 else -1

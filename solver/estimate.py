@@ -7,8 +7,9 @@ differently between nodes; and under a traction bound the drag is that bound tim
 known to a part of an element; forces have one more term, which matters on the coarsest meshes alone, where all three
 can agree by chance. At finite strain lines follow the edges, and one coarser mesh will do, as long as it has fewer
 layers in the fat than the answer's: from 3.6 to 6 they are three, and meshes of 6 agreed with those of 3.6 where both
-were 4 % off. The factors were chosen and measured with benchmarks/error_estimate.py and finite_error_estimate.py;
-docs/solver.md has the figures.
+were 4 % off. Where the bound acts, its force depends on how much of the last elements touches: `felt` says what a
+number makes of that. The factors were chosen and measured with benchmarks/error_estimate.py and
+finite_error_estimate.py; docs/solver.md has the figures.
 """
 
 from math import sqrt
@@ -16,7 +17,7 @@ from math import sqrt
 import numpy as np
 
 from solver.mesh import Array
-from solver.mesher import ANYWHERE, FINEST, SHORT
+from solver.mesher import ANYWHERE, EDGE, FINEST, SHORT
 from solver.scene import Scene
 
 FINENESS = {"small": (5, 6, 8, 10, 12, 16, 20, 24), "finite": (7, 10, 12, 16, 20, 24)}  # meshes that can be asked for
@@ -24,14 +25,15 @@ DEFAULT = {"small": 8, "finite": 10}
 FROM_MESHES = {"small": 0.15, "finite": 0.35}
 FROM_FINENESS = {"small": 0.07, "finite": 0.15}
 FROM_COARSE = 1.0  # of both forces at small strain, by fineness to the fourth power
-FROM_BOUND = 0.2  # of an element that touches
+FROM_BOUND = 0.2  # of an element that touches, at small strain
+FROM_EDGE = 0.15  # of an element at the edge of contact, at finite strain, as if the bound acted on so much more skin
 
 
-def estimates(scene: Scene, fineness: float, numbers: Array, others: Array) -> Array:
+def estimates(scene: Scene, fineness: float, numbers: Array, others: Array, felt: Array | float = 0.0) -> Array:
     """Return the estimated errors (3,), relative, of SED, normal and tangential force `numbers` (3,).
 
-    `others` (n, 3) are those of the coarser meshes. A number that is 0 on all meshes, as the drag without friction, is
-    exact.
+    `others` (n, 3) are those of the coarser meshes. At finite strain `felt` (3,) is the relative change of each by that
+    of the traction bound. A number that is 0 on all meshes, as the drag without friction, is exact.
     """
     kind = scene.solve.kinematics
     size = np.abs(numbers)
@@ -40,6 +42,8 @@ def estimates(scene: Scene, fineness: float, numbers: Array, others: Array) -> A
     if kind == "small":
         found[1:] += FROM_COARSE / _resolved(scene, fineness) ** 4
         found[2] += _of_bound(scene, fineness, float(size[1]), float(size[2]))
+    else:
+        found += FROM_EDGE * _element(scene, fineness) / (2.0 * _half(scene) * scene.finger.tip_radius) * np.abs(felt)
     return np.where((size == 0.0) & (largest == 0.0), 0.0, np.minimum(found, 1.0))
 
 
@@ -62,6 +66,11 @@ def _resolved(scene: Scene, fineness: float) -> float:
 def _half(scene: Scene) -> float:
     """Return half the length of the skin that may touch, by the tip's radius."""
     return sqrt(2.0 * scene.loading.depth / scene.finger.tip_radius)
+
+
+def _element(scene: Scene, fineness: float) -> float:
+    """Return the length of an element at a known edge of contact [mm]."""
+    return EDGE * scene.finger.tip_radius / fineness * min(1.0, _half(scene) / SHORT[1])
 
 
 def _of_bound(scene: Scene, fineness: float, normal: float, drag: float) -> float:

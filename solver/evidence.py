@@ -1,6 +1,6 @@
 """What a result leaves out, each with a number computed for its scene: how much that could have changed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,6 @@ DENSITY = 1.1e-9  # of soft tissue [t/mm3 = N s2/mm4]
 # Relaxation of the fingerpad under load: times from Pawluk and Howe 1999 (J. Biomech. Eng. 121, 178); their weights are
 # not in the abstract, so a fifth of the instantaneous stiffness is assumed for each, and two fifths stay.
 RELAXATION = ((0.004, 0.2), (0.07, 0.2), (1.4, 0.2))
-STAYS = 0.4
 WORTH_TELLING = 0.02  # part of the SED from which something left out is worth a warning [-]
 LARGE_STRAIN = 0.1  # a strain from which finite strain ought to be considered [-]
 
@@ -112,6 +111,8 @@ def warnings(scene: Scene, left_out: Mapping[str, Any]) -> tuple[str, ...]:
     }
     if scene.solve.course == "history":
         needs["viscosity"] = "give the tissues a Prony series"
+    elif scene.materials.relax:
+        needs["viscosity"] = 'ask for solve.course = "history"'
     for name, cure in needs.items():
         change = left_out[name]["estimate"] if name in left_out else None
         if change is not None and change > WORTH_TELLING:
@@ -193,18 +194,31 @@ def _inertia(scene: Scene, normal: float, length: float) -> dict[str, Any]:
 
 
 def _viscosity(scene: Scene, slide: float) -> dict[str, Any]:
-    if scene.materials.relax:
-        longest = scene.materials.longest_relaxation
-        how = "tissues relax as the scene says; in the end they have their relaxed moduli"
-        return {"estimate": 0.0, "from": {"longest_relaxation_s": longest}, "how": how}
     lasting = 2.0 * slide / scene.loading.speed if scene.loading.direction else 0.0
-    after = sum(g * tau * (np.exp(-lasting / tau) - np.exp(-(lasting + 1.0) / tau)) for tau, g in RELAXATION)
+    if scene.materials.relax and scene.solve.course == "history":
+        longest = scene.materials.longest_relaxation
+        how = "tissues relaxed as the scene says, until nothing changed"
+        return {"estimate": 0.0, "from": {"longest_relaxation_s": longest}, "how": how}
+    if scene.materials.relax:
+        series = [[(t.tau, t.g) for t in tissue.prony] for tissue in scene.materials.by_region]
+        whose = "the tissues relaxing by the scene's own series, the largest of them"
+    else:
+        series = [list(RELAXATION)]
+        whose = (
+            "all layers relaxing alike with the times of Pawluk and Howe (1999) and assumed weights of a fifth each; "
+            "it would scale all surfaces alike"
+        )
     return {
-        "estimate": float(after) / STAYS,
-        "from": {"slide_s": lasting, "relaxation_s": [tau for tau, _ in RELAXATION]},
-        "how": "stress above its relaxed value when sliding has settled, all layers relaxing alike with the times of "
-        "Pawluk and Howe (1999) and assumed weights of a fifth each; it would scale all surfaces alike",
+        "estimate": max(_held_after(lasting, terms) for terms in series),
+        "from": {"slide_s": lasting, "relaxation_s": sorted({tau for terms in series for tau, _ in terms})},
+        "how": f"stress above its relaxed value when sliding has settled, {whose}",
     }
+
+
+def _held_after(lasting: float, terms: Sequence[tuple[float, float]]) -> float:
+    """Return the stress above its relaxed value, relative, after a press of 1 s and a slide `lasting` so long [s]."""
+    after = sum(g * tau * (np.exp(-lasting / tau) - np.exp(-(lasting + 1.0) / tau)) for tau, g in terms)
+    return float(after) / (1.0 - sum(g for _, g in terms))
 
 
 def _elastic_slide(finger: FingerModel, displacement: Array) -> float:
@@ -215,12 +229,12 @@ def _elastic_slide(finger: FingerModel, displacement: Array) -> float:
 def _history(scene: Scene, sticking: float, slide: float) -> dict[str, Any]:
     marched = scene.solve.course == "history" or scene.loading.direction == 0
     return {
-        "estimate": 0.0,
+        "estimate": 0.0 if marched else sticking,
         "from": {"sticking_part": sticking, "elastic_slide_mm": slide},
         "how": "the history was marched"
         if marched
-        else "no touching point sticks, so nothing of the way here is left once the bone has slid a few times the "
-        "skin's own sideways displacement",
+        else "part of the touching points that stick: those alone depend on the way, which is forgotten once the bone "
+        "has slid a few times the skin's own sideways displacement",
     }
 
 

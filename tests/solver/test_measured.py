@@ -1,12 +1,13 @@
 """Evidence for what was left out can be measured, and scenes that need more than was asked are told so."""
 
 import json
+import math
 from dataclasses import replace
 
 import pytest
 
 from solver.reference import SLIPPERINESS, STICKINESS, scene
-from solver.scene import Material, SceneError, Solve
+from solver.scene import Material, Relaxation, SceneError, Solve
 from solver.solution import solve
 
 
@@ -67,3 +68,15 @@ def test_a_scene_that_folds_at_finite_strain_is_told_at_small_strain():
 def test_evidence_of_another_kind_is_refused():
     with pytest.raises(SceneError, match=r"solve\.evidence"):
         Solve(evidence="guessed")
+
+
+def test_a_relaxing_finger_solved_as_settled_is_told_what_it_still_holds_and_one_marched_holds_nothing():
+    given = replace(scene(SLIPPERINESS[4]), solve=Solve(tolerance=0.5))
+    dermis = replace(given.materials.dermis, prony=(Relaxation(0.3, 1.0),))
+    settled = solve(replace(given, materials=replace(given.materials, dermis=dermis)))
+    numbers = entry(settled, "viscosity")["from"]
+    left = 0.3 * (1.0 - math.exp(-1.0)) * math.exp(-numbers["slide_s"]) / 0.7  # of a ramp of 1 s, after the slide
+    assert entry(settled, "viscosity")["estimate"] == pytest.approx(left)
+    assert any("viscosity" in told and "history" in told for told in settled.warnings)
+    marched = solve(replace(settled.scene, solve=Solve("small", "history", 0.5)))
+    assert entry(marched, "viscosity")["estimate"] == 0.0
