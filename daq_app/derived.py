@@ -9,6 +9,7 @@ from daq_app.cli import WrongValue
 from daq_app.console import Console
 from sessions.analysis import Analysis, AnalysisSettings, analyse
 from sessions.analysis.area import FIXED, AreaLaw
+from sessions.analysis.bootstrap import BootstrapSettings, intervals_of
 from sessions.blinding import revealed
 from sessions.decisions import Decisions
 from sessions.prediction import PredictionOptions, SessionPrediction, predict
@@ -23,10 +24,15 @@ ANALYSIS = "analysis.json"
 PREDICTION = "prediction.json"
 
 
-def analysed(recording: Recording, console: Console, area: AreaLaw = FIXED) -> Analysis:
-    """Return the analysis of a session, tau_max told by a law of the area, and keep it in the session's folder."""
+def analysed(
+    recording: Recording, console: Console, area: AreaLaw = FIXED, bootstrap: BootstrapSettings | None = None
+) -> Analysis:
+    """Return the analysis of a session, tau_max told by a law of the area, and keep it in the session's folder.
+
+    `bootstrap` says what the intervals kept with it are drawn from.
+    """
     analysis = analyse(recording, AnalysisSettings(area=area))
-    _keep(recording, ANALYSIS, analysis.to_dict(), console)
+    _keep(recording, ANALYSIS, analysis_document(analysis, bootstrap), console)
     return analysis
 
 
@@ -55,6 +61,22 @@ def predicted_again(recording: Recording, analysis: Analysis, stored: Mapping[st
     stimuli: list[Mapping[str, Any]] = [row.get("stimulus") or {} for row in stored.get("trials", ())]
     blind = all(stimulus.get("index") is None for stimulus in stimuli)
     return with_alternatives(predict(analysis, (recording if blind else revealed(recording)).plan, options)).to_dict()
+
+
+def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = None) -> dict[str, Any]:
+    """Return an analysis with its bootstrap intervals, as it is kept and printed."""
+    return {**analysis.to_dict(), "bootstrap": intervals_of(analysis.strokes, bootstrap)}
+
+
+def analysed_again(recording: Recording, stored: Mapping[str, Any], decisions: Decisions) -> dict[str, Any]:
+    """Return the analysis made once more as the document `stored` was. Raises SettingsError where that is damaged."""
+    return analysis_document(analyse(recording, settings_of(stored), decisions), bootstrap_of(stored))
+
+
+def bootstrap_of(stored: Mapping[str, Any]) -> BootstrapSettings:
+    """Return what the intervals of a stored analysis were drawn from. Raises SettingsError."""
+    held: Mapping[str, Any] = stored.get("bootstrap") or {}
+    return from_table(held.get("settings") or {}, BootstrapSettings, ANALYSIS)
 
 
 def settings_of(stored: Mapping[str, Any]) -> AnalysisSettings:

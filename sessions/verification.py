@@ -16,7 +16,7 @@ def differences(stored: object, fresh: object, where: str) -> Iterator[str]:
     """
     if isinstance(stored, Mapping) and isinstance(fresh, Mapping):
         then, now = cast("Mapping[str, Any]", stored), cast("Mapping[str, Any]", fresh)
-        for key in sorted({*then, *now} - TIMINGS):
+        for key in sorted({*then, *now} - TIMINGS, key=_rank):
             if key not in then or key not in now:
                 yield f"{where}.{key} is {'new' if key in now else 'no longer made'}"
             else:
@@ -30,6 +30,11 @@ def differences(stored: object, fresh: object, where: str) -> Iterator[str]:
                 yield from differences(a, b, f"{where}[{i}]")
     elif stored != fresh or isinstance(stored, bool) != isinstance(fresh, bool):
         yield f"{where} was stored as {stored!r} and comes out as {fresh!r}{_by(cast('object', stored), fresh)}"
+
+
+def _rank(key: str) -> tuple[int, str]:
+    """Return where a name stands among the differences: what others come from first, what comes of others last."""
+    return (0 if key in ("settings", "options", "decisions") else 2 if key == "bootstrap" else 1), key
 
 
 def _by(stored: object, fresh: object) -> str:

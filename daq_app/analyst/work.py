@@ -12,6 +12,7 @@ from daq_app.analyst.compared import NAMES, compared
 from daq_app.analyst.edges import brought_back, decision_of, taken_back
 from daq_app.analyst.pictures import film_of, finger_of, lost_film
 from daq_app.analyst.raw import raw_readings
+from daq_app.derived import analysis_document
 from sessions.analysis import analyse
 from sessions.blinding import revealed
 from sessions.decisions import DecisionError, append, read
@@ -239,7 +240,9 @@ class Work:
             html.write_report(findings(self._recording, self._analysis, self._prediction, further=further), path)
             return str(path)
         made_by = {"made_by": software_versions()}
-        source = ExportSource(self._recording, made_by | self._analysis.to_dict(), made_by | self._prediction.to_dict())
+        source = ExportSource(
+            self._recording, made_by | analysis_document(self._analysis), made_by | self._prediction.to_dict()
+        )
         told = self.timed(f"writing {asked.what}")
 
         def shown(part: float) -> None:

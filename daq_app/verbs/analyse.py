@@ -5,13 +5,12 @@ seeded block bootstrap over sensor noise, zero, calibration and choice of window
 """
 
 import argparse
-from dataclasses import asdict
 from pathlib import Path
 
 from daq_app.area_option import add_area, area_law
 from daq_app.cli import WrongValue
 from daq_app.console import Console, number, table
-from daq_app.derived import analysed
+from daq_app.derived import analysed, analysis_document
 from sessions.analysis.bootstrap import BootstrapSettings, StrokeIntervals, stroke_intervals
 from sessions.analysis.tilt import Tilt
 from sessions.recording import Recording
@@ -39,10 +38,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     """Analyse the session, keep the result in its folder and print it."""
     chosen = _bootstrap(options)
     recording = Recording.open(options.session)
-    analysis = analysed(recording, console, area_law(options))
-    intervals = [stroke_intervals(stroke, at, chosen) for at, stroke in enumerate(analysis.strokes)]
-    told = {"kind": chosen.kind, "settings": asdict(chosen), "strokes": [found.to_dict() for found in intervals]}
-    console.result({**analysis.to_dict(), "bootstrap": told})
+    analysis = analysed(recording, console, area_law(options), chosen)
+    console.result(analysis_document(analysis, chosen))
     if recording.simulated_sentence:
         console.say(recording.simulated_sentence)
     rows = [
@@ -64,6 +61,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.say(f"* {decision.sentence}")
     if rows:
         console.say(f"\n{chosen.kind}:")
+        intervals = (stroke_intervals(stroke, at, chosen) for at, stroke in enumerate(analysis.strokes))
         console.say(table([_row(found) for found in intervals], head=INTERVALS))
     if analysis.tilt is not None:
         console.say(_leaning(analysis.tilt, analysis.settings.tilt))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from daq_app.cli import DONE, FLAWED, WrongValue
 from daq_app.console import Console, number
-from daq_app.derived import ANALYSIS, PREDICTION, analysed, settings_of
+from daq_app.derived import ANALYSIS, PREDICTION, analysed, bootstrap_of, settings_of
 from sessions.analysis import Analysis, Stroke, analyse
 from sessions.analysis.decided import tried, with_old
 from sessions.decisions import Decision, DecisionError, Decisions, append, read
@@ -70,7 +70,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     made = append(recording, decision)
     stored = load_derived(recording.folder, ANALYSIS)
     if stored is not None:
-        analysed(recording, console, settings_of(stored).area)
+        analysed(recording, console, settings_of(stored).area, bootstrap_of(stored))
     older = (recording.folder / PREDICTION).is_file()
     changed = _changes(analysis, after)
     console.result({"decision": made.to_dict(), "changes": changed, "prediction_is_older": older})

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from daq_app.cli import FLAWED
 from daq_app.console import Console
-from daq_app.derived import ANALYSIS, PREDICTION, made_under, predicted_again, settings_of
+from daq_app.derived import ANALYSIS, PREDICTION, analysed_again, made_under, predicted_again, settings_of
 from sessions.analysis import analyse
 from sessions.blinding import revealed
 from sessions.decisions import read
@@ -51,7 +51,7 @@ def _source(recording: Recording, console: Console) -> ExportSource:
     made_by = {"made_by": software_versions()}
     analysis, prediction = load_derived(recording.folder, ANALYSIS), load_derived(recording.folder, PREDICTION)
     if analysis is None or not made_under(analysis, decided):
-        analysis = made_by | analyse(recording, settings_of(analysis or {}), decided).to_dict()
+        analysis = made_by | analysed_again(recording, analysis or {}, decided)
     if prediction is not None and not made_under(prediction, decided):
         console.note(f"{PREDICTION} was made under other decisions than those in force, and is made anew")
         found = analyse(recording, settings_of(prediction), decided)

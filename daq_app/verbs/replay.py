@@ -15,7 +15,7 @@ from typing import Any
 
 from daq_app.cli import WrongValue
 from daq_app.console import Console
-from daq_app.derived import ANALYSIS, PREDICTION, predicted_again, settings_of
+from daq_app.derived import ANALYSIS, PREDICTION, analysed_again, predicted_again, settings_of
 from sessions.analysis import analyse
 from sessions.decisions import read
 from sessions.recording import Recording
@@ -54,8 +54,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         compared = ["readings", "events", ANALYSIS]
         decided = read(recording.folder)  # people decided about the recording, not about its replay
         stored = load_derived(options.session, ANALYSIS)
-        fresh = _plain(analyse(replayed, settings_of(stored or {}), decided).to_dict())
-        expected = _plain(analyse(recording).to_dict()) if stored is None else stored
+        fresh = _plain(analysed_again(replayed, stored or {}, decided))
+        expected = _plain(analysed_again(recording, {}, decided)) if stored is None else stored
         found += _changed(ANALYSIS, expected, fresh)
         if not options.no_prediction:
             predicted = load_derived(options.session, PREDICTION)

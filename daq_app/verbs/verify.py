@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 
 from daq_app.console import Console
-from daq_app.derived import ANALYSIS, PREDICTION, made_under, predicted_again, settings_of
+from daq_app.derived import ANALYSIS, PREDICTION, analysed_again, made_under, predicted_again, settings_of
 from sessions.analysis import analyse
 from sessions.decisions import DECISIONS, read
 from sessions.recording import Recording, RecordingError
@@ -41,10 +41,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
             stored = load_derived(folder, name)
             if stored is None:
                 continue
-            analysis = analyse(recording, settings_of(stored), decided)
             if not made_under(stored, decided):
                 found.append(f"{name} was made under other decisions than those in force: make it anew")
-            fresh = analysis.to_dict() if name == ANALYSIS else predicted_again(recording, analysis, stored)
+            if name == ANALYSIS:
+                fresh = analysed_again(recording, stored, decided)
+            else:
+                fresh = predicted_again(recording, analyse(recording, settings_of(stored), decided), stored)
         except (RecordingError, SettingsError) as damaged:
             found.append(" ".join(str(damaged).split()))
             continue

@@ -5,7 +5,7 @@ Statist. 17:1217). Every repeat also draws how wrong calibration and zero may be
 and ended; the interval lies between two quantiles of what the repeats give.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -80,6 +80,13 @@ def stroke_intervals(stroke: Stroke, number: int, settings: BootstrapSettings | 
         stroke.trial,
         *(interval(name) for name in ("mu_static", "mu_dynamic", "mu_max", "tau_max", "speed")),
     )
+
+
+def intervals_of(strokes: Sequence[Stroke], settings: BootstrapSettings | None = None) -> dict[str, Any]:
+    """Return the intervals of all strokes as plain data, with what they are and the settings they were drawn with."""
+    chosen = settings or BootstrapSettings()
+    found = [stroke_intervals(stroke, at, chosen).to_dict() for at, stroke in enumerate(strokes)]
+    return {"kind": chosen.kind, "settings": asdict(chosen), "strokes": found}
 
 
 def friction_draws(

@@ -13,7 +13,10 @@ Cell = str | int | float | None
 
 AXES = (("Fx", "N"), ("Fy", "N"), ("Fz", "N"), ("Tx", "N mm"), ("Ty", "N mm"), ("Tz", "N mm"))
 _SUFFIXES = {"mm/s": "mm_per_s", "N/mm": "N_per_mm", "N mm": "Nmm", "mm2": "mm2"}
-_PAIRS = {"steady": ("start", "stop"), "mu_interval": ("low", "high"), "mu_dynamic_interval": ("low", "high")}
+_BOOTSTRAPPED = ("mu_static", "mu_dynamic", "mu_max", "tau_max", "speed")
+_PAIRS = {"steady": ("start", "stop"), "mu_interval": ("low", "high"), "mu_dynamic_interval": ("low", "high")} | {
+    f"{name}_bootstrap": ("low", "high") for name in _BOOTSTRAPPED
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +59,7 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
         trials(source.recording),
         answers(source.recording),
         positions(source.recording),
-        _of("strokes", "a row for each stroke", analysis["strokes"], _STROKE),
+        _of("strokes", "a row for each stroke", _strokes(analysis), _STROKE),
         _of("friction", "what the model is given: a row for each trial with a stroke", analysis["friction"], _FRICTION),
         _of(
             "flaws", "what is wrong with the recording or with a stroke", [_named(f) for f in analysis["flaws"]], _FLAW
@@ -153,6 +156,17 @@ def _zero(recording: Recording, trial: int, start_ns: int | None) -> tuple[float
     return zero
 
 
+def _strokes(analysis: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the strokes with their bootstrap intervals, where the analysis holds them."""
+    strokes: Sequence[dict[str, Any]] = analysis["strokes"]
+    held: Mapping[str, Any] = analysis.get("bootstrap") or {}
+    told: Sequence[Mapping[str, Any]] = held.get("strokes") or ()
+    if not told:
+        return list(strokes)
+    ends: list[dict[str, Any]] = [{f"{name}_bootstrap": one[name] for name in _BOOTSTRAPPED} for one in told]
+    return [{**stroke, **end} for stroke, end in zip(strokes, ends, strict=True)]
+
+
 def _named(flaw: Mapping[str, Any]) -> dict[str, Any]:
     return {"flaw": flaw["name"], **{key: value for key, value in flaw.items() if key != "name"}}
 
@@ -218,6 +232,12 @@ _STROKE = {
     "zero": ("", "where the zero of the forces came from"),
     "zero_drift": ("N", "how far the zero moved from before the stroke to after it"),
     "flaws": ("", "names of what is wrong with it"),
+    **{
+        f"{n}_bootstrap": ("", f"95 % bootstrap interval of {n}, in its unit")
+        for n in ("mu_static", "mu_dynamic", "mu_max")
+    },
+    "tau_max_bootstrap": ("MPa", "95 % bootstrap interval of tau_max"),
+    "speed_bootstrap": ("mm/s", "95 % bootstrap interval of the speed"),
     "contact_area": ("mm2", "by which tau_max was told"),
     "area_exponent": ("", "with which that area follows the normal force"),
     "number": ("", "of the stroke within its trial, from 1"),

@@ -1,0 +1,48 @@
+"""Processor time of the analysis of a session of ten trials, without and with its bootstrap intervals.
+
+Run from the repository's root: python -m benchmarks.analysis [SESSION]; without one a simulated one is recorded first.
+"""
+
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+
+from daq_app.cli import run
+from sessions.analysis import analyse
+from sessions.analysis.bootstrap import intervals_of
+from sessions.recording import Recording
+
+RUNS = 9
+
+
+def main() -> None:
+    """Print the medians."""
+    with tempfile.TemporaryDirectory() as room:
+        folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(room) / "session"
+        if len(sys.argv) < 2:
+            words = ["run", "sensotact-friction", "--device", "sim:?seed=7&rate=200", "--subject", "P01", "--headless"]
+            run([*words, "--simulate-subject", "1", "--seed", "3", "--pace", "20", "--out", str(folder)])
+        strokes = analyse(Recording.open(folder)).strokes  # what is loaded once is loaded now
+        intervals_of(strokes)
+        alone = _taken(lambda: analyse(Recording.open(folder)))
+        drawn = _taken(lambda: intervals_of(strokes))
+    print(f"{len(strokes)} strokes, medians of {RUNS}, processor time")
+    print(f"opened and analysed   {1000 * alone:6.0f} ms   (reach 1000)")
+    print(f"bootstrap intervals   {1000 * drawn:6.0f} ms   (both together: reach 5000)")
+
+
+def _taken(work: Callable[[], object]) -> float:
+    """Return the median processor time of some work [s]."""
+    found: list[float] = []
+    for _ in range(RUNS):
+        began = time.process_time()
+        work()
+        found.append(time.process_time() - began)
+    return median(found)
+
+
+if __name__ == "__main__":
+    main()
