@@ -1,68 +1,83 @@
-"""A state carried from a coarse mesh of a finger to a finer one, where Newton starts a few iterations from its end."""
+"""A state carried from one mesh of a finger to another, where Newton starts a few iterations from its end."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from solver import kernels
 from solver.elements import Q2P1, line
 from solver.finite_body import VALUES, FiniteBody
-from solver.mesh import Array
+from solver.mesh import Array, Indices
 from solver.mesher import FingerMesh, with_middles
 from solver.newton import Shape
 
 
-def carried(shape: Shape, coarse: FingerMesh, coarse_body: FiniteBody, fine: FingerMesh, body: FiniteBody) -> Shape:
-    """Return `shape`, found on `coarse`, as a start on `body`, made of `fine`, a mesh of the same finger.
+@dataclass(frozen=True, slots=True, eq=False)
+class Places:
+    """Where a mesh of a finger has its nodes and quadrature points: arc positions [mm], and heights over the bone.
 
-    Displacements are interpolated by the elements' own functions in arc position and height over the bone, so a mesh
-    carries its state to itself unchanged. The states of skin nodes follow from interpolated pressures.
+    Heights are 0 on the bone, 1 between fat and skin, 2 on the outside.
     """
-    along = _interpolation(with_middles(coarse.arcs), with_middles(fine.arcs))
-    across = _interpolation(_heights(coarse), _heights(fine))
-    grid = shape.u.reshape(along.shape[1], across.shape[1], 2)
+
+    body: FiniteBody
+    arcs: Array  # (2 a + 1,) of the nodes along the skin
+    heights: Array  # (2 b + 1,) of the nodes across the tissue
+    inner_arcs: Array  # (a, 3) of the quadrature points
+    inner_heights: Array  # (b, 3)
+    points: Array  # (e, 9, 2) quadrature points [mm]
+    skin: Array  # (k,) arc positions of the skin that may touch
+    lengths: Array  # (k,) skin that each stands for, along the arc [mm]
+
+    @staticmethod
+    def of(finger: FingerMesh, body: FiniteBody) -> "Places":
+        """Return the places of a mesh."""
+        arcs, heights = with_middles(finger.arcs), _heights(finger)
+        skin = arcs[np.searchsorted(finger.whole, finger.mesh.skin)]
+        lengths = np.empty(len(skin))
+        kernels.tributary(skin, body.middle, lengths)
+        points = VALUES @ finger.mesh.nodes[finger.mesh.elements]
+        return Places(body, arcs, heights, _inner(arcs[::2]), _inner(heights[::2]), points, skin, lengths)
+
+
+def carried(shape: Shape, old: Places, new: Places) -> Shape:
+    """Return `shape`, found on the mesh of `old`, as a start on that of `new`, a mesh of the same finger.
+
+    The states of skin nodes follow from interpolated pressures.
+    """
+    u, pressure = carried_fields(shape, old, new)
+    traction = np.where(shape.touching[:, None], shape.reaction / old.lengths[:, None], 0.0)
+    reaction = np.stack([np.interp(new.skin, old.skin, traction[:, a], 0.0, 0.0) for a in (0, 1)], axis=1)
+    nearest = np.abs(new.skin[:, None] - old.skin).argmin(axis=1)
+    touching = np.interp(new.skin, old.skin, shape.touching.astype(float)) > 0.5
+    state = np.where(touching, np.maximum(shape.state[nearest], kernels.SLIP), kernels.OPEN).astype(np.int32)
+    sense = shape.sense[nearest].copy()
+    return Shape(u, pressure, state, sense, reaction * new.lengths[:, None], shape.pull, shape.iterations)
+
+
+def carried_fields(shape: Shape, old: Places, new: Places) -> tuple[Array, Array]:
+    """Return displacements (nodes, 2) [mm] and pressure modes (e, 3) of `shape` on the mesh of `new`.
+
+    Displacements are interpolated by the elements' own functions in arc position and height, so a mesh carries its
+    state to itself unchanged. Pressures are those of the elements they come from: what interpolated displacements
+    change in volume, small as it is, a stiff body would answer strongly.
+    """
+    along, across = _interpolation(old.arcs, new.arcs), _interpolation(old.heights, new.heights)
+    grid = shape.u.reshape(len(old.arcs), len(old.heights), 2)
     lines = (along @ grid.reshape(len(grid), -1)).reshape(len(along), -1, 2)
     u = (across @ lines).reshape(-1, 2)
-    u[body.mesh.held] = 0.0
+    u[new.body.mesh.held] = 0.0
 
-    skins = [np.searchsorted(mesh.whole, mesh.mesh.skin) for mesh in (coarse, fine)]
-    places = [with_middles(mesh.arcs)[skin] for mesh, skin in zip((coarse, fine), skins, strict=True)]
-    lengths = [np.empty(len(place)) for place in places]
-    for place, length in zip(places, lengths, strict=True):
-        kernels.tributary(place, (np.arange(len(place)) % 2).astype(np.int32), length)
-    traction = np.where(shape.touching[:, None], shape.reaction / lengths[0][:, None], 0.0)
-    reaction = np.stack([np.interp(places[1], places[0], traction[:, a], 0.0, 0.0) for a in (0, 1)], axis=1)
-    nearest = np.abs(places[1][:, None] - places[0]).argmin(axis=1)
-    touching = np.interp(places[1], places[0], shape.touching.astype(float)) > 0.5
-    state = np.where(touching, np.maximum(shape.state[nearest], kernels.SLIP), kernels.OPEN)
-    return Shape(
-        u,
-        _pressure(shape.pressure, coarse, coarse_body, fine, body),
-        state.astype(np.int32),
-        shape.sense[nearest].copy(),
-        reaction * lengths[1][:, None],
-        shape.pull,
-        shape.iterations,
-    )
+    station = _piece(old.arcs[::2], new.inner_arcs)  # (a, 3)
+    layer = _piece(old.heights[::2], new.inner_heights)  # (b, 3)
+    host = (station[:, None, :, None] * (len(old.heights) // 2) + layer[None, :, None, :]).reshape(-1, 9)
+    # each element's pressure is c + cx x + cy y
+    slopes = (shape.pressure[:, None] @ old.body.combination)[:, 0]
+    start = slopes[:, 0] - slopes[:, 1] * old.body.centre[:, 0] - slopes[:, 2] * old.body.centre[:, 1]
+    field = start[host] + slopes[host, 1] * new.points[..., 0] + slopes[host, 2] * new.points[..., 1]
+    return u, ((new.body.weight * field)[:, None] @ new.body.modes)[:, 0]
 
 
-def _pressure(
-    pressure: Array, coarse: FingerMesh, coarse_body: FiniteBody, fine: FingerMesh, body: FiniteBody
-) -> Array:
-    """Return the pressure modes (e, 3) of `body` that fit the field of `pressure` on `coarse_body` best.
-
-    Carried displacements would not do: what they change in volume, small as it is, a stiff body answers strongly.
-    """
-    arcs, heights = _gauss(fine.arcs), _gauss(_heights(fine)[::2])
-    station = np.clip(np.searchsorted(coarse.arcs, arcs) - 1, 0, len(coarse.arcs) - 2)  # (a, 3)
-    lines = _heights(coarse)[::2]
-    layer = np.clip(np.searchsorted(lines, heights) - 1, 0, len(lines) - 2)  # (b, 3)
-    host = (station[:, None, :, None] * (len(lines) - 1) + layer[None, :, None, :]).reshape(-1, 9)
-    place = VALUES @ body.mesh.nodes[body.mesh.elements] - coarse_body.centre[host]  # (e, q, 2)
-    slope = (pressure[:, None] @ coarse_body.combination)[:, 0][host]  # (e, q, 3)
-    field = slope[..., 0] + slope[..., 1] * place[..., 0] + slope[..., 2] * place[..., 1]
-    return ((body.weight * field)[:, None] @ body.modes)[:, 0]
-
-
-def _gauss(lines: Array) -> Array:
+def _inner(lines: Array) -> Array:
     """Return the three quadrature points (n, 3) between each two of `lines` (n + 1,)."""
     return lines[:-1, None] + np.diff(lines)[:, None] * (1.0 + Q2P1.points[:3, 0]) / 2.0
 
@@ -78,11 +93,16 @@ def _heights(finger: FingerMesh) -> Array:
     return out
 
 
+def _piece(ends: Array, points: Array) -> Indices:
+    """Return which gap between `ends` (n + 1,) each of `points` lies in."""
+    return np.searchsorted(ends[1:-1], points, side="right")
+
+
 def _interpolation(nodes: Array, points: Array) -> Array:
     """Return the matrix (p, n) that takes values at `nodes` (n,) of quadratic lines to `points` (p,)."""
     ends = nodes[::2]
-    piece = np.clip(np.searchsorted(ends, points, side="right") - 1, 0, len(ends) - 2)
+    piece = _piece(ends, points)
     local = 2.0 * (points - ends[piece]) / (ends[piece + 1] - ends[piece]) - 1.0
     out = np.zeros((len(points), len(nodes)))
-    np.put_along_axis(out, 2 * piece[:, None] + np.arange(3), line(local)[0], axis=1)
+    out[np.arange(len(points))[:, None], 2 * piece[:, None] + np.arange(3)] = line(local)[0]
     return out

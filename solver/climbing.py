@@ -40,14 +40,47 @@ class Climbed:
     setup_s: float  # meshes and tables [s]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Ascent:
+    """What a scene was solved by: the state that found the edges of contact, and the one that counts."""
+
+    foot: Climbed
+    top: Climbed
+
+
+def ascended(
+    scene: Scene,
+    expected: float,
+    fineness: float,
+    stop: Callable[[], bool],
+    make: Maker = FiniteFinger.of,
+    before: Ascent | None = None,
+) -> Ascent:
+    """Return the settled state of a scene on a mesh made for it; for the arguments see `foot`.
+
+    It is begun at the undeformed finger, or at `before`, the ascent of a surface that shares the rough mesh: from there
+    the rough state is two systems away, and what it has changed by leads to a state as near on the finer mesh. Raises
+    NoSteadyState, NotConverged, Cancelled.
+    """
+    low = foot(scene, expected, fineness, stop, make, None if before is None else before.foot)
+    near = before if before is not None and before.foot.finger is low.finger else None
+    return Ascent(low, climbed(scene, fineness, low, stop, make, near))
+
+
 def foot(
-    scene: Scene, expected: float, fineness: float, stop: Callable[[], bool], make: Maker = FiniteFinger.of
+    scene: Scene,
+    expected: float,
+    fineness: float,
+    stop: Callable[[], bool],
+    make: Maker = FiniteFinger.of,
+    near: Climbed | None = None,
 ) -> Climbed:
     """Return the settled state on a mesh that does not know the edges of contact, from which others can be climbed.
 
     `expected` is the depth [mm], or about it where forces are given; a given drag is left for the mesh that counts,
     since the limit of friction lies a little elsewhere on each. A rough mesh will do where its state is sound.
-    Near a limit, only a mesh of `fineness` itself can tell. Raises NoSteadyState, NotConverged, Cancelled.
+    Near a limit, only a mesh of `fineness` itself can tell. From `near`, where it is of the same mesh, it is begun.
+    Raises NoSteadyState, NotConverged, Cancelled.
     """
     depth = expected if scene.normal_force is not None else scene.loading.depth
     scene = scene.undragged() if scene.loading.dragged else scene
@@ -55,7 +88,7 @@ def foot(
     finger = make(scene, Sizing(ROUGH, depth, margin=MARGIN))
     setup = perf_counter() - begun
     try:
-        shape = roughly(finger, scene, stop)
+        shape = roughly(finger, scene, stop, near.shape if near is not None and near.finger is finger else None)
         if sound(finger.newton, shape, finger.geometry.whole):
             return Climbed(finger, shape, setup)
         depth = shape.pull.depth
@@ -65,21 +98,40 @@ def foot(
 
 
 def climbed(
-    scene: Scene, fineness: float, below: Climbed, stop: Callable[[], bool], make: Maker = FiniteFinger.of
+    scene: Scene,
+    fineness: float,
+    below: Climbed,
+    stop: Callable[[], bool],
+    make: Maker = FiniteFinger.of,
+    before: Ascent | None = None,
 ) -> Climbed:
     """Return the settled state on a mesh of `fineness` whose lines follow the edges of contact found `below`.
 
+    It is begun at the state `below`, or at what that has changed by since `before` added to the state found then.
     Raises NoSteadyState, NotConverged, Cancelled.
     """
     edges = below.finger.edges(below.shape)
-    return _on(scene, Sizing(fineness, below.shape.pull.depth, margin=MARGIN, edges=edges), below, stop, make)
+    sizing = Sizing(fineness, below.shape.pull.depth, margin=MARGIN, edges=edges)
+    return _on(scene, sizing, below, stop, make, before)
 
 
-def _on(scene: Scene, sizing: Sizing, below: Climbed | None, stop: Callable[[], bool], make: Maker) -> Climbed:
+def _on(
+    scene: Scene,
+    sizing: Sizing,
+    below: Climbed | None,
+    stop: Callable[[], bool],
+    make: Maker,
+    before: Ascent | None = None,
+) -> Climbed:
     begun = perf_counter()
     finger = make(scene, sizing)
-    start = None if below is None else finger.brought(below.shape, below.finger)
     setup = perf_counter() - begun
+    start = None
+    if below is not None and before is None:
+        start = finger.brought(below.shape, below.finger)
+    elif below is not None and before is not None:
+        low, top = before.foot.shape, before.top
+        start = finger.brought_on(below.shape, low, below.finger, top.shape, top.finger)
     return Climbed(finger, settled(finger, scene, stop, start), setup)
 
 

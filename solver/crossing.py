@@ -13,17 +13,13 @@ def crosses_itself(outline: Array) -> bool:
     >>> bool(crosses_itself(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 0.5]])))
     False
     """
-    start, end = outline[:-1], outline[1:]
-
-    def side(origin: Array, to: Array, point: Array) -> Array:
-        """Return on which side of each line (rows) each point (columns) lies."""
-        along = (to - origin)[:, None]
-        off = point[None] - origin[:, None]
-        return along[..., 0] * off[..., 1] - along[..., 1] * off[..., 0]
-
-    apart = (side(start, end, start) * side(start, end, end)) < 0.0
+    start, along = outline[:-1], np.diff(outline, axis=0)
+    # on which side of each piece (rows) each point (columns) lies: the cross product of two differences
+    side = along[:, :1] * outline[:, 1] - along[:, 1:] * outline[:, 0]
+    side -= (along[:, 0] * start[:, 1] - along[:, 1] * start[:, 0])[:, None]
+    apart = side[:, :-1] * side[:, 1:] < 0.0
     crossing = apart & apart.T
-    return bool(np.triu(crossing, 2).any())
+    return bool(crossing.any()) and bool(np.triu(crossing, 2).any())
 
 
 def least_stretch(before: Array, after: Array) -> float:
@@ -31,5 +27,5 @@ def least_stretch(before: Array, after: Array) -> float:
 
     A neo-Hookean half-space in plane strain wrinkles at 0.544 (Biot 1963, Appl. Sci. Res. A 12, 168).
     """
-    lengths = [np.linalg.norm(np.diff(points, axis=0), axis=1) for points in (before, after)]
-    return float((lengths[1] / lengths[0]).min())
+    steps = [np.diff(points, axis=0) for points in (before, after)]
+    return float((np.hypot(steps[1][:, 0], steps[1][:, 1]) / np.hypot(steps[0][:, 0], steps[0][:, 1])).min())

@@ -148,7 +148,7 @@ class Elimination:
         p = self.plan
         self.carried[:] = force
         kernels.condense(
-            self.carried, p.start, p.inner, p.border, p.border_at, p.numbers, p.factor_at, self._factors
+            self.carried, p.start, p.inner, p.border, p.border_at, p.numbers, p.factor_at, self._factors, self._near
         )  # fmt: skip
         return self.carried[p.size - len(self.stiffness) :]
 

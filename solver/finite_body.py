@@ -30,6 +30,7 @@ class FiniteBody:
     grad_y: Array  # (e, 9, 9)
     weight: Array  # (e, 9) areas of the quadrature points [mm2]
     modes: Array  # (e, 9, 3) pressure modes there, orthonormal over the element [1/mm]
+    laplace: Array  # (e, 9, 9) integrals of the shear modulus times grad N_i . grad N_j [N/mm per mm]
     centre: Array  # (e, 2) the modes are combinations of 1, x - centre, y - centre
     combination: Array  # (e, 3, 3) mode m = sum over l of combination[m, l] (1, x - centre, y - centre)[l]
     shear: Array  # (e,) [MPa]
@@ -59,17 +60,22 @@ class FiniteBody:
         combination = np.asarray(np.linalg.inv(np.linalg.cholesky(mass)), np.float64)
         modes = raw @ np.swapaxes(combination, 1, 2)
 
+        shear = np.array([law.shear for law in laws])[mesh.region]
+        grad_x, grad_y = np.ascontiguousarray(gradient[..., 0]), np.ascontiguousarray(gradient[..., 1])
+        stiff = (weight * shear[:, None])[:, :, None]
+        laplace = np.swapaxes(stiff * grad_x, 1, 2) @ grad_x + np.swapaxes(stiff * grad_y, 1, 2) @ grad_y
         plan = Plan.of(mesh)
         at_middle = (np.arange(len(mesh.skin)) % 2).astype(np.int32)
         return FiniteBody(
             mesh,
-            np.ascontiguousarray(gradient[..., 0]),
-            np.ascontiguousarray(gradient[..., 1]),
+            grad_x,
+            grad_y,
             weight,
             np.ascontiguousarray(modes),
+            laplace,
             centre,
             combination,
-            np.array([law.shear for law in laws])[mesh.region],
+            shear,
             np.array([law.stiffening for law in laws])[mesh.region],
             np.array([law.lame for law in laws])[mesh.region],
             mesh.elements.astype(np.int32),

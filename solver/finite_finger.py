@@ -1,49 +1,54 @@
 """The finger at finite strain on one mesh, ready for any surface."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 
-from solver.carrying import carried
+from solver.carrying import Places, carried, carried_fields
 from solver.finite_body import FiniteBody, FiniteProbes
 from solver.grid import MeshError
 from solver.mesh import Array
 from solver.mesher import FingerMesh, Sizing, finger_mesh, with_middles
 from solver.newton import Newton, Shape
 from solver.receptor import ROW, endings, middle
-from solver.scene import Scene, SceneError
-from solver.stiffness import Elastic
-from solver.tissues import finite_laws, settled_moduli
+from solver.scene import Receptor, Scene, SceneError
+from solver.tissues import finite_laws
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)  # without slots: what few ask for is made when they ask
 class FiniteFinger:
     """A finger on one mesh, ready for any surface."""
 
+    receptor: Receptor
     geometry: FingerMesh
     newton: Newton
-    ending: FiniteProbes
-    point: FiniteProbes
-    row: FiniteProbes
+    ending: FiniteProbes  # the reference ending alone
 
     @staticmethod
     def of(scene: Scene, sizing: Sizing) -> "FiniteFinger":
         """Mesh the finger of `scene`. Raises SceneError where its outline cannot be meshed."""
         try:
             made = finger_mesh(scene.finger, scene.receptor, sizing)
-            elastic = Elastic.of(made.mesh, settled_moduli(scene.materials))
             body = FiniteBody.of(made.mesh, finite_laws(scene.materials))
         except (MeshError, LinAlgError) as bad:
             raise SceneError("finger", scene.finger, f"no mesh fits it ({bad})") from bad
-        return FiniteFinger(
-            made,
-            Newton(body),
-            FiniteProbes.of(body, endings(made, elastic, scene.receptor, np.zeros(1))),
-            FiniteProbes.of(body, middle(made, elastic, scene.receptor)),
-            FiniteProbes.of(body, endings(made, elastic, scene.receptor, ROW)),
-        )
+        at_touch = FiniteProbes.of(body, endings(made, body, scene.receptor, np.zeros(1)))
+        return FiniteFinger(scene.receptor, made, Newton(body), at_touch)
+
+    @cached_property
+    def point(self) -> FiniteProbes:
+        """The middle of the reference ending."""
+        body = self.newton.body
+        return FiniteProbes.of(body, middle(self.geometry, body, self.receptor))
+
+    @cached_property
+    def row(self) -> FiniteProbes:
+        """The row of receptors."""
+        body = self.newton.body
+        return FiniteProbes.of(body, endings(self.geometry, body, self.receptor, ROW))
 
     def sed_ending(self, shape: Shape) -> float:
         """Return the SED averaged over the reference ending [MPa]."""
@@ -55,7 +60,19 @@ class FiniteFinger:
 
     def brought(self, shape: Shape, other: "FiniteFinger") -> Shape:
         """Return `shape`, found on `other`, as a start on this mesh."""
-        return carried(shape, other.geometry, other.newton.body, self.geometry, self.newton.body)
+        return carried(shape, other.places, self.places)
+
+    def brought_on(self, now: Shape, before: Shape, other: "FiniteFinger", top: Shape, finest: "FiniteFinger") -> Shape:
+        """Return `top`, found on `finest`, with what has changed from `before` to `now` on `other`, as a start here."""
+        change = replace(now, u=now.u - before.u, pressure=now.pressure - before.pressure)
+        start = carried(change, other.places, self.places)
+        u, pressure = carried_fields(top, finest.places, self.places)
+        return replace(start, u=u + start.u, pressure=pressure + start.pressure)
+
+    @cached_property
+    def places(self) -> Places:
+        """Where nodes and quadrature points lie, for states that are carried."""
+        return Places.of(self.geometry, self.newton.body)
 
     def edges(self, shape: Shape) -> tuple[float, float] | None:
         """Return the arc positions [mm] where contact ends; None where it is too short to tell.

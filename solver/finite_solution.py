@@ -10,13 +10,14 @@ from time import perf_counter
 import numpy as np
 
 from solver import evidence, kernels_numpy
-from solver.climbing import climbed, error_estimates, foot
+from solver.climbing import Ascent, ascended, error_estimates
 from solver.failures import Cancelled, SolveFailure
 from solver.finite_finger import FiniteFinger
 from solver.finite_relaxing import RelaxingCourse
 from solver.finite_states import PRESSES, course
 from solver.kernels import CAP, OPEN, SLIP, STICK
 from solver.mesh import Array
+from solver.mesher import Sizing
 from solver.newton import Shape
 from solver.prediction import History, Prediction, Row, Skin
 from solver.receptor import ROW
@@ -37,6 +38,18 @@ def answers(
     cannot be meshed, Cancelled where `progress` (told the part done) says so.
     """
     found: list[Answer] = []
+    before: Ascent | None = None
+    rough: dict[Sizing, FiniteFinger] = {}
+
+    def make(scene: Scene, sizing: Sizing) -> FiniteFinger:
+        """Mesh the finger, or take its rough mesh again: surfaces that share it begin one at the other."""
+        if sizing.edges is not None:
+            return FiniteFinger.of(scene, sizing)
+        if sizing not in rough:
+            rough.clear()
+            rough[sizing] = FiniteFinger.of(scene, sizing)
+        return rough[sizing]
+
     for number, scene in enumerate(scenes):
         part = number / len(scenes)
 
@@ -46,17 +59,17 @@ def answers(
         if stop():
             raise Cancelled
         try:
-            found.append(_predicted(scene, expected, fineness, stop))
+            begun = perf_counter()
+            before = ascended(scene, expected, fineness, stop, make, before)
+            found.append(_predicted(scene, before, fineness, stop, begun))
         except SolveFailure as failure:
             found.append(failure)
     return found
 
 
-def _predicted(scene: Scene, expected: float, fineness: float, stop: Callable[[], bool]) -> Prediction:
-    begun = perf_counter()
-    rough = foot(scene, expected, fineness, stop)
-    at = climbed(scene, fineness, rough, stop)
-    finger, shape, setup = at.finger, at.shape, rough.setup_s + at.setup_s
+def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[], bool], begun: float) -> Prediction:
+    at = way_up.top
+    finger, shape, setup = at.finger, at.shape, way_up.foot.setup_s + at.setup_s
     way: list[Shape] = []
     relaxing: RelaxingCourse | None = None
     if scene.solve.course == "history":
@@ -154,7 +167,7 @@ def _audits(scene: Scene, finger: FiniteFinger, shape: Shape, excess: Array | No
     small strain, the bound on the deformed length.
     """
     body, mesh = finger.newton.body, finger.geometry.mesh
-    element_forces, _ = kernels_numpy.forces_and_tangents(body, shape.u, np.zeros((len(body.nodes), 3)))
+    element_forces = kernels_numpy.forces(body, shape.u)
     if excess is not None:
         element_forces = element_forces + excess
     inner = np.zeros(mesh.nodes.shape)

@@ -39,11 +39,20 @@ def settled(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], start:
     return steady(finger.newton, _pull_sliding(scene), finger.geometry.whole, start=start, stop=stop, proven=True)
 
 
-def roughly(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool]) -> Shape:
-    """Return a state near the settled one, from which others may start if it is `sound`. Raises as `settled`."""
+def roughly(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: Shape | None = None) -> Shape:
+    """Return a state near the settled one, from which others may start if it is `sound`. Raises as `settled`.
+
+    It is sought first from `near`, the settled state of a surface that slides the same way.
+    """
     if scene.normal_force is not None or (scene.loading.direction == 0 and scene.friction.mu > 0.0):
         return settled(finger, scene, stop)
-    return sliding.settled(finger.newton, _pull_sliding(scene), None, LEADING, stop)
+    pull = _pull_sliding(scene)
+    if near is not None and near.pull.sense == pull.sense:
+        try:
+            return sliding.settled(finger.newton, pull, near, LEADING, stop)
+        except NotConverged:
+            pass
+    return sliding.settled(finger.newton, pull, None, LEADING, stop)
 
 
 def _settled_under(

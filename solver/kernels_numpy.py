@@ -31,13 +31,27 @@ def energy(body: FiniteBody, u: Array) -> float:
     return float(np.sum(body.weight * body.shear[:, None] / 2.0 * grown) + np.sum(body.lame / 2.0 * (volume**2).T))
 
 
+def forces(body: FiniteBody, u: Array) -> Array:
+    """Return the internal forces (e, 18) of the elements, ordered x, y, x, y, ..."""
+    F = deformation(body, u)
+    J, volume = _logarithm(body, F)
+    inverse = np.swapaxes(np.linalg.inv(F), -1, -2)
+    G = body.shear[:, None] * slopes(body.stiffening[:, None], _excess(F, J))[0]
+    pressure = body.lame[:, None] * (body.modes @ volume[:, :, None])[:, :, 0]
+    stress = body.weight[:, :, None, None] * (
+        G[:, :, None, None] * (F - inverse) + pressure[:, :, None, None] * inverse
+    )
+    gradient = np.stack([body.grad_x, body.grad_y], axis=-1).reshape(len(F), 9, 9, 2)
+    return (gradient @ np.swapaxes(stress, -1, -2)).sum(axis=1).reshape(len(F), 18)
+
+
 def forces_and_tangents(body: FiniteBody, u: Array, pressure: Array) -> tuple[Array, Array]:
     """Return the internal forces (e, 18) and tangents (e, 18, 18) of the elements, ordered x, y, x, y, ...
 
     `pressure` (e, 3) is what the geometric part of the tangent sees; the forces follow from `u` alone.
     """
     F = deformation(body, u)
-    J, volume = _logarithm(body, F)
+    J = np.linalg.det(F)
     inverse = np.swapaxes(np.linalg.inv(F), -1, -2)
     gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
     w = body.weight
@@ -46,15 +60,12 @@ def forces_and_tangents(body: FiniteBody, u: Array, pressure: Array) -> tuple[Ar
     spatial = np.einsum("eqaA,eqiA->eqia", inverse, gradient)  # gradients in the deformed body
     dilate = np.einsum("eq,eqm,eqia->emia", w, body.modes, spatial)
     excess = np.einsum("eqaA,eqiA->eqia", F - inverse, gradient)
-    force = np.einsum("eq,eqia->eia", w * G, excess)
-    force += body.lame[:, None, None] * np.einsum("em,emia->eia", volume, dilate)
     geometric = w * (G - np.einsum("eqm,em->eq", body.modes, pressure))
     tangent = np.einsum("eq,eqiA,eqjA,ab->eiajb", w * G, gradient, gradient, np.eye(2))
     tangent += np.einsum("eq,eqja,eqib->eiajb", geometric, spatial, spatial)
     tangent += np.einsum("eq,eqia,eqjb->eiajb", 2.0 * growth * w * body.shear[:, None], excess, excess)
     tangent += np.einsum("e,emia,emjb->eiajb", body.lame, dilate, dilate)
-    count = len(body.nodes)
-    return force.reshape(count, 18), tangent.reshape(count, 18, 18)
+    return forces(body, u), tangent.reshape(-1, 18, 18)
 
 
 def without_centres(body: FiniteBody, u: Array, pressure: Array) -> tuple[Array, Array]:

@@ -119,9 +119,9 @@ class Newton:
         """Fill tangents and forces at `shape` and return the least det F."""
         body = self.body
         return kernels.assemble(
-            shape.u, shape.pressure, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening,
-            body.lame, body.nodes, body.unknown, self.tangent, self.force, self.fold, self.core, self.dilate,
-            self.volume,
+            shape.u, shape.pressure, body.grad_x, body.grad_y, body.weight, body.modes, body.laplace, body.shear,
+            body.stiffening, body.lame, body.nodes, body.unknown, self.tangent, self.force, self.fold, self.core,
+            self.dilate, self.volume,
         )  # fmt: skip
 
     def _resisted(self, shape: Shape) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from solver.mesh import Array, Indices, Mesh
 from solver.mesher import FingerMesh
 from solver.scene import Receptor
-from solver.stiffness import Elastic, Probes, local_coordinates
+from solver.stiffness import Centred, Elastic, Probes, local_coordinates
 
 ROW: Array = 0.25 * np.arange(-32.0, 25.0)  # arc positions of the row of receptors [mm]
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
@@ -36,7 +36,7 @@ class Endings:
         return np.unique(mesh.elements[np.unique(self.probes.element)])
 
 
-def endings(finger: FingerMesh, elastic: Elastic, receptor: Receptor, arcs: Array) -> Endings:
+def endings(finger: FingerMesh, elements: Centred, receptor: Receptor, arcs: Array) -> Endings:
     """Return the patches of `receptor` at positions `arcs` (r,) [mm], integrated exactly over the pieces of elements.
 
     A patch reaches half the ending's length to both sides, measured along its own middle line.
@@ -58,14 +58,14 @@ def endings(finger: FingerMesh, elastic: Elastic, receptor: Receptor, arcs: Arra
     # a length on the tip's arc shrinks with the depth
     curved = (arc > outline.palmar) & (arc < outline.dorsal)
     area = area * np.where(curved, 1.0 - depth / outline.finger.tip_radius, 1.0)
-    return Endings(_probes(finger, elastic, arc, depth), area, patch.astype(np.int64), len(arcs))
+    return Endings(_probes(finger, elements, arc, depth), area, patch.astype(np.int64), len(arcs))
 
 
-def middle(finger: FingerMesh, elastic: Elastic, receptor: Receptor) -> Endings:
+def middle(finger: FingerMesh, elements: Centred, receptor: Receptor) -> Endings:
     """Return the point in the middle of the reference ending: the mean of its limits from the elements around it."""
     arc = _ASIDE * np.array([-1.0, 1.0, -1.0, 1.0])
     depth = receptor.depth + _ASIDE * np.array([-1.0, -1.0, 1.0, 1.0])
-    return Endings(_probes(finger, elastic, arc, depth), np.full(4, 0.25), np.zeros(4, np.int64), 1)
+    return Endings(_probes(finger, elements, arc, depth), np.full(4, 0.25), np.zeros(4, np.int64), 1)
 
 
 def _pieces(arc_lines: Array, depth_lines: Array, number: int) -> Array:
@@ -83,7 +83,7 @@ def _gauss(lines: Array) -> tuple[Array, Array]:
     return (lines[:-1, None] + half * (1.0 + _POINTS)).ravel(), (half * _WEIGHTS).ravel()
 
 
-def _probes(finger: FingerMesh, elastic: Elastic, arc: Array, depth: Array) -> Probes:
+def _probes(finger: FingerMesh, elements: Centred, arc: Array, depth: Array) -> Probes:
     """Find the elements that hold the places at `arc` and `depth` (p,) and the local coordinates in them."""
     mesh = finger.mesh
     station = np.clip(np.searchsorted(finger.arcs, arc) - 1, 0, len(finger.arcs) - 2)
@@ -93,4 +93,4 @@ def _probes(finger: FingerMesh, elastic: Elastic, arc: Array, depth: Array) -> P
     side = (arc - finger.arcs[station]) / np.diff(finger.arcs)[station] * 2.0 - 1.0
     corners = mesh.nodes[mesh.elements[element]]
     local = local_coordinates(corners, finger.outline.tissue(arc, depth), np.stack([out, side], axis=1))
-    return Probes.at(mesh, elastic, element, local)
+    return Probes.at(mesh, elements, element, local)

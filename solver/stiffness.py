@@ -28,6 +28,15 @@ class Isotropic(Protocol):
         ...
 
 
+class Centred(Protocol):
+    """Elements with the places that their pressure modes are counted from."""
+
+    @property
+    def centre(self) -> Array:
+        """Where they are, (e, 2) [mm]."""
+        ...
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Elastic:
     """Elements made of Hooke materials: e of them, displacements ordered x, y, x, y, ... within each."""
@@ -92,12 +101,12 @@ class Probes:
     modes: Array  # (p, 3) volume-strain modes there
 
     @staticmethod
-    def at(mesh: Mesh, elastic: Elastic, element: Indices, local: Array) -> "Probes":
+    def at(mesh: Mesh, elements: Centred, element: Indices, local: Array) -> "Probes":
         """Place probes at `local` (p, 2) coordinates of `element` (p,)."""
         values, slopes = Q2P1.shape(local)
         corners = mesh.nodes[mesh.elements[element]]
         jacobian = np.swapaxes(corners, 1, 2) @ slopes
-        place = (values[:, None] @ corners)[:, 0] - elastic.centre[element]
+        place = (values[:, None] @ corners)[:, 0] - elements.centre[element]
         modes = np.concatenate([np.ones((len(element), 1)), place], axis=1)
         return Probes(element, slopes @ np.linalg.inv(jacobian), modes)
 

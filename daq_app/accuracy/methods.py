@@ -8,7 +8,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from daq_app.accuracy.asked import clock
-from solver.climbing import MARGIN, Climbed, climbed, foot
+from solver.climbing import MARGIN, Ascent, Climbed, ascended, climbed
 from solver.elements import Q2P1
 from solver.existence import steady
 from solver.finger import FingerModel
@@ -109,7 +109,7 @@ class ClimbingMeshed:
         self._fineness, self._shift = fineness, shift
         self._made: dict[Sizing, FiniteFinger] = {}
         self.setup_s = 0.0
-        finger = self.solve(replace(scene, friction=Friction(0.0))).finger
+        finger = self.solve(replace(scene, friction=Friction(0.0))).top.finger
         self._newton = finger.newton
         self.dofs = finger.newton.body.dofs
 
@@ -121,17 +121,15 @@ class ClimbingMeshed:
             self.setup_s += clock() - begun
         return self._made[sizing]
 
-    def solve(self, scene: Scene, before: State | None = None) -> Climbed:
-        """Return the settled state; every surface begins at the undeformed finger, so `before` is not used."""
-        del before
-        below = foot(scene, scene.loading.depth, self._fineness, _going_on, self._make)
-        return climbed(scene, self._fineness, below, _going_on, self._make)
+    def solve(self, scene: Scene, before: State | None = None) -> Ascent:
+        """Return the settled state, from undeformed or from `before`, of another surface at the same depth."""
+        return ascended(scene, scene.loading.depth, self._fineness, _going_on, self._make, before)
 
     def numbers(self, state: State) -> Array:
         """Return SED, normal force and drag."""
-        return np.abs(state.finger.numbers(state.shape))
+        return np.abs(state.top.finger.numbers(state.top.shape))
 
-    def numbers_together(self, states: Sequence[Climbed]) -> Array:
+    def numbers_together(self, states: Sequence[Ascent]) -> Array:
         """Return them for several states (n, 3)."""
         return np.array([self.numbers(state) for state in states])
 

@@ -33,6 +33,7 @@ def assemble(
     grad_y: Array,
     weight: Array,
     modes: Array,
+    laplace: Array,
     shear: Array,
     stiffening: Array,
     lame: Array,
@@ -48,7 +49,8 @@ def assemble(
     """Fill the tangents and the internal forces at displacements `u` (nodes, 2); return the least det F.
 
     `pressure` (e, 3) are the pressure modes that the tangent sees (the linearised prediction), while the forces follow
-    from `u` alone. `grad_x`, `grad_y` (e, q, 9), `weight` (e, q), `modes` (e, q, 3, orthonormal over the element);
+    from `u` alone. `grad_x`, `grad_y` (e, q, 9), `weight` (e, q), `modes` (e, q, 3, orthonormal over the element),
+    `laplace` (e, 9, 9) integrals of the products of gradients times `shear`;
     `shear`, `stiffening` (Ogden's exponent), `lame` (e,); `nodes` (e, 9), `unknown` (e, 8, 2), -1 where fixed.
     Filled: `tangent` (e, 16, 16) of the outer nodes, lower half, `force` (n,), `fold` (e, 2, 17)
     (centre = -(fold @ (outer unknowns, 1))), `core` (e, 3) of the centre's stiffness inverted (xx, xy, yy),
@@ -57,21 +59,18 @@ def assemble(
     """
     force[:] = 0.0
     least = np.inf
-    xx, yy, xy = np.empty((9, 9)), np.empty((9, 9)), np.empty((9, 9))
-    full, b = np.empty((18, 18)), np.empty((18, 3))
-    hx, hy, sx, sy = np.empty(9), np.empty(9), np.empty(9), np.empty(9)
-    fx, fy = np.empty(9), np.empty(9)
+    # Sums over quadrature points are products of small matrices of a fixed size, columns by direction: x of nine nodes,
+    # then y. `h`: gradients in the deformed body, `bent`: the same by their weights, `s`: what the stress is made of.
+    h, s, bent = np.empty((9, 18)), np.empty((9, 18)), np.empty((9, 18))
+    wide, push, more, even = np.empty((9, 3)), np.empty(9), np.empty(9), np.empty(9)
+    d, f = np.empty((3, 18)), np.empty(18)
+    by_x, by_y, full = np.empty(18), np.empty(18), np.empty((18, 18))
     ux, uy = np.empty(9), np.empty(9)
     for e in range(nodes.shape[0]):
         for i in range(9):
             ux[i], uy[i] = u[nodes[e, i], 0], u[nodes[e, i], 1]
-        xx[:, :] = 0.0
-        yy[:, :] = 0.0
-        xy[:, :] = 0.0
-        b[:, :] = 0.0
-        fx[:] = 0.0
-        fy[:] = 0.0
         v0 = v1 = v2 = 0.0
+        stiffens = stiffening[e] != PLAIN
         for q in range(9):
             gx, gy = grad_x[e, q], grad_y[e, q]
             f00, f01, f10, f11 = 1.0, 0.0, 0.0, 1.0
@@ -85,68 +84,75 @@ def assemble(
             if not j > 0.0:
                 return least
             w = weight[e, q]
-            m0, m1, m2 = modes[e, q, 0], modes[e, q, 1], modes[e, q, 2]
+            wide[q, 0], wide[q, 1], wide[q, 2] = w * modes[e, q, 0], w * modes[e, q, 1], w * modes[e, q, 2]
             log = np.log(j)
-            v0 += w * m0 * log
-            v1 += w * m1 * log
-            v2 += w * m2 * log
-            g = shear[e]
-            growth = 0.0
-            if stiffening[e] != PLAIN:
+            v0 += wide[q, 0] * log
+            v1 += wide[q, 1] * log
+            v2 += wide[q, 2] * log
+            wg = w * shear[e]
+            if stiffens:
                 excess = f00 * f00 + f01 * f01 + f10 * f10 + f11 * f11 - 2.0 - 2.0 * log
                 grown, growth = stiffened(stiffening[e], excess)
-                g *= grown
-            wg = w * g
-            geometric = wg - w * (m0 * pressure[e, 0] + m1 * pressure[e, 1] + m2 * pressure[e, 2])
+                more[q] = 2.0 * growth * wg
+                wg *= grown
+            push[q] = wg
+            geometric = wg - (wide[q, 0] * pressure[e, 0] + wide[q, 1] * pressure[e, 1] + wide[q, 2] * pressure[e, 2])
             a00, a01, a10, a11 = f11 / j, -f10 / j, -f01 / j, f00 / j  # inverse transposed
             for i in range(9):
-                hx[i] = a00 * gx[i] + a01 * gy[i]
-                hy[i] = a10 * gx[i] + a11 * gy[i]
-                sx[i] = f00 * gx[i] + f01 * gy[i] - hx[i]
-                sy[i] = f10 * gx[i] + f11 * gy[i] - hy[i]
-                fx[i] += wg * sx[i]
-                fy[i] += wg * sy[i]
-                b[2 * i, 0] += w * m0 * hx[i]
-                b[2 * i, 1] += w * m1 * hx[i]
-                b[2 * i, 2] += w * m2 * hx[i]
-                b[2 * i + 1, 0] += w * m0 * hy[i]
-                b[2 * i + 1, 1] += w * m1 * hy[i]
-                b[2 * i + 1, 2] += w * m2 * hy[i]
-            for i in range(9):
-                px, py = wg * gx[i], wg * gy[i]
-                qx, qy = geometric * hx[i], geometric * hy[i]
-                for k in range(9):
-                    laplace = px * gx[k] + py * gy[k]
-                    xx[i, k] += laplace + qx * hx[k]
-                    yy[i, k] += laplace + qy * hy[k]
-                    xy[i, k] += qy * hx[k]
-            if stiffening[e] != PLAIN:
-                more = 2.0 * growth * w * shear[e]
-                for i in range(9):
-                    for k in range(9):
-                        xx[i, k] += more * sx[i] * sx[k]
-                        yy[i, k] += more * sy[i] * sy[k]
-                        xy[i, k] += more * sx[i] * sy[k]
+                x, y = a00 * gx[i] + a01 * gy[i], a10 * gx[i] + a11 * gy[i]
+                h[q, i], h[q, 9 + i] = x, y
+                bent[q, i], bent[q, 9 + i] = geometric * x, geometric * y
+                s[q, i], s[q, 9 + i] = f00 * gx[i] + f01 * gy[i] - x, f10 * gx[i] + f11 * gy[i] - y
         lam = lame[e]
         volume[e, 0], volume[e, 1], volume[e, 2] = v0, v1, v2
-        for i in range(18):
-            b0, b1, b2 = b[i, 0], b[i, 1], b[i, 2]
-            dilate[e, 0, i], dilate[e, 1, i], dilate[e, 2, i] = b0, b1, b2
-            c0, c1, c2 = lam * b0, lam * b1, lam * b2
-            for k in range(i + 1):
-                full[i, k] = c0 * b[k, 0] + c1 * b[k, 1] + c2 * b[k, 2]
-            push = c0 * v0 + c1 * v1 + c2 * v2
-            if i % 2 == 0:
-                fx[i // 2] += push
-            else:
-                fy[i // 2] += push
+        for c in range(18):
+            d0 = d1 = d2 = total = 0.0
+            for q in range(9):
+                d0 += wide[q, 0] * h[q, c]
+                d1 += wide[q, 1] * h[q, c]
+                d2 += wide[q, 2] * h[q, c]
+                total += push[q] * s[q, c]
+            d[0, c], d[1, c], d[2, c] = d0, d1, d2
+            f[c] = total + lam * (d0 * v0 + d1 * v1 + d2 * v2)
         for i in range(9):
-            for k in range(i + 1):
-                full[2 * i, 2 * k] += xx[i, k]
-                full[2 * i + 1, 2 * k + 1] += yy[i, k]
-                full[2 * i + 1, 2 * k] += xy[k, i]
-                if k < i:
-                    full[2 * i, 2 * k + 1] += xy[i, k]
+            dilate[e, 0, 2 * i], dilate[e, 1, 2 * i], dilate[e, 2, 2 * i] = d[0, i], d[1, i], d[2, i]
+            dilate[e, 0, 2 * i + 1], dilate[e, 1, 2 * i + 1], dilate[e, 2, 2 * i + 1] = (
+                d[0, 9 + i],
+                d[1, 9 + i],
+                d[2, 9 + i],
+            )
+            for c in range(18):  # columns along x of the node's rows (x, then y), and those along y
+                x = y = 0.0
+                for q in range(9):
+                    x += bent[q, i] * h[q, c]
+                    y += bent[q, 9 + i] * h[q, c]
+                by_x[c], by_y[c] = x, y
+            x0, x1, x2 = lam * d[0, i], lam * d[1, i], lam * d[2, i]
+            y0, y1, y2 = lam * d[0, 9 + i], lam * d[1, 9 + i], lam * d[2, 9 + i]
+            for c in range(9):
+                even[c] = laplace[e, i, c]
+            if stiffens:
+                even[:] = 0.0
+                for q in range(9):
+                    x, y = push[q] * grad_x[e, q, i], push[q] * grad_y[e, q, i]
+                    for c in range(9):
+                        even[c] += x * grad_x[e, q, c] + y * grad_y[e, q, c]
+            for c in range(9):
+                by_x[c] += even[c] + x0 * d[0, c] + x1 * d[1, c] + x2 * d[2, c]
+                by_x[9 + c] += y0 * d[0, c] + y1 * d[1, c] + y2 * d[2, c]
+                by_y[c] += x0 * d[0, 9 + c] + x1 * d[1, 9 + c] + x2 * d[2, 9 + c]
+                by_y[9 + c] += even[c] + y0 * d[0, 9 + c] + y1 * d[1, 9 + c] + y2 * d[2, 9 + c]
+            if stiffens:
+                for q in range(9):
+                    x, y = more[q] * s[q, i], more[q] * s[q, 9 + i]
+                    for c in range(9):
+                        by_x[c] += x * s[q, c]
+                        by_x[9 + c] += y * s[q, c]
+                        by_y[c] += x * s[q, 9 + c]
+                        by_y[9 + c] += y * s[q, 9 + c]
+            for c in range(i + 1):
+                full[2 * i, 2 * c], full[2 * i, 2 * c + 1] = by_x[c], by_y[c]
+                full[2 * i + 1, 2 * c], full[2 * i + 1, 2 * c + 1] = by_x[9 + c], by_y[9 + c]
         # the centre node meets no other element: rows 16 and 17 are eliminated
         det = full[16, 16] * full[17, 17] - full[17, 16] * full[17, 16]
         k00, k01, k11 = full[17, 17] / det, -full[17, 16] / det, full[16, 16] / det
@@ -154,16 +160,15 @@ def assemble(
         for i in range(16):
             fold[e, 0, i] = k00 * full[16, i] + k01 * full[17, i]
             fold[e, 1, i] = k01 * full[16, i] + k11 * full[17, i]
-        fold[e, 0, 16] = k00 * fx[8] + k01 * fy[8]
-        fold[e, 1, 16] = k01 * fx[8] + k11 * fy[8]
+        fold[e, 0, 16] = k00 * f[8] + k01 * f[17]
+        fold[e, 1, 16] = k01 * f[8] + k11 * f[17]
         for i in range(16):
             c0, c1 = full[16, i], full[17, i]
             for k in range(i + 1):
                 tangent[e, i, k] = full[i, k] - c0 * fold[e, 0, k] - c1 * fold[e, 1, k]
             row = unknown[e, i // 2, i % 2]
             if row >= 0:
-                mine = fx[i // 2] if i % 2 == 0 else fy[i // 2]
-                force[row] += mine - c0 * fold[e, 0, 16] - c1 * fold[e, 1, 16]
+                force[row] += f[i // 2 + 9 * (i % 2)] - c0 * fold[e, 0, 16] - c1 * fold[e, 1, 16]
     return least
 
 

@@ -164,22 +164,29 @@ def condense(
     numbers: Narrow,
     factor_at: Wide,
     factors: Array,
+    near: Array,
 ) -> None:
     """Replace `force` (n,) by L^-1 force inside the body, and at its end by the force that the skin feels.
 
-    `numbers` are the unknowns of all borders, one after the other from `border_at` on.
+    `numbers` are the unknowns of all borders, one after the other from `border_at` on; `near` (b,) is memory for the
+    largest of them.
     """
     for p in range(start.shape[0]):
         k, b, first = inner[p], border[p], start[p]
         top = factors[factor_at[p] : factor_at[p] + k * (k + b)].reshape(k, k + b)
-        out = numbers[border_at[p] : border_at[p] + b]
+        passed = near[:b]
+        passed[:] = 0.0
         for i in range(k):
             row = top[i]
             part = force[first + i] / row[i]
-            for j in range(i + 1, k):
-                force[first + j] -= row[j] * part
+            mine, across = force[first + i + 1 : first + k], row[i + 1 : k]
+            for j in range(k - i - 1):
+                mine[j] -= across[j] * part
+            across = row[k:]
             for j in range(b):
-                force[out[j]] -= row[k + j] * part
+                passed[j] += across[j] * part
+        for j in range(b):
+            force[numbers[border_at[p] + j]] -= passed[j]
 
 
 @compiled

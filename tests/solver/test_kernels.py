@@ -22,8 +22,9 @@ def distorted(law, seed=1):
 def assembled(body, u, pressure):
     newton = Newton(body)
     least = kernels.assemble(
-        u, pressure, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening, body.lame,
-        body.nodes, body.unknown, newton.tangent, newton.force, newton.fold, newton.core, newton.dilate, newton.volume,
+        u, pressure, body.grad_x, body.grad_y, body.weight, body.modes, body.laplace, body.shear, body.stiffening,
+        body.lame, body.nodes, body.unknown, newton.tangent, newton.force, newton.fold, newton.core, newton.dilate,
+        newton.volume,
     )  # fmt: skip
     return newton, least
 
