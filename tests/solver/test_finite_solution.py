@@ -3,12 +3,16 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from daq_app.accuracy.methods import climbed_twice
+from solver.climbing import ascended
 from solver.failures import NoSteadyState
+from solver.finite_finger import FiniteFinger
 from solver.reference import SLIPPERINESS, STICKINESS, scene
 from solver.scene import Friction, Loading, Scene, Solve
-from solver.solution import answers, solve
+from solver.solution import answers, solve, solve_together
 
 # Ending-averaged SED [MPa], normal and tangential force [N/mm] of the published finger: means of two independent codes
 # (quadrilaterals with exact contact, up to 36,000 unknowns; high-order triangles with penalty contact, 27,000).
@@ -45,6 +49,48 @@ def test_forces_balance_and_nothing_is_exceeded(four, name):
     audits = dict(four[name].audits)
     assert audits.pop("smallest_det_F") > 0.5
     assert all(value < 1e-8 for value in audits.values()), audits
+
+
+DIFFERENT = 0.05  # part of the range of several surfaces that differences between them may be off
+
+
+@pytest.mark.parametrize("number", [0, 1, 2], ids=["SED", "normal force", "tangential force"])
+def test_differences_between_surfaces_solved_together_are_good_to_5_percent_of_their_range(four, number):
+    slid = [name for name in REFERENCE if name.startswith("slip")]
+    found = [(four[name].sed_ending, four[name].normal_force, four[name].tangential_force)[number] for name in slid]
+    true = [REFERENCE[name][number] for name in slid]
+    apart = np.subtract.outer(found, found) - np.subtract.outer(true, true)
+    assert np.abs(apart).max() < DIFFERENT * np.ptp(true)
+
+
+@pytest.mark.slow
+def test_differences_between_five_surfaces_are_those_of_separate_overkill_solves():
+    scenes = [finite(surface, tolerance=0.01) for surface in SLIPPERINESS]
+    found = np.array([[p.sed_ending, p.normal_force, p.tangential_force] for p in solve_together(scenes)])
+    true = np.array([climbed_twice(scene, (14.0, 20.0, 17.0))[0].mean(axis=0) for scene in scenes])
+    apart = (found[:, None] - found) - (true[:, None] - true)
+    assert (np.abs(apart).max(axis=(0, 1)) < DIFFERENT * np.ptp(true, axis=0)).all()
+
+
+def test_a_surface_begun_at_anothers_state_ends_where_one_begun_at_the_undeformed_finger_does():
+    made = {}
+
+    def make(scene, sizing):
+        """Keep the rough mesh, and one mesh for each surface."""
+        key = "rough" if sizing.edges is None else scene.friction
+        if key not in made:
+            made[key] = FiniteFinger.of(scene, sizing)
+        return made[key]
+
+    one, other = finite(SLIPPERINESS[0]), finite(SLIPPERINESS[1])
+    before = ascended(one, 1.5, 6.0, lambda: False, make)
+    fresh = ascended(other, 1.5, 6.0, lambda: False, make)
+    warm = ascended(other, 1.5, 6.0, lambda: False, make, before)
+    np.testing.assert_allclose(warm.top.shape.u, fresh.top.shape.u, rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(warm.top.shape.reaction, fresh.top.shape.reaction, rtol=0.0, atol=1e-11)
+    assert warm.top.shape.iterations - before.foot.shape.iterations < fresh.top.shape.iterations
+    edges = [at.foot.finger.edges(at.foot.shape) for at in (warm, fresh)]
+    np.testing.assert_allclose(*edges, rtol=0.0, atol=1e-4)  # so that meshes, and answers, are the same but for that
 
 
 def test_a_result_is_json_and_says_what_was_modelled(four):
