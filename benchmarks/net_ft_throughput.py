@@ -1,27 +1,41 @@
 """How fast the net-ft driver reads the simulated box, what it loses, how old its readings are and what it costs.
 
-The box runs in a process of its own, so that the CPU share is the driver's alone: its receiving thread, and a reader
-that asks every few milliseconds as a session does. The age of a reading is counted from the instant it was taken in
-the box (both processes share the machine's monotonic clock) to its hand-over, newest reading of each hand-over.
+Three processes: the box; the driver, its receiving thread and a reader that asks every few milliseconds as a session
+does, makes newtons and hands them on 60 times a second as the recorder does; and, with --draw, one that takes them and
+draws six axes as the window does. Processor time is the driver's process alone. Lag is counted from a reading's arrival
+to its hand-over, age from the instant it was taken in the box (all share the machine's monotonic clock), both of the
+newest reading of each hand-over.
 
-    python -m benchmarks.net_ft_throughput [--seconds 10] [--every 2] [--rates 200 1000 7000 14000 28000]
+    python -m benchmarks.net_ft_throughput [--seconds 60] [--every 2] [--rates 200 1000 7000] [--draw]
+    python -m benchmarks.net_ft_throughput --beyond 14000 28000 56000 112000
 
-Rates above 7000 Hz tell the box that time runs faster.
+Beyond 7000 Hz, which no box gives, records packed before are sent by a process that does nothing else, since the
+simulated box cannot keep up there; time is told to run faster.
 """
 
 import argparse
+import contextlib
 import multiprocessing
+import os
+import socket
 import time
+from dataclasses import replace
 from multiprocessing.connection import Connection
 
 import numpy as np
 
 from drivers.catalog import open_transducer
 from drivers.clock import Clock, PacedClock, RealClock
+from drivers.links import UdpLink
+from drivers.net_ft.device import NetFtTransducer
+from drivers.net_ft.wire import RECORD
+from drivers.readings import ReadingBlock
+from drivers.transducer import Transducer
 from simulators.bench import Bench
 from simulators.net_ft_box import NetFtBox
 
 TOP = 7000  # [Hz] of the box itself
+SHOWN_EVERY = 1 / 60  # [s]
 
 
 def main() -> None:
@@ -29,54 +43,147 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--seconds", type=float, default=10.0)
     options.add_argument("--every", type=float, default=2.0, help="the reader's pause between two hand-overs [ms]")
-    options.add_argument("--rates", type=int, nargs="+", default=[200, 1000, 7000, 14000, 28000])
+    options.add_argument("--rates", type=int, nargs="+", default=[200, 1000, 7000])
+    options.add_argument("--beyond", type=int, nargs="+", default=[], help="rates to be sent ready packed, instead")
+    options.add_argument("--draw", action="store_true", help="let another process draw what is read")
     given = options.parse_args()
-    print(f"{'':>8} {'received':>10} {'of them':>8} {'':>9} {'age of newest [ms]':>19} {'CPU':>8}")
-    print(f"{'rate Hz':>8} {'a second':>10} {'lost':>8} {'malformed':>9} {'p50':>9} {'p99':>9} {'% core':>8}")
-    for rate in given.rates:
-        print(row(rate, given.seconds, given.every * 1e-3), flush=True)
+    print(f"load of this computer: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+    print(f"{'':>8} {'received':>10} {'of them':>8} {'':>9} {'lag [ms]':>13} {'age [ms]':>13} {'CPU':>7} {'drawn':>8}")
+    print(
+        f"{'rate Hz':>8} {'a second':>10} {'lost':>8} {'malformed':>9} {'p50':>6} {'p99':>6} {'p50':>6} {'p99':>6} "
+        f"{'% core':>7} {'a second':>8}"
+    )
+    for rate in given.beyond or given.rates:
+        ready = rate in given.beyond
+        print(row(rate, given.seconds, given.every * 1e-3, drawing=given.draw, ready=ready), flush=True)
+    print(f"load of this computer: {os.getloadavg()[0]:.1f}")
 
 
-def row(rate: int, seconds: float, every: float) -> str:
+def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) -> str:
     """Measure one rate [Hz] for so many real seconds, asking `every` so many seconds."""
     factor = max(1.0, rate / TOP)
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    process = context.Process(target=serve, args=(min(rate, TOP), factor, theirs))
-    process.start()
+    box = context.Process(target=serve, args=(min(rate, TOP), factor, theirs))
+    box.start()
     uri, origin = ours.recv()
-    transducer = open_transducer(uri, clock(factor))
+    shown, window = context.Pipe()
+    drawer = context.Process(target=draw, args=(rate, window)) if drawing else None
+    if drawer is not None:
+        drawer.start()
+        shown.recv()
+    transducer: Transducer = open_transducer(uri, clock(factor))
+    if ready:
+        there, theirs = context.Pipe()
+        sender = context.Process(target=send, args=(rate, seconds + 5.0, theirs), daemon=True)
+        sender.start()
+        port, info = there.recv(), replace(transducer.info, rate=float(TOP))
+        transducer = NetFtTransducer(info, lambda: UdpLink("127.0.0.1", port), lambda: info, clock(factor))
+    calibration = transducer.info.calibration
     transducer.start()
     ages: list[float] = []
+    lags: list[float] = []
+    waiting: list[ReadingBlock] = []
+    due = 0.0
     began, used, received = time.monotonic(), time.process_time(), transducer.health.received
-    while time.monotonic() - began < seconds:
+    while (now := time.monotonic()) - began < seconds:
         block = transducer.read(0.1 * factor)
         if len(block):
-            ages.append(time.monotonic() - origin - float(block.counter[-1]) / 7000.0 / factor)
+            now = time.monotonic()
+            ages.append(np.nan if ready else now - origin - float(block.counter[-1]) / 7000.0 / factor)
+            lags.append(transducer.health.lag_ms / 1e3 / factor)
+            waiting.append(block)
+        if now >= due and waiting:
+            due = now + SHOWN_EVERY
+            gathered, waiting = ReadingBlock.joined(waiting), []
+            wrench = calibration.wrench(gathered.raw, np.zeros(6))
+            if drawer is not None:
+                shown.send((gathered.time, wrench))
         time.sleep(every)
-    wall, used, received = (
-        time.monotonic() - began,
-        time.process_time() - used,
-        transducer.health.received - received,
-    )
+    wall, used = time.monotonic() - began, time.process_time() - used
     health = transducer.health
+    received = health.received - received
     transducer.close()
     ours.send("end")
-    process.join()
-    p50, p99 = np.percentile(ages, [50, 99]) * 1e3
+    box.join()
+    frames = 0.0
+    if drawer is not None:
+        shown.send(None)
+        frames = shown.recv() / wall
+        drawer.join()
+    lag, age = np.percentile(lags, [50, 99]) * 1e3, np.percentile(ages, [50, 99]) * 1e3
     return (
         f"{rate:8d} {received / wall:10.0f} {health.lost:8d} {health.malformed:9d} "
-        f"{p50:9.2f} {p99:9.2f} {100 * used / wall:8.1f}"
+        f"{lag[0]:6.2f} {lag[1]:6.2f} {age[0]:6.2f} {age[1]:6.2f} {100 * used / wall:7.1f} {frames:8.1f}"
     )
 
 
 def serve(rate: int, factor: float, pipe: Connection) -> None:
-    """Be the other process: serve a box until told to end. First tell its address and when its time began [s]."""
+    """Be the box's process: serve until told to end. First tell its address and when its time began [s]."""
     box = NetFtBox(Bench(1), clock(factor), rate=rate)
     box.start()
     pipe.send((box.uri, time.monotonic() - box.now() / factor))
     pipe.recv()
     box.close()
+
+
+def send(rate: int, seconds: float, pipe: Connection) -> None:
+    """Be a box that is asked to stream and sends so many seconds of records, `rate` a second, packed before."""
+    count = round(rate * seconds)
+    records = np.zeros(count, RECORD)
+    records["number"] = records["counter"] = np.arange(1, count + 1)
+    packed, size = records.tobytes(), RECORD.itemsize
+    port = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    port.bind(("127.0.0.1", 0))
+    pipe.send(port.getsockname()[1])
+    _, asker = port.recvfrom(100)
+    port.connect(asker)
+    began, sent = time.monotonic(), 0
+    with contextlib.suppress(ConnectionError):  # whoever asked has gone
+        while sent < count:
+            due = min(round((time.monotonic() - began) * rate), count)
+            for i in range(sent, due):
+                port.send(packed[i * size : (i + 1) * size])
+            sent = due
+            time.sleep(0.0002)
+
+
+def draw(rate: int, pipe: Connection) -> None:
+    """Be the window's process: draw the last ten seconds of six axes at each hand-over; at the end tell how often."""
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    from PySide6.QtWidgets import QApplication
+
+    from daq_app.live_trace import CHANNELS, LiveTrace
+    from daq_app.qt.live_panel import AXES
+    from daq_app.qt.live_plot import LivePlot
+    from daq_app.qt.tokens import LIGHT
+
+    application = QApplication([])
+    trace = LiveTrace(float(rate))
+    plots = [LivePlot(*axis, LIGHT, 1.0) for axis in AXES]
+    for plot in plots:
+        plot.resize(1200, 500)
+        plot.show()
+    pipe.send("ready")
+    frames, ended = 0, False
+    while not ended:
+        arrived = [pipe.recv()]
+        while pipe.poll():
+            arrived.append(pipe.recv())
+        ended = arrived[-1] is None
+        for told in filter(None, arrived):
+            values = np.full((len(CHANNELS), len(told[0])), np.nan)
+            values[:6] = told[1].T
+            trace.add(told[0], values)
+        if (newest := trace.newest) is not None:
+            columns = trace.columns(newest - 10.0, newest, 1200)
+            for plot in plots:
+                plot.show_columns(columns, newest, (), time.monotonic())
+                plot.repaint()
+            application.processEvents()
+            frames += 1
+    with contextlib.suppress(BrokenPipeError):
+        pipe.send(frames)
 
 
 def clock(factor: float) -> Clock:
