@@ -33,6 +33,11 @@ class LiveFinite:
         """Indentation found [mm]."""
         return self._stepper.depth
 
+    @property
+    def rest(self) -> Array:
+        """Return where the nodes that are drawn are while nothing touches (n, 2) [mm]."""
+        return self._drawn.rest
+
     def step(self, normal: float, pull: float, mu: float, tau: float) -> float:
         """Return the SED at the ending [MPa] under forces [N/mm]; nan where they are beyond its reach."""
         follows = self._stepper

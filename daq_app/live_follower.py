@@ -19,7 +19,7 @@ from solver.failures import SolveFailure
 from solver.fields import fields_of
 from solver.finger import FingerModel
 from solver.live_picture import LivePicture
-from solver.mesh import Array
+from solver.mesh import Array, Indices
 from solver.mesher import Sizing
 from solver.receptor import ROW
 from solver.scene import Friction, Loading, Scene, Solve
@@ -72,12 +72,8 @@ class _Seen:
     time: float  # [s, device time]
     row: Array
     picture: Picture
+    rest: Array  # (n, 2) where its nodes are while nothing touches [mm]
     depth: float
-
-    @property
-    def shown(self) -> tuple[Array, Picture, float]:
-        """Return what is drawn of it."""
-        return self.row, self.picture, self.depth
 
 
 class Follower:
@@ -88,11 +84,11 @@ class Follower:
 
     def __init__(self, use: Use) -> None:
         """Mesh and condense the finger. Raises SceneError or MeshError where it cannot be meshed."""
-        scene = live_scene(use.plan)
+        self._made_for = _finger(use)
+        scene, self._area, _ = self._made_for
+        self._kinematics: Kinematics = use.kinematics
         finger = FingerModel.of(scene, Sizing(FINENESS["small"], scene.loading.depth, margin=MARGIN["small"]))
         self._scene = scene
-        self._area = DEFAULT_AREA if use.plan is None else use.plan.contact_area
-        self._kinematics: Kinematics = use.kinematics
         self._small, self._drawn = SmallStepper(Condensed.of(finger), LEAST_MU), LivePicture.of(finger)
         self._small.step(1e-3, 0.0)  # compiles, or loads what was compiled
         self._small.forget()
@@ -103,11 +99,16 @@ class Follower:
         self._said: deque[tuple[float, float]] = deque()
         self._seen: deque[_Seen] = deque(maxlen=SEEN)
 
+    def follows(self, use: Use) -> bool:
+        """Say whether it follows just this finger already."""
+        return self._made_for == _finger(use)
+
     def take(self, forces: Forces) -> Provisional:
         """Return what the model says of a batch."""
         if forces.stream != self._stream:
             self._stream = forces.stream
             self._said.clear()
+            self._seen.clear()
             self._untouched()
         steps = [self._step(n, p) for n, p in zip(forces.normal, forces.pull, strict=True)]
         sed = np.array([said for said, _ in steps])
@@ -116,9 +117,9 @@ class Follower:
         while self._said and self._said[0][0] < forces.time[-1] - KEPT:
             self._said.popleft()
         shown = self._finite if self._finite is not None and self._reached else self._small
-        row, picture, now = shown.row(), self._picture(), float(forces.time[-1])
+        row, now, (picture, rest) = shown.row(), float(forces.time[-1]), self._picture()
         if sed[-1] > 0.0 and (not self._seen or abs(now - self._seen[-1].time) >= SEEN_EVERY):
-            self._seen.append(_Seen(now, row, picture, shown.depth))
+            self._seen.append(_Seen(now, row, picture, rest, shown.depth))
         return Provisional(
             forces.time, sed, row, picture, shown.depth, self._mu,
             self._kinematics, instead, forces.received_ns, forces.stream,
@@ -134,9 +135,9 @@ class Follower:
         try:
             found = None if scene is None else solve(scene)
         except SolveFailure as failure:
-            return self._unsettled(asked, provisional, str(failure))
+            return self._unsettled(asked, provisional, str(failure.in_a_sentence()), failed=True)
         if found is None:
-            return self._unsettled(asked, provisional, "the stroke gives no friction.")
+            return self._unsettled(asked, provisional, "The stroke gives no friction.")
         fields = fields_of(found)
         sed = fields.sed[fields.triangles].mean(axis=1)
         picture = Picture(fields.nodes, fields.triangles, sed, fields.outlines["skin"])
@@ -145,12 +146,17 @@ class Follower:
             found.indentation, self._kinematics,
         )  # fmt: skip
 
-    def _unsettled(self, asked: Settle, provisional: float | None, why: str) -> Settled:
+    def _unsettled(self, asked: Settle, provisional: float | None, why: str, *, failed: bool = False) -> Settled:
         """Return why there is no full solve, with the last state that was followed in the steady window."""
         first, last = asked.steady
         seen = next((seen for seen in reversed(self._seen) if first <= seen.time <= last), None)
-        row, picture, depth = (np.full(len(ROW), np.nan), None, None) if seen is None else seen.shown
-        return Settled(asked.trial, None, None, provisional, row, picture, depth, self._kinematics, why)
+        if seen is None:
+            unknown = np.full(len(ROW), np.nan)
+            return Settled(asked.trial, None, None, provisional, unknown, None, None, self._kinematics, why)
+        picture = seen.picture
+        if failed:
+            picture = replace(picture, lost=most_squeezed(seen.rest, picture.nodes, picture.faces))
+        return Settled(asked.trial, None, None, provisional, seen.row, picture, seen.depth, self._kinematics, why)
 
     def _step(self, normal: float, pull: float) -> tuple[float, bool]:
         """Return the SED under forces [N], and whether finite strain told it; nothing that touches is within reach."""
@@ -180,12 +186,34 @@ class Follower:
         if self._finite is not None:
             self._finite.forget()
 
-    def _picture(self) -> Picture:
+    def _picture(self) -> tuple[Picture, Array]:
+        """Return what is drawn, and where its nodes are while nothing touches (n, 2) [mm]."""
         if self._finite is not None and self._reached:
-            return Picture(*self._finite.drawn(), self._finite.outline())
+            return Picture(*self._finite.drawn(), self._finite.outline()), self._finite.rest
         forces = self._small.forces()
         nodes = self._drawn.nodes(forces, self._small.depth)
-        return Picture(nodes, self._drawn.faces, self._drawn.sed(forces), self._small.outline())
+        return Picture(nodes, self._drawn.faces, self._drawn.sed(forces), self._small.outline()), self._drawn.rest
+
+
+def most_squeezed(rest: Array, moved: Array, faces: Indices) -> tuple[float, float]:
+    """Return the middle (x, y) [mm] of the face that is shortened most in any direction.
+
+    `rest` and `moved` are nodes (n, 2) before and after, `faces` (f, 4); each is taken to stretch as its diagonals do.
+
+    >>> square = np.array([[0.0, 0.0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]])
+    >>> pressed = square * [1.0, 0.5] + [[0, 0], [0, 0], [-0.8, 0]] * 2
+    >>> most_squeezed(square, pressed, np.array([[0, 1, 4, 3], [1, 2, 5, 4]]))
+    (1.1, 0.25)
+    """
+    before, after = (np.stack([at[:, 2] - at[:, 0], at[:, 3] - at[:, 1]], axis=2) for at in (rest[faces], moved[faces]))
+    stretches = np.linalg.svd(after @ np.linalg.inv(before), compute_uv=False)  # the least last
+    x, y = moved[faces[int(np.argmin(stretches[:, -1]))]].mean(axis=0).tolist()
+    return x, y
+
+
+def _finger(use: Use) -> tuple[Scene, float, Kinematics]:
+    """Return all that tells one finger to be followed from another."""
+    return live_scene(use.plan), DEFAULT_AREA if use.plan is None else use.plan.contact_area, use.kinematics
 
 
 def _finite(scene: Scene) -> "LiveFinite":

@@ -51,6 +51,7 @@ class Picture:
     faces: NDArray[np.int64]  # (f, 3 or 4); none where only the outline is known
     sed: Array  # (f,) [MPa]
     outline: Array  # (w, 2) deformed skin [mm]
+    lost: tuple[float, float] | None = None  # where tissue is squeezed most [mm], of a state that led nowhere
 
 
 @dataclass(frozen=True, slots=True, eq=False)

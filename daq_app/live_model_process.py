@@ -30,7 +30,9 @@ def run(connection: Connection) -> None:
             match connection.recv():
                 case Use() as use:
                     try:
-                        follower, problem = Follower(use), ""
+                        if follower is None or not follower.follows(use):  # meshing takes its time
+                            follower = Follower(use)
+                        problem = ""
                     except (SceneError, MeshError) as error:
                         follower, problem = None, str(error)
                     connection.send(Ready(problem))

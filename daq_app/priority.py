@@ -3,7 +3,7 @@
 import os
 import sys
 
-BELOW = 10  # on POSIX, nice's steps towards the end of the queue
+BELOW = 5  # on POSIX, nice's steps towards the end of the queue
 BELOW_NORMAL = 0x4000  # on Windows, its name for the same
 
 

@@ -43,8 +43,12 @@ def _of_settled(settled: Settled) -> str:
     shown = "" if settled.provisional is None else f" · shown live {_kpa(settled.provisional)}"
     how = KINEMATICS[settled.kinematics]
     if settled.sed is None:
-        kept = "" if settled.picture is None else " The picture is the last state that was followed."
-        return f"No full solve at {how}: {settled.reason}{kept}{shown}"
+        kept = ""
+        if settled.depth is not None:
+            lost = settled.picture is not None and settled.picture.lost is not None
+            marked = "; ⊗ marks its most squeezed tissue" if lost else ""
+            kept = f" Shown is the last state that was followed, {settled.depth:.1f} mm deep{marked}."
+        return f"No full solve at {how}{shown}. {settled.reason}{kept}"
     error = "" if settled.error is None else f" ± {100 * settled.error:.1f} %"
     by = settled.difference
     if by is not None:

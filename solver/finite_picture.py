@@ -35,6 +35,11 @@ class FinitePicture:
         each = Endings(probes, np.ones(len(element)), np.arange(len(element)), len(element))
         return cls(mesh.elements[:, QUARTERS].reshape(-1, 4), body, FiniteProbes.of(body, each))
 
+    @property
+    def rest(self) -> Array:
+        """Return where the nodes are undeformed (n, 2) [mm]."""
+        return self._body.mesh.nodes
+
     def nodes(self, shape: Shape) -> Array:
         """Return where the nodes are (n, 2) [mm], the surface being y = 0."""
         return self._body.mesh.nodes + shape.u - [0.0, shape.pull.depth]

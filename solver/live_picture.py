@@ -22,7 +22,7 @@ class LivePicture:
     """A finger as its contact forces (2 k,) see it, those along y first."""
 
     faces: Indices  # (f, 4) nodes of the quadrilaterals that are drawn
-    _nodes: Array  # (n, 2) undeformed [mm]
+    rest: Array  # (n, 2) undeformed nodes [mm]
     _moved: Array  # (2 n, 2 k) displacements, x and y in turn [mm per N/mm]
     _strain: Array  # (3, f, 2 k) exx, eyy and 2 exy in the middle of each face [1 per N/mm]
     _theta: Array  # (f, 2 k) volume strain there
@@ -50,7 +50,7 @@ class LivePicture:
 
     def nodes(self, forces: Array, depth: float) -> Array:
         """Return where the nodes are (n, 2) [mm] under contact forces (k, 2) [N/mm], the surface being y = 0."""
-        return self._nodes + (self._moved @ _stacked(forces)).reshape(-1, 2) - [0.0, depth]
+        return self.rest + (self._moved @ _stacked(forces)).reshape(-1, 2) - [0.0, depth]
 
     def sed(self, forces: Array) -> Array:
         """Return the SED in the middle of each face (f,) [MPa] under contact forces (k, 2) along x and y [N/mm]."""

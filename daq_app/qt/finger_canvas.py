@@ -12,6 +12,7 @@ from PySide6.QtGui import QBrush, QColor, QLinearGradient, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from daq_app.analyst.frame import Frame, halved, seen, step_above
+from daq_app.qt.indicators import paint_lost
 from daq_app.qt.tokens import MODEL, SMALL, Tokens, font
 
 pg: Any = pyqtgraph  # it has no types
@@ -135,7 +136,7 @@ class FingerCanvas(QWidget):
         painter.drawLine(QPointF(box.left(), origin.y()), QPointF(box.right(), origin.y()))
         self._paint_contact(painter, frame, origin, per_mm)
         if self._lost is not None:
-            self._paint_lost(painter, placed(np.array([self._lost]))[0])
+            paint_lost(painter, placed(np.array([self._lost]))[0], self._tokens)
         painter.restore()
 
     def _shown(self, frame: Frame) -> Box:
@@ -201,14 +202,6 @@ class FingerCanvas(QWidget):
             if ends[-1] - ends[0] > painter.fontMetrics().horizontalAdvance(words):
                 box = QRectF(ends[0], level + 2, ends[-1] - ends[0], painter.fontMetrics().height())
                 painter.drawText(box, Qt.AlignmentFlag.AlignHCenter, words)
-
-    def _paint_lost(self, painter: QPainter, at: QPointF) -> None:
-        painter.setPen(QPen(QColor("white"), 5.0))
-        painter.drawEllipse(at, 11.0, 11.0)
-        painter.setPen(QPen(QColor(self._tokens.wrong), 2.5))
-        painter.drawEllipse(at, 11.0, 11.0)
-        painter.drawLine(at + QPointF(-7, -7), at + QPointF(7, 7))
-        painter.drawLine(at + QPointF(-7, 7), at + QPointF(7, -7))
 
     def _paint_bar(self, painter: QPainter, box: QRectF) -> None:
         words = f"SED 0 to {self._top:g} kPa"

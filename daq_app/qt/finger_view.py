@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from daq_app.live_model import Picture
 from daq_app.plot_scale import PlotScale
+from daq_app.qt.indicators import paint_lost
 from daq_app.qt.shapes import faces, lines
 from daq_app.qt.tokens import MODEL, SMALL, Tokens, font
 from daq_app.view_model import ModelWords
@@ -67,7 +68,7 @@ class FingerView(QWidget):
         """Paint words, finger and row."""
         painter = QPainter(self)
         painter.fillRect(self.rect(), QColor(self._tokens.surface))
-        painter.setFont(font(SMALL, self._scale, bold=self._words.state in ("settled", "instead", "beyond", "failed")))
+        painter.setFont(font(SMALL, self._scale, bold=self._words.state in ("settled", "instead", "beyond")))
         painter.setPen(
             QColor(self._tokens.look if self._words.state in ("instead", "beyond", "failed") else self._tokens.quiet)
         )
@@ -104,6 +105,9 @@ class FingerView(QWidget):
             painter.setPen(QPen(QColor(self._tokens.text), 1.5, style))
             for piece in lines(*placed(picture.outline).T):
                 painter.drawPolyline(piece)
+            if picture.lost is not None:
+                x, y = placed(np.array([picture.lost]))[0].tolist()
+                paint_lost(painter, QPointF(x, y), self._tokens)
         painter.restore()
         painter.setPen(QColor(self._tokens.quiet))
         painter.drawText(

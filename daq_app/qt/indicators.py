@@ -163,3 +163,13 @@ class Arrow(QWidget):
         painter.drawLine(QPointF(0, half), QPointF(0, -half))
         painter.drawLine(QPointF(0, -half), QPointF(-12, -half + 14))
         painter.drawLine(QPointF(0, -half), QPointF(12, -half + 14))
+
+
+def paint_lost(painter: QPainter, at: QPointF, tokens: Tokens) -> None:
+    """Mark the place of a failed solve, on any ground: a ring with a cross."""
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    for colour, width in ((tokens.surface, 5.0), (tokens.wrong, 2.5)):
+        painter.setPen(QPen(QColor(colour), width))
+        painter.drawEllipse(at, 11.0, 11.0)
+        painter.drawLine(at + QPointF(-7, -7), at + QPointF(7, 7))
+        painter.drawLine(at + QPointF(-7, 7), at + QPointF(7, -7))

@@ -14,6 +14,7 @@ from daq_app.view_model import ModelTrace, model_words
 from sessions.analysis import FrictionParameters
 from sessions.plan import Frame
 from sessions.protocols import plan, protocol
+from solver.failures import NoSteadyState
 from solver.solution import solve
 
 PLAN = plan(protocol("sensotact-friction"), "S01", 3, frame=Frame("-z", "set", 20.0, "set"))
@@ -95,6 +96,14 @@ def test_a_lifted_finger_forgets_the_friction_of_the_touch_before(follower):
     assert lifted.mu < MU
 
 
+def test_another_plan_with_the_same_finger_needs_no_other_mesh(follower):
+    assert follower.follows(Use(replace(PLAN, subject="S02"), "small"))
+    assert not follower.follows(Use(PLAN, "finite"))
+    assert not follower.follows(Use(replace(PLAN, contact_area=2.0 * AREA), "small"))
+    deeper = replace(PLAN.blocks[0], indentation=3.0)
+    assert not follower.follows(Use(replace(PLAN, blocks=(deeper, *PLAN.blocks[1:])), "small"))
+
+
 def test_forces_beyond_its_reach_are_marked_and_the_next_touch_is_followed_again(follower):
     far = follower.take(Forces(np.array([6.0]), np.array([500.0]), np.array([0.0]), 0, 1))
     assert far.beyond
@@ -122,6 +131,23 @@ def test_a_full_solve_that_fails_says_why_and_keeps_what_was_shown(follower):
     assert settled.reason in model_words(None, settled, "").words
     assert settled.picture.sed.max() > 0.0  # the last good state stays to be seen
     assert settled.depth == pytest.approx(1.54, abs=0.02)
+    assert settled.picture.lost is None
+
+
+def test_a_solve_that_finds_nothing_is_marked_in_the_last_state_that_was_followed(follower, monkeypatch):
+    def wedged(_scene):
+        raise NoSteadyState("at 1.5 mm of indentation the finger wedges")
+
+    monkeypatch.setattr("daq_app.live_follower.solve", wedged)
+    follower.take(forces_of(stroke(), FRAME))
+    settled = follower.settle(Settle(1, PLAN, FRICTION, NORMAL, (1.2, 2.0)))
+    x, y = settled.picture.lost  # squeezed most between bone and surface, above the contact
+    assert abs(x) < 4.0
+    assert 0.0 < y < 4.0
+    words = model_words(None, settled, "")
+    assert words.state == "failed"
+    assert "At 1.5 mm of indentation the finger wedges." in words.words
+    assert "⊗" in words.words
 
 
 def test_readings_become_200_steps_a_second_and_unhealthy_ones_are_left_out():
