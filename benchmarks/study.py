@@ -1,9 +1,12 @@
-"""How a study's time falls with processes: the same simulated session many times over, on one and on two.
+"""How a study's time falls with processes: the same simulated session many times over, on one process and on two.
 
-Run it on an idle machine: python -m benchmarks.study [SESSIONS]. Every copy has a name of its own, so none is taken
-from what was computed before. Prints wall time of each, their ratio, and what 1,000 sessions would take.
+Run it on an idle machine: python -m benchmarks.study [SESSIONS] [small|finite]; the second word adds many paths. Every
+copy has a name of its own, so none is taken from what was computed before. Both ways take turns, so that whatever else
+the machine does falls on both alike. Prints wall times, their ratio, processor time, and what 1,000 sessions would take.
 """
 
+import os
+import resource
 import shutil
 import sys
 import tempfile
@@ -15,18 +18,23 @@ from daq_app.pooling import Shelf, visits
 from daq_app.synthetic import synthetic_study
 from sessions.pooling.visit import VisitOptions
 
-OPTIONS = VisitOptions()
+ROUNDS = 5
 
 
-def timed(folders: list[Path], shelf: Path, workers: int) -> float:
-    """Return the wall time [s] of computing all sessions."""
-    begun = time.perf_counter()
-    done, failed = visits(folders, OPTIONS, Shelf(shelf, OPTIONS), Console(as_json=True), workers=workers)
+def timed(folders: list[Path], shelf: Path, options: VisitOptions, workers: int) -> tuple[float, float]:
+    """Return the wall time and the workers' processor time [s] of computing all sessions."""
+    before, begun = _children(), time.perf_counter()
+    done, failed = visits(folders, options, Shelf(shelf, options), Console(as_json=True), workers=workers)
     assert len(done) == len(folders), failed
-    return time.perf_counter() - begun
+    return time.perf_counter() - begun, _children() - before
 
 
-def main(count: int) -> None:
+def _children() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def main(count: int, options: VisitOptions) -> None:
     """Make the sessions, time them, print."""
     with tempfile.TemporaryDirectory() as room:
         base = Path(room)
@@ -34,13 +42,25 @@ def main(count: int) -> None:
         folders = [base / f"copy{i:04d}" for i in range(count)]
         for folder in folders:
             shutil.copytree(base / "one" / "S01", folder)
-        one = timed(folders, base / "shelf-one", 1)
-        two = timed(folders, base / "shelf-two", 2)
-        print(f"{count} sessions: {one:.1f} s with one process, {two:.1f} s with two: {one / two:.2f} times as fast")
-        print(f"1,000 sessions would take {1000 * two / count / 60:.1f} min with two")
-        again = timed(folders, base / "shelf-two", 2)
-        print(f"once computed: {again:.2f} s")
+        wall, work = {1: 0.0, 2: 0.0}, {1: 0.0, 2: 0.0}
+        for part in range(ROUNDS):
+            for workers in (1, 2):
+                took = timed(folders[part::ROUNDS], base / f"shelf-{workers}", options, workers)
+                wall[workers], work[workers] = wall[workers] + took[0], work[workers] + took[1]
+        print(f"load average at the end: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+        print(
+            f"{count} sessions in {ROUNDS} rounds: {wall[1]:.1f} s with one process, {wall[2]:.1f} s with two: ", end=""
+        )
+        print(f"{wall[1] / wall[2]:.2f} times as fast")
+        print(f"processor time a session: {work[1] / count:.2f} s with one process, {work[2] / count:.2f} s with two")
+        print(f"1,000 sessions with two: {1000 * wall[2] / count / 60:.1f} min here, ", end="")
+        print(f"{1000 * work[2] / count / 2 / 60:.1f} min where nothing else runs")
+        print(f"once computed: {timed(folders, base / 'shelf-2', options, 2)[0]:.2f} s")
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 100)
+    sessions = int(sys.argv[1]) if len(sys.argv) > 1 else 100
+    if len(sys.argv) > 2:
+        main(sessions, VisitOptions(paths="finite" if sys.argv[2] == "finite" else "small"))
+    else:
+        main(sessions, VisitOptions())

@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import signal
 import tempfile
+import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -86,23 +87,30 @@ def visits(
     OSError where the shelf cannot be written.
     """
     keys = {folder: shelf.key(folder) for folder in folders}
-    done = [visit for visit in (shelf.found(key) for key in keys.values()) if visit is not None]
-    missing = [folder for folder in folders if shelf.found(keys[folder]) is None]
+    kept = {folder: shelf.found(key) for folder, key in keys.items()}
+    done = [visit for visit in kept.values() if visit is not None]
+    missing = [folder for folder, visit in kept.items() if visit is None]
     if done:
         console.note(f"{len(done)} of {len(folders)} sessions were computed before and are taken as they are")
     failed: list[tuple[str, str]] = []
     named = {folder.name: keys[folder] for folder in missing}
     begun = time.monotonic()
+    if missing:
+        console.progress(0.0, f"0 of {len(missing)} sessions")
     answers = _local(missing, options, workers) if scheduler is None else _dask(missing, options, scheduler)
-    for count, (name, answer) in enumerate(answers, 1):
-        if isinstance(answer, str):
-            failed.append((name, answer))
-            console.note(f"{name}: {answer}")
-        else:
-            shelf.keep(named[name], answer)
-            done.append(Visit.from_dict(answer))
-        left = (time.monotonic() - begun) / count * (len(missing) - count)
-        console.progress(0.95 * count / len(missing), f"{count} of {len(missing)} sessions, {left:.0f} s left")
+    try:
+        for count, (name, answer) in enumerate(answers, 1):
+            if isinstance(answer, str):
+                failed.append((name, answer))
+                console.note(f"{name}: {answer}")
+            else:
+                shelf.keep(named[name], answer)
+                done.append(Visit.from_dict(answer))
+            left = (time.monotonic() - begun) / count * (len(missing) - count)
+            console.progress(0.95 * count / len(missing), f"{count} of {len(missing)} sessions, {left:.0f} s left")
+    except KeyboardInterrupt:
+        console.note(f"{len(done)} of {len(folders)} sessions are computed and kept; the next run goes on from there")
+        raise
     return done, failed
 
 
@@ -147,7 +155,7 @@ def _in_pool(folders: Sequence[Path], options: VisitOptions, workers: int) -> It
     # Threads of the linear algebra would change the last bits, and cost more than they bring at these sizes.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     fresh = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=fresh, initializer=_quiet)
+    pool = ProcessPoolExecutor(workers, mp_context=fresh, initializer=_attend)
     try:
         waiting: set[Future[Answer]] = {pool.submit(computed, folder, options) for folder in folders}
         while waiting:
@@ -162,9 +170,17 @@ def _in_pool(folders: Sequence[Path], options: VisitOptions, workers: int) -> It
         raise
 
 
-def _quiet() -> None:
-    """Leave Ctrl-C to the process that was asked to stop."""
+def _attend() -> None:
+    """Leave Ctrl-C to the process that was asked to stop, and end where that one was killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)  # nobody is left to hand anything to
 
 
 def _dask(folders: Sequence[Path], options: VisitOptions, address: str) -> Iterator[Answer]:

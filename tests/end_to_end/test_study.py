@@ -1,6 +1,10 @@
 """A synthetic study from its seed to its page: made, computed once, spoilt parts named, the same wherever computed."""
 
 import json
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -94,6 +98,49 @@ def test_a_worker_that_dies_costs_its_own_session_alone(study, tmp_path, monkeyp
     done, failed = visits([study / "S02", study / "S01"], STEADY, Shelf(tmp_path, STEADY), Console(as_json=True))
     assert [visit.session for visit in done] == ["S01"]
     assert [name for name, _ in failed] == ["S02"]
+
+
+def test_ctrl_c_keeps_what_is_done_and_says_so(pool, study, tmp_path, monkeypatch, capsys):
+    row = next(visit for visit in pool["visits"] if visit["session"] == "S01")
+
+    def stopped(*_):
+        yield "S01", row
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pooling, "_in_pool", stopped)
+    assert run(["study", str(study), "--out", str(tmp_path)]) == 130
+    assert "1 of 3 sessions are computed and kept" in capsys.readouterr().err
+    assert len(list((tmp_path / "results").iterdir())) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no /proc to see processes in")
+def test_killed_at_any_moment_it_leaves_no_process_behind_and_goes_on_where_it_was(study, tmp_path):
+    command = [sys.executable, "-m", "daq_app", "study", str(study), "--out", str(tmp_path), "--workers", "1"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as running:
+        results = tmp_path / "results"
+        _until(lambda: results.is_dir() and any(results.iterdir()))
+        children = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
+        running.send_signal(signal.SIGKILL)
+    assert children
+    _until(lambda: not any(_runs(child) for child in children))
+    again = subprocess.run([*command, "--json"], capture_output=True, text=True, check=False)
+    assert again.returncode == 3
+    assert "computed before" in again.stderr
+
+
+def _until(true):
+    deadline = time.monotonic() + 120.0
+    while not true():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def _runs(process):
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
 
 
 def test_a_study_is_refused_in_a_sentence_where_there_is_none(tmp_path, capsys):

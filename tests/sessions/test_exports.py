@@ -308,6 +308,7 @@ def test_the_official_validator_finds_no_error_in_a_bids_export(exports, name):
     ]
     assert [issue for issue in every if issue["severity"] == "error"] == []
     assert told["summary"]["totalFiles"] > 0
+    assert any("daq-app" in name for name in told["derivativesSummary"])
     assert run.returncode == 0
 
 

@@ -1,0 +1,58 @@
+"""The study's table opened by other programs: R and pandas read the same numbers, and R comes to the same result."""
+
+import shutil
+import subprocess
+
+import pytest
+from study_example import study
+
+from sessions.exports.study_csv import paths_csv, trials_csv
+
+RSCRIPT = shutil.which("Rscript")
+
+R = """
+t <- read.csv("trials.csv")
+stopifnot(is.numeric(t$score), is.numeric(t$sed_MPa), is.numeric(t$mu), is.character(t$excluded))
+stopifnot(all(is.na(t$mu_static)))
+kept <- t[t$excluded == "", ]
+fit <- anova(lm(score ~ factor(subject) + sed_MPa, kept))
+ss <- fit[["Sum Sq"]]
+p <- read.csv("paths.csv")
+usual <- p[p$usual == "yes", ]
+cat(sprintf("%d %.17g %.12g %.12g", nrow(t), t$sed_MPa[1], sqrt(ss[2] / (ss[2] + ss[3])), usual$r_within_subjects))
+"""
+
+
+@pytest.fixture(scope="module")
+def found():
+    return study()
+
+
+@pytest.fixture
+def folder(found, tmp_path):
+    (tmp_path / "trials.csv").write_text(trials_csv(found), encoding="utf-8")
+    (tmp_path / "paths.csv").write_text(paths_csv(found), encoding="utf-8")
+    return tmp_path
+
+
+@pytest.mark.skipif(RSCRIPT is None, reason="no R to open the table in")
+def test_r_opens_the_table_and_comes_to_the_same_correlation_within_subjects(found, folder):
+    (folder / "read.R").write_text(R, encoding="utf-8")
+    done = subprocess.run([RSCRIPT, "--vanilla", "read.R"], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    rows, first, r, usual = done.stdout.split()
+    assert int(rows) == sum(len(visit.rows) for visit in found.visits)
+    assert float(first) == found.visits[0].rows[0].sed
+    # The correlation within subjects is that of an analysis of covariance (Bland & Altman 1995).
+    assert float(r) == pytest.approx(found.descriptors[0].repeated.r, rel=1e-9)
+    assert float(usual) == pytest.approx(float(r), rel=1e-9)
+
+
+def test_pandas_opens_the_table_with_every_number(found, folder):
+    pandas = pytest.importorskip("pandas")
+    table = pandas.read_csv(folder / "trials.csv")
+    rows = [row for visit in found.visits for row in visit.rows]
+    assert table["sed_MPa"].tolist() == pytest.approx([row.sed for row in rows], rel=1e-14)
+    assert table["score"].tolist() == pytest.approx([row.score for row in rows], rel=1e-14)
+    assert table.dtypes["index"] == "int64"
+    assert table["excluded"].notna().sum() == 5  # the five trials of the one subject left out
