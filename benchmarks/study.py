@@ -2,7 +2,7 @@
 
 Run it on an idle machine: python -m benchmarks.study [SESSIONS] [small|finite]; the second word adds many paths. Every
 copy has a name of its own, so none is taken from what was computed before. Both ways take turns, so that whatever else
-the machine does falls on both alike. Prints wall times, their ratio, processor time, and what 1,000 sessions would take.
+the machine does falls on both alike. Prints wall times, their ratio, processor time, and what 1,000 would take.
 """
 
 import os
