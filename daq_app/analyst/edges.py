@@ -69,3 +69,11 @@ def brought_back(decisions: Decisions, by: str) -> Decision | None:
     if last is None or last.number < max(decided):
         return None
     return Decision(by, "redone in the window", undoes=last.number)
+
+
+def decision_meant(decisions: Decisions, line: Decision) -> Decision:
+    """Return the decision that a line undoes or redoes, however often it was undone and redone before."""
+    by_number = {one.number: one for one in decisions.lines}
+    while line.undoes is not None:
+        line = by_number[line.undoes]
+    return line

@@ -82,6 +82,13 @@ class Written:
 
 
 @dataclass(frozen=True, slots=True)
+class Decided:
+    """A decision is recorded, undone or redone, and every number follows."""
+
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True)
 class Problem:
     """Something could not be done; what was known before stays."""
 
@@ -174,5 +181,5 @@ class Stop:
 
 
 Ask = Choose | Move | Undo | Draw | ShowHistory | ShowReadings | Compare | Write | GoOn | Stop
-Said = Step | Found | Answered | Drawn | Filmed | Read | Compared | Written | Problem | Cancelled | Idle
+Said = Step | Found | Answered | Drawn | Filmed | Read | Compared | Written | Decided | Problem | Cancelled | Idle
 Message = Ask | Said

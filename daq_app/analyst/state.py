@@ -61,13 +61,15 @@ def fold(state: AnalystState, message: m.Message) -> AnalystState:
             return replace(state, read=message)
         case m.Compared():
             return replace(state, compared=message, told="")
-        case m.Step() | m.Idle() | m.Written() | m.Problem() | m.Cancelled():
+        case m.Step() | m.Idle() | m.Written() | m.Decided() | m.Problem() | m.Cancelled():
             return _gone_on(state, message)
         case _:
             return _asked(state, message)
 
 
-def _gone_on(state: AnalystState, said: m.Step | m.Idle | m.Written | m.Problem | m.Cancelled) -> AnalystState:
+def _gone_on(
+    state: AnalystState, said: m.Step | m.Idle | m.Written | m.Decided | m.Problem | m.Cancelled
+) -> AnalystState:
     match said:
         case m.Step():
             return replace(state, step=said)
@@ -75,6 +77,8 @@ def _gone_on(state: AnalystState, said: m.Step | m.Idle | m.Written | m.Problem 
             return replace(state, step=None)
         case m.Written(path):
             return replace(state, told=f"Written: {path}")
+        case m.Decided(sentence):
+            return replace(state, told=sentence)
         case m.Problem(sentence):
             return replace(state, step=None, told=sentence)
         case m.Cancelled():

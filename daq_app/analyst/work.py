@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.compared import NAMES, compared
-from daq_app.analyst.edges import brought_back, decision_of, taken_back
+from daq_app.analyst.edges import brought_back, decision_meant, decision_of, taken_back
 from daq_app.analyst.pictures import film_of, finger_of, lost_film
 from daq_app.analyst.raw import raw_readings
 from daq_app.derived import analysis_document
@@ -108,16 +108,19 @@ class Work:
 
     def _move(self, asked: m.Move) -> None:
         stroke = self._report.strokes[asked.stroke - 1]
-        append(self._recording, decision_of(stroke, asked.edge, asked.time, asked.by, asked.why))
+        made = append(self._recording, decision_of(stroke, asked.edge, asked.time, asked.by, asked.why))
         self._analyse()
+        self._say(m.Decided(f"Recorded: {made.sentence}"))
 
     def _undo(self, by: str, *, again: bool) -> None:
         decisions = read(self._recording.folder)
         line = brought_back(decisions, by) if again else taken_back(decisions, by)
         if line is None:
             raise NothingToShow("There is nothing to redo." if again else "There is no decision to undo.")
-        append(self._recording, line)
+        made = append(self._recording, line)
         self._analyse()
+        meant = decision_meant(decisions, line)
+        self._say(m.Decided(f"{'Redone' if again else 'Undone'}, as decision {made.number}: {meant.sentence}"))
 
     def _first(self) -> int | None:
         """Return the position among predicted rows of the trial that is chosen."""
@@ -208,6 +211,8 @@ class Work:
         if way.march is not None:
             self._say(m.Filmed(key, film_of(way, way.march.instants, self._sketch(way), told)))
             return
+        if prediction.prediction is not None or way.scene.materials.relax:
+            raise NothingToShow("The way of tissues that relax is not kept as states that can be drawn.")
         film, why = lost_film(way, self._sketch(way), told)
         self._say(m.Filmed(key, film, why or prediction.reasons.get("sed", "")))
 

@@ -81,6 +81,7 @@ class AnalystWindow(QMainWindow):
         self.report = button("Report…", "write the report", self._report)
         self.format, self.export = choice("format of the export"), button("Export…", "write an export", self._export)
         self.format.addItems(sorted(FORMATS))
+        self._scrolled: list[QScrollArea] = []
         self._parts = [self._panel(name, column) for name, column in self._named()]
         self._pages = QTabWidget()
         self._pages.setAccessibleName("trials, stroke or model")
@@ -235,14 +236,17 @@ class AnalystWindow(QMainWindow):
         scrolled.setStyleSheet("QScrollArea, QWidget#column { background: transparent; border: none; }")
         scrolled.setWidget(column)
         layout.addWidget(scrolled)
+        self._scrolled.append(scrolled)
         return frame
 
     def _place_columns(self) -> None:
-        needed = sum(column.minimumSizeHint().width() + 4 * GRID for _, column in self._named()) + 4 * GRID
-        narrow = self.width() < needed
+        least = [column.minimumSizeHint().width() + 2 * GRID for _, column in self._named()]
+        narrow = self.width() < sum(width + 4 * GRID for width in least)
         if narrow == self._narrow:
             return
         self._narrow = narrow
+        for scrolled, width in zip(self._scrolled, least, strict=True):
+            scrolled.setMinimumWidth(0 if narrow else width)
         self._pages.setVisible(narrow)
         self._beside.setVisible(not narrow)
         for (name, _), part, stretch in zip(self._named(), self._parts, (3, 6, 6), strict=True):

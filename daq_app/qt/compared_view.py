@@ -24,6 +24,7 @@ class ComparedView(QWidget):
         self.table.setAccessibleName("two sessions compared")
         self.table.setTabKeyNavigation(False)
         self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.table.setMinimumHeight(130)
         self.table.verticalHeader().hide()
         self.picture = PictureView("the picture of both sessions", save)
         top = QHBoxLayout()

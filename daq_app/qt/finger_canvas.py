@@ -47,7 +47,7 @@ class FingerCanvas(QWidget):
         shades: Any = pg.colormap.get("magma")
         table = shades.map(np.linspace(1.0, 0.2, SHADES), mode="byte")
         self._shades = [QColor(int(r), int(g), int(b)) for r, g, b, *_ in table]
-        self.setMinimumSize(160, 120)
+        self.setMinimumSize(160, 260)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("finger of the model: none")
 

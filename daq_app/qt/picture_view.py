@@ -72,7 +72,7 @@ class _Canvas(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self._image, self._words = QImage(), ""
-        self.setMinimumSize(160, 120)
+        self.setMinimumSize(160, 200)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
     def show_png(self, content: bytes, words: str) -> None:

@@ -47,6 +47,7 @@ class StrokeColumn(QWidget):
         self._scroll = self._scrolled()
         self.tabs.addTab(self._scroll, "Numbers")
         self.tabs.addTab(self.readings, "Readings")
+        self.tabs.setMinimumHeight(170)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(GRID // 2)

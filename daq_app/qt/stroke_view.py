@@ -173,7 +173,7 @@ class StrokeView(QWidget):
 
 def _plot(tokens: Tokens, name: str) -> Any:  # noqa: ANN401  pyqtgraph has no types
     plot = pg.PlotWidget(background=tokens.surface)
-    plot.setMinimumSize(120, 70)
+    plot.setMinimumSize(120, 100)
     plot.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     item = plot.getPlotItem()
     item.setMenuEnabled(False)

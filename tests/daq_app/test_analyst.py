@@ -257,6 +257,7 @@ def test_a_window_moved_in_a_session_is_a_decision_beside_it_and_its_numbers_fol
     assert after.normal_force != before.normal_force
     work.do(m.Undo("E03"))
     assert said[-1].report.strokes[0].steady == before.steady
+    assert said[-1].told.startswith("Undone, as decision 2: decision 1 by E02: steady of stroke 1 of trial 1")
     work.do(m.Undo("E03", again=True))
     assert said[-1].report.strokes[0].steady == after.steady
     assert len(read(tmp_path / "session").lines) == 3

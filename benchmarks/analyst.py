@@ -1,0 +1,121 @@
+"""How soon the analyst's window knows a session, and how soon it lets go: python -m benchmarks.analyst SESSION.
+
+Processor times are those of the process that does the work; wall times depend on what else the machine does.
+"""
+
+import argparse
+import os
+import shutil
+import statistics
+import tempfile
+import time
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+STOPS = 5
+
+
+def main() -> None:
+    """Open a copy of a session, move a window, draw a history, and stop the work again and again."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("session", type=Path)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as room:
+        folder = Path(room) / options.session.name
+        shutil.copytree(options.session, folder)
+        _work(folder)
+        _stops(folder)
+
+
+def _work(folder: Path) -> None:
+    """Print the processor time of each thing that is asked for."""
+    begun = time.process_time()
+    from daq_app.analyst import messages as m
+    from daq_app.analyst.work import Work
+
+    print(f"loading the work                 {time.process_time() - begun:6.2f} s")
+    begun = time.process_time()
+    known: dict[str, float] = {}
+    said: list[m.Said] = []
+
+    def say(message: m.Said) -> None:
+        known.setdefault(type(message).__name__, time.process_time() - begun)
+        said.append(message)
+
+    work = Work(folder, say)
+    work.go_on()
+    print(
+        f"trials and strokes are known after {known['Found']:4.2f} s, the first finger after {known['Answered']:.2f} s"
+    )
+    answers = sum(isinstance(one, m.Answered) for one in said)
+    print(f"all {answers} trials are answered after {time.process_time() - begun:4.2f} s")
+    report = next(one.report for one in said if isinstance(one, m.Found))
+    stroke = next(s for s in report.strokes if s.steady is not None)
+    for words, asked in (
+        (
+            "a moved edge, until numbers follow",
+            m.Move(stroke.number, "steady begin", stroke.steady[0] + 0.05, "B", "b"),
+        ),
+        ("undo", m.Undo("B")),
+        ("readings of a trial", m.ShowReadings(stroke.number)),
+        ("history of a finger", m.ShowHistory((stroke.trial, stroke.number))),
+        ("first picture of the session", m.Draw("course")),
+        ("second picture", m.Draw("friction")),
+    ):
+        begun = time.process_time()
+        work.do(asked)
+        print(f"{words:36s} {time.process_time() - begun:4.2f} s")
+    film = next(one.film for one in said if isinstance(one, m.Filmed))
+    _painting(film)
+
+
+def _painting(film) -> None:  # noqa: ANN001
+    """Print what painting a state of the finger takes."""
+    from PySide6.QtWidgets import QApplication
+
+    from daq_app.qt.finger_canvas import FingerCanvas
+    from daq_app.qt.tokens import LIGHT
+
+    application = QApplication([])
+    canvas = FingerCanvas(LIGHT, 1.0)
+    canvas.resize(520, 560)
+    for near in (False, True):
+        took: list[float] = []
+        for frame in film.frames[::4]:
+            canvas.show_frame(frame, film.triangles, film.arcs, 30.0, "", near=near)
+            begun = time.process_time()
+            canvas.grab()
+            took.append(time.process_time() - begun)
+        print(
+            f"painting the {'contact' if near else 'finger '}                  {1e3 * statistics.median(took):5.0f} ms"
+        )
+    del application
+
+
+def _stops(folder: Path) -> None:
+    """Print how long a stop takes to be answered, while the model answers."""
+    from daq_app.analyst import messages as m
+    from daq_app.analyst.process import Analyst
+
+    took: list[float] = []
+    for _ in range(STOPS):
+        analyst = Analyst(folder)
+        _until(analyst, m.Answered)
+        begun = time.monotonic()
+        analyst.ask(m.Stop())
+        _until(analyst, m.Cancelled)
+        took.append(time.monotonic() - begun)
+        analyst.close()
+    median, longest = 1e3 * statistics.median(took), 1e3 * max(took)
+    print(f"a stop is answered after {median:.0f} ms by the wall, the longest {longest:.0f} ms")
+
+
+def _until(analyst, kind: type) -> None:  # noqa: ANN001
+    while not any(isinstance(one, kind) for one in analyst.poll()):
+        time.sleep(0.001)
+
+
+if __name__ == "__main__":
+    main()
