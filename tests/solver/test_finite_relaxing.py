@@ -247,6 +247,7 @@ def published(materials, course="history", kinematics="finite", **loading):
     return replace(given, materials=materials, loading=driven, solve=Solve(kinematics, course, 0.5))
 
 
+@pytest.mark.slow
 def test_pressed_lightly_the_finger_relaxes_as_at_small_strain():
     tissues = of_layers(Relaxation(0.3, 0.07), Relaxation(0.2, 0.3))
     found = [solve(published(tissues, kinematics=k, indentation=0.02)) for k in ("small", "finite")]
