@@ -21,7 +21,7 @@ SLOW = pytest.mark.slow
         (0.44, 0.015478),
         pytest.param(0.48, 0.019038, marks=SLOW),
         pytest.param(0.64, 0.049998, marks=SLOW),
-        (0.67, 0.05255),
+        pytest.param(0.67, 0.05255, marks=SLOW),
     ],
 )
 def test_four_surfaces_have_no_settled_sliding_at_two_millimetres_and_the_refusal_says_how_far_they_have(mu, tau):

@@ -268,6 +268,7 @@ def test_in_the_end_a_sliding_finger_has_its_relaxed_moduli_and_overshoots_on_th
     assert found.history.sed_ending[-1] == pytest.approx(found.sed_ending, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_given_force_presses_a_relaxing_finger_deeper_with_time():
     found = solve(published(of_layers(Relaxation(0.5, 0.5)), indentation=None, normal_force=0.05, slide="none"))
     depth, time = -found.history.bone_y, found.history.time

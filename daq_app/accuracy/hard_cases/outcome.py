@@ -14,6 +14,7 @@ from solver.solution import answers
 BALANCE = ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance")  # those of them that an answer has
 LIMITS = ("penetration", "tension", "cone_violation")
 UNBALANCED, EXCEEDED = 1e-4, 1e-7  # largest part of the forces left over; largest part by which a law is exceeded
+NOTHING = 1.0  # estimated error of an answer of which nothing is known
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,7 @@ def _answered(found: Prediction) -> Outcome:
         flaws.append("smallest_det_F")
     if not found.sed_ending > 0.0:
         flaws.append("sed_ending")
-    if not 0.0 < found.error_estimate < math.inf:
+    if not 0.0 < found.error_estimate < NOTHING:
         flaws.append("error_estimate")
     numbers = (found.sed_ending, found.sed_point, found.normal_force, found.tangential_force, found.error_estimate)
     balance = max(checks[name] for name in BALANCE if name in checks)
