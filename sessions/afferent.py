@@ -2,11 +2,11 @@
 
 No fitted map from SED to the rate of a human SA-II afferent was found in the literature. This one is the simplest that
 has what such units show: firing at rest, a static and a dynamic part, slow adaptation, regular intervals. Its order of
-surfaces in the settled state is that of the SED, whatever the parameters: what it adds is the course in time.
+surfaces in the settled state is that of the SED, as long as none lies at a bound: what it adds is the course in time.
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -22,11 +22,13 @@ SHOWN = 10  # every so many steps the rate is told
 
 @dataclass(frozen=True, slots=True)
 class AfferentSettings:
-    """Drive x = (SED / reference)^exponent; rate r = r0 + static x + dynamic max(0, dx/dt) - adaptation a, in 0..rmax.
+    """Rate r = background + static x + dynamic max(0, dx/dt) - adaptation a, in 0 to the greatest rate.
 
-    a follows x with the time constant: da/dt = (x - a) / adaptation_time.
+    Drive x = (max(0, SED - threshold) / (reference - threshold))^exponent; a follows x with the time constant:
+    da/dt = (x - a) / adaptation_time.
     """
 
+    threshold: float = 4e-6
     exponent: float = 1.0
     background: float = 5.0
     static_gain: float = 20.0
@@ -41,6 +43,12 @@ class AfferentSettings:
 
 # Unit, standing, and what it rests on. "assumed": no authority is claimed for the number.
 TOLD: Mapping[str, tuple[str, str, str]] = {
+    "threshold": (
+        "MPa",
+        "assumed",
+        "SED of 1 % strain in the published dermis, E e^2 / 2 with E = 0.08 MPa; that units fire from below 1 %: "
+        "Edin 2004, J. Neurophysiol. 92:3233",
+    ),
     "exponent": ("-", "assumed", "1: rate follows SED, the hypothesis under test; 0.5: rate follows strain"),
     "background": ("imp/s", "assumed", "that SA-2s fire at rest: Saal, Birznieks & Johansson 2023, eLife 89616"),
     "static_gain": ("imp/s", "assumed", "at the reference SED; sweep 5 to 40"),
@@ -86,7 +94,7 @@ def firing_rate(time: Array, sed: Array, reference: float, settings: AfferentSet
     SED goes straight between its instants; before the first nothing is adapted. `reference` [MPa] is where x is 1.
     """
     grid = np.arange(float(time[0]), float(time[-1]) + STEP / 2, STEP)
-    x = np.maximum(np.interp(grid, time, sed) / reference, 0.0) ** settings.exponent
+    x = _drive(np.interp(grid, time, sed), reference, settings)
     rise = np.diff(x, prepend=x[0]) / STEP
     kept = float(np.exp(-STEP / settings.adaptation_time))
     adapted = np.zeros_like(x)
@@ -94,6 +102,12 @@ def firing_rate(time: Array, sed: Array, reference: float, settings: AfferentSet
         adapted[i] = kept * adapted[i - 1] + (1.0 - kept) * (x[i] + x[i - 1]) / 2.0
     rate = settings.background + settings.static_gain * x + settings.dynamic_gain * np.maximum(rise, 0.0)
     return grid, np.clip(rate - settings.adaptation_gain * adapted, 0.0, settings.greatest_rate)
+
+
+def _drive(sed: Array, reference: float, settings: AfferentSettings) -> Array:
+    """Return the drive (n,) [-] of SED (n,) [MPa]: 0 up to the threshold, 1 at the reference."""
+    beyond = max(reference - settings.threshold, np.finfo(np.float64).tiny)
+    return (np.maximum(sed - settings.threshold, 0.0) / beyond) ** settings.exponent
 
 
 def spike_times(time: Array, rate: Array, draw: np.random.Generator, settings: AfferentSettings) -> Array:
@@ -126,21 +140,44 @@ def session_firing(
         if row.history is None or row.sed is None:
             continue
         time, rate = firing_rate(row.history.time, row.history.sed_ending, reference, chosen)
-        x = (row.sed / reference) ** chosen.exponent
+        x = float(_drive(np.array(row.sed), reference, chosen))
         settled = chosen.background + (chosen.static_gain - chosen.adaptation_gain) * x
         spikes = spike_times(time, rate, np.random.default_rng([chosen.seed, number]), chosen)
         found.append(Firing(row.trial, time, rate, float(np.clip(settled, 0.0, chosen.greatest_rate)), spikes))
     return reference, tuple(found)
 
 
-def parameters(settings: AfferentSettings) -> list[dict[str, Any]]:
-    """Return every parameter with its value, unit, standing and what it rests on."""
-    values = asdict(settings)
-    return [
-        {
-            "name": field.name,
-            "value": values[field.name],
-            **dict(zip(("unit", "standing", "basis"), TOLD[field.name], strict=True)),
-        }
-        for field in fields(settings)
-    ]
+def parameters(settings: AfferentSettings, reference: float | None = None) -> list[dict[str, Any]]:
+    """Return every parameter with its value, unit, standing ("assumed", or "set" by somebody) and what it rests on.
+
+    `reference` [MPa] is told with them where it is given.
+    """
+    told: list[dict[str, Any]] = []
+    if reference is not None:
+        basis = "where x is 1: the median SED of the trials; another reference scales every gain"
+        told.append({"name": "reference", "value": reference, "unit": "MPa", "standing": "assumed", "basis": basis})
+    for one in fields(settings):
+        value: float = getattr(settings, one.name)
+        unit, standing, basis = TOLD[one.name]
+        chosen = standing if value == one.default else "set"
+        told.append({"name": one.name, "value": value, "unit": unit, "standing": chosen, "basis": basis})
+    return told
+
+
+def settings_with(changes: Mapping[str, float], seed: int = 0) -> AfferentSettings:
+    """Return settings with some parameters set by somebody.
+
+    Raises ValueError, with a sentence, for a name that is none and a value that means nothing.
+
+    >>> settings_with({"static_gain": 30.0}).static_gain
+    30.0
+    """
+    names = [one.name for one in fields(AfferentSettings) if one.name != "seed"]
+    for name, value in changes.items():
+        if name not in names:
+            raise ValueError(f"{name} is no parameter of the afferent: give one of {', '.join(names)}")
+        least = 1e-6 if name in ("exponent", "adaptation_time", "greatest_rate", "variation") else 0.0
+        most = 1.0 if name == "variation" else 1e4
+        if not least <= value <= most:
+            raise ValueError(f"{name} = {value:g} is not allowed: {least:g} to {most:g}")
+    return replace(AfferentSettings(seed=seed), **changes)

@@ -13,7 +13,7 @@ from daq_app.area_option import add_area, area_law
 from daq_app.cli import WrongValue
 from daq_app.console import Console, number, table
 from daq_app.derived import analysed, predicted, visit
-from sessions.afferent import AfferentSettings, parameters, session_firing
+from sessions.afferent import AfferentSettings, parameters, session_firing, settings_with
 from sessions.alternative import Alternative
 from sessions.analysis import Analysis
 from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction
@@ -61,6 +61,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="also firing rates and spike times of an SA-II afferent: an illustration",
     )
+    parser.add_argument(
+        "--afferent-set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="a parameter of the afferent, such as static_gain=30; --afferent prints all of them",
+    )
     parser.add_argument("--afferent-seed", type=int, default=0, metavar="SEED", help="of the spike times (0)")
     parser.add_argument(
         "--seal",
@@ -74,6 +81,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     """Predict, keep the result in the session's folder and print it."""
     if options.afferent_seed < 0:
         raise WrongValue(f"--afferent-seed {options.afferent_seed} is not allowed: a whole number from 0 on")
+    _afferent(options)
     asked = PredictionOptions(
         tau_reading=options.tau,
         scene=None if options.scene is None else load_toml(options.scene, Scene),
@@ -171,11 +179,26 @@ def _row(one: SedInterval) -> list[str]:
 
 
 def _firing(prediction: SessionPrediction, options: argparse.Namespace) -> dict[str, Any]:
-    settings = AfferentSettings(seed=options.afferent_seed)
+    settings = _afferent(options)
     reference, found = session_firing(prediction, settings)
     about = "an illustration with assumed numbers: no fitted map from SED to the rate of an SA-II afferent is known"
-    told = {"about": about, "reference_sed": reference, "parameters": parameters(settings)}
+    told = {"about": about, "reference_sed": reference, "parameters": parameters(settings, reference)}
     return {"afferent": {**told, "trials": [one.to_dict() for one in found]}}
+
+
+def _afferent(options: argparse.Namespace) -> AfferentSettings:
+    """Return the parameters of the afferent with those that were set. Raises WrongValue."""
+    changes: dict[str, float] = {}
+    for given in options.afferent_set:
+        name, _, value = given.partition("=")
+        try:
+            changes[name.strip()] = float(value)
+        except ValueError:
+            raise WrongValue(f"--afferent-set {given} is not allowed: NAME=VALUE, such as static_gain=30") from None
+    try:
+        return settings_with(changes, options.afferent_seed)
+    except ValueError as wrong:
+        raise WrongValue(f"--afferent-set: {wrong}") from None
 
 
 def _print_firing(firing: dict[str, Any], console: Console) -> None:

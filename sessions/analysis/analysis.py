@@ -302,6 +302,8 @@ def _worth_measuring(
         if stop - start >= settings.shortest_stroke and peak >= settings.light_share * greatest:
             kept.append(piece)
         else:
-            sentence = f"A light or short touch from {start:.2f} to {stop:.2f} s, up to {peak:.2g} N, is no stroke."
-            flaws.append(Flaw(FlawName.LIGHT_TOUCH, sentence, "note"))
+            tapped = stop - start < settings.shortest_stroke
+            what, name = ("tap", FlawName.TAP) if tapped else ("light touch", FlawName.LIGHT_TOUCH)
+            sentence = f"A {what} from {start:.2f} to {stop:.2f} s, up to {peak:.2g} N, is no stroke."
+            flaws.append(Flaw(name, sentence, "note"))
     return kept, flaws

@@ -38,6 +38,7 @@ class AnalysisSettings:
     shear: float = 3.0  # the centre of pressure may move so far while the skin only shears [mm]
     shear_steps: float = 2.0  # and so many steps of coarse torques are no movement [-]
     one_way: float = 0.9  # the tangential force keeps its direction: length of its mean unit vector [-]
+    side_load: float = 0.3  # so much of the drag across the movement is a load from the side [-]
     speed_error: float = 0.10  # a speed with a greater relative standard error is refused [-]
     speed_line: float = 0.95  # so is one whose line explains less than this share of the movement [-]
     speed_step: float = 0.10  # so is one whose centre of pressure moves in steps of this share of the way [-]

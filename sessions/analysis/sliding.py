@@ -60,6 +60,8 @@ def slide(
         found.numbers |= {"speed": moved.speed, "speed_error": moved.error}
         _break_away(found, track, moved, settings)
     _direction(found, track, window, moved if trouble is None else None)
+    if trouble is None and moved is not None:
+        _side_load(found, track, window, moved, settings)
     return window
 
 
@@ -141,6 +143,20 @@ def _break_away(found: Findings, track: Track, moved: Movement, settings: Analys
     first = int(last_slow[-1]) + 1 if len(last_slow) else 0
     if first <= start:
         found.numbers["break_away"] = float(track.time[first])
+
+
+def _side_load(found: Findings, track: Track, window: slice, moved: Movement, settings: AnalysisSettings) -> None:
+    """Name a drag that does not lie along the movement: friction alone opposes it."""
+    drag = mean_vector(track.wrench[window, :2])
+    along = np.array(moved.along) / moved.speed
+    across = float(abs(drag[0] * along[1] - drag[1] * along[0]))
+    share = across / float(np.hypot(*drag))
+    if share > settings.side_load:
+        sentence = (
+            f"{100 * share:.0f} % of the tangential force lies across the finger's movement: a load from the side, a "
+            "face that leans, or axes that are turned; T/N holds it, and friction along the movement is less."
+        )
+        found.flaw(FlawName.SIDE_LOAD, sentence, "doubtful")
 
 
 def _direction(found: Findings, track: Track, window: slice, moved: Movement | None) -> None:

@@ -7,19 +7,28 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from sessions.afferent import TOLD, AfferentSettings, firing_rate, parameters, session_firing, spike_times
+from sessions.afferent import (
+    TOLD,
+    AfferentSettings,
+    firing_rate,
+    parameters,
+    session_firing,
+    settings_with,
+    spike_times,
+)
 
 USUAL = AfferentSettings()
+PLAIN = replace(USUAL, threshold=0.0)  # whose closed forms are short
 
 
 def test_a_constant_sed_adapts_as_the_exponential_does():
-    time, rate = firing_rate(np.array([0.0, 6.0]), np.array([0.01, 0.01]), 0.01, USUAL)
+    time, rate = firing_rate(np.array([0.0, 6.0]), np.array([0.01, 0.01]), 0.01, PLAIN)
     expected = 5.0 + 20.0 - 6.0 * (1.0 - np.exp(-time / 1.5))
     assert rate == pytest.approx(expected, abs=1e-3)
 
 
 def test_a_ramp_adds_the_dynamic_part_and_adapts_late():
-    time, rate = firing_rate(np.array([0.0, 1.0]), np.array([0.0, 0.01]), 0.01, USUAL)
+    time, rate = firing_rate(np.array([0.0, 1.0]), np.array([0.0, 0.01]), 0.01, PLAIN)
     # x = t, dx/dt = 1, a = t - tau (1 - exp(-t / tau)).
     expected = 5.0 + 20.0 * time + 4.0 - 6.0 * (time - 1.5 * (1.0 - np.exp(-time / 1.5)))
     assert rate[1:] == pytest.approx(expected[1:], abs=1e-3)
@@ -66,3 +75,26 @@ def test_the_same_seed_gives_the_same_spikes_and_each_trial_its_own():
 def test_every_parameter_is_told_with_its_standing():
     assert set(TOLD) == {field.name for field in fields(AfferentSettings)}
     assert {one["standing"] for one in parameters(USUAL) if one["name"] != "seed"} == {"assumed"}
+
+
+def test_up_to_its_threshold_the_unit_only_fires_at_rest_and_at_the_reference_the_drive_is_one():
+    deaf = replace(USUAL, threshold=0.004, adaptation_gain=0.0)
+    for sed, rate in ((0.004, 5.0), (0.01, 25.0), (0.007, 15.0)):  # background; with the static gain; half of it
+        assert firing_rate(np.array([0.0, 1.0]), np.full(2, sed), 0.01, deaf)[1][-1] == pytest.approx(rate)
+
+
+def test_the_usual_threshold_is_the_sed_of_one_per_cent_strain_in_the_dermis():
+    assert pytest.approx(0.5 * 0.08 * 0.01**2) == USUAL.threshold
+
+
+def test_a_parameter_that_somebody_set_is_told_as_set_and_the_reference_as_assumed():
+    told = {one["name"]: one for one in parameters(settings_with({"static_gain": 30.0}), 0.0086)}
+    assert (told["static_gain"]["value"], told["static_gain"]["standing"]) == (30.0, "set")
+    assert (told["reference"]["value"], told["reference"]["standing"]) == (0.0086, "assumed")
+    assert {one["standing"] for name, one in told.items() if name not in ("static_gain", "seed")} == {"assumed"}
+
+
+@pytest.mark.parametrize("wrong", [{"loudness": 1.0}, {"variation": 0.0}, {"threshold": -1.0}, {"static_gain": np.nan}])
+def test_a_parameter_that_is_none_or_means_nothing_is_refused(wrong):
+    with pytest.raises(ValueError, match=r"afferent|not allowed"):
+        settings_with(wrong)

@@ -107,7 +107,7 @@ def test_a_tap_and_a_light_touch_are_named_and_are_no_strokes():
     brush = wrench(t, trapezium(t, 6.0, 7.0, 0.1, 0.2), 0.1 * np.ones_like(t), np.zeros_like(t))
     found = analysed(block(t, felt(stroke(t) + tap + brush)), of=trial())
     assert len(found.strokes) == 1
-    assert [flaw.name for flaw in found.flaws] == ["light_touch", "light_touch"]
+    assert [flaw.name for flaw in found.flaws] == ["tap", "light_touch"]
 
 
 def test_a_recording_that_begins_in_contact_has_no_onset_and_its_zero_from_after():

@@ -1,0 +1,197 @@
+"""Every flaw there is fires on the fault it is named after, planted in closed form, and costs what it says."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+from made_strokes import CALIBRATION, COUNTS, HEIGHT, INFO, SETTINGS, block, felt, plan, stroke, times, trapezium, trial
+from made_strokes import wrench as made
+
+from drivers.readings import ReadingBlock
+from sessions.analysis.analysis import analyse_blocks
+from sessions.analysis.flaws import Flaw, FlawName
+from sessions.decisions import Decision, Decisions
+from sessions.plan import Frame
+
+T = times()
+PLAIN = stroke(T)
+N = trapezium(T, 1.0, 3.0, 0.1, 2.0)
+ALONG = 25.0 * (T - 2.0)
+HALF = 0.5 * np.ones_like(T)
+
+
+@dataclass(frozen=True)
+class Case:
+    readings: ReadingBlock
+    gone: tuple[str, ...] = ()  # numbers of the first stroke that must be withheld
+    kept: tuple[str, ...] = ("mu_dynamic",)  # and those that must not
+    also: frozenset[str] = frozenset()  # flaws that come with it by necessity
+    extra: dict = field(default_factory=dict)  # further arguments
+
+
+def cut(keep):
+    return block(T[keep], felt(PLAIN)[keep], sequence=np.flatnonzero(keep))
+
+
+def without(start, stop):
+    keep = np.ones(len(T), bool)
+    keep[start:stop] = False
+    return cut(keep)
+
+
+def changed(rows, values):
+    raw = felt(PLAIN)
+    raw[rows] = raw[values] if isinstance(values, int) else values
+    return block(T, raw)
+
+
+def moved(**columns):
+    """A plain stroke with columns of its readings changed."""
+    raw = felt(PLAIN)
+    for name, change in columns.items():
+        at = ("fx", "fy", "fz", "tx", "ty", "tz").index(name)
+        raw[:, at] = change(raw[:, at])
+    return block(T, raw)
+
+
+def turning():
+    angle = np.pi * np.clip(T - 1.0, 0, 2)
+    raw = made(T, N, np.zeros_like(T), 10.0 * (T - 2.0))
+    raw[:, 0], raw[:, 1] = 0.5 * N * np.cos(angle), 0.5 * N * np.sin(angle)
+    return raw
+
+
+def sideways(share):
+    """A stroke along x with a constant push along y, its centre of pressure still moving along x."""
+    raw = made(T, N, HALF, ALONG)
+    push = share * N
+    raw[:, 1] += push
+    raw[:, 3] -= HEIGHT * push
+    raw[:, 5] += ALONG * push
+    return raw
+
+
+def creeping():
+    n = np.where((T > 1.0) & (T < 3.0), 2.0 * np.clip((T - 1.8) / 0.1, 0.1, 1.0), 0.0)
+    return made(T, n, HALF, ALONG)
+
+
+LONG = times(8.0)
+DIP = trapezium(LONG, 1.0, 7.0, 0.1) * (3.0 - 2.8 * trapezium(LONG, 3.6, 4.4, 0.2))
+BOTH = felt(stroke(LONG, begin=1.0, end=3.0) + stroke(LONG, begin=5.0, end=7.0))
+TAPS = sum(made(LONG, trapezium(LONG, at, at + 0.12, 0.02, 2.0), 0 * LONG, 0 * LONG) for at in (1.0, 3.0, 5.0))
+BRUSH = felt(stroke(LONG) + made(LONG, trapezium(LONG, 6.0, 7.0, 0.1, 0.2), 0.1 + 0 * LONG, 0 * LONG))
+INSIDE = (T > 1.3) & (T < 2.8)
+SWAYING = 2.0 + 0.5 * np.sin(2 * np.pi * 2.0 * T)
+FRICTION = ("mu_dynamic", "mu_max", "tau_max")
+
+CASES = {
+    "lost_readings": Case(without(400, 430), ("tau_max", "mu_max")),
+    "saturated": Case(
+        block(T, felt(PLAIN), status=np.where((T > 1.9) & (T < 2.0), 1 << 17, 0)), ("tau_max", "peak_normal")
+    ),
+    "frozen_sensor": Case(changed(slice(420, 460), 419), ("tau_max",)),
+    "dead_sensor": Case(moved(ty=lambda t: 0 * t), ("speed", *FRICTION), (), frozenset({"no_steady_sliding"})),
+    "irregular_time": Case(block(T + np.random.default_rng(3).uniform(0, 0.002, len(T)), felt(PLAIN))),
+    "unknown_rate": Case(block(0 * T, felt(PLAIN)), (), ()),
+    "recording": Case(block(T, felt(PLAIN)), extra={"told": [Flaw(FlawName.RECORDING, "Lost.", "doubtful")]}),
+    "no_unloaded_stretch": Case(
+        block(T[INSIDE], felt(made(T, SWAYING, HALF, ALONG))[INSIDE]),
+        (*FRICTION, "speed", "direction"),
+        (),
+        frozenset({"begins_in_contact", "ends_in_contact"}),
+    ),
+    "zero_after_contact": Case(cut(T >= 1.5), also=frozenset({"begins_in_contact"})),
+    "drift": Case(block(T, felt(PLAIN + 0.3 * (T > 2.0)[:, None] * np.eye(6)[0])), (*FRICTION, "normal_force"), ()),
+    "normal_axis_implausible": Case(
+        block(T, felt(made(T, N * (1.0 + 0.2 * np.sin(2 * np.pi * 1.7 * T)), HALF, ALONG))),
+        kept=(),
+        extra={"frame": Frame("+z", "set", HEIGHT, "set")},
+    ),
+    "units_implausible": Case(
+        moved(tx=lambda t: 1e3 * t, ty=lambda t: 1e3 * t, tz=lambda t: 1e3 * t),
+        ("speed", *FRICTION),
+        (),
+        extra={"info": replace(INFO, calibration=replace(CALIBRATION, rated=np.full(6, np.nan)))},
+    ),
+    "no_stroke": Case(block(T, felt(0 * PLAIN)), (), ()),
+    "second_stroke": Case(block(LONG, BOTH)),
+    "light_touch": Case(block(LONG, BRUSH)),
+    "tap": Case(block(LONG, felt(TAPS)), (), (), frozenset({"no_stroke"})),
+    "not_lifted_between": Case(
+        block(LONG, felt(made(LONG, DIP, 0.5 + 0 * LONG, 10.0 * (LONG - 4.0)))),
+        kept=("lift",),
+        also=frozenset({"second_stroke", "drift"}),  # 0.2 N are left in the valley
+    ),
+    "begins_in_contact": Case(cut(T >= 1.5), ("onset",), also=frozenset({"zero_after_contact"})),
+    "ends_in_contact": Case(cut(T <= 2.5), ("lift",)),
+    "slow_onset": Case(block(T, felt(creeping()))),
+    "too_little_force": Case(
+        block(T, felt(stroke(T, newtons=0.2))), (*FRICTION, "speed"), (), frozenset({"no_steady_sliding", "drift"})
+    ),
+    "ratio_above_one_at_low_force": Case(
+        block(T, felt(made(T, trapezium(T, 1.0, 3.0, 0.4, 3.0), np.where(T < 1.12, 1.6, 0.5), ALONG))), ("mu_static",)
+    ),
+    "side_load": Case(block(T, felt(sideways(0.3)))),
+    "no_steady_sliding": Case(block(T, felt(made(T, N, 0.3 + 0 * T, 0 * T))), (*FRICTION, "speed", "direction"), ()),
+    "speed_not_measurable": Case(
+        block(T, felt(made(T, N, HALF, ALONG + 10.0 * np.sin(2 * np.pi * 1.5 * T)))), ("speed", "speed_error")
+    ),
+    "height_unknown": Case(
+        block(T, felt(made(T, N, 0.5 + 0.03 * (T - 2.0), 2.0 * (T - 2.0)))),
+        ("speed",),
+        extra={"frame": Frame("-z", "default", HEIGHT, "default")},
+    ),
+    "direction_turns": Case(
+        block(T, felt(turning())), ("speed", "direction"), also=frozenset({"speed_not_measurable"})
+    ),
+    "direction_disagrees": Case(block(T, felt(made(T, N, -HALF, ALONG))), ("speed", "direction")),
+    "wrong_direction": Case(block(T, felt(stroke(T, direction=-1)))),
+    "decision": Case(
+        block(T, felt(PLAIN)),
+        extra={"decisions": Decisions((Decision("E02", "w", "lift", 1, 7, None, 2.0, number=1),))},
+    ),
+}
+"""The fault by the flaw it must raise; trials ask for one stroke from proximal to distal."""
+
+
+def found(case, of):
+    given = {"frame": None, "info": INFO, "told": (), "decisions": None, **case.extra}
+    planned = plan([of], given["frame"])
+    return analyse_blocks([(of, case.readings)], planned, given["info"], SETTINGS, given["told"], given["decisions"])
+
+
+def test_every_flaw_there_is_has_a_fault_here():
+    assert set(CASES) == {str(name) for name in FlawName}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_fault_raises_its_flaw_and_no_other(name):
+    case = CASES[name]
+    raised = {str(flaw.name) for flaw in found(case, trial()).flaws}
+    assert name in raised
+    assert raised - {name} <= case.also
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_flaw_withholds_what_it_says_and_leaves_the_rest(name):
+    case = CASES[name]
+    analysis = found(case, trial())
+    for number in case.gone:
+        assert getattr(analysis.strokes[0], number) is None, number
+    for number in case.kept:
+        assert getattr(analysis.strokes[0], number) is not None, number
+    assert all(not flaw.sentence[0].islower() and flaw.sentence.endswith(".") for flaw in analysis.flaws)
+
+
+def test_counts_need_an_unloaded_stretch_to_show_even_a_contact():
+    raw = felt(made(T, SWAYING, HALF, ALONG))[INSIDE] / np.diag(COUNTS.matrix)
+    case = Case(block(T[INSIDE], raw), extra={"info": replace(INFO, calibration=COUNTS)})
+    assert found(case, trial()).strokes == ()
+
+
+@pytest.mark.parametrize(("share", "fires"), [(0.10, False), (0.3, True)])
+def test_a_push_from_the_side_is_named_by_its_share_of_the_drag(share, fires):
+    """A tenth of N beside a drag of half of N is 20 % of the tangential force; three tenths are 51 %."""
+    names = {str(flaw.name) for flaw in found(Case(block(T, felt(sideways(share)))), trial()).flaws}
+    assert ("side_load" in names) == fires
