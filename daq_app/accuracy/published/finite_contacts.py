@@ -9,7 +9,7 @@ import numpy as np
 from daq_app.accuracy.published.bodies import graded, mirrored, mound
 from solver.finite_body import FiniteBody
 from solver.hyperelastic import NeoHooke
-from solver.kernels import CAP, STICK
+from solver.kernels import CAP
 from solver.march import march
 from solver.mesh import Array
 from solver.newton import Newton, Pull, Shape
@@ -74,17 +74,22 @@ class LightFinite:
         return drag, (float(np.ptp(at)) / 2 if len(at) else 0.0) / self.half_width
 
     def sheared(self, mu: float, part: float) -> tuple[float, float, float]:
-        """Return Q/(mu P) once the surface has moved so that `part` acts or more, half the stick by a, q(0)/(mu p0)."""
+        """Return Q/(mu P) once the surface has moved so that `part` acts or more, half the stick by a, q(0)/(mu p0).
+
+        What friction could carry and does not, mu p - q, is distributed as a Hertz pressure over the stick: half its
+        width c is told by the second moment, c = 2 sqrt(<x^2>), to a part of an element.
+        """
         pull = self.pressed.pull._replace(mu=mu, sense=0)
         (state,) = march(self.newton, [pull])
         travel = 0.0
         while float(state.force[0]) < part * mu * float(state.force[1]):
             travel += STEP
             (state,) = march(self.newton, [pull._replace(travel=travel)], state)
-        sticks, middle = self.x[state.state == STICK], len(self.x) // 2
+        spare, middle = mu * state.reaction[:, 1] - state.reaction[:, 0], len(self.x) // 2
+        sticks = 2.0 * float(np.sqrt(spare @ self.x**2 / spare.sum()))
         traction = float(state.reaction[middle, 0] / self.length[middle]) / (mu * self.peak)
         drag = float(state.force[0]) / (mu * float(state.force[1]))
-        return drag, (float(np.ptp(sticks)) / 2 if len(sticks) else 0.0) / self.half_width, traction
+        return drag, sticks / self.half_width, traction
 
 
 @cache

@@ -181,5 +181,5 @@ def at_finite_strain() -> Iterator[Problem]:
         half = math.sqrt(1 - drag)
         name, source = f"partial slip at finite strain, Q/(mu P) {drag:.3f}", "Cattaneo 1938, Mindlin 1949"
         off = abs(width - half)
-        yield Problem(name, source, "half stick c, by a", half, width, off, 0.05, clock() - begun)
+        yield Problem(name, source, "half stick c, by a", half, width, off, 0.02, clock() - begun)
         yield _row(name, source, "q(0)/(mu p0)", 1 - half, traction, 0.02, begun)
