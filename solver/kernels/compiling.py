@@ -1,10 +1,12 @@
-"""How the loops are compiled, and the words they share."""
+"""How the loops are compiled and kept on disk, and the words they share."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
 import numpy as np
+from numba.core.caching import FunctionCache
+from numba.core.runtime.nrt import rtsys
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -16,6 +18,23 @@ OPEN, STICK, SLIP, CAP = 0, 1, 2, 3  # states of a node of the skin
 _FAST = {"contract", "reassoc", "arcp", "nsz"}  # nan and infinity keep their meaning
 
 
+class _Kept(FunctionCache):
+    """Machine code on disk, read without what numba knows of Python's and NumPy's functions.
+
+    Numba loads all of that first, SciPy's linear algebra with it, which takes longer than a solve. Only compiling needs
+    it, and loads it itself.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:  # noqa: ANN401 - numba declares no types
+        """Return the code for argument types `sig`; None where it is not on disk."""
+        # what loops need while they run: the memory of arrays
+        rtsys.initialize(target_context)  # pyright: ignore[reportUnknownMemberType]
+        with self._guard_against_spurious_io_errors():
+            return super()._load_overload(sig, target_context)  # pyright: ignore
+
+
 def compiled(function: Compiled) -> Compiled:
     """Return `function` compiled when first called, kept on disk; numba itself declares no types."""
-    return numba.njit(cache=True, fastmath=_FAST)(function)  # pyright: ignore
+    loop: Any = numba.njit(fastmath=_FAST)(function)  # pyright: ignore
+    loop._cache = _Kept(function)  # noqa: SLF001 - what njit(cache=True) does, with its own class
+    return loop
