@@ -1,5 +1,6 @@
 """The live model says of measured forces what the full solve says of the settled stroke."""
 
+import functools
 import time
 from dataclasses import replace
 
@@ -40,6 +41,12 @@ def live(time_, wrench, status=None, stream=1):
     return Live(stream, number, time_, number * 5_000_000, wrench, status, NOTHING)
 
 
+@functools.cache
+def solved(scene):
+    """Solve a scene once for all tests."""
+    return solve(scene)
+
+
 @pytest.fixture(scope="module")
 def follower():
     return Follower(Use(PLAN, "small"))
@@ -47,7 +54,7 @@ def follower():
 
 def test_sliding_forces_lead_to_the_sed_of_the_full_solve(follower):
     said = follower.take(forces_of(stroke(), FRAME))
-    found = solve(settled_scene(PLAN, FRICTION, NORMAL))
+    found = solved(settled_scene(PLAN, FRICTION, NORMAL))
     assert said.sed[-1] == pytest.approx(found.sed_ending, rel=0.02)  # what the stepper's mesh is good to
     assert said.depth == pytest.approx(found.indentation, rel=0.02)
     assert said.mu == pytest.approx(MU, rel=1e-9)
@@ -64,7 +71,7 @@ def test_the_picture_holds_the_energy_that_the_row_tells(follower):
 
 def test_finite_strain_tells_within_its_reach_and_small_strain_is_marked_where_it_tells_instead(follower):
     finite = Follower(Use(PLAN, "finite"))
-    within = finite.take(forces_of(stroke(), FRAME))
+    within = finite.take(forces_of(stroke(rate=100), FRAME))
     assert not within.instead.any()
     found = solve(settled_scene(PLAN, FRICTION, NORMAL, "finite"))
     assert within.sed[-1] == pytest.approx(found.sed_ending, rel=0.03)  # what the stepper's mesh is good to
@@ -72,7 +79,7 @@ def test_finite_strain_tells_within_its_reach_and_small_strain_is_marked_where_i
     assert model_words(within, None, "").state == "provisional"
     lifted = Forces(np.array([5.0]), np.array([0.0]), np.array([0.0]), 0, 1)
     finite.take(lifted)
-    hard = forces_of(stroke(), FRAME)
+    hard = forces_of(stroke(rate=100), FRAME)
     beyond = finite.take(Forces(5.0 + hard.time, 3.0 * hard.normal, 5.0 * hard.pull, 0, 1))
     first = int(np.argmax(beyond.instead))
     assert first > 0
@@ -111,7 +118,8 @@ def test_forces_beyond_its_reach_are_marked_and_the_next_touch_is_followed_again
     assert not follower.take(Forces(np.array([7.0]), np.array([1.0]), np.array([0.0]), 0, 1)).beyond
 
 
-def test_the_full_solve_is_told_beside_the_mean_of_what_was_shown_over_the_steady_window(follower):
+def test_the_full_solve_is_told_beside_the_mean_of_what_was_shown_over_the_steady_window(follower, monkeypatch):
+    monkeypatch.setattr("daq_app.live_follower.solve", solved)
     said = follower.take(forces_of(stroke(), FRAME))
     settled = follower.settle(Settle(1, PLAN, FRICTION, NORMAL, (1.2, 2.0)))
     steady = said.sed[(said.time >= 1.2) & (said.time <= 2.0)]
