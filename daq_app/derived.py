@@ -45,8 +45,7 @@ def predicted(
         console.progress(part, "predicting")
         return True
 
-    asked = options or PredictionOptions(beside="small")
-    prediction = predict(analysis, recording.plan, asked, lambda part: shown(0.5 * part))
+    prediction = predict(analysis, recording.plan, options, lambda part: shown(0.5 * part))
     prediction = with_alternatives(prediction, lambda part: shown(0.5 + 0.5 * part))
     _keep(recording, PREDICTION, prediction.to_dict(), console)
     return prediction

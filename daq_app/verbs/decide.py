@@ -63,12 +63,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.by is None or options.why is None:
         raise WrongValue("a decision says who decides and why: give --by CODE and --why REASON")
     check_code("--by", options.by)
-    analysis = analyse(recording, decisions=before)
+    stored = load_derived(recording.folder, ANALYSIS)
+    analysis = analyse(recording, settings_of(stored or {}), before)
     asked = _asked(options) if options.tilt is None else _tilt(options, analysis)
     decision = with_old(analysis, asked)
-    after = tried(recording, decision, before)
+    after = tried(recording, decision, before, analysis)
     made = append(recording, decision)
-    stored = load_derived(recording.folder, ANALYSIS)
     if stored is not None:
         analysed(recording, console, settings_of(stored).area, bootstrap_of(stored))
     older = (recording.folder / PREDICTION).is_file()

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from sessions.analysis.analysis import Analysis, analyse
 from sessions.analysis.flaws import FlawName
+from sessions.analysis.settings import AnalysisSettings
 from sessions.analysis.stroke import Stroke
 from sessions.decisions import Decision, DecisionError, Decisions, Value
 from sessions.recording import Recording
@@ -26,13 +27,13 @@ def with_old(analysis: Analysis, decision: Decision) -> Decision:
     raise DecisionError(f"there is no {decision.of}: {there}")
 
 
-def tried(recording: Recording, decision: Decision, before: Decisions) -> Analysis:
-    """Return the analysis as it would be with a decision more.
+def tried(recording: Recording, decision: Decision, before: Decisions, now: Analysis) -> Analysis:
+    """Return the analysis as it would be with a decision more; `now` is that without it.
 
     Raises DecisionError where the decision cannot be, or would change nothing.
     """
-    found = analyse(recording, decisions=before.with_line(decision))
-    known = {flaw.sentence for flaw in analyse(recording, decisions=before).flaws}
+    found = analyse(recording, AnalysisSettings(area=now.settings.area), before.with_line(decision))
+    known = {flaw.sentence for flaw in now.flaws}
     for flaw in found.flaws:
         if flaw.name is FlawName.DECISION and flaw.sentence not in known and decision.undoes is None:
             raise DecisionError(flaw.sentence)
