@@ -8,8 +8,9 @@ known to a part of an element; forces have one more term, which matters on the c
 can agree by chance. At finite strain lines follow the edges, and one coarser mesh will do, as long as it has fewer
 layers in the fat than the answer's: from 3.6 to 6 they are three, and meshes of 6 agreed with those of 3.6 where both
 were 4 % off. Where the bound acts, its force depends on how much of the last elements touches: `felt` says what a
-number makes of that. The factors were chosen and measured with benchmarks/error_estimate.py and
-finite_error_estimate.py; docs/solver.md has the figures.
+number makes of that. Near the friction limit of small strain numbers grow without bound, and each mesh has its own
+limit: there `felt` says what they make of the coefficient. The factors were chosen and measured with
+benchmarks/error_estimate.py and finite_error_estimate.py; docs/solver.md has the figures.
 """
 
 from math import sqrt
@@ -25,6 +26,7 @@ DEFAULT = {"small": 8, "finite": 10}
 FROM_MESHES = {"small": 0.15, "finite": 0.35}
 FROM_FINENESS = {"small": 0.07, "finite": 0.15}
 FROM_COARSE = 1.0  # of both forces at small strain, by fineness to the fourth power
+FROM_LIMIT, CALM = 1.5, 2.0  # of the mesh's own part, for every relative change by friction's beyond that many
 FROM_BOUND = 0.2  # of an element that touches, at small strain
 FROM_EDGE = 0.15  # of an element at the edge of contact, at finite strain, as if the bound acted on so much more skin
 
@@ -32,8 +34,9 @@ FROM_EDGE = 0.15  # of an element at the edge of contact, at finite strain, as i
 def estimates(scene: Scene, fineness: float, numbers: Array, others: Array, felt: Array | float = 0.0) -> Array:
     """Return the estimated errors (3,), relative, of SED, normal and tangential force `numbers` (3,).
 
-    `others` (n, 3) are those of the coarser meshes. At finite strain `felt` (3,) is the relative change of each by that
-    of the traction bound. A number that is 0 on all meshes, as the drag without friction, is exact.
+    `others` (n, 3) are those of the coarser meshes. `felt` (3,) is the relative change of each by that of the friction
+    coefficient (small strain) or of the traction bound (finite strain). A number that is 0 on all meshes, as the drag
+    without friction, is exact.
     """
     kind = scene.solve.kinematics
     size = np.abs(numbers)
@@ -42,6 +45,7 @@ def estimates(scene: Scene, fineness: float, numbers: Array, others: Array, felt
     if kind == "small":
         found[1:] += FROM_COARSE / _resolved(scene, fineness) ** 4
         found[2] += _of_bound(scene, fineness, float(size[1]), float(size[2]))
+        found += FROM_LIMIT * _least(scene, fineness) * np.maximum(np.abs(felt) - CALM, 0.0)
     else:
         found += FROM_EDGE * _element(scene, fineness) / (2.0 * _half(scene) * scene.finger.tip_radius) * np.abs(felt)
     return np.where((size == 0.0) & (largest == 0.0), 0.0, np.minimum(found, 1.0))

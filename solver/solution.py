@@ -33,6 +33,7 @@ DOUBTED = 1e-8  # and from which it is told
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
 PIERCED = 1e-7  # part of the indentation by which skin may lie too low without it being told [-]
 SAME = 1e-6  # relative difference of normal forces up to which two states under a given force are one
+NUDGE = 1e-4  # of the coefficient of friction, to see what it does
 ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements
 LOW = 1e-8  # part of the indentation by which skin may lie too low before it is laid on the surface again [-]
 
@@ -399,13 +400,32 @@ def _error_estimates(scene: Scene, shared: _Shared, contact: Contact, numbers: A
     The same scene is solved on a mesh with elements twice as long, and on that mesh moved along the skin by half an
     element, so that the edges of contact fall differently between nodes.
     """
+    first, second = shared.coarse
     try:
-        others = [numbers_on(finger, [_nearest(scene, finger)])[0] for finger in shared.coarse]
+        near, far = _nearest(scene, first), _nearest(scene, second)
     except (ContactLost, SolveFailure):
         return 1.0, 1.0, 1.0  # so near a limit that a coarser mesh has no state: nothing is known of the error
-    depth = indentation(scene, contact)
-    found = estimates(scene.driven(depth), shared.fineness, numbers, np.array(others))
+    beside = _rubbed_more(scene, first, near)
+    here = numbers_on(first, [near] if beside is None else [near, beside])
+    felt = np.zeros(3) if beside is None else (here[1] / here[0] - 1.0) / NUDGE
+    others = np.concatenate([here[:1], numbers_on(second, [far])])
+    found = estimates(scene.driven(indentation(scene, contact)), shared.fineness, numbers, others, felt)
     return float(found[0]), float(found[1]), float(found[2])
+
+
+def _rubbed_more(scene: Scene, finger: FingerModel, contact: Contact) -> Contact | None:
+    """Return the state beside a settled slide, its coefficient of friction a little larger; None where there is none.
+
+    Nor is there one where forces are given, since those do not grow without bound.
+    """
+    law, direction = _law(scene), scene.loading.direction
+    if law.frictionless or direction == 0 or scene.normal_force is not None:
+        return None
+    more = replace(law, mu=(1.0 + NUDGE) * law.mu)
+    try:
+        return Course(finger.body.touchable, more).sliding(scene.loading.depth, direction, contact.state)
+    except ContactLost:
+        return None
 
 
 def _nearest(scene: Scene, finger: FingerModel) -> Contact:
