@@ -55,7 +55,8 @@ def solve_together(scenes: Sequence[Scene], progress: Progress | None = None) ->
     """Return the predictions of several scenes, in their order.
 
     Scenes with the same finger, materials and receptor share one mesh, fine enough for the strictest tolerance among
-    them, so that differences between them are more accurate than each of them. Raises as `solve` does.
+    them, so that differences between them are more accurate than each of them; at finite strain each has a mesh for
+    its own contact. Raises as `solve` does.
     """
     done: list[Prediction] = []
     for answer in answers(scenes, progress):
@@ -103,19 +104,27 @@ def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
 
 
 def _solve_group(scenes: list[Scene], progress: Progress | None, watch: Watch | None) -> list[_Answer]:
-    """Refine until every scene's estimate meets its tolerance, or the finest mesh is reached."""
+    """Refine until every scene's estimate meets its tolerance, or the finest mesh is reached.
+
+    Where scenes share a mesh, all are solved again on the finer one; at finite strain those alone that need it.
+    """
     asked = [s.solve.tolerance for s in scenes]
     kind = scenes[0].solve.kinematics
     strictest = min((a for a in asked if a is not None), default=None)
     depth = max(expected_depth(scene) for scene in scenes)
     fineness = DEFAULT[kind] if strictest is None else coarsest_for(scenes[0].driven(depth), strictest)
+    found: dict[int, _Answer] = {}
+    todo = list(range(len(scenes)))
     while True:
-        done = _on_mesh(scenes, depth, fineness, progress, watch)
-        missed = [_misses(answer, tolerance) for answer, tolerance in zip(done, asked, strict=True)]
+        found |= zip(todo, _on_mesh([scenes[i] for i in todo], depth, fineness, progress, watch), strict=True)
+        missed = [_misses(found[i], asked[i]) for i in range(len(scenes))]
         finer = [n for n in FINENESS[kind] if n > fineness]
         if not finer or not any(missed):
             break
         fineness = finer[0]
+        if kind == "finite":
+            todo = [i for i in todo if missed[i]]
+    done = [found[i] for i in range(len(scenes))]
     told = "The finest mesh leaves an error estimate above the tolerance asked for."
     return [
         replace(answer, warnings=(*answer.warnings, told)) if misses and isinstance(answer, Prediction) else answer
