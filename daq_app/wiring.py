@@ -9,6 +9,7 @@ from daq_app.due_events import DueEvents
 from drivers.address import check_options, parse_address
 from drivers.catalog import open_transducer
 from drivers.clock import Clock
+from drivers.tool import without_tool
 from drivers.transducer import SetupError, Transducer
 from sessions.plan import Frame, Trial
 from sessions.recording import Recording
@@ -102,6 +103,7 @@ def connected(uri: str, clock: Clock) -> Generator[Connected]:
             transducer.close()
         return
     check_options(address, _OPTIONS)
+    without_tool(address)  # refused in terms of this address
     bench = Bench(address.number("seed", 0, 0, 2**31 - 1))
     box = NetFtBox(bench, clock, rate=address.number("rate", 200, 1, 7000))
     box.start()

@@ -6,6 +6,7 @@ from typing import Literal
 from urllib.parse import unquote, urlsplit
 
 import serial
+from serial.tools import list_ports
 
 from drivers.address import Address
 from drivers.transducer import LinkLost, SetupError
@@ -72,6 +73,11 @@ class SerialLink:
         """Give the port back. Harmless when repeated."""
         with contextlib.suppress(*_GONE):  # it was pulled out
             self._port.close()
+
+
+def serial_ports() -> tuple[str, ...]:
+    """Return the serial ports of this computer that a device is plugged into; none of them is opened."""
+    return tuple(sorted(port.device for port in list_ports.comports() if port.vid is not None))
 
 
 def port_of(address: Address) -> str:

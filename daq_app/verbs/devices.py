@@ -1,6 +1,7 @@
 """List the transducers that can be reached now, or open one and print its health and noise for 3 s.
 
 Listing only asks who is there, at the devices' usual addresses and at those named; a device in use is not disturbed.
+Serial ports are named without being opened.
 """
 
 import argparse
@@ -16,6 +17,7 @@ from daq_app.wiring import connected
 from drivers.catalog import Found, reachable
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock
+from drivers.serial_link import serial_ports
 from drivers.transducer import Transducer
 
 EXAMPLE = "daq-app devices probe sim:"
@@ -37,19 +39,25 @@ def run(options: argparse.Namespace, console: Console) -> int:
             raise WrongValue("'devices probe' takes one address, for example sim: or net-ft://192.168.1.1")
         return _probe(options.words[1], console)
     found = reachable(options.words)
-    console.result({"devices": [_described(device) for device in found] + [{"uri": "sim:", "simulated": True}]})
+    lines = serial_ports()
+    described = [_described(device) for device in found] + [{"uri": "sim:", "simulated": True}]
+    console.result({"devices": described, "serial_ports": list(lines)})
     rows = [
-        [device.uri, device.info.model, device.info.serial, "reachable"]
+        [device.uri, device.info.model, device.info.serial, device.info.calibration.source]
         if device.info
         else [device.uri, "–", "–", "no answer"]
         for device in found
     ]
-    console.say(
-        table([*rows, ["sim:", "simulated bench", "–", "always there"]], head=["address", "model", "serial", ""])
-    )
+    rows.append(["sim:", "simulated bench", "–", "always there"])
+    console.say(table(rows, head=["address", "model", "serial", "calibration"]))
+    for line in lines:
+        console.say(
+            f"{line} is a serial port, which was not opened: ask it as serial-ft://{line} or digital-ft://{line}"
+        )
     for device in found:
         if device.problem:
-            console.say(f"{device.uri}: {device.problem}")
+            told = device.problem.removeprefix(f"{device.uri}: ")
+            console.say(told if device.uri in told else f"{device.uri}: {told}")
         if device.info is not None and (life := life_of(device.info.serial)) is not None:
             console.say(f"{device.info.serial}: {_told(life)}")
     return 0
@@ -108,6 +116,7 @@ def _probe(uri: str, console: Console) -> int:
         }
     )
     console.say(f"{info.model}, serial {info.serial}, {number(info.rate, 4)} Hz set")
+    console.say(f"calibration: {info.calibration.source}")
     console.say(f"measured {number(_measured_rate(readings), 5)} Hz on the session's clock")
     counts = {name: value for name, value in asdict(health).items() if name not in ("lag_ms", "rate_words")}
     console.say(", ".join(f"{name} {value}" for name, value in counts.items()) + f", lag {health.lag_ms:.1f} ms")
