@@ -44,15 +44,19 @@ def roughly(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: 
 
     It is sought first from `near`, the settled state of a surface that slides the same way.
     """
+    if near is not None:
+        alike = near.pull.sense == -(scene.loading.direction or 1)
+        near = replace(near, iterations=0) if alike else None
     if scene.normal_force is not None or (scene.loading.direction == 0 and scene.friction.mu > 0.0):
-        return settled(finger, scene, stop)
+        return settled(finger, scene, stop, near)
     pull = _pull_sliding(scene)
-    if near is not None and near.pull.sense == pull.sense:
+    for begin in dict.fromkeys((near, None)):
         try:
-            return sliding.settled(finger.newton, pull, near, LEADING, stop)
+            return sliding.settled(finger.newton, pull, begin, LEADING, stop)
         except NotConverged:
-            pass
-    return sliding.settled(finger.newton, pull, None, LEADING, stop)
+            if begin is None:
+                raise
+    raise AssertionError  # the last begin is none
 
 
 def _settled_under(
@@ -84,7 +88,8 @@ def _sliding_under(
     sense = -(scene.loading.direction or 1)
     if start is not None:
         try:
-            near = replace(start, pull=start.pull._replace(sense=sense))
+            pull = start.pull._replace(mu=float(scene.friction.mu), tau=scene.friction.cap, sense=sense)
+            near = replace(start, pull=pull)
             shape = finite_forced.balanced(newton, near, Given(force, None))
             stays = not leapt(newton, start, shape, outline)
             return steady(newton, shape.pull, outline, start=shape, stop=stop, proven=stays)

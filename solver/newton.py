@@ -96,7 +96,7 @@ class Newton:
         self.skin_x, self.skin_y = body.mesh.nodes[body.skin].T.copy()
         self._felt, self._reaction = np.zeros(2 * skin), np.zeros((skin, 2))
         self._state, self._sense = np.zeros(skin, np.int32), np.zeros(skin, np.int32)
-        self._tangent_at: Shape | None = None  # what was found with the tangent that is there
+        self._tangent_at: Array | None = None  # the displacements found with the tangent that is there
         self._free = np.zeros(2 * skin, np.int32)
         self._matrix, self._right = np.zeros(4 * skin * skin), np.zeros((2 * skin, 4))
 
@@ -177,7 +177,7 @@ class Newton:
         """
         anchor = start.place(self.body)[:, 0] + (pull.travel - start.pull.travel)
         shape = before = self._entered(start, pull)
-        kept = self._tangent_at is start
+        kept = self._tangent_at is start.u
         scale, last, new = 1.0, 0.0, False
         for _ in range(limit):
             if kept:
@@ -198,7 +198,7 @@ class Newton:
             fall = min(largest / last, 1.0) if last > 0.0 else 1.0
             left = min((2.0 * fall) ** 2 if not kept else 4.0 * fall if new else 2.0 * fall, 1.0)
             if largest * left < MARGIN * tolerance and not changed and scale == 1.0:
-                self._tangent_at = shape
+                self._tangent_at = shape.u
                 return shape
             new = not kept
             still = largest < NEAR if last == 0.0 else fall < SLOW
