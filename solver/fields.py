@@ -15,6 +15,7 @@ from solver.stiffness import Elastic, Probes, local_coordinates
 from solver.tissues import finite_laws, settled_moduli
 
 # Eight triangles of each element, in its nine nodes
+_AROUND = [0, 4, 1, 5, 2, 6, 3, 7]  # the nodes along the sides of an element
 _SPLIT = np.array([[8, 0, 4], [8, 4, 1], [8, 1, 5], [8, 5, 2], [8, 2, 6], [8, 6, 3], [8, 3, 7], [8, 7, 0]])
 
 
@@ -35,6 +36,7 @@ class Sketch:
 
     mesh: Mesh
     triangles: Indices  # (t, 3) of the nodes that are drawn
+    elements: Indices  # (e, 8) of those nodes, along the sides of each element
     probes: Probes  # at the nodes of every element, one element after the other
     elastic: Elastic
     _kept: Indices  # (n,) node of the mesh behind each node that is drawn
@@ -60,6 +62,7 @@ class Sketch:
         return Sketch(
             mesh=mesh,
             triangles=place[:, _SPLIT].reshape(-1, 3),
+            elements=place[:, _AROUND],
             probes=Probes.at(mesh, elastic, np.repeat(np.arange(count), 9), np.tile(Q2P1.positions, (count, 1))),
             elastic=elastic,
             _kept=kept % len(mesh.nodes),

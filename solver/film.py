@@ -1,5 +1,6 @@
 """The way of a finger as pictures: from first touch, or as far as a solve that failed had come."""
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -54,15 +55,25 @@ def way_until(
 ) -> tuple[tuple[Instant, ...], SolveFailure | None]:
     """Return the states from first touch on, and why there are no more where they end before the finger settles.
 
-    Raises Cancelled where `progress` says so.
+    They end before tissue folds: states beyond solve the equations of small strain and are none of a finger's. Raises
+    Cancelled where `progress` says so.
     """
     law = FrictionLaw(float(scene.friction.mu), scene.friction.cap)
     way = Way(finger.body.touchable, law, scene.loading_per_mm)
     try:
         course(way, scene.loading_per_mm, progress)
     except SolveFailure as failure:
-        return tuple(way.instants), failure
+        return _unfolded(finger, way.instants), failure
     return tuple(way.instants), None
+
+
+def _unfolded(finger: FingerModel, instants: Sequence[Instant]) -> tuple[Instant, ...]:
+    """Return the states before the first in which tissue is turned inside out; what folds stays folded."""
+
+    def folds(instant: Instant) -> bool:
+        return bool(np.prod(finger.stretches(finger.displacement(instant.contact)), axis=0).min() <= 0.0)
+
+    return tuple(instants[: max(bisect_left(instants, True, key=folds), 1)])
 
 
 def most_squeezed(finger: FingerModel, contact: Contact, depth: float) -> tuple[float, float]:

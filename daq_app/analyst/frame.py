@@ -39,10 +39,18 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Parts:
+    """What the nodes of a frame are put together to."""
+
+    triangles: Indices  # (t, 3)
+    elements: Indices  # (e, 8) along the sides of each element of the mesh
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Finger:
     """A finger's settled state, or the last good one where there is none."""
 
-    triangles: Indices  # (t, 3) of the frame's nodes
+    parts: Parts
     frame: Frame
     arcs: Array  # (r,) where the receptors of the row lie along the skin [mm]
 
@@ -78,7 +86,7 @@ class Instant:
 class Film:
     """A finger from first touch to its last state; where there is no settled one, as far as it was found."""
 
-    triangles: Indices
+    parts: Parts
     frames: tuple[Frame, ...]
     instants: tuple[Instant, ...]
     arcs: Array

@@ -4,8 +4,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from daq_app.analyst.frame import Contact, Film, Finger, Frame, Instant
+from daq_app.analyst.frame import Contact, Film, Finger, Frame, Instant, Parts
 from sessions.prediction import Way
+from sessions.report import Field
 from solver.failures import Cancelled
 from solver.fields import Fields, Sketch, fields_of
 from solver.film import Still, most_squeezed, stills, way_until
@@ -13,6 +14,7 @@ from solver.prediction import Prediction, Skin
 from solver.receptor import ROW
 from solver.stepping import Instant as Step
 
+MOST = 150  # states of a way that did not settle, which may be long
 AT_ONCE = 8  # states that are drawn before progress is told
 Told = Callable[[float], bool]
 
@@ -20,7 +22,9 @@ Told = Callable[[float], bool]
 def finger_of(prediction: Prediction, sketch: Sketch) -> Finger:
     """Return the settled finger of a prediction."""
     drawn = fields_of(prediction, sketch)
-    return Finger(drawn.triangles, _frame(drawn, prediction.skin, prediction.row.sed), prediction.row.arc)
+    return Finger(
+        Parts(sketch.triangles, sketch.elements), _frame(drawn, prediction.skin, prediction.row.sed), prediction.row.arc
+    )
 
 
 def film_of(way: Way, instants: Sequence[Step], sketch: Sketch, told: Told) -> Film:
@@ -31,18 +35,42 @@ def film_of(way: Way, instants: Sequence[Step], sketch: Sketch, told: Told) -> F
         if not told(min(1.0, (begin + AT_ONCE) / len(instants))):
             raise Cancelled
     frames = tuple(_frame(still.fields, still.skin, still.row) for still in made)
-    return Film(sketch.triangles, frames, tuple(_instant(still) for still in made), ROW)
+    return Film(Parts(sketch.triangles, sketch.elements), frames, tuple(_instant(still) for still in made), ROW)
 
 
 def lost_film(way: Way, sketch: Sketch, told: Told) -> tuple[Film, str]:
     """Return the states up to where a solve that has no answer came, and what stopped it there."""
     instants, failure = way_until(way.scene, way.finger, told)
-    film = film_of(way, instants, sketch, told)
+    every = max(1, -(-len(instants) // MOST))
+    film = film_of(way, [*instants[:-1:every], instants[-1]], sketch, told)
     if failure is None:
         return film, ""
     last = instants[-1]
     lost = most_squeezed(way.finger, last.contact, last.depth)
-    return Film(film.triangles, film.frames, film.instants, film.arcs, lost), str(failure.in_a_sentence())
+    return Film(film.parts, film.frames, film.instants, film.arcs, lost), str(failure.in_a_sentence())
+
+
+def field_at(experiment: str, index: int, film: Film, at: int) -> Field:
+    """Return one state of a film as the figures of a report draw it."""
+    frame = film.frames[at]
+    contact = frame.contact
+    return Field(
+        experiment=experiment,
+        index=index,
+        nodes=_pairs(frame.nodes),
+        triangles=tuple((int(a), int(b), int(c)) for a, b, c in film.parts.triangles),
+        sed=tuple(frame.sed.tolist()),
+        outlines={name: _pairs(line) for name, line in frame.outlines.items()},
+        patch=_pairs(frame.patch),
+        contact=_pairs(np.column_stack([contact.x, contact.gap])),
+        pressure=tuple(contact.pressure.tolist()),
+        traction=tuple(contact.traction.tolist()),
+        state=contact.state,
+    )
+
+
+def _pairs(points: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> tuple[tuple[float, float], ...]:
+    return tuple((float(x), float(y)) for x, y in points)
 
 
 def _frame(drawn: Fields, skin: Skin, row: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> Frame:

@@ -60,8 +60,9 @@ def film_words(film: m.Filmed | None, at: int | None = None) -> str:
             return ""
         last = film.film.instants[-1]
         return (
-            f"No settled state: the last good one is shown, at {last.time:.3f} s, {last.depth:.3g} mm deep after "
-            f"{abs(last.travel):.3g} mm of sliding; ⊗ marks its most squeezed tissue. {film.why}"
+            f"No settled state. The last good one, before tissue folds, is step {len(film.film.instants)}: "
+            f"at {last.time:.3f} s, {last.depth:.3g} mm deep after {abs(last.travel):.3g} mm of sliding; "
+            f"⊗ marks its most squeezed tissue. {film.why}"
         )
     now, frame = film.film.instants[at], film.film.frames[at]
     count = len(film.film.instants)

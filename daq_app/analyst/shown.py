@@ -19,14 +19,26 @@ class Point:
 
 
 def words_of(row: Row) -> str:
-    """Return a line of the list of trials; "!" marks flaws, "✎" that somebody decided something."""
+    """Return a line of the list of trials; what its marks mean is told by `marks_of`."""
     if row.stroke is None:
         assert row.prediction is not None  # a row has at least one of them
         return _named(row.prediction) + "  no stroke"
     mu = "µ –" if row.stroke.mu_dynamic is None else f"µ {row.stroke.mu_dynamic:.2f}"
     mark = ("  !" if row.stroke.flaws else "") + ("  ✎" if row.stroke.decided else "")
-    failed = "  no SED" if row.prediction is not None and row.prediction.sed is None else ""
+    failed = "  ✗" if row.prediction is not None and row.prediction.sed is None else ""
     return f"{_named(row.stroke)}  {mu}{mark}{failed}"
+
+
+def marks_of(row: Row) -> str:
+    """Return what the marks of a line mean, for who hovers and for screen readers."""
+    told: list[str] = []
+    if row.stroke is not None and row.stroke.flaws:
+        told.append("! has flaws: " + ", ".join(flaw.replace("_", " ") for flaw in row.stroke.flaws))
+    if row.stroke is not None and row.stroke.decided:
+        told.append("✎ somebody decided something about it")
+    if row.prediction is not None and row.prediction.sed is None:
+        told.append("✗ the model has no SED for it")
+    return "; ".join(told)
 
 
 def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
@@ -56,6 +68,45 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
         ]
     elif state.stage == "analysed":
         told.append(("SED", "– stopped before this trial" if state.halted else "not predicted yet"))
+    return tuple(told)
+
+
+FRICTION_HEAD = (
+    "trial",
+    "stimulus",
+    "µ steady",
+    "95 %",
+    "µ greatest",
+    "τ max [kPa]",
+    "V [mm/s]",
+    "N [N]",
+    "way",
+    "flaws",
+)
+WAYS = {1: "distal", -1: "proximal"}
+
+
+def friction_table(report: Report | None) -> tuple[tuple[str, ...], ...]:
+    """Return a line of `FRICTION_HEAD` for each stroke, in order of time; "–" where honesty allows no number."""
+    return () if report is None else tuple(_friction_line(stroke) for stroke in report.strokes)
+
+
+def scene_table(state: AnalystState) -> tuple[tuple[str, str, str], ...]:
+    """Return what the model holds of the chosen trial, and of all: name, value, remark."""
+    row = chosen(state)
+    said = None if row is None else row.prediction
+    told: list[tuple[str, str, str]] = []
+    if said is not None:
+        way = "" if said.direction is None else f"{WAYS[said.direction]}, as measured"
+        told += [
+            ("µ of this trial", _value(said.mu, "{:.4f}", said.reasons, "mu"), said.mu_rule),
+            ("τ max of this trial", _value(_kpa(said.tau_max), "{:.2f} kPa", said.reasons, "tau_max"), ""),
+            ("indentation", _value(said.indentation, "{:.3g} mm", said.reasons, "indentation"), "of the block's plan"),
+            ("way", way or "–", ""),
+        ]
+    report = state.report
+    if report is not None:
+        told += [(fact.name, fact.value, fact.remark) for fact in (*report.modelled, *report.left_out)]
     return tuple(told)
 
 
@@ -123,3 +174,24 @@ def _kpa(mpa: float | None) -> float | None:
 
 def _value(value: float | None, form: str, reasons: dict[str, str], name: str) -> str:
     return form.format(value) if value is not None else f"–  {reasons.get(name, '')}".rstrip()
+
+
+def _friction_line(s: StrokeFinding) -> tuple[str, ...]:
+    stimulus = f"{s.experiment} {s.code if s.index is None else s.index}".strip()
+    interval = "–" if s.mu_interval is None else f"{s.mu_interval[0]:.3f} to {s.mu_interval[1]:.3f}"
+    return (
+        f"stroke {s.number}" if s.trial is None else str(s.trial),
+        stimulus or "–",
+        _or_dash(s.mu_dynamic, "{:.3f}"),
+        interval,
+        _or_dash(s.mu_max, "{:.3f}"),
+        _or_dash(_kpa(s.tau_max), "{:.1f}"),
+        _or_dash(s.speed, "{:.1f}"),
+        _or_dash(s.normal_force, "{:.2f}"),
+        "–" if s.direction is None else WAYS[s.direction],
+        ", ".join(flaw.replace("_", " ") for flaw in s.flaws),
+    )
+
+
+def _or_dash(value: float | None, form: str) -> str:
+    return "–" if value is None else form.format(value)

@@ -1,7 +1,7 @@
 """What is made of a session for the analyst: first its strokes, then the model's answers, then what is asked for."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from daq_app.analyst import messages as m
 from daq_app.analyst.compared import NAMES, compared
 from daq_app.analyst.edges import brought_back, decision_meant, decision_of, taken_back
-from daq_app.analyst.pictures import film_of, finger_of, lost_film
+from daq_app.analyst.pictures import field_at, film_of, finger_of, lost_film
 from daq_app.analyst.raw import raw_readings
 from daq_app.derived import analysis_document
 from sessions.analysis import analyse
@@ -47,6 +47,7 @@ class Work:
         self._ways: dict[m.Key, tuple[TrialPrediction, Way]] = {}
         self._sketches: dict[int, Sketch] = {}
         self._other: Report | None = None  # that is compared
+        self._filmed: m.Filmed | None = None  # the last history
         self._analyse()
 
     @property
@@ -164,9 +165,9 @@ class Work:
         with in_pixels() as pixels:
             if what in ("finger", "contact"):
                 every = self._fields()
-                field = every.get(int(of))
+                field = self._field(of, every)
                 with look():
-                    levels = common_levels(tuple(every.values())) if every else ()
+                    levels = common_levels(tuple(every.values()) or (field,)) if field is not None else ()
                     pair = None if field is None else finger_panels(field, levels, simulated=report.simulated)
                 panel = None if pair is None else pair[what == "contact"]
             elif what == "compared":
@@ -177,6 +178,19 @@ class Work:
             else:
                 panel = picture(report, what, of or None)
         return panel, b"" if panel is None else pixels[panel.name]
+
+    def _field(self, of: str, every: Mapping[int, Field]) -> Field | None:
+        """Return the finger of a stroke, settled, or at a step of the history that was drawn last."""
+        stroke, _, step = of.partition(" ")
+        if not step:
+            return every.get(int(stroke))
+        film = self._filmed
+        if film is None or film.key[1] != int(stroke):
+            return None
+        finding = self._report.strokes[int(stroke) - 1]
+        if finding.index is None:  # a picture for paper says which stimulus it is of
+            return None
+        return field_at(finding.experiment, finding.index, film.film, int(step))
 
     def _compared_panel(self) -> "Panel | None":
         from sessions.exports.figures.compared import compared_panel
@@ -209,12 +223,15 @@ class Work:
         prediction, way = found
         told = self.timed("drawing the history")
         if way.march is not None:
-            self._say(m.Filmed(key, film_of(way, way.march.instants, self._sketch(way), told)))
+            self._filmed = m.Filmed(key, film_of(way, way.march.instants, self._sketch(way), told))
+            self._say(self._filmed)
             return
         if prediction.prediction is not None or way.scene.materials.relax:
             raise NothingToShow("The way of tissues that relax is not kept as states that can be drawn.")
         film, why = lost_film(way, self._sketch(way), told)
-        self._say(m.Filmed(key, film, why or prediction.reasons.get("sed", "")))
+        first = prediction.reasons.get("sed", "")
+        self._filmed = m.Filmed(key, film, f"{first} Followed from first touch: {why}" if why else first)
+        self._say(self._filmed)
 
     def _read(self, number: int) -> None:
         stroke = self._report.strokes[number - 1]

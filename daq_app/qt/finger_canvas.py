@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QLinearGradient, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from daq_app.analyst.frame import Frame, halved, seen, step_above
+from daq_app.analyst.frame import Frame, Parts, halved, seen, step_above
 from daq_app.qt.indicators import paint_lost
 from daq_app.qt.tokens import MODEL, SMALL, Tokens, font
 
@@ -21,12 +22,23 @@ Array = NDArray[np.float64]
 Placed = Callable[[Array], list[QPointF]]  # where points (n, 2) [mm] are drawn
 Box = tuple[float, float, float, float]  # left, right, below, above [mm]
 
+NO_PARTS = Parts(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64))
 SHADES = 64
 ARROWS, LONGEST = 22, 1.5  # tractions at most, and the longest of them [mm]
 NEAR = (4.6, -2.6, 4.4)  # half width, below and above of the close view [mm]
 ROW_PART = 0.24  # of the height that the row of receptors takes
 STYLES = {"slip": Qt.PenStyle.SolidLine, "cap": Qt.PenStyle.DashLine, "stick": Qt.PenStyle.DotLine}
 STATE_WORDS = {"slip": "slips", "cap": "slips at the bound", "stick": "sticks"}
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a state is shown."""
+
+    top: float  # end of the colours [kPa]
+    near: bool = False  # the contact alone
+    mesh: bool = False
+    lost: tuple[float, float] | None = None  # a place that is marked [mm]
 
 
 class FingerCanvas(QWidget):
@@ -37,11 +49,9 @@ class FingerCanvas(QWidget):
         super().__init__()
         self._tokens, self._scale = tokens, scale
         self._frame: Frame | None = None
-        self._triangles: NDArray[np.int64] = np.empty((0, 3), np.int64)
+        self._parts = NO_PARTS
         self._arcs: Array = np.empty(0)
-        self._top = 1.0  # end of the colours [kPa]
-        self._near = False
-        self._lost: tuple[float, float] | None = None
+        self._look = Look(1.0)
         self._words = ""
         self._kept: QPixmap | None = None
         shades: Any = pg.colormap.get("magma")
@@ -54,20 +64,15 @@ class FingerCanvas(QWidget):
     def show_frame(
         self,
         frame: Frame | None,
-        triangles: NDArray[np.int64],
+        parts: Parts,
         arcs: Array,
-        top: float,
         words: str,
-        *,
-        near: bool,
-        lost: tuple[float, float] | None = None,
+        look: Look,
     ) -> None:
-        """Show a state with colours up to `top` [kPa]; `near` shows the contact alone, `lost` marks a place."""
-        same = frame is self._frame and (top, near, words, lost) == (self._top, self._near, self._words, self._lost)
-        if same:
+        """Show a state, and how."""
+        if frame is self._frame and (words, look) == (self._words, self._look):
             return
-        self._frame, self._triangles, self._arcs, self._top = frame, triangles, arcs, top
-        self._near, self._words, self._lost = near, words, lost
+        self._frame, self._parts, self._arcs, self._words, self._look = frame, parts, arcs, words, look
         self._kept = None
         self.setAccessibleName(words or "finger of the model: none")
         self.update()
@@ -109,6 +114,8 @@ class FingerCanvas(QWidget):
         per_mm = min(box.width() / (right - left), box.height() / (above - below))
         if per_mm < 1.0:
             return
+        across, up = (box.width() / per_mm - (right - left)) / 2.0, box.height() / per_mm - (above - below)
+        visible = (left - across, right + across, below, above + up)
         origin = QPointF(box.center().x() - per_mm * (left + right) / 2.0, box.bottom() + per_mm * below)
 
         def placed(points: Array) -> list[QPointF]:
@@ -119,7 +126,9 @@ class FingerCanvas(QWidget):
         painter.setClipRect(box)
         ink = QColor(self._tokens.text)
         painter.fillRect(QRectF(box.left(), origin.y(), box.width(), box.bottom() - origin.y()), self._ground())
-        self._paint_tissue(painter, placed, frame, (left, right, below, above))
+        self._paint_tissue(painter, placed, frame, visible)
+        if self._look.mesh:
+            self._paint_mesh(painter, placed(frame.nodes), box)
         for name, outline in frame.outlines.items():
             painter.setPen(QPen(ink, 1.4 if name == "skin" else 0.7))
             painter.setBrush(QColor(self._tokens.surface) if name == "bone" else Qt.BrushStyle.NoBrush)
@@ -135,13 +144,13 @@ class FingerCanvas(QWidget):
         painter.setPen(QPen(ink, 1.4))
         painter.drawLine(QPointF(box.left(), origin.y()), QPointF(box.right(), origin.y()))
         self._paint_contact(painter, frame, origin, per_mm)
-        if self._lost is not None:
-            paint_lost(painter, placed(np.array([self._lost]))[0], self._tokens)
+        if self._look.lost is not None:
+            paint_lost(painter, placed(np.array([self._look.lost]))[0], self._tokens)
         painter.restore()
 
     def _shown(self, frame: Frame) -> Box:
         """Return left, right, below and above of what is drawn [mm]."""
-        if not self._near:
+        if not self._look.near:
             x, y = frame.nodes[:, 0], frame.nodes[:, 1]
             return float(x.min()) - 0.5, float(x.max()) + 0.5, -3.2, float(y.max()) + 0.3
         places: list[float] = frame.contact.x.tolist()
@@ -156,11 +165,11 @@ class FingerCanvas(QWidget):
         return made
 
     def _paint_tissue(self, painter: QPainter, placed: Placed, frame: Frame, shown: Box) -> None:
-        nodes, sed, triangles = seen(frame.nodes, frame.sed, self._triangles, shown)
-        if self._near:
+        nodes, sed, triangles = seen(frame.nodes, frame.sed, self._parts.triangles, shown)
+        if self._look.near:
             nodes, sed, triangles = halved(nodes, sed, triangles)
         points = placed(nodes)
-        part = 1000.0 * sed[triangles].mean(axis=1) / self._top
+        part = 1000.0 * sed[triangles].mean(axis=1) / self._look.top
         wanted = (np.clip(np.nan_to_num(part), 0.0, 1.0) * (SHADES - 1)).astype(np.int64)
         order = np.argsort(wanted, kind="stable")
         shades: list[int] = wanted[order].tolist()
@@ -174,6 +183,16 @@ class FingerCanvas(QWidget):
                 last = shade
             painter.drawPolygon([points[a], points[b], points[c]])
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+
+    def _paint_mesh(self, painter: QPainter, points: list[QPointF], box: QRectF) -> None:
+        ink = QColor("black")
+        ink.setAlpha(110)
+        painter.setPen(QPen(ink, 0.6))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        around: list[list[int]] = self._parts.elements.tolist()
+        for element in around:
+            if box.contains(points[element[0]]) or box.contains(points[element[4]]):
+                painter.drawPolygon([points[node] for node in element])
 
     def _paint_contact(self, painter: QPainter, frame: Frame, origin: QPointF, per_mm: float) -> None:
         """Draw tractions as arrows that end where they act, and under them what each stretch of skin does."""
@@ -204,7 +223,7 @@ class FingerCanvas(QWidget):
                 painter.drawText(box, Qt.AlignmentFlag.AlignHCenter, words)
 
     def _paint_bar(self, painter: QPainter, box: QRectF) -> None:
-        words = f"SED 0 to {self._top:g} kPa"
+        words = f"SED 0 to {self._look.top:g} kPa"
         width = painter.fontMetrics().horizontalAdvance(words) + 8
         strip = QRectF(box.left(), box.top() + 3, max(box.width() - width, 1.0), box.height() - 6)
         gradient = QLinearGradient(strip.topLeft(), strip.topRight())

@@ -8,12 +8,13 @@ from daq_app.analyst import messages as m
 from daq_app.analyst.compared import compared
 from daq_app.analyst.frame import top
 from daq_app.analyst.seen import common_top, film_words, finger_words, shown_film, was_tried
-from daq_app.analyst.shown import session_pictures
+from daq_app.analyst.shown import scene_table, session_pictures
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.qt.compared_view import PICTURE, ComparedView
-from daq_app.qt.finger_canvas import FingerCanvas
+from daq_app.qt.finger_canvas import NO_PARTS, FingerCanvas, Look
 from daq_app.qt.parts import Wrapped, button, choice
 from daq_app.qt.picture_view import PictureView, SaveButtons
+from daq_app.qt.text_table import TextTable
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.transport_bar import TransportBar
 
@@ -39,7 +40,8 @@ class ModelColumn(QWidget):
         self.finger = FingerCanvas(tokens, scale)
         self.near = button("Contact", "show the contact alone, with its tractions", self._paint, "small")
         self.free = button("Own scale", "colours that fit this trial alone", self._paint, "small")
-        for made in (self.near, self.free):
+        self.mesh = button("Mesh", "show the mesh", self._paint, "small")
+        for made in (self.near, self.free, self.mesh):
             made.setCheckable(True)
             made.setMinimumWidth(made.sizeHint().width() + 2 * GRID)  # bold while it is on
         self.history = button("History", "show the finger from first touch on", self._ask_history, "small")
@@ -50,6 +52,7 @@ class ModelColumn(QWidget):
         self.which, self.picture = choice("picture of the session"), PictureView("the picture", self._save)
         self.which.activated.connect(lambda: self._show_session())
         self.compared = ComparedView(self.other_wanted.emit, self._save)
+        self.scene = TextTable("scene and model", ("of the model", "value", "remark"))
         self.tabs = QTabWidget()
         self.tabs.setAccessibleName("pictures")
         session = QWidget()
@@ -57,7 +60,12 @@ class ModelColumn(QWidget):
         inside.setContentsMargins(0, 0, 0, 0)
         inside.addWidget(self.which)
         inside.addWidget(self.picture, 1)
-        for name, page in (("Finger", self._finger_page()), ("Session", session), ("Comparison", self.compared)):
+        for name, page in (
+            ("Finger", self._finger_page()),
+            ("Session", session),
+            ("Comparison", self.compared),
+            ("Scene", self.scene),
+        ):
             self.tabs.addTab(page, name)
         self.tabs.currentChanged.connect(lambda: self._show_session())
         layout = QVBoxLayout(self)
@@ -78,10 +86,10 @@ class ModelColumn(QWidget):
         self.history.setEnabled(film is None and said is not None and said.mu is not None)
         self.why.show_text(film_words(film))
         self._ask_where(state, film)
-        drawable = row is not None and row.stroke is not None and row.key in state.fingers
+        drawable = row is not None and row.stroke is not None and (film is not None or row.key in state.fingers)
         self._name = f" {row.stroke.number}" if drawable and row is not None and row.stroke is not None else ""
-        self._name_saves()
         self._paint()
+        self.scene.show_lines(scene_table(state))
         if before is None or before.version != state.version or before.report is None:
             names = [words for _, words in session_pictures(state.report)]
             if names != [self.which.itemText(i) for i in range(self.which.count())]:
@@ -126,24 +134,20 @@ class ModelColumn(QWidget):
     def _paint(self) -> None:
         state = self._state
         row = None if state is None else chosen(state)
-        film = self._film
-        near, free = self.near.isChecked(), self.free.isChecked()
-        if film is not None and self._at is not None:
-            frame, lost = film.film.frames[self._at], film.film.lost
-            high = top(frame) if free else max(common_top(state), top(film.film.frames[-1]) if lost else 0.0)
-            words = film_words(film, self._at)
-            last = self._at == len(film.film.frames) - 1
-            self.finger.show_frame(
-                frame, film.film.triangles, film.film.arcs, high, words, near=near, lost=lost if last else None
-            )
-            return
-        finger = None if state is None or row is None else state.fingers.get(row.key)
-        if finger is None:
-            empty = np.empty((0, 3), np.int64)
-            self.finger.show_frame(None, empty, np.empty(0), 1.0, finger_words(state), near=near)
-            return
-        high = top(finger.frame) if free else common_top(state)
-        self.finger.show_frame(finger.frame, finger.triangles, finger.arcs, high, finger_words(state), near=near)
+        film, at = self._film, self._at
+        if film is not None and at is not None:
+            frame, parts, arcs, words = film.film.frames[at], film.film.parts, film.film.arcs, film_words(film, at)
+        else:
+            finger = None if state is None or row is None else state.fingers.get(row.key)
+            words = finger_words(state)
+            frame = None if finger is None else finger.frame
+            parts, arcs = (NO_PARTS, np.empty(0)) if finger is None else (finger.parts, finger.arcs)
+        lost = film.film.lost if film is not None and at == len(film.film.frames) - 1 else None
+        own = 1.0 if frame is None else top(frame)
+        high = own if self.free.isChecked() else max(common_top(state), own if lost else 0.0)
+        look = Look(high, self.near.isChecked(), self.mesh.isChecked(), lost)
+        self.finger.show_frame(frame, parts, arcs, words, look)
+        self._name_saves()
 
     def _moved(self, at: int) -> None:
         self._at = at
@@ -168,7 +172,8 @@ class ModelColumn(QWidget):
 
     def _name_saves(self) -> None:
         kind = "contact" if self.near.isChecked() else "finger"
-        self.save.set_name(f"{kind}{self._name}" if self._name else "")
+        at = "" if self._film is None or self._at is None else f" {self._at}"  # of the history that is shown
+        self.save.set_name(f"{kind}{self._name}{at}" if self._name else "")
 
     def _save(self, name: str, path: str) -> None:
         self.asked.emit(m.Write(f"picture {name}", path))
@@ -176,10 +181,9 @@ class ModelColumn(QWidget):
     def _finger_page(self) -> QWidget:
         page = QWidget()
         bar = QHBoxLayout()
-        for part in (self.near, self.free, self.history):
+        for part in (self.near, self.free, self.mesh, self.history):
             bar.addWidget(part)
         bar.addWidget(self.save, 1)
-        self.near.clicked.connect(lambda: self._name_saves())
         layout = QVBoxLayout(page)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.finger, 1)

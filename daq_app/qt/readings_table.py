@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QHeaderView, QTableView, QVBoxLayout, QWidget
 
 from daq_app.analyst.raw import RawReadings
 from daq_app.qt.parts import Wrapped
+from daq_app.qt.tokens import GRID
 
 HEAD = ("window", "sequence", "counter", "status", "time [s]", "received [ns]")
 Index = QModelIndex | QPersistentModelIndex
@@ -43,7 +44,17 @@ class ReadingsTable(QWidget):
             f"{readings.place}. raw 1 to 6 as the device sent them [{readings.unit}]; "
             f"N and T unfiltered, zero taken off: {readings.zero}."
         )
-        self.table.resizeColumnsToContents()
+        self._fit_columns()
+
+    def _fit_columns(self) -> None:
+        """Make each column as wide as its head and a few of its lines need: there may be a hundred thousand."""
+        model, count = self._model, self._model.rowCount()
+        metrics = self.table.fontMetrics()
+        for column in range(model.columnCount()):
+            texts = [model.headerData(column, Qt.Orientation.Horizontal)]
+            texts += [model.index(row, column).data() for row in (0, count // 2, count - 1) if 0 <= row < count]
+            widest = max(metrics.horizontalAdvance(str(text)) for text in texts)
+            self.table.setColumnWidth(column, round(1.15 * widest) + 2 * GRID)  # steady ones are bold
 
     def go_to(self, row: int) -> None:
         """Show one reading."""

@@ -5,13 +5,14 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QTabWidget,
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.messages import Edge
-from daq_app.analyst.shown import numbers
+from daq_app.analyst.shown import FRICTION_HEAD, friction_table, numbers
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.qt.decisions_bar import DecisionsBar
 from daq_app.qt.parts import label
 from daq_app.qt.picture_view import SaveButtons
 from daq_app.qt.readings_table import ReadingsTable
 from daq_app.qt.stroke_view import StrokeView
+from daq_app.qt.text_table import TextTable
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.transport_bar import TransportBar
 from sessions.report.contents import StrokeFinding
@@ -47,6 +48,9 @@ class StrokeColumn(QWidget):
         self._scroll = self._scrolled()
         self.tabs.addTab(self._scroll, "Numbers")
         self.tabs.addTab(self.readings, "Readings")
+        self.friction = TextTable("friction of every stroke", FRICTION_HEAD)
+        self.friction.told.connect(self._choose)
+        self.tabs.addTab(self.friction, "All strokes")
         self.tabs.setMinimumHeight(170)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -70,6 +74,7 @@ class StrokeColumn(QWidget):
             self.decisions.show_decided(() if stroke is None else tuple(stroke.decided.values()))
             self._read = None
         self._show_readings(state)
+        self.friction.show_lines(friction_table(state.report), state.row)
         told = numbers(state)
         if told != self._told:
             self._told = told
@@ -97,6 +102,9 @@ class StrokeColumn(QWidget):
         self._play_next = True
 
     _play_next = False
+
+    def _choose(self, row: int) -> None:
+        self.asked.emit(m.Choose(row))
 
     def _show_readings(self, state: AnalystState) -> None:
         stroke, read = self._stroke, state.read

@@ -88,6 +88,8 @@ class StrokeView(QWidget):
             plot.disableAutoRange()
         if len(self._time):
             self._plots[0].setXRange(self._time[0], self._time[-1], padding=0.09)
+            known = self._columns[2][np.isfinite(self._columns[2])]
+            self._plots[1].setYRange(0.0, max(float(known.max()), 0.01) if len(known) else 1.0, padding=0.04)
 
     def show_readings(self, readings: RawReadings | None) -> None:
         """Show the readings as they were recorded, thin, behind the stroke."""

@@ -3,13 +3,13 @@
 from typing import Any
 
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QListWidget, QVBoxLayout, QWidget
 
 from daq_app.analyst import messages as m
-from daq_app.analyst.shown import points, row_words
-from daq_app.analyst.state import AnalystState, chosen
+from daq_app.analyst.shown import marks_of, points, row_words
+from daq_app.analyst.state import AnalystState, chosen, rows
 from daq_app.qt.parts import label
 from daq_app.qt.tokens import MODEL, Tokens
 
@@ -48,6 +48,11 @@ class TrialsColumn(QWidget):
             for at, words in enumerate(listed):
                 self.list.item(at).setText(words)
         self._listed = listed
+        for at, row in enumerate(rows(state)):
+            item = self.list.item(at)
+            told = marks_of(row)
+            item.setToolTip(told)
+            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{listed[at]} {told}".rstrip())
         self.list.setCurrentRow(state.row if chosen(state) is not None else -1)
         self.list.blockSignals(False)
         ring = pg.mkPen(QColor(self._tokens.text))

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from daq_app.analyst import messages as m
 from daq_app.analyst.compared import compared
 from daq_app.analyst.edges import APART, brought_back, decision_of, edges_of, taken_back, within
-from daq_app.analyst.frame import Contact, Finger, Frame
+from daq_app.analyst.frame import Contact, Finger, Frame, Parts
 from daq_app.analyst.lineage import lineage
 from daq_app.analyst.messages import EDGES
 from daq_app.analyst.process import Analyst
@@ -30,7 +30,7 @@ from tests.sessions.report_example import example
 SESSION = Path(__file__).parents[1] / "data" / "sessions" / "version-1" / "sealed"
 NOTHING = np.empty(0)
 FINGER = Finger(
-    np.empty((0, 3), np.int64),
+    Parts(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64)),
     Frame(np.zeros((1, 2)), np.zeros(1), {}, np.zeros((1, 2)), Contact(*[NOTHING] * 4, ()), NOTHING),
     NOTHING,
 )

@@ -11,7 +11,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLineEdit, QListWidget, QSlider
 
 from daq_app.analyst import messages as m
-from daq_app.analyst.frame import Contact, Film, Frame, Instant
+from daq_app.analyst.frame import Contact, Film, Frame, Instant, Parts
 from daq_app.analyst.lineage import lineage
 from daq_app.analyst.raw import RawReadings
 from daq_app.analyst.shown import points
@@ -76,12 +76,12 @@ def frame(sed):
     return Frame(square, np.full(3, sed), {"skin": square}, square, contact, np.array([sed, sed]))
 
 
-TRIANGLE, ARCS = np.array([[0, 1, 2]]), np.array([0.0, 1.0])
+PARTS, ARCS = Parts(np.array([[0, 1, 2]]), np.array([[0, 0, 1, 1, 2, 2, 2, 2]])), np.array([0.0, 1.0])
 
 
 def film(**more):
     told = [Instant(0.1 * i, 1.0, 0.0 if i < 2 else 0.5, 0.001 * i, 1.0, 0.1, 3, i) for i in range(4)]
-    return Film(TRIANGLE, tuple(frame(0.001 * i) for i in range(4)), tuple(told), ARCS, **more)
+    return Film(PARTS, tuple(frame(0.001 * i) for i in range(4)), tuple(told), ARCS, **more)
 
 
 def raw(stroke, n=50):
@@ -99,6 +99,17 @@ def test_a_point_of_prediction_against_score_chooses_its_trial_in_every_column(w
     assert window.trials.list.currentRow() == point.row
     assert window.stroke.stroke.accessibleName().endswith(f"stroke {chosen(window.state).stroke.number}")
     assert m.Choose(point.row) in window._work.asked
+
+
+def test_the_table_of_all_strokes_chooses_a_trial_and_the_scene_tells_what_the_model_was_given(window):
+    table = window.stroke.friction
+    assert table.rowCount() == len(window.state.report.strokes)
+    table.setCurrentCell(3, 0)
+    assert window.state.row == 3
+    said = chosen(window.state).prediction
+    cells = {window.model.scene.item(row, 0).text(): window.model.scene.item(row, 1).text() for row in range(4)}
+    assert cells["µ of this trial"] == f"{said.mu:.4f}"
+    assert cells["indentation"] == f"{said.indentation:.3g} mm"
 
 
 def test_stopping_is_answered_at_once_and_keeps_what_was_found(window):
@@ -170,11 +181,11 @@ def test_a_failed_solve_says_where_when_and_why_and_its_last_good_state_stays(wi
     key = chosen(window.state).key
     window.take(m.Filmed(key, film(lost=(0.5, 0.5)), "The drag wedges it."))
     words = window.model.why.text()
-    assert "last good one is shown, at 0.300 s" in words
+    assert "is step 4: at 0.300 s" in words
     assert words.endswith("The drag wedges it.")
-    assert window.model.finger._lost == (0.5, 0.5)
+    assert window.model.finger._look.lost == (0.5, 0.5)
     window.model.player.step(-1)
-    assert window.model.finger._lost is None
+    assert window.model.finger._look.lost is None
 
 
 def test_how_far_a_failed_solve_came_is_asked_for_without_being_told(window):
