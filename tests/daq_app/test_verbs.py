@@ -89,8 +89,8 @@ def test_predict_gives_a_row_a_trial_and_every_number_comes_out_again_in_another
 
 
 def test_the_reading_of_tau_as_printed_is_asked_for_by_name_and_is_a_hundredth(session, capsys):
-    run(["predict", str(session), "--beside", "none", "--json"])
-    computed = printed(capsys)["trials"]
+    run(["analyse", str(session), "--json"])
+    computed = printed(capsys)["friction"]
     run(["predict", str(session), "--beside", "none", "--json", "--tau", "as-printed"])
     document = printed(capsys)
     assert document["options"]["tau_reading"] == "as-printed"

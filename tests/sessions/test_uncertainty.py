@@ -50,13 +50,13 @@ def test_draws_are_those_of_the_intervals_of_friction(analysis):
 
 
 def test_derivatives_give_what_solving_the_draws_gives(analysis, prediction, intervals):
-    # The other route: the solver run at a hundred draws of the friction.
+    # The other route: the solver run at forty draws of the friction.
     row, found = prediction.trials[0], intervals[0]
     assert found.method == "derivatives"
     mu, tau_max = friction_draws(analysis.strokes[0], 0, "maximum")
-    solved = seds_with([(row, float(m), float(t)) for m, t in zip(mu[:100], tau_max[:100], strict=True)])
+    solved = seds_with([(row, float(m), float(t)) for m, t in zip(mu[:40], tau_max[:40], strict=True)])
     low, high = np.quantile(solved, [0.025, 0.975])
-    carried = found.by_mu * (mu[:100] - row.mu) + found.by_tau_max * (tau_max[:100] - row.tau_max)
+    carried = found.by_mu * (mu[:40] - row.mu) + found.by_tau_max * (tau_max[:40] - row.tau_max)
     assert np.quantile(row.sed + carried, [0.025, 0.975]) == pytest.approx([low, high], abs=0.05 * (high - low))
     assert found.low < row.sed < found.high
 
