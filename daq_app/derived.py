@@ -12,12 +12,14 @@ from sessions.analysis.area import FIXED, AreaLaw
 from sessions.analysis.bootstrap import BootstrapSettings, intervals_of
 from sessions.blinding import revealed
 from sessions.decisions import Decisions
-from sessions.prediction import PredictionOptions, SessionPrediction, predict
+from sessions.plan import SessionPlan
+from sessions.prediction import PredictionOptions, Progress, SessionPrediction, predict
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import store_derived
 from sessions.side_by_side import with_alternatives
 from sessions.study_file import is_study
 from sessions.toml_file import from_table
+from sessions.uncertainty import with_intervals
 from sessions.visits import force_visit
 
 ANALYSIS = "analysis.json"
@@ -45,8 +47,7 @@ def predicted(
         console.progress(part, "predicting")
         return True
 
-    prediction = predict(analysis, recording.plan, options, lambda part: shown(0.5 * part))
-    prediction = with_alternatives(prediction, lambda part: shown(0.5 + 0.5 * part))
+    prediction = _predicted(analysis, recording.plan, options, shown)
     _keep(recording, PREDICTION, prediction.to_dict(), console)
     return prediction
 
@@ -59,7 +60,20 @@ def predicted_again(recording: Recording, analysis: Analysis, stored: Mapping[st
     options = from_table(stored.get("options", {}), PredictionOptions, PREDICTION)
     stimuli: list[Mapping[str, Any]] = [row.get("stimulus") or {} for row in stored.get("trials", ())]
     blind = all(stimulus.get("index") is None for stimulus in stimuli)
-    return with_alternatives(predict(analysis, (recording if blind else revealed(recording)).plan, options)).to_dict()
+    return _predicted(analysis, (recording if blind else revealed(recording)).plan, options, lambda _: True).to_dict()
+
+
+def _predicted(
+    analysis: Analysis, plan: SessionPlan, options: PredictionOptions | None, progress: Progress
+) -> SessionPrediction:
+    """Return the prediction with all that its options ask for beside it."""
+    parts = 1 + (options is not None and options.beside != "none") + (options is not None and options.intervals)
+
+    def part(number: int) -> Progress:
+        return lambda done: progress((number + done) / parts)
+
+    prediction = with_alternatives(predict(analysis, plan, options, part(0)), part(1))
+    return with_intervals(analysis, prediction, progress=part(parts - 1))
 
 
 def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = None) -> dict[str, Any]:

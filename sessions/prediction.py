@@ -13,6 +13,7 @@ from sessions.analysis import Analysis, FrictionParameters, Stroke
 from sessions.analysis.area import FIXED, AreaLaw
 from sessions.decisions import Decision
 from sessions.plan import DISTAL_TO_PROXIMAL, PROXIMAL_TO_DISTAL, Block, SessionPlan, Stimulus, Trial
+from sessions.sed_interval import SedInterval
 from solver.failures import SolveFailure
 from solver.fields import Fields, fields_of
 from solver.finger import FingerModel
@@ -41,6 +42,7 @@ class PredictionOptions:
     indentation: float | None = None  # [mm], instead of each block's own
     course: Literal["steady", "history"] = "history"
     kinematics: Literal["small", "finite"] = "small"
+    intervals: bool = False  # also what the uncertainty of friction makes of each SED, see `sessions.uncertainty`
     beside: Literal["none", "small", "both"] = "none"  # also otherwise, see `sessions.side_by_side`; at which strain
 
 
@@ -106,6 +108,7 @@ class SessionPrediction:
     options: PredictionOptions
     decisions: tuple[Decision, ...] = ()  # of people about the strokes, in force
     area: AreaLaw = FIXED  # by which tau_max was told
+    intervals: tuple[SedInterval, ...] = ()  # of each trial's SED, where they were asked for
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, None where honesty allows no number."""
@@ -114,6 +117,7 @@ class SessionPrediction:
             "trials": [trial.to_dict() for trial in self.trials],
             "decisions": [decision.to_dict() for decision in self.decisions],
             "area": asdict(self.area),
+            **({"sed_intervals": [one.to_dict() for one in self.intervals]} if self.options.intervals else {}),
             "width": self.width,
             "width_origin": self.width_origin,
             "options": asdict(self.options),

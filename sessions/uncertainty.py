@@ -5,8 +5,7 @@ state is missing at an end, the solver is run at draws themselves. Each interval
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +13,9 @@ from numpy.typing import NDArray
 from sessions.analysis import Analysis
 from sessions.analysis.bootstrap import BootstrapSettings, friction_draws
 from sessions.prediction import Progress, SessionPrediction, TrialPrediction, seds_with, tau_scale
+from sessions.sed_interval import SedInterval
 
 Array = NDArray[np.float64]
-Method = Literal["derivatives", "sampling"]
 
 SAMPLES = 60  # draws that are solved where derivatives do not suffice
 BEND = 0.1  # the SED goes straight where its middle lies within this share of its range off the chord [-]
@@ -24,22 +23,16 @@ _FLAT = 1e-5  # a bend below this share of the SED is of no account [-]
 _ENDS = (0.025, 0.975)
 
 
-@dataclass(frozen=True, slots=True)
-class SedInterval:
-    """The 95 % interval of one SED that friction alone makes: not the model's own error."""
-
-    trial: int | None
-    stroke: int | None
-    low: float | None  # [MPa]; None where `reason` says why
-    high: float | None
-    method: Method | None
-    by_mu: float | None  # derivative of the SED by mu [MPa]
-    by_tau_max: float | None  # derivative of the SED by tau_max as the model gets it [-]
-    reason: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data."""
-        return asdict(self)
+def with_intervals(
+    analysis: Analysis,
+    prediction: SessionPrediction,
+    settings: BootstrapSettings | None = None,
+    progress: Progress | None = None,
+) -> SessionPrediction:
+    """Return a prediction with the interval of each SED where its options ask for them. Raises as `sed_intervals`."""
+    if not prediction.options.intervals:
+        return prediction
+    return replace(prediction, intervals=sed_intervals(analysis, prediction, settings, progress))
 
 
 def sed_intervals(

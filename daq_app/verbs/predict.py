@@ -15,11 +15,10 @@ from daq_app.console import Console, number, table
 from daq_app.derived import analysed, predicted, visit
 from sessions.afferent import AfferentSettings, parameters, session_firing, settings_with
 from sessions.alternative import Alternative
-from sessions.analysis import Analysis
 from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction
 from sessions.sealing import SEAL, seal_prediction
+from sessions.sed_interval import SedInterval
 from sessions.toml_file import load_toml
-from sessions.uncertainty import SedInterval, sed_intervals
 from solver.scene import Scene
 
 EXAMPLE = "daq-app predict recordings/P07 --tau as-printed"
@@ -88,15 +87,15 @@ def run(options: argparse.Namespace, console: Console) -> int:
         indentation=options.indentation,
         kinematics=options.kinematics,
         beside=options.beside,
+        intervals=options.intervals,
     )
     recording = visit(options.session, options.subject)
     analysis = analysed(recording, console, area_law(options))
     prediction = predicted(recording, analysis, console, asked)
-    intervals = _intervals(analysis, prediction, console) if options.intervals else ()
+    intervals = prediction.intervals
     seal = {"sealed_sha256": seal_prediction(recording, prediction.to_dict())} if options.seal else {}
-    extra = {"sed_intervals": [one.to_dict() for one in intervals]} if options.intervals else {}
     firing = _firing(prediction, options) if options.afferent else {}
-    console.result({**prediction.to_dict(), **seal, **extra, **firing})
+    console.result({**prediction.to_dict(), **seal, **firing})
     if recording.simulated_sentence:
         console.say(recording.simulated_sentence)
     rows = [
@@ -157,14 +156,6 @@ def _cell(one: Alternative) -> str:
         return "–"
     beside = one.indentation if one.variant.driven == "force" else one.normal_force
     return f"{number(one.sed * 1e3, 4)} ({number(beside)})"
-
-
-def _intervals(analysis: Analysis, prediction: SessionPrediction, console: Console) -> tuple[SedInterval, ...]:
-    def shown(part: float) -> bool:
-        console.progress(0.99 * part, "carrying the uncertainty of friction through the solver")
-        return True
-
-    return sed_intervals(analysis, prediction, progress=shown)
 
 
 def _row(one: SedInterval) -> list[str]:

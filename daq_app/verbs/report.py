@@ -10,17 +10,15 @@ from daq_app.area_option import add_area, area_law
 from daq_app.console import Console
 from daq_app.derived import analysed, predicted, visit
 from sessions.afferent import AfferentSettings, session_firing
-from sessions.analysis import Analysis
 from sessions.blinding import revealed
 from sessions.paths import trial_paths
 from sessions.plan import Blinded
-from sessions.prediction import Progress, SessionPrediction
+from sessions.prediction import PredictionOptions, Progress, SessionPrediction
 from sessions.recording import Recording
 from sessions.recording.derived import store_page
 from sessions.report import Further
 from sessions.report.predictions import afferent_facts
 from sessions.study_file import is_study
-from sessions.uncertainty import sed_intervals
 from sessions.visits import score_visits
 
 PAGE = "report.html"
@@ -59,11 +57,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
         if one.plan.blinded:
             raise Blinded(f"{one.folder} is blinded: a report tells scores by index; 'daq-app unblind' opens the key")
     analysis = analysed(recording, console, area_law(options))
-    prediction = predicted(recording, analysis, console)
+    prediction = predicted(recording, analysis, console, PredictionOptions(intervals=True))
     from sessions.exports import html
     from sessions.report import findings, score_table
 
-    further = _further(recording, analysis, prediction, options, console)
+    further = _further(recording, prediction, options, console)
     report = findings(recording, analysis, prediction, [score_table(one) for one in others], further=further)
     console.progress(0.9, "drawing")
     if options.out is None:  # beside the recording it is one more thing made of it, and listed in its manifest
@@ -79,7 +77,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 def _further(
     recording: Recording,
-    analysis: Analysis,
     prediction: SessionPrediction,
     options: argparse.Namespace,
     console: Console,
@@ -93,10 +90,9 @@ def _further(
 
         return tell
 
-    intervals = sed_intervals(analysis, prediction, progress=shown("carrying the uncertainty of friction through"))
     reference, firing = session_firing(prediction) if options.afferent else (None, ())
     paths = None
     if options.paths is not None and recording.plan.forces:
         finite = options.paths == "finite"
         paths = trial_paths(recording, progress=shown("many paths of the analysis"), finite=finite)
-    return Further(intervals, firing, afferent_facts(AfferentSettings(), reference), paths)
+    return Further(prediction.intervals, firing, afferent_facts(AfferentSettings(), reference), paths)

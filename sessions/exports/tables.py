@@ -14,9 +14,12 @@ Cell = str | int | float | None
 AXES = (("Fx", "N"), ("Fy", "N"), ("Fz", "N"), ("Tx", "N mm"), ("Ty", "N mm"), ("Tz", "N mm"))
 _SUFFIXES = {"mm/s": "mm_per_s", "N/mm": "N_per_mm", "N mm": "Nmm", "mm2": "mm2"}
 _BOOTSTRAPPED = ("mu_static", "mu_dynamic", "mu_max", "tau_max", "speed")
-_PAIRS = {"steady": ("start", "stop"), "mu_interval": ("low", "high"), "mu_dynamic_interval": ("low", "high")} | {
-    f"{name}_bootstrap": ("low", "high") for name in _BOOTSTRAPPED
-}
+_PAIRS = {
+    "steady": ("start", "stop"),
+    "mu_interval": ("low", "high"),
+    "sed_interval": ("low", "high"),
+    "mu_dynamic_interval": ("low", "high"),
+} | {f"{name}_bootstrap": ("low", "high") for name in _BOOTSTRAPPED}
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +73,9 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
     if prediction is None:
         return made
     rows = [{k: v for k, v in row.items() if k not in ("solver", "alternatives")} for row in prediction["trials"]]
+    ends: Sequence[Mapping[str, Any]] = prediction.get("sed_intervals") or ()
+    for row, one in zip(rows, ends, strict=False):  # one for each trial, where they were asked for
+        row["sed_interval"] = None if one["low"] is None else (one["low"], one["high"])
     predicted = _of("predictions", "what the finite-element finger predicts for each trial", rows, _PREDICTION)
     otherwise = [
         {"trial": row["trial"], **one["variant"], **{k: v for k, v in one.items() if k != "variant"}}
@@ -317,6 +323,7 @@ _PREDICTION = {
     "direction": ("", "+1 proximal to distal, -1 back"),
     "speed": ("mm/s", "of the slide"),
     "sed": ("MPa", "strain-energy density averaged over the ending (mJ/mm3)"),
+    "sed_interval": ("MPa", "95 % interval of sed that the uncertainty of friction makes, where it was asked for"),
     "error_estimate": ("", "relative, of sed"),
     "normal_per_mm": ("N/mm", "the model's normal force"),
     "tangential_per_mm": ("N/mm", "the model's tangential force"),

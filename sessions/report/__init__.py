@@ -29,7 +29,7 @@ from sessions.report.experiments import experiments
 from sessions.report.predictions import fields, left_out, modelled, predicted_seds, predictions
 from sessions.report.strokes import course, flaws, strokes
 from sessions.sealing import NUMBERS, sealed_sentence
-from sessions.uncertainty import SedInterval
+from sessions.sed_interval import SedInterval
 
 __all__ = [
     "Answers",

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sessions.afferent import AfferentSettings, Firing, parameters
 from sessions.prediction import SessionPrediction, TrialPrediction
 from sessions.report.contents import Fact, Field, History, PredictionFinding
-from sessions.uncertainty import SedInterval
+from sessions.sed_interval import SedInterval
 
 _SCENE = {"finger": "mm, degrees", "materials": "E in MPa", "receptor": "mm"}  # what all trials share, with its units
 _READINGS = {
