@@ -41,10 +41,13 @@ class Tree:
     size: int  # number of unknowns, fixed ones included
 
     @staticmethod
-    def of(elements: Indices, centres: Array, fixed: Indices, kept: Indices, leaf: int = LEAF) -> "Tree":
+    def of(
+        elements: Indices, centres: Array, fixed: Indices, kept: Indices, leaf: int = LEAF, *, flat: bool = True
+    ) -> "Tree":
         """Plan the elimination for `elements` (e, n) of unknowns at `centres` (e, 2), at most `leaf` in a leaf.
 
-        Unknowns in `fixed` take no part (their displacement is zero); those in `kept` are passed on to the end.
+        Unknowns in `fixed` take no part (their displacement is zero); those in `kept` are passed on to the end. Without
+        `flat` the flat positions that `Reduced` needs are left out.
         """
         order, ranges, children = _halved(centres, leaf)
         position = np.empty(len(order), np.int64)
@@ -73,9 +76,9 @@ class Tree:
             where[inner] = np.arange(len(inner))
             where[border] = np.arange(len(inner), total)
             places = tuple(where[parts[c].border] for c in below)
-            spots = tuple((place[:, None] * total + place).ravel() for place in places)
+            spots = tuple((place[:, None] * total + place).ravel() for place in places) if flat else ()
             entries = np.empty(0, np.int64)
-            if not below:
+            if flat and not below:
                 at = np.where(free[mine], where[mine], -1)
                 both = (at[:, :, None] >= 0) & (at[:, None, :] >= 0)
                 entries = np.where(both, at[:, :, None] * total + at[:, None, :], total * total).ravel()

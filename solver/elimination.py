@@ -1,6 +1,7 @@
 """The order in which a symmetric body is eliminated down to its skin, as the arrays that the compiled loops ask for."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -41,57 +42,68 @@ class Plan:
 
     @staticmethod
     def of(mesh: Mesh) -> "Plan":
-        """Plan the elimination of `mesh`, the centres of its elements already eliminated inside them."""
-        raw = (2 * mesh.elements[:, :8, None] + np.arange(2)).reshape(-1, 16)
-        skin = (2 * mesh.skin[:, None] + np.arange(2)).ravel()
-        fixed = np.concatenate([2 * mesh.held, 2 * mesh.held + 1])
-        tree = Tree.of(raw, places(mesh.elements), fixed, skin, LEAF)
-        number = np.full(2 * len(mesh.nodes), -1)
-        sequence = np.concatenate([*(part.inner for part in tree.parts), skin])
-        number[sequence] = np.arange(len(sequence))
-        total = len(sequence)
-        borders = [np.sort(number[part.border]) for part in tree.parts]
-        inner = np.array([len(part.inner) for part in tree.parts])
-        border = np.array([len(b) for b in borders])
-        start = np.concatenate([[0], np.cumsum(inner)[:-1]])
-        border_at = np.concatenate([[0], np.cumsum(border)[:-1]])
-        place = np.zeros(int(border.sum()), np.int32)
-        children = np.full((len(border), 2), -1)
-        leaf = np.zeros((len(border), 2), np.int64)
-        at = np.full((len(tree.order), 16), -1)
-        where = np.full(total + 1, -1)  # the last place is that of fixed unknowns, whose number is -1
-        number[fixed] = -1
-        for p, part in enumerate(tree.parts):
-            where[start[p] : start[p] + inner[p]] = np.arange(inner[p])
-            where[borders[p]] = inner[p] + np.arange(border[p])
-            if part.children:
-                children[p] = part.children
-                for child in part.children:
-                    place[border_at[child] : border_at[child] + border[child]] = where[borders[child]]
-            else:
-                leaf[p] = part.elements.start, part.elements.stop
-                at[part.elements] = where[number[raw[tree.order[part.elements]]]]
-        sizes = inner * (inner + border)
-        wait_at, waiting = _waiting(children, border)
-        return Plan(
-            unknown=_narrow(number[raw]),
-            size=total,
-            start=_narrow(start),
-            inner=_narrow(inner),
-            border=_narrow(border),
-            children=_narrow(children),
-            border_at=_narrow(border_at),
-            numbers=_narrow(np.concatenate(borders)),
-            place=place,
-            run=_narrow(_runs(place, border)),
-            factor_at=np.cumsum(sizes) - sizes,
-            wait_at=wait_at,
-            leaf=_narrow(leaf),
-            order=_narrow(tree.order),
-            at=_narrow(at),
-            factors=int(sizes.sum()),
-            waiting=waiting,
-        )
+        """Plan the elimination of `mesh`, the centres of its elements already eliminated inside them.
+
+        It does not depend on where nodes lie, so the last plans are kept for meshes that differ in nothing else.
+        """
+        return _planned(len(mesh.nodes), mesh.elements.tobytes(), mesh.skin.tobytes(), mesh.held.tobytes())
+
+
+@lru_cache(maxsize=4)
+def _planned(count: int, *numbers: bytes) -> Plan:
+    """Return the plan for `count` nodes and the numbers of elements' nodes (e, 9), of the skin and of held ones."""
+    elements, skin_nodes, held = (np.frombuffer(part, np.int64) for part in numbers)
+    elements = elements.reshape(-1, 9)
+    raw = (2 * elements[:, :8, None] + np.arange(2)).reshape(-1, 16)
+    skin = (2 * skin_nodes[:, None] + np.arange(2)).ravel()
+    fixed = np.concatenate([2 * held, 2 * held + 1])
+    tree = Tree.of(raw, places(elements), fixed, skin, LEAF, flat=False)
+    number = np.full(2 * count, -1)
+    sequence = np.concatenate([*(part.inner for part in tree.parts), skin])
+    number[sequence] = np.arange(len(sequence))
+    total = len(sequence)
+    borders = [np.sort(number[part.border]) for part in tree.parts]
+    inner = np.array([len(part.inner) for part in tree.parts])
+    border = np.array([len(b) for b in borders])
+    start = np.concatenate([[0], np.cumsum(inner)[:-1]])
+    border_at = np.concatenate([[0], np.cumsum(border)[:-1]])
+    place = np.zeros(int(border.sum()), np.int32)
+    children = np.full((len(border), 2), -1)
+    leaf = np.zeros((len(border), 2), np.int64)
+    at = np.full((len(tree.order), 16), -1)
+    where = np.full(total + 1, -1)  # the last place is that of fixed unknowns, whose number is -1
+    number[fixed] = -1
+    for p, part in enumerate(tree.parts):
+        where[start[p] : start[p] + inner[p]] = np.arange(inner[p])
+        where[borders[p]] = inner[p] + np.arange(border[p])
+        if part.children:
+            children[p] = part.children
+            for child in part.children:
+                place[border_at[child] : border_at[child] + border[child]] = where[borders[child]]
+        else:
+            leaf[p] = part.elements.start, part.elements.stop
+            at[part.elements] = where[number[raw[tree.order[part.elements]]]]
+    sizes = inner * (inner + border)
+    wait_at, waiting = _waiting(children, border)
+    return Plan(
+        unknown=_narrow(number[raw]),
+        size=total,
+        start=_narrow(start),
+        inner=_narrow(inner),
+        border=_narrow(border),
+        children=_narrow(children),
+        border_at=_narrow(border_at),
+        numbers=_narrow(np.concatenate(borders)),
+        place=place,
+        run=_narrow(_runs(place, border)),
+        factor_at=np.cumsum(sizes) - sizes,
+        wait_at=wait_at,
+        leaf=_narrow(leaf),
+        order=_narrow(tree.order),
+        at=_narrow(at),
+        factors=int(sizes.sum()),
+        waiting=waiting,
+    )
 
 
 def _narrow(numbers: Indices) -> Narrow:
