@@ -79,7 +79,7 @@ class Outline:
         up = y * cos(angle) - x * sin(angle) + self.finger.tip_radius
         return np.stack([across, up], axis=-1)
 
-    def along(self, arc: float, depth: float, distance: Array) -> Array:
+    def along(self, arc: Array | float, depth: float, distance: Array | float) -> Array:
         """Return the arc positions that lie `distance` from `arc`, measured at `depth` below the skin.
 
         On the tip's arc a length at depth 1.9 is 3.1/5 of the skin's above it; on straight skin they are equal.
@@ -92,4 +92,4 @@ class Outline:
         below = np.array([self.palmar - self.finger.shaft_length, self.palmar, 0.0, 0.0])
         below[2] = self.palmar + ratio * (self.dorsal - self.palmar)
         below[3] = below[2] + self.finger.shaft_length
-        return np.interp(np.interp(arc, skin, below) + distance, below, skin)
+        return np.asarray(np.interp(np.interp(arc, skin, below) + distance, below, skin))

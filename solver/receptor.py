@@ -46,19 +46,19 @@ def endings(finger: FingerMesh, elements: Centred, receptor: Receptor, arcs: Arr
     depth_lines = np.unique(np.concatenate([finger.depths, [receptor.depth - across / 2, receptor.depth + across / 2]]))
     inside = np.abs(depth_lines - receptor.depth) <= across / 2 * (1 + 1e-12)
     depth_lines = depth_lines[inside]
-    places: list[Array] = []
-    for number, arc in enumerate(arcs):
-        low, high = outline.along(float(arc), receptor.depth, np.array([-along / 2, along / 2]))
-        if outline.palmar_cut + 1e-9 < low and high < outline.dorsal_cut - 1e-9:
-            lines = np.concatenate([[low], finger.arcs[(finger.arcs > low) & (finger.arcs < high)], [high]])
-            places.append(_pieces(lines, depth_lines, number))
-    if not places:
-        places = [np.zeros((0, 4))]
-    arc, depth, area, patch = np.concatenate(places).T
+    low, high = (outline.along(arcs, receptor.depth, side * along / 2) for side in (-1.0, 1.0))
+    reaches = (outline.palmar_cut + 1e-9 < low) & (high < outline.dorsal_cut - 1e-9)
+    start, stop = np.maximum(low[:, None], finger.arcs[:-1]), np.minimum(high[:, None], finger.arcs[1:])
+    patch, piece = np.nonzero((start < stop) & reaches[:, None])
+    arc, arc_weight = _gauss(start[patch, piece], stop[patch, piece])
+    depth, depth_weight = _gauss(depth_lines[:-1], depth_lines[1:])
+    area = (arc_weight[:, None] * depth_weight).ravel()
+    patch = np.repeat(patch, len(_POINTS) * len(depth))
+    arc, depth = np.repeat(arc, len(depth)), np.tile(depth, len(arc))
     # a length on the tip's arc shrinks with the depth
     curved = (arc > outline.palmar) & (arc < outline.dorsal)
     area = area * np.where(curved, 1.0 - depth / outline.finger.tip_radius, 1.0)
-    return Endings(_probes(finger, elements, arc, depth), area, patch.astype(np.int64), len(arcs))
+    return Endings(_probes(finger, elements, arc, depth), area, patch, len(arcs))
 
 
 def middle(finger: FingerMesh, elements: Centred, receptor: Receptor) -> Endings:
@@ -68,19 +68,10 @@ def middle(finger: FingerMesh, elements: Centred, receptor: Receptor) -> Endings
     return Endings(_probes(finger, elements, arc, depth), np.full(4, 0.25), np.zeros(4, np.int64), 1)
 
 
-def _pieces(arc_lines: Array, depth_lines: Array, number: int) -> Array:
-    """Return Gauss points (q, 4) of a patch cut along the lines: arc, depth, weight, number of the patch."""
-    arc, arc_weight = _gauss(arc_lines)
-    depth, depth_weight = _gauss(depth_lines)
-    a, d = np.meshgrid(arc, depth, indexing="ij")
-    weight = arc_weight[:, None] * depth_weight
-    return np.stack([a.ravel(), d.ravel(), weight.ravel(), np.full(a.size, number)], axis=1)
-
-
-def _gauss(lines: Array) -> tuple[Array, Array]:
-    """Return the Gauss points and weights of each interval between `lines`."""
-    half = np.diff(lines)[:, None] / 2.0
-    return (lines[:-1, None] + half * (1.0 + _POINTS)).ravel(), (half * _WEIGHTS).ravel()
+def _gauss(start: Array, stop: Array) -> tuple[Array, Array]:
+    """Return the Gauss points and weights (3 n,) of the intervals between `start` and `stop` (n,)."""
+    half = (stop - start)[:, None] / 2.0
+    return (start[:, None] + half * (1.0 + _POINTS)).ravel(), (half * _WEIGHTS).ravel()
 
 
 def _probes(finger: FingerMesh, elements: Centred, arc: Array, depth: Array) -> Probes:
