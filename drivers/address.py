@@ -59,4 +59,5 @@ def check_options(address: Address, allowed: frozenset[str]) -> None:
     """Raise SetupError when the address has an option that is not `allowed`."""
     for option in address.options:
         if option not in allowed:
-            raise AddressError(f"{address.uri}: unknown option {option!r}; allowed are {', '.join(sorted(allowed))}")
+            known = ", ".join(sorted(allowed | {"tool"}))  # which every transducer takes, see `drivers.tool`
+            raise AddressError(f"{address.uri}: unknown option {option!r}; allowed are {known}")

@@ -126,7 +126,8 @@ def _info(
             "calibration": f"{file.calibration.source}, SHA-256 {file.sha256}",
             "constants": f"{constants.positive_slope!r} V above and {constants.negative_slope!r} V below "
             f"code {constants.centre!r}, as the converter states them",
-            "gauges": "differential pairs 0-1 to 10-11, +-10 V, resolution index 1, settling time its own choice",
+            "gauges": "differential pairs 0-1 to 10-11, +-10 V, resolution index 1, settling time its own choice; "
+            "accepted when a stream begins, and not to be read back",
             "bias": "none in the device",
             "filter": "none",
             "time": "the converter's own clock; gauges of one reading are converted one after the other",

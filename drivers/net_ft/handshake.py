@@ -118,7 +118,9 @@ def _commanded(place: Where, found: Configuration) -> dict[str, str]:
     done: dict[str, str] = {}
     if place.reset_latch:
         _wrench(place, wire.RESET_LATCH)
-        done["monitor condition latch"] = "reset at opening, as the address asks"
+        still = wire.is_latched(_tcp(place, wire.READ_WRENCH, 16))
+        read_back = "and latched again: its condition holds" if still else "and read back as not latched"
+        done["monitor condition latch"] = f"reset at opening, as the address asks, {read_back}"
     if place.set_bias:
         _wrench(place, wire.SET_BIAS)
         time.sleep(_SETTLING)

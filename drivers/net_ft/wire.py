@@ -133,6 +133,15 @@ def parse_wrench(answer: bytes) -> tuple[int, ...] | None:
     return _WRENCH.unpack(answer)[2:]
 
 
+def is_latched(answer: bytes) -> bool:
+    """Tell whether the status that comes with such an answer, its upper half, says that a condition is latched.
+
+    >>> is_latched(bytes.fromhex("1234 8001" + "0000" * 6)), is_latched(bytes.fromhex("1234 0000" + "0000" * 6))
+    (True, False)
+    """
+    return len(answer) == _WRENCH.size and bool(_WRENCH.unpack(answer)[1] & 1)
+
+
 @dataclass(frozen=True, slots=True)
 class Units:
     """How the TCP port counts."""

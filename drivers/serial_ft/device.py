@@ -98,7 +98,7 @@ def _info(place: _Where, baud: int, said: str, rate: float) -> TransducerInfo:
         "baud": f"{baud}, {'as the address says' if len(place.bauds) == 1 else 'found by trying'}",
         "output": "binary, without checksum" if place.binary else "ASCII, without checksum",
         "bias": "all biases of the controller dropped when a stream begins",
-        "filter": "no moving average",
+        "filter": "no moving average; set, answered with a prompt, and not to be read back",
         "units": "counts per N and N-m as the address says; the controller cannot be asked",
         "time": "host arrival at the measured rate; the controller has no clock or record number, "
         f"and a loss shorter than {GAP:g} s that leaves no broken bytes is not noticed",

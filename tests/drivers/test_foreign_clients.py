@@ -1,6 +1,7 @@
 """Simulated boxes as other people's clients see them, so that one misreading of a manual is not made twice.
 
-The LabJack U6 is read by its maker's client in tests/drivers/labjack_u6.
+The LabJack U6 is read by its maker's client in tests/drivers/labjack_u6. No kept package reads the stand-alone
+controller, nor the stream of the RS-485 transducer.
 """
 
 import contextlib

@@ -106,7 +106,8 @@ def test_a_bias_is_set_where_the_address_asks_for_it_and_told():
 
 def test_a_latch_is_reset_where_the_address_asks_for_it_and_told(served):
     info = open_transducer(f"{served().uri}&latch=reset", CLOCK).info
-    assert info.settings["monitor condition latch"] == "reset at opening, as the address asks"
+    told = info.settings["monitor condition latch"]
+    assert told == "reset at opening, as the address asks, and read back as not latched"
     with pytest.raises(SetupError, match="latch=maybe must be keep or reset"):
         open_transducer(f"{served().uri}&latch=maybe", CLOCK)
 
