@@ -141,12 +141,12 @@ class LivePanel(QFrame):
         now = self._held if self._held is not None else newest
         if now is None or newest is None:
             now, marks = 0.0, ()
-        width = max(self.plots[0].width(), 100)
+        count = self._columns()
         seen = tuple(mark for mark in marks if mark.stop >= now - self._seconds and mark.start <= now)
-        drawn = (trace, now, self._seconds, width, seen)
+        drawn = (trace, now, self._seconds, count, seen)
         if drawn != self._drawn:
             self._drawn = drawn
-            columns = trace.columns(now - self._seconds, np.nextafter(now, np.inf), width)
+            columns = trace.columns(now - self._seconds, np.nextafter(now, np.inf), count)
             for plot in self.plots:
                 if plot.isVisible():
                     plot.show_columns(columns, now, seen, clock)
@@ -165,11 +165,15 @@ class LivePanel(QFrame):
         for said in self._model.poll():
             self._model_trace.add(said)
 
+    def _columns(self) -> int:
+        """Return how many columns a curve has: two pixels each, as its line is wide."""
+        return max(self.plots[0].width() // 2, 100)
+
     def _draw_model(self, now: float, clock: float) -> None:
         """Draw what the model says: of the last stroke once it was solved in full, or else of this moment."""
         if self._model_plot.isVisible():
-            last, count = np.nextafter(now, np.inf), max(self._model_plot.width(), 100)
-            columns = self._model_trace.columns(now - self._seconds, last, count)
+            last = np.nextafter(now, np.inf)
+            columns = self._model_trace.columns(now - self._seconds, last, self._columns())
             self._model_plot.show_columns(columns, now, (), clock)
         if not self.finger.isVisible() or self.holding:
             return
