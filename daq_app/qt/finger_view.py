@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from daq_app.live_model import Picture
 from daq_app.plot_scale import PlotScale
 from daq_app.qt.indicators import paint_lost
-from daq_app.qt.shapes import faces, lines
+from daq_app.qt.shapes import draw_line, faces, fine
 from daq_app.qt.tokens import MODEL, SMALL, Tokens, font
 from daq_app.view_model import ModelWords
 from solver.receptor import ROW
@@ -21,7 +21,7 @@ PART = 0.62  # of the height that the finger takes; the row has the rest
 # The colour map magma (van der Walt and Smith, 2015), from its light end to a fifth before its dark one.
 MAGMA = ("#fcfdbf", "#fecf92", "#fe9f6d", "#f7705c", "#de4968", "#b5367a", "#8c2981", "#641a80", "#3b0f70")
 WORDS = 0.45  # of the height, at most, that a sentence takes
-SHADES = 32
+SHADES = 20
 EVERY = 1 / 30  # no new picture sooner after another: nobody sees more [s]
 TOP = 0.97  # of the faces' SED lies below the end of the colour scale
 
@@ -102,9 +102,8 @@ class FingerView(QWidget):
         if picture is not None:
             self._paint_faces(painter, picture, placed(picture.nodes))
             style = Qt.PenStyle.SolidLine if self._words.state == "settled" else Qt.PenStyle.DashLine
-            painter.setPen(QPen(QColor(self._tokens.text), 1.5, style))
-            for piece in lines(*placed(picture.outline).T):
-                painter.drawPolyline(piece)
+            painter.setPen(fine(self._tokens.text, style))
+            draw_line(painter, *placed(picture.outline).T)
             if picture.lost is not None:
                 x, y = placed(np.array([picture.lost]))[0].tolist()
                 paint_lost(painter, QPointF(x, y), self._tokens)
@@ -119,13 +118,12 @@ class FingerView(QWidget):
     def _paint_faces(self, painter: QPainter, picture: Picture, places: Array) -> None:
         """Paint the faces, those of one shade at once."""
         part = np.clip(np.nan_to_num(1000.0 * picture.sed / self._colours.high), 0.0, 1.0)
-        shade = (part * (SHADES - 1)).astype(int)
+        shade = (part * (SHADES - 1)).astype(np.int64)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
         painter.setPen(Qt.PenStyle.NoPen)
-        numbers: list[int] = np.unique(shade).tolist()
-        for number in numbers:
+        for number, path in faces(places[picture.faces], shade):
             painter.setBrush(_COLOURS[number])
-            painter.drawPath(faces(places[picture.faces[shade == number]]))
+            painter.drawPath(path)
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
 
@@ -156,9 +154,8 @@ class FingerView(QWidget):
         x = plot.left() + plot.width() * across[known]
         y = plot.bottom() - plot.height() * self._row[known] / self._heights.high
         style = Qt.PenStyle.SolidLine if self._words.state == "settled" else Qt.PenStyle.DashLine
-        painter.setPen(QPen(QColor(MODEL), 2, style))
-        for piece in lines(x, y):
-            painter.drawPolyline(piece)
+        painter.setPen(fine(MODEL, style))
+        draw_line(painter, x, y)
 
 
 def _alike(one: Picture | None, other: Picture | None) -> bool:

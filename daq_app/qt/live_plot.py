@@ -16,7 +16,7 @@ from daq_app.course_state import Mark
 from daq_app.live_trace import CHANNELS, Columns
 from daq_app.plot_scale import MARGIN, PlotScale, ticks, times
 from daq_app.qt.curve import Curve
-from daq_app.qt.shapes import lines
+from daq_app.qt.shapes import draw_line, fine
 from daq_app.qt.tokens import SMALL, Tokens, font
 
 Array = NDArray[np.float64]
@@ -109,14 +109,8 @@ class LivePlot(QWidget):
             if curve.dashed:
                 # Dashes belong to the readings, and move with them.
                 y = np.where(np.floor(self._columns.time * DASHES / self._seconds) % 3 < 2, y, np.nan)
-            pieces = lines(x, np.clip(y, -FAR, FAR))
-            painter.setPen(_fine(self._colour(curve.colour)))
-            # Twice, a pixel apart: a pen of two pixels takes a hundred times as long.
-            for down in (0.0, 1.0 / ratio):
-                painter.translate(0.0, down)
-                for piece in pieces:
-                    painter.drawPolyline(piece)
-            painter.translate(0.0, -1.0 / ratio)
+            painter.setPen(fine(self._colour(curve.colour)))
+            draw_line(painter, x, np.clip(y, -FAR, FAR))
 
     def _anew(self) -> None:
         self._ground = None
@@ -143,7 +137,7 @@ class LivePlot(QWidget):
         inside = self._inside()
         self._paint_values(painter, inside)
         self._paint_times(painter, inside)
-        painter.setPen(_fine(self._tokens.line))
+        painter.setPen(fine(self._tokens.line))
         painter.drawLine(inside.topLeft(), inside.bottomLeft())
         painter.drawLine(inside.bottomLeft(), inside.bottomRight())
         self._paint_names(painter, inside)
@@ -157,7 +151,7 @@ class LivePlot(QWidget):
             y = inside.bottom() - (value - low) * inside.height() / (high - low)
             faint = QColor(self._tokens.line)
             faint.setAlpha(110)
-            painter.setPen(_fine(faint))
+            painter.setPen(fine(faint))
             painter.drawLine(QPointF(inside.left(), y), QPointF(inside.right(), y))
             painter.setPen(QColor(self._tokens.quiet))
             top = min(max(y - line / 2.0, 0.0), self.height() - line)
@@ -169,7 +163,7 @@ class LivePlot(QWidget):
         widest = metrics.horizontalAdvance("−00 s ")
         for value in times(self._seconds, inside.width() / widest):
             x = inside.right() + value * inside.width() / self._seconds
-            painter.setPen(_fine(self._tokens.line))
+            painter.setPen(fine(self._tokens.line))
             painter.drawLine(QPointF(x, inside.bottom()), QPointF(x, inside.bottom() - 4))
             if not self._times_shown:
                 continue
@@ -211,12 +205,12 @@ class LivePlot(QWidget):
                 fill = QColor(self._tokens.act)
                 fill.setAlpha(36)
                 painter.fillRect(QRectF(start, inside.top(), stop - start, inside.height()), fill)
-                painter.setPen(_fine(self._tokens.act, Qt.PenStyle.DotLine))
+                painter.setPen(fine(self._tokens.act, Qt.PenStyle.DotLine))
                 painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
                 painter.drawLine(QPointF(stop, inside.top()), QPointF(stop, inside.bottom()))
                 continue
             onset = mark.kind == "onset"
-            painter.setPen(_fine(self._tokens.quiet, Qt.PenStyle.SolidLine if onset else Qt.PenStyle.DashLine))
+            painter.setPen(fine(self._tokens.quiet, Qt.PenStyle.SolidLine if onset else Qt.PenStyle.DashLine))
             painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
             words = self._words[mark.kind]
             if inside.height() >= 3 * line:  # a lower plot has no room for words; the ones above it say them
@@ -234,13 +228,6 @@ def _range(values: Array, rows: Sequence[int]) -> tuple[float, float]:
         return np.inf, -np.inf
     least, greatest = float(np.fmin.reduce(chosen, axis=None)), float(np.fmax.reduce(chosen, axis=None))
     return (np.inf, -np.inf) if np.isnan(least) else (least, greatest)
-
-
-def _fine(colour: str | QColor, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:
-    """Return a pen one pixel of the screen wide, whatever the scaling."""
-    made = QPen(QColor(colour), 1, style)
-    made.setCosmetic(True)
-    return made
 
 
 def _number(value: float) -> str:

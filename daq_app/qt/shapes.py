@@ -1,17 +1,40 @@
 """Arrays as what a painter draws, without a Python object for each point."""
 
+from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QByteArray, QDataStream
-from PySide6.QtGui import QPainterPath, QPolygonF
+from PySide6.QtCore import QByteArray, QDataStream, Qt
+from PySide6.QtGui import QColor, QPainter, QPainterPath, QPen, QPolygonF
 from shiboken6 import VoidPtr
 
 Array = NDArray[np.float64]
 
 _ELEMENT = np.dtype([("kind", ">i4"), ("x", ">f8"), ("y", ">f8")])  # of a path in Qt's own serial form
 _TAIL = (0).to_bytes(4, "big") + (1).to_bytes(4, "big")  # where the last part begins; overlaps are filled
+
+
+def fine(colour: str | QColor, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:
+    """Return a pen one pixel of the screen wide, whatever the scaling."""
+    made = QPen(QColor(colour), 1, style)
+    made.setCosmetic(True)
+    return made
+
+
+def draw_line(painter: QPainter, x: Array, y: Array) -> None:
+    """Draw the line through points (n,) with a fine pen, two pixels of the screen high.
+
+    It is drawn twice, a pixel apart: a pen of two pixels takes a hundred times as long.
+    """
+    pieces = lines(x, y)
+    pixel = 1.0 / painter.device().devicePixelRatio()
+    for down in (0.0, pixel):
+        painter.translate(0.0, down)
+        for piece in pieces:
+            painter.drawPolyline(piece)
+    painter.translate(0.0, -pixel)
 
 
 def lines(x: Array, y: Array) -> list[QPolygonF]:
@@ -31,16 +54,18 @@ def _polygon(points: Array) -> QPolygonF:
     return made
 
 
-def faces(corners: Array) -> QPainterPath:
-    """Return closed polygons (f, k, 2), to be filled at once."""
-    made = QPainterPath()
-    count, each = corners.shape[:2]
-    if not count:
-        return made
-    elements = np.empty((count, each), _ELEMENT)
+def faces(corners: Array, shades: NDArray[np.int64]) -> Iterator[tuple[int, QPainterPath]]:
+    """Return closed polygons (f, k, 2) as one path for each of their shades (f,), to be filled at once."""
+    order = np.argsort(shades, kind="stable")
+    sorted_shades = shades[order]
+    elements = np.empty(corners.shape[:2], _ELEMENT)
     elements["kind"] = 1  # draws a line to it ...
     elements["kind"][:, 0] = 0  # ... or begins anew there
-    elements["x"], elements["y"] = corners[..., 0], corners[..., 1]
-    stream = QDataStream(QByteArray(elements.size.to_bytes(4, "big") + elements.tobytes() + _TAIL))
-    stream >> made  # pyright: ignore[reportUnusedExpression]  it reads into `made`
-    return made
+    elements["x"], elements["y"] = corners[order, :, 0], corners[order, :, 1]
+    edges = np.flatnonzero(np.diff(sorted_shades, prepend=-1, append=-1)).tolist()
+    for begin, end in pairwise(edges):
+        part = elements[begin:end]
+        made = QPainterPath()
+        stream = QDataStream(QByteArray(part.size.to_bytes(4, "big") + part.tobytes() + _TAIL))
+        stream >> made  # pyright: ignore[reportUnusedExpression]  it reads into `made`
+        yield int(sorted_shades[begin]), made

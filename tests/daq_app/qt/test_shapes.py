@@ -16,20 +16,24 @@ def test_a_line_is_broken_where_a_point_is_unknown_and_every_other_point_is_kept
     assert lines(np.empty(0), np.empty(0)) == []
 
 
-def test_faces_are_filled_and_what_they_surround_is_not():
+def test_faces_are_filled_each_in_its_shade_and_what_they_surround_is_not():
     picture = QImage(90, 90, QImage.Format.Format_RGB32)
     picture.fill(QColor("white"))
-    low, high = [10.0, 30.0, 60.0], [30.0, 60.0, 80.0]
-    squares = [(a, b, c, d) for a, c in zip(low, high, strict=True) for b, d in zip(low, high, strict=True)]
-    around = [corner for corner in squares if corner != (30.0, 30.0, 60.0, 60.0)]
-    corners = np.array([[(a, b), (c, b), (c, d), (a, d)] for a, b, c, d in around])
+    edges = {10.0: 30.0, 30.0: 60.0, 60.0: 80.0}
+    around = [(a, b) for a in edges for b in edges if (a, b) != (30.0, 30.0)]
+    corners = np.array([[(a, b), (edges[a], b), (edges[a], edges[b]), (a, edges[b])] for a, b in around])
     painter = QPainter(picture)
     painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor("black"))
-    painter.drawPath(faces(corners))
+    colours = {0: QColor("black"), 5: QColor("red")}
+    for shade, path in faces(corners, np.array([5 if a == 10.0 else 0 for a, _ in around])):
+        painter.setBrush(colours[shade])
+        painter.drawPath(path)
     painter.end()
-    black = {(x, y) for x in range(5, 90, 10) for y in range(5, 90, 10) if picture.pixelColor(x, y) == QColor("black")}
-    assert black == {(x, y) for x in range(15, 80, 10) for y in range(15, 80, 10)} - {
-        (x, y) for x in (35, 45, 55) for y in (35, 45, 55)
-    }
-    assert faces(np.empty((0, 4, 2))).isEmpty()
+
+    def expected(x, y):
+        inside = 10 < x < 80 and 10 < y < 80 and not (30 < x < 60 and 30 < y < 60)
+        return "white" if not inside else "red" if x < 30 else "black"
+
+    places = [(x, y) for x in range(5, 90, 10) for y in range(5, 90, 10)]
+    assert all(picture.pixelColor(x, y) == QColor(expected(x, y)) for x, y in places)
+    assert list(faces(np.empty((0, 4, 2)), np.empty(0, np.int64))) == []
