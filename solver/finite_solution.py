@@ -13,17 +13,19 @@ from solver import evidence, kernels_numpy
 from solver.climbing import Ascent, ascended, error_estimates
 from solver.failures import Cancelled, SolveFailure
 from solver.finite_finger import FiniteFinger
-from solver.finite_relaxing import RelaxingCourse
+from solver.finite_relaxing import RelaxingCourse, RelaxingNewton
 from solver.finite_states import PRESSES, course
 from solver.kernels import CAP, OPEN, SLIP, STICK
 from solver.mesh import Array
 from solver.mesher import Sizing
-from solver.newton import Shape
+from solver.newton import EQUILIBRIUM, Newton, Shape
 from solver.prediction import History, Prediction, Row, Skin
 from solver.receptor import ROW
 from solver.scene import Scene
 
 NAMES = {OPEN: "open", STICK: "stick", SLIP: "slip", CAP: "cap"}
+ROUGH = 1e-8  # unbalanced part of the forces from which displacements are corrected further [-]
+CORRECTIONS = 4  # at most
 
 Answer = Prediction | SolveFailure
 Progress = Callable[[float], bool]
@@ -76,11 +78,12 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         relaxing = RelaxingCourse(scene, finger, stop) if scene.materials.relax else None
         way = course(scene, finger, stop) if relaxing is None else relaxing.shapes
         shape = way[-1]
-    sed, normal, tangential = (float(number) for number in finger.numbers(shape))
     driven = scene.driven(shape.pull.depth)
     body = finger.newton.body
+    newton = finger.newton if relaxing is None else relaxing.newton
+    shape, checks = _balanced(newton, shape, lambda found: _audits(driven, finger, found, newton))
+    sed, normal, tangential = (float(number) for number in finger.numbers(shape))
     skin = _skin(finger, shape)
-    checks = _audits(driven, finger, shape, None if relaxing is None else relaxing.newton.excess(shape))
     if way and (relaxing is None or _sticking(shape) == 0.0):  # stuck and relaxing, the end depends on the way
         checks["course_against_direct"] = abs(finger.sed_ending(at.shape) / sed - 1.0)
     solved = perf_counter()
@@ -157,10 +160,36 @@ def _contact_width(skin: Skin) -> float:
     return float(high - low)
 
 
-def _audits(scene: Scene, finger: FiniteFinger, shape: Shape, excess: Array | None) -> dict[str, float]:
+def _balanced(
+    newton: Newton, shape: Shape, audits: Callable[[Shape], dict[str, float]]
+) -> tuple[Shape, dict[str, float]]:
+    """Return a state and its checks, its displacements so good that no force is left over but by round-off.
+
+    Displacements good to a part of a nanometre leave much of a light touch on a nearly incompressible body unbalanced.
+    """
+    checks = audits(shape)
+    for _ in range(CORRECTIONS):
+        if _unbalanced(checks) <= ROUGH:
+            break
+        x = shape.place(newton.body)[:, 0]
+        if not newton.linearise(shape, shape.pull, x):
+            break
+        after, _, changed = newton.moved(shape, shape.pull, newton.steps[:, EQUILIBRIUM].copy(), x)
+        better = audits(after)
+        if changed or not _unbalanced(better) < _unbalanced(checks):
+            break
+        shape, checks = after, better
+    return shape, checks
+
+
+def _unbalanced(checks: dict[str, float]) -> float:
+    return max(checks[name] for name in ("equilibrium_x", "equilibrium_y", "inner_forces"))
+
+
+def _audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: Newton) -> dict[str, float]:
     """Return the checks of one state. Perfect is 0, save for `smallest_det_F` (of displacement at quadrature points).
 
-    `excess` (e, 18) are the forces that tissue holds beyond its relaxed law.
+    `newton` is the finger's own, or that of its tissues as they relax.
 
     `equilibrium_x`, `equilibrium_y`: bone reaction plus contact force, by the contact force. `inner_forces`: largest
     unbalanced force on a node that is neither held nor touching. `penetration`, `tension`, `cone_violation`: as at
@@ -168,8 +197,8 @@ def _audits(scene: Scene, finger: FiniteFinger, shape: Shape, excess: Array | No
     """
     body, mesh = finger.newton.body, finger.geometry.mesh
     element_forces = kernels_numpy.forces(body, shape.u)
-    if excess is not None:
-        element_forces = element_forces + excess
+    if isinstance(newton, RelaxingNewton):
+        element_forces = element_forces + newton.excess(shape)
     inner = np.zeros(mesh.nodes.shape)
     np.add.at(inner, body.nodes, element_forces.reshape(-1, 9, 2))
     total = max(float(shape.force[1]), np.finfo(float).tiny)

@@ -9,34 +9,40 @@ from solver.mesh import Array
 
 def deformation(body: FiniteBody, u: Array) -> Array:
     """Return F (e, 9, 2, 2) at the quadrature points for displacements `u` (nodes, 2)."""
+    return np.eye(2) + _gradient(body, u)
+
+
+def _gradient(body: FiniteBody, u: Array) -> Array:
+    """Return F - 1 (e, 9, 2, 2) to its own digits, which stiff tissue multiplies."""
     gradient = np.stack([body.grad_x, body.grad_y], axis=-1)  # (e, q, 9, 2)
-    return np.eye(2) + np.einsum("eia,eqiA->eqaA", u[body.nodes], gradient)
+    return np.einsum("eia,eqiA->eqaA", u[body.nodes], gradient)
 
 
-def _logarithm(body: FiniteBody, F: Array) -> tuple[Array, Array]:
-    """Return J (e, 9) and the modes of ln J (e, 3)."""
-    J = np.linalg.det(F)
-    return J, np.einsum("eq,eqm,eq->em", body.weight, body.modes, np.log(J))
+def _logarithm(body: FiniteBody, H: Array) -> tuple[Array, Array]:
+    """Return ln J (e, 9) and its modes (e, 3) for F = 1 + H."""
+    log = np.log1p(np.trace(H, axis1=-2, axis2=-1) + np.linalg.det(H))
+    return log, np.einsum("eq,eqm,eq->em", body.weight, body.modes, log)
 
 
-def _excess(F: Array, J: Array) -> Array:
-    return np.sum(F * F, axis=(-2, -1)) - 2.0 - 2.0 * np.log(J)
+def _excess(H: Array, log: Array) -> Array:
+    return 2.0 * (np.trace(H, axis1=-2, axis2=-1) - log) + np.sum(H * H, axis=(-2, -1))
 
 
 def energy(body: FiniteBody, u: Array) -> float:
     """Return the energy stored in the body [N mm per mm]."""
-    F = deformation(body, u)
-    J, volume = _logarithm(body, F)
-    grown = shape(body.stiffening[:, None], _excess(F, J))
+    H = _gradient(body, u)
+    log, volume = _logarithm(body, H)
+    grown = shape(body.stiffening[:, None], _excess(H, log))
     return float(np.sum(body.weight * body.shear[:, None] / 2.0 * grown) + np.sum(body.lame / 2.0 * (volume**2).T))
 
 
 def forces(body: FiniteBody, u: Array) -> Array:
     """Return the internal forces (e, 18) of the elements, ordered x, y, x, y, ..."""
-    F = deformation(body, u)
-    J, volume = _logarithm(body, F)
+    H = _gradient(body, u)
+    F = np.eye(2) + H
+    log, volume = _logarithm(body, H)
     inverse = np.swapaxes(np.linalg.inv(F), -1, -2)
-    G = body.shear[:, None] * slopes(body.stiffening[:, None], _excess(F, J))[0]
+    G = body.shear[:, None] * slopes(body.stiffening[:, None], _excess(H, log))[0]
     pressure = body.lame[:, None] * (body.modes @ volume[:, :, None])[:, :, 0]
     stress = body.weight[:, :, None, None] * (
         G[:, :, None, None] * (F - inverse) + pressure[:, :, None, None] * inverse
@@ -50,12 +56,13 @@ def forces_and_tangents(body: FiniteBody, u: Array, pressure: Array) -> tuple[Ar
 
     `pressure` (e, 3) is what the geometric part of the tangent sees; the forces follow from `u` alone.
     """
-    F = deformation(body, u)
-    J = np.linalg.det(F)
+    H = _gradient(body, u)
+    F = np.eye(2) + H
+    log, _ = _logarithm(body, H)
     inverse = np.swapaxes(np.linalg.inv(F), -1, -2)
     gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
     w = body.weight
-    grown, growth = slopes(body.stiffening[:, None], _excess(F, J))
+    grown, growth = slopes(body.stiffening[:, None], _excess(H, log))
     G = body.shear[:, None] * grown
     spatial = np.einsum("eqaA,eqiA->eqia", inverse, gradient)  # gradients in the deformed body
     dilate = np.einsum("eq,eqm,eqia->emia", w, body.modes, spatial)

@@ -73,25 +73,26 @@ def assemble(
         stiffens = stiffening[e] != PLAIN
         for q in range(9):
             gx, gy = grad_x[e, q], grad_y[e, q]
-            f00, f01, f10, f11 = 1.0, 0.0, 0.0, 1.0
+            h00, f01, f10, h11 = 0.0, 0.0, 0.0, 0.0
             for i in range(9):
-                f00 += ux[i] * gx[i]
+                h00 += ux[i] * gx[i]
                 f01 += ux[i] * gy[i]
                 f10 += uy[i] * gx[i]
-                f11 += uy[i] * gy[i]
-            j = f00 * f11 - f01 * f10
+                h11 += uy[i] * gy[i]
+            grown = h00 + h11 + h00 * h11 - f01 * f10  # det F - 1, to its own digits: stiff tissue multiplies them
+            f00, f11, j = 1.0 + h00, 1.0 + h11, 1.0 + grown
             least = min(least, j)
             if not j > 0.0:
                 return least
             w = weight[e, q]
             wide[q, 0], wide[q, 1], wide[q, 2] = w * modes[e, q, 0], w * modes[e, q, 1], w * modes[e, q, 2]
-            log = np.log(j)
+            log = np.log1p(grown)
             v0 += wide[q, 0] * log
             v1 += wide[q, 1] * log
             v2 += wide[q, 2] * log
             wg = w * shear[e]
             if stiffens:
-                excess = f00 * f00 + f01 * f01 + f10 * f10 + f11 * f11 - 2.0 - 2.0 * log
+                excess = 2.0 * (h00 + h11 - log) + h00 * h00 + f01 * f01 + f10 * f10 + h11 * h11
                 grown, growth = stiffened(stiffening[e], excess)
                 more[q] = 2.0 * growth * wg
                 wg *= grown
@@ -207,24 +208,25 @@ def forces(
         v0 = v1 = v2 = 0.0
         for q in range(9):
             gx, gy = grad_x[e, q], grad_y[e, q]
-            f00, f01, f10, f11 = 1.0, 0.0, 0.0, 1.0
+            h00, f01, f10, h11 = 0.0, 0.0, 0.0, 0.0
             for i in range(9):
-                f00 += ux[i] * gx[i]
+                h00 += ux[i] * gx[i]
                 f01 += ux[i] * gy[i]
                 f10 += uy[i] * gx[i]
-                f11 += uy[i] * gy[i]
-            j = f00 * f11 - f01 * f10
+                h11 += uy[i] * gy[i]
+            grown = h00 + h11 + h00 * h11 - f01 * f10  # det F - 1, to its own digits: stiff tissue multiplies them
+            f00, f11, j = 1.0 + h00, 1.0 + h11, 1.0 + grown
             least = min(least, j)
             if not j > 0.0:
                 return least
             w = weight[e, q]
-            log = np.log(j)
+            log = np.log1p(grown)
             v0 += w * modes[e, q, 0] * log
             v1 += w * modes[e, q, 1] * log
             v2 += w * modes[e, q, 2] * log
             g = w * shear[e]
             if stiffening[e] != PLAIN:
-                excess = f00 * f00 + f01 * f01 + f10 * f10 + f11 * f11 - 2.0 - 2.0 * log
+                excess = 2.0 * (h00 + h11 - log) + h00 * h00 + f01 * f01 + f10 * f10 + h11 * h11
                 g *= stiffened(stiffening[e], excess)[0]
             a00, a01, a10, a11 = f11 / j, -f10 / j, -f01 / j, f00 / j
             inverse[q, 0], inverse[q, 1], inverse[q, 2], inverse[q, 3] = a00, a01, a10, a11
@@ -322,27 +324,29 @@ def energies(
         if e != seen:
             v0 = v1 = v2 = 0.0
             for q in range(9):
-                f00, f01, f10, f11 = 1.0, 0.0, 0.0, 1.0
+                h00, f01, f10, h11 = 0.0, 0.0, 0.0, 0.0
                 for i in range(9):
                     x, y = u[nodes[e, i], 0], u[nodes[e, i], 1]
-                    f00 += x * grad_x[e, q, i]
+                    h00 += x * grad_x[e, q, i]
                     f01 += x * grad_y[e, q, i]
                     f10 += y * grad_x[e, q, i]
-                    f11 += y * grad_y[e, q, i]
-                log = weight[e, q] * np.log(f00 * f11 - f01 * f10)
+                    h11 += y * grad_y[e, q, i]
+                log = weight[e, q] * np.log1p(h00 + h11 + h00 * h11 - f01 * f10)
                 v0 += log * modes[e, q, 0]
                 v1 += log * modes[e, q, 1]
                 v2 += log * modes[e, q, 2]
             seen = e
-        f00, f01, f10, f11 = 1.0, 0.0, 0.0, 1.0
+        h00, f01, f10, h11 = 0.0, 0.0, 0.0, 0.0
         for i in range(9):
             x, y = u[nodes[e, i], 0], u[nodes[e, i], 1]
-            f00 += x * at_x[p, i]
+            h00 += x * at_x[p, i]
             f01 += x * at_y[p, i]
             f10 += y * at_x[p, i]
-            f11 += y * at_y[p, i]
+            h11 += y * at_y[p, i]
         fit = at_modes[p, 0] * v0 + at_modes[p, 1] * v1 + at_modes[p, 2] * v2
-        excess = f00 * f00 + f01 * f01 + f10 * f10 + f11 * f11 - 2.0 - 2.0 * np.log(f00 * f11 - f01 * f10)
+        linear = h00 + h11
+        excess = 2.0 * (linear - np.log1p(linear + h00 * h11 - f01 * f10))
+        excess += h00 * h00 + f01 * f01 + f10 * f10 + h11 * h11
         if stiffening[e] != PLAIN:
             half = np.sinh(stiffening[e] / 2.0 * np.arcsinh(0.5 * np.sqrt(max(excess, 0.0))))
             excess = 16.0 / stiffening[e] ** 2 * half * half

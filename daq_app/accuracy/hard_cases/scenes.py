@@ -84,6 +84,7 @@ def _tissues(make: _Maker) -> list[HardScene]:
     return [
         *plain,
         *limit,
+        HardScene("nu 0.4999999 at 1e-05 mm", make(depth=1e-5, nu=0.4999999), ANSWER),
         HardScene("bone 1e10 times stiffer than fat", ratio, ANSWER, "nu 0.48", 1e-3),
         HardScene("epidermis 1e6 times stiffer than fat", stiff, EITHER, slow=True),
     ]
