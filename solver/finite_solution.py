@@ -36,10 +36,11 @@ def answers(
 ) -> list[Answer]:
     """Return the predictions of scenes, or why there is none, on meshes of that fineness.
 
-    `expected` is the depth [mm] that they reach, or about it where forces are given. Raises SceneError where the finger
-    cannot be meshed, Cancelled where `progress` (told the part done) says so.
+    Those pressed alike and moved the same way are solved one after the other, friction rising, each begun at the one
+    before. `expected` is the depth [mm] that they reach, or about it where forces are given. Raises SceneError where
+    the finger cannot be meshed, Cancelled where `progress` (told the part done) says so.
     """
-    found: list[Answer] = []
+    found: dict[int, Answer] = {}
     before: Ascent | None = None
     rough: dict[Sizing, FiniteFinger] = {}
 
@@ -52,8 +53,8 @@ def answers(
             rough[sizing] = FiniteFinger.of(scene, sizing)
         return rough[sizing]
 
-    for number, scene in enumerate(scenes):
-        part = number / len(scenes)
+    for number in sorted(range(len(scenes)), key=lambda number: _alike(scenes[number])):
+        scene, part = scenes[number], len(found) / len(scenes)
 
         def stop(part: float = part) -> bool:
             return progress is not None and not progress(part)
@@ -63,10 +64,15 @@ def answers(
         try:
             begun = perf_counter()
             before = ascended(scene, expected, fineness, stop, make, before)
-            found.append(_predicted(scene, before, fineness, stop, begun))
+            found[number] = _predicted(scene, before, fineness, stop, begun)
         except SolveFailure as failure:
-            found.append(failure)
-    return found
+            found[number] = failure
+    return [found[number] for number in range(len(scenes))]
+
+
+def _alike(scene: Scene) -> tuple[float, str, float]:
+    """Return what scenes are sorted by, so that neighbours are alike."""
+    return scene.loading.indentation or 0.0, str(scene.loading.slide), float(scene.friction.mu)
 
 
 def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[], bool], begun: float) -> Prediction:
