@@ -24,7 +24,8 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     options = parser.parse_args()
     print(f"load of this computer: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
-    _alone(options.repeats)
+    for kinematics in ("small", "finite"):
+        _alone(kinematics, options.repeats)
     for _ in range(options.repeats):
         _beside(options.seconds)
     print(f"load of this computer: {os.getloadavg()[0]:.1f}")
@@ -39,21 +40,22 @@ def _forces(seconds: float, rate: int) -> tuple[np.ndarray, np.ndarray]:
     return at, wrench
 
 
-def _alone(repeats: int) -> None:
+def _alone(kinematics: str, repeats: int) -> None:
     from daq_app.live_follower import Follower
     from daq_app.live_model import Forces, Use
 
-    follower = Follower(Use(None, "small"))
+    follower = Follower(Use(None, kinematics))
     at, wrench = _forces(5.0, 200)
     for size, name in ((1, "one picture a step"), (4, "a picture every four steps")):
         took = []
         for _ in range(repeats):
-            began = time.perf_counter()
+            began = time.process_time()
             for i in range(0, len(at), size):
                 part = slice(i, i + size)
                 follower.take(Forces(at[part], -wrench[part, 2], -wrench[part, 0], 0, 1))
-            took.append(time.perf_counter() - began)
-        print(f"alone, {name}: {len(at) / statistics.median(took):.0f} steps a second, median of {repeats}")
+            took.append(time.process_time() - began)
+        told = f"{len(at) / statistics.median(took):.0f} steps a second of the processor"
+        print(f"alone, {kinematics} strain, {name}: {told}, median of {repeats}")
 
 
 def _beside(seconds: float) -> None:

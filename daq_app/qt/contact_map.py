@@ -6,7 +6,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from daq_app.qt.shapes import lines
+from daq_app.qt.shapes import blank, lines
 from daq_app.qt.tokens import MU, SMALL, Tokens, font
 
 Array = NDArray[np.float64]
@@ -66,9 +66,8 @@ class ContactMap(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Copy the sample, and paint the trail upon it."""
-        ratio = self.devicePixelRatioF()
-        if self._ground is None or self._ground.devicePixelRatio() != ratio:
-            self._ground = self._painted_ground(ratio)
+        if self._ground is None or self._ground.devicePixelRatio() != self.devicePixelRatioF():
+            self._ground = self._painted_ground()
         painter = QPainter(self)
         painter.drawPixmap(0, 0, self._ground)
         per_mm = self._per_mm()
@@ -90,12 +89,10 @@ class ContactMap(QWidget):
         """Return how many pixels a millimetre has."""
         return min((self.height() - 2 * MARGIN) / ALONG, (self.width() - 2 * MARGIN) / ACROSS)
 
-    def _painted_ground(self, ratio: float) -> QPixmap:
+    def _painted_ground(self) -> QPixmap:
         """Return sample, grid, words and arrow."""
         t = self._tokens
-        made = QPixmap(round(self.width() * ratio), round(self.height() * ratio))
-        made.setDevicePixelRatio(ratio)
-        made.fill(QColor(t.surface))
+        made = blank(self, t.surface)
         per_mm = self._per_mm()
         if per_mm <= TOO_SMALL:
             return made

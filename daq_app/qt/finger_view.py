@@ -129,7 +129,7 @@ class FingerView(QWidget):
 
     def _paint_row(self, painter: QPainter, box: QRectF) -> None:
         line = painter.fontMetrics().height()
-        plot = box.adjusted(6, line, -6, -line)
+        plot = box.adjusted(6, 2, -6, -line)
         painter.setPen(QColor(self._tokens.quiet))
         painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop, "  SED along the skin [kPa]")
         painter.drawText(

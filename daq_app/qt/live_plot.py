@@ -16,7 +16,7 @@ from daq_app.course_state import Mark
 from daq_app.live_trace import CHANNELS, Columns
 from daq_app.plot_scale import MARGIN, PlotScale, ticks, times
 from daq_app.qt.curve import Curve
-from daq_app.qt.shapes import draw_line, fine
+from daq_app.qt.shapes import blank, draw_line, fine
 from daq_app.qt.tokens import SMALL, Tokens, font
 
 Array = NDArray[np.float64]
@@ -93,9 +93,8 @@ class LivePlot(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Copy what stands still, and draw the rest upon it."""
-        ratio = self.devicePixelRatioF()
-        if self._ground is None or self._ground.devicePixelRatio() != ratio:
-            self._ground = self._painted_ground(ratio)
+        if self._ground is None or self._ground.devicePixelRatio() != self.devicePixelRatioF():
+            self._ground = self._painted_ground()
         painter = QPainter(self)
         painter.drawPixmap(0, 0, self._ground)
         inside = self._inside()
@@ -127,11 +126,9 @@ class LivePlot(QWidget):
         beyond = MARGIN * (self._scale.high - self._scale.low)
         return self._scale.low - beyond, self._scale.high + beyond
 
-    def _painted_ground(self, ratio: float) -> QPixmap:
+    def _painted_ground(self) -> QPixmap:
         """Return axes, grid, numbers and names."""
-        made = QPixmap(round(self.width() * ratio), round(self.height() * ratio))
-        made.setDevicePixelRatio(ratio)
-        made.fill(QColor(self._tokens.surface))
+        made = blank(self, self._tokens.surface)
         painter = QPainter(made)
         painter.setFont(font(SMALL, self._type_scale))
         inside = self._inside()
@@ -213,7 +210,7 @@ class LivePlot(QWidget):
             painter.setPen(fine(self._tokens.quiet, Qt.PenStyle.SolidLine if onset else Qt.PenStyle.DashLine))
             painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
             words = self._words[mark.kind]
-            if inside.height() >= 3 * line:  # a lower plot has no room for words; the ones above it say them
+            if inside.height() >= 5 * line:  # a lower plot has no room for words; the ones above it say them
                 left = start - words.size().width() - 3 if onset else start + 3
                 painter.drawStaticText(QPointF(left, inside.top() + line), words)
 

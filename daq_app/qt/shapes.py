@@ -2,18 +2,29 @@
 
 from collections.abc import Iterator
 from itertools import pairwise
+from math import ceil
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QByteArray, QDataStream, Qt
-from PySide6.QtGui import QColor, QPainter, QPainterPath, QPen, QPolygonF
+from PySide6.QtGui import QColor, QPainter, QPainterPath, QPen, QPixmap, QPolygonF
+from PySide6.QtWidgets import QWidget
 from shiboken6 import VoidPtr
 
 Array = NDArray[np.float64]
 
 _ELEMENT = np.dtype([("kind", ">i4"), ("x", ">f8"), ("y", ">f8")])  # of a path in Qt's own serial form
 _TAIL = (0).to_bytes(4, "big") + (1).to_bytes(4, "big")  # where the last part begins; overlaps are filled
+
+
+def blank(widget: QWidget, colour: str) -> QPixmap:
+    """Return a picture as large as a widget, in the pixels of its screen: never a pixel short where scaling is odd."""
+    ratio = widget.devicePixelRatioF()
+    made = QPixmap(ceil(widget.width() * ratio), ceil(widget.height() * ratio))
+    made.setDevicePixelRatio(ratio)
+    made.fill(QColor(colour))
+    return made
 
 
 def fine(colour: str | QColor, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:
