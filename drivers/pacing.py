@@ -39,7 +39,7 @@ class Pacing:
         self._told = self._period
         self._limit = GAP * factor + 3.0 * self._period
         self._settle = _SETTLE * factor + self._period
-        self.watch = RateWatch(rate, factor, self._limit)
+        self.watch = RateWatch(rate, factor, self._limit, vague=2.0 * _SPREAD)
         self._count = 0  # records that came, broken ones too
         self._sequence = 0
         self._time = 0.0

@@ -9,14 +9,16 @@ COARSE, FINE = (1, 0.1), (3, 0.02)  # over so many windows, twice running, the r
 class RateWatch:
     """Watches one stream. Records reach the computer late, and never early: so of each window one is looked at."""
 
-    def __init__(self, rate: float, factor: float, silence: float) -> None:
+    def __init__(self, rate: float, factor: float, silence: float, vague: float = 0.0) -> None:
         """Expect `rate` counts a second [Hz] of a session clock that runs `factor` times real time.
 
         Across more than `silence` [s] without a record nothing is compared: something may have been lost in it.
+        `rate` was only measured for a moment where it is `vague`, by up to that share [-]: what is found first is it.
         """
         self.rate = rate  # as found last [Hz]
         self.found = 0  # how often it was found to be another than before
-        self._set = rate
+        self.asked = rate  # as set [Hz]
+        self._vague = vague
         self._window = WINDOW * factor
         self._silence = silence
         self._points: deque[tuple[int, float]] = deque(maxlen=2 * FINE[0] + 1)  # count and arrival, one a window
@@ -27,7 +29,7 @@ class RateWatch:
     @property
     def is_off(self) -> bool:
         """Tell whether the rate is another than the one set."""
-        return self.rate != self._set
+        return self.rate != self.asked
 
     def take(self, count: int, received_ns: int) -> bool:
         """Take how far the device has counted by something that arrived; tell whether its rate is found to be another.
@@ -64,12 +66,21 @@ class RateWatch:
             first, middle, last = (self._points[i] for i in (-1 - 2 * windows, -1 - windows, -1))
             before, after = (_rate(*pair) / self.rate - 1.0 for pair in ((first, middle), (middle, last)))
             if min(abs(before), abs(after)) > most and before * after > 0.0 and abs(after - before) < 0.5 * abs(after):
-                found = _rate(first, last)
-                self.rate = self._set if abs(found / self._set - 1.0) < most else found
-                self.found += 1
                 self._points.clear()
+                self._find(_rate(first, last), most)
                 return True
+            if windows == FINE[0]:
+                self._vague = 0.0  # it is as it was measured
         return False
+
+    def _find(self, found: float, most: float) -> None:
+        """Take another rate for true."""
+        if abs(found / self.asked - 1.0) < self._vague:
+            self.rate = self.asked = found
+        else:
+            self.rate = self.asked if abs(found / self.asked - 1.0) < most else found
+            self.found += 1
+        self._vague = 0.0
 
 
 def rate_words(what: str, found: float, asked: float) -> str:

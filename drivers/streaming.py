@@ -186,7 +186,7 @@ class StreamingTransducer(ThreadedTransducer):
                 restarted=self._restarted,
                 saturated=self._saturated,
                 off_rate=watch.found,
-                rate_words=rate_words("readings come", watch.rate, self._info.rate) if watch.found else "",
+                rate_words=rate_words("readings come", watch.rate, watch.asked) if watch.found else "",
                 lag_ms=self._lag_ms,
             )
 

@@ -344,7 +344,10 @@ def test_an_undisturbed_stream_is_whole(undisturbed, name):
     if name != "replay":
         assert health.lost == 0
         assert np.diff(block.sequence).tolist() == [1] * (len(block) - 1)
-        np.testing.assert_allclose(block.time[-1] / (len(block) - 1), 1.0 / course.info.rate, rtol=0.05)
+        passed = (block.received_ns[-1] - block.received_ns[0]) * 1e-9
+        assert block.time[-1] == pytest.approx(
+            passed, rel=0.05, abs=0.1 + 0.1 * simulator(name).factor
+        )  # both may have come late
     assert np.all(np.diff(block.time) > 0.0)
     assert np.all(np.diff(block.received_ns) >= 0)
 

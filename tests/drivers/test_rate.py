@@ -49,6 +49,16 @@ def test_a_rate_that_becomes_another_is_found_within_seconds_and_so_is_its_retur
     assert watch.found == 2
 
 
+def test_a_rate_that_was_only_measured_for_a_moment_is_put_right_without_a_word_and_watched_from_then_on():
+    made = np.cumsum(np.repeat([1.0, 2.0], [3000, 2000]) / 300.0)  # 10 s at 300 Hz, then half of it
+    watch = RateWatch(282.0, 1.0, 1.0, vague=0.1)
+    (_, right), (_, half) = watched(watch, np.arange(len(made)), late(made, jitter=0.004, stalls=0))
+    assert right == pytest.approx(300.0, rel=0.01)
+    assert watch.asked == right
+    assert half == pytest.approx(150.0, rel=0.02)
+    assert watch.found == 1
+
+
 def test_time_that_runs_faster_is_allowed_for():
     counted = np.arange(8000)
     watch = RateWatch(200.0, 10.0, 5.0)
