@@ -42,5 +42,6 @@ def tried(recording: Recording, decision: Decision, before: Decisions, now: Anal
 
 def _stands(stroke: Stroke, what: str) -> Value:
     if what == "stick":
-        return None if stroke.onset is None or stroke.break_away is None else (stroke.onset, stroke.break_away)
+        ended = stroke.break_away if stroke.stick_end is None else stroke.stick_end
+        return None if stroke.onset is None or ended is None else (stroke.onset, ended)
     return getattr(stroke, what)

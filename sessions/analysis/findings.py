@@ -11,7 +11,7 @@ LOADS = ("normal_force", "tangential_force", "peak_normal", "peak_tangential")
 PEAKS = ("mu_max", "tau_max", "contact_area", "peak_normal", "peak_tangential")
 SPEED = ("speed", "speed_error")
 DIRECTION = ("direction", "direction_from")
-EVERYTHING = (*COEFFICIENTS, *LOADS, *SPEED, *DIRECTION, "steady", "readings", "break_away")
+EVERYTHING = (*COEFFICIENTS, *LOADS, *SPEED, *DIRECTION, "steady", "readings", "break_away", "stick_end")
 
 
 @dataclass

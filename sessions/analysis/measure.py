@@ -10,6 +10,7 @@ from sessions.analysis.settings import AnalysisSettings
 from sessions.analysis.sliding import slide
 from sessions.analysis.span import Span, ZeroInForce
 from sessions.analysis.steady import mean_of
+from sessions.analysis.stick import stick_end
 from sessions.analysis.stroke import Stroke
 from sessions.analysis.track import Track, curve_of, mean_vector, track_of
 from sessions.decisions import Decided
@@ -50,6 +51,7 @@ def measured(
         if window is not None:
             _friction(found, track, window, zero, settings)
             _static_peak(found, track, window, zero, settings)
+            found.numbers["stick_end"] = stick_end(track.time[: window.stop], track.ratio[: window.stop], settings)
             _judge_way(found, track, window, settings)
         _take_decided(found, track, decided)
         _judge_drift(found, zero, settings)
@@ -257,7 +259,7 @@ def _take_decided(found: Findings, track: Track, decided: Decided) -> None:
         inside = track.ratio[(track.time >= stick[0]) & (track.time <= stick[1])]
         inside = inside[np.isfinite(inside)]
         if len(inside):
-            found.numbers |= {"mu_static": float(inside.max()), "break_away": stick[1]}
+            found.numbers |= {"mu_static": float(inside.max()), "break_away": stick[1], "stick_end": stick[1]}
             if found.reasons.get("mu_static") in _STICK_WITHOUT:
                 del found.reasons["mu_static"]
         else:

@@ -30,6 +30,8 @@ class AnalysisSettings:
     steady_shortest: float = 0.05  # ... and in time [s]
     static_share: float = 0.05  # a static peak stands so far above the 0.2 s after it [-] ...
     static_noise: float = 3.0  # ... and so many standard deviations of the noise of T/N [-]
+    stick_rise: float = 0.1  # a stick phase: T/N climbs by this share of its level before it stays there [-] ...
+    stick_left: float = 0.5  # ... and the climb leaves no more than this share of its variance [-]
     smoothing: float = 0.1  # the maximum of T/N is that of the force means over so long [s]
     block: float = 0.1  # intervals and standard errors are those of the means over so long [s]
     confidence: float = 0.95

@@ -38,7 +38,7 @@ class Stroke:
     onset: float | None  # [s, device time]; None where the recording begins in contact
     lift: float | None  # [s, device time]; None where it ends in contact
     steady: Interval | None  # steady window [s, device time]
-    break_away: float | None  # end of the stick phase [s, device time], where one is seen
+    break_away: float | None  # from here on the centre of pressure slides [s, device time], where that is seen
     direction: int | None  # +1 proximal to distal (along +x of the face frame), -1 back
     direction_from: str | None  # "centre of pressure", "tangential force" or "decision"
     speed: float | None  # slope of the centre of pressure on time over the steady window [mm/s]
@@ -58,6 +58,7 @@ class Stroke:
     zero_drift: float | None  # how far the forces' zero moved from before the stroke to after it [N]
     flaws: tuple[str, ...]
     reasons: Mapping[str, str]  # for each number withheld, the flaw that forbids it
+    stick_end: float | None = None  # where T/N stops climbing, by a change point [s, device time]; None: no stick phase
     contact_area: float | None = None  # by which tau_max was told [mm2]
     area_exponent: float = 0.0  # with which that area follows the normal force [-]
     number: int = 1  # within its trial, or within a recording without trials, from 1

@@ -1,0 +1,62 @@
+"""Where the stick phase ends: the change point at which T/N stops climbing.
+
+Pushed against a surface that holds it, a finger's T/N climbs in about a straight line until the contact slips and then
+stays: a line and a level that meet, fitted by least squares for every instant at which they may meet (Hinkley 1969,
+Biometrika 56:495, two-phase regression).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.analysis.settings import AnalysisSettings
+
+Array = NDArray[np.float64]
+
+_CANDIDATES = 40  # instants at which line and level may meet; then as many about the best of them
+_FEWEST = 5  # readings of the climb, and of the level
+
+
+def stick_end(time: Array, ratio: Array, settings: AnalysisSettings) -> float | None:
+    """Return the instant [s] at which T/N (n,) [-] stops climbing; None where it does not climb first.
+
+    `time` (n,) [s] reaches from the contact to the end of the steady window; nan of the ratio is left out. A climb
+    counts where it explains most of what a level alone leaves, and rises by a share of the level (`stick_rise`).
+    """
+    held = np.isfinite(ratio)
+    t, y = time[held], ratio[held]
+    if len(t) < 2 * _FEWEST:
+        return None
+    rough = _best(t, y, _FEWEST, len(t) - _FEWEST)
+    step = -(-len(t) // _CANDIDATES)
+    fit = _best(t, y, max(rough.place - step, _FEWEST), min(rough.place + step, len(t) - _FEWEST))
+    meets = float(t[fit.place])
+    climbs = fit.slope > 0.0 and fit.slope * (meets - float(t[0])) >= settings.stick_rise * fit.level
+    return meets if climbs and fit.left <= settings.stick_left * float(((y - y.mean()) ** 2).sum()) else None
+
+
+class _Fit(NamedTuple):
+    place: int  # reading at which line and level meet
+    slope: float  # of the line [1/s]
+    level: float  # [-]
+    left: float  # sum of squares that the fit leaves
+
+
+def _best(t: Array, y: Array, first: int, last: int) -> _Fit:
+    """Return the best fit whose line and level meet between two readings, at one of some of them."""
+    places = np.unique(np.linspace(first, last, _CANDIDATES).round().astype(int))
+    slope, level, left = _fits(t, y, t[places])
+    best = int(np.argmin(left))
+    return _Fit(int(places[best]), float(slope[best]), float(level[best]), float(left[best]))
+
+
+def _fits(t: Array, y: Array, meets: Array) -> tuple[Array, Array, Array]:
+    """Return slope, level and squares left (k,) of y = level - slope * max(meets - t, 0) for each meeting (k,)."""
+    short = np.maximum(meets[:, None] - t, 0.0)  # (k, n) how long before they meet
+    mean = short.mean(axis=1)
+    from_mean = short - mean[:, None]
+    spread = (from_mean**2).sum(axis=1)
+    slope = -(from_mean @ (y - y.mean())) / spread
+    left = ((y - y.mean()) ** 2).sum() - slope**2 * spread
+    return slope, y.mean() + slope * mean, left
