@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 Array = NDArray[np.float64]
 
@@ -13,6 +12,8 @@ def white_noise(seed: int, times: Array, channels: int = 6) -> Array:
     Instants in the same microsecond share their noise. The hash is SplitMix64 (Steele, Lea, Flood, 2014), keyed by
     the seed and counted by instant and channel; the normal deviate is the inverse of the distribution at that point.
     """
+    from scipy.special import ndtri  # slow to load, and a bench that is no simulated one has no need of it
+
     instants = np.rint(times * 1e6).astype(np.int64).astype(np.uint64)
     key = np.random.SeedSequence(seed).generate_state(1, np.uint64)  # an array: scalars would warn on wrapping
     counted = instants[:, None] * np.uint64(channels) + np.arange(channels, dtype=np.uint64)

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from sessions.analysis.contacts import Contact
 from sessions.analysis.settings import AnalysisSettings
@@ -93,6 +92,8 @@ def tilt_of(presses: Sequence[Press], settings: AnalysisSettings) -> Tilt | None
     """Return the tilt that presses tell, with intervals; None without any."""
     if not presses:
         return None
+    from scipy.special import stdtrit  # slow to load, and neither window nor recorder has need of it
+
     leans = np.array([press.lean for press in presses])
     mean = leans.mean(axis=0)
     per_cent = f"{100 * settings.confidence:g} %"
