@@ -40,6 +40,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also along every other reasonable choice of the analysis; with 'finite' at finite strain too (a minute)",
     )
     parser.add_argument(
+        "--beside",
+        choices=["none", "small", "both"],
+        default="small",
+        help="also otherwise, as for 'daq-app predict': both readings of tau_max, by depth and by force, both ways; with "
+        "'both' at finite strain too (about a minute)",
+    )
+    parser.add_argument(
         "--afferent", action="store_true", help="also firing rates of an SA-II afferent: an illustration"
     )
     parser.add_argument("--figures", type=Path, metavar="DIR", help="also write every picture as SVG, its data as CSV")
@@ -57,7 +64,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         if one.plan.blinded:
             raise Blinded(f"{one.folder} is blinded: a report tells scores by index; 'daq-app unblind' opens the key")
     analysis = analysed(recording, console, area_law(options))
-    prediction = predicted(recording, analysis, console, PredictionOptions(intervals=True))
+    prediction = predicted(recording, analysis, console, PredictionOptions(intervals=True, beside=options.beside))
     from sessions.exports import html
     from sessions.report import findings, score_table
 

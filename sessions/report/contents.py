@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, dataclass, field
 
+from sessions.alternative import Alternative
 from sessions.analysis.scores import MeanScore, Relation
 from sessions.paths import PathFinding
 
@@ -124,6 +125,7 @@ class PredictionFinding:
     interval_by: str = ""  # "derivatives" or "sampling"
     peak_rate: float | None = None  # of an SA-II afferent, an illustration [imp/s]
     settled_rate: float | None = None  # likewise
+    alternatives: tuple[Alternative, ...] = ()  # the trial in each variant, where they were asked for
 
 
 @dataclass(frozen=True, slots=True)

@@ -144,6 +144,7 @@ def finding_of(row: TrialPrediction) -> PredictionFinding:
         wall_s=row.wall_s,
         history=None if history is None else History(_numbers(history.time), _numbers(history.sed_ending)),
         reasons=reasons,
+        alternatives=row.alternatives,
     )
 
 

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from sessions.alternative import Alternative, variants
 from sessions.analysis.scores import Score, ScoreTable, mean_scores, relation, score_matrix
 from sessions.paths import PATHS, PathTrial, path_findings
 from sessions.report import (
@@ -174,6 +175,12 @@ def prediction(number, descriptor, index):
         interval_by="derivatives",
         peak_rate=34.5,
         settled_rate=22.6,
+        alternatives=tuple(
+            Alternative(variant, tau, DEPTH[descriptor], *((sed, 0.001) if small else (None, None)), 3.0, 2.0, why)
+            for variant in variants("both")
+            for small in [variant.kinematics == "small"]
+            for why in ["" if small else "there is no settled sliding"]
+        ),
     )
 
 

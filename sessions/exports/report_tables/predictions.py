@@ -1,7 +1,8 @@
 """Tables of predictions: responses, forces beside measured ones, both directions."""
 
+from sessions.alternative import Alternative
 from sessions.exports.report_tables.cells import Cell, Column, Notes, Table, grouped
-from sessions.exports.wording import direction, places, sed, significant, tau
+from sessions.exports.wording import digits, direction, places, sed, significant, tau
 from sessions.report import PredictionFinding, Report
 
 
@@ -69,6 +70,33 @@ def afferent_table(report: Report) -> Table | None:
         "known; every parameter below is assumed. The order of the settled rates is that of the SED whatever they are."
     )
     return Table("table-afferent", caption, columns, groups, notes.listed())
+
+
+def beside_table(report: Report) -> Table | None:
+    """Return each trial's SED in every variant it was predicted in, side by side."""
+    first = next((p.alternatives for p in report.predictions if p.alternatives), ())
+    if not first:
+        return None
+    notes = Notes()
+
+    def cell(one: Alternative) -> Cell:
+        if one.sed is None:
+            return notes.number(None, sed, one.reason)
+        held = one.indentation if one.variant.driven == "force" else one.normal_force
+        unit = "mm" if one.variant.driven == "force" else "N"
+        return Cell(sed(one.sed) if held is None else f"{sed(one.sed)} ({digits(held, 2)} {unit})")
+
+    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+        return (*_named(p), *(cell(one) for one in p.alternatives))
+
+    told = "; ".join(f"({n}) {one.variant.sentence}" for n, one in enumerate(first, 1))
+    caption = (
+        f"The same trials predicted otherwise, SED in kPa: {told}. In brackets the model's normal force, or the depth "
+        "that the measured force presses it to. Within a column all trials share a mesh. A dash says why."
+    )
+    columns = (*_who(report), *(Column(f"({n})", "kPa") for n in range(1, len(first) + 1)))
+    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
+    return Table("table-beside", caption, columns, groups, notes.listed())
 
 
 def force_table(report: Report) -> Table | None:
