@@ -43,8 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--beside",
         choices=["none", "small", "both"],
         default="small",
-        help="also otherwise, as for 'daq-app predict': both readings of tau_max, by depth and by force, both ways; with "
-        "'both' at finite strain too (about a minute)",
+        help="also otherwise, as for 'daq-app predict': both readings of tau_max, by depth and by force, both ways; "
+        "with 'both' at finite strain too (about a minute)",
     )
     parser.add_argument(
         "--afferent", action="store_true", help="also firing rates of an SA-II afferent: an illustration"
