@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.readings import ReadingBlock
 from sessions.analysis.forces import in_face_frame
 from sessions.recording import Recording
 from sessions.recording.schema import LIVE_FILE, SEALED_FILE
@@ -48,22 +49,65 @@ class RawReadings:
         return max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
 
 
-def raw_readings(recording: Recording, stroke: StrokeFinding) -> RawReadings:
-    """Return the readings of the take that holds a stroke, or of a recording without trials those around it."""
-    block = recording.readings(stroke.trial)
+class RawFile:
+    """The readings of a recording, with the rows they have in its file; what is needed again is kept."""
+
+    def __init__(self, recording: Recording) -> None:
+        """Read nothing yet."""
+        self._recording = recording
+        self._whole: ReadingBlock | None = None  # of a recording without trials
+        self._before: dict[tuple[int, int], int] | None = None  # rows before the block that begins so
+
+    def around(self, stroke: StrokeFinding) -> RawReadings:
+        """Return the readings of the take that holds a stroke, or of a recording without trials those around it."""
+        block = self._block(stroke)
+        return _with_forces(self._recording, stroke, block, self._place(block))
+
+    def _block(self, stroke: StrokeFinding) -> ReadingBlock:
+        if stroke.trial is not None:
+            return self._recording.readings(stroke.trial)
+        if self._whole is None:
+            self._whole = self._recording.readings()
+        begin = -np.inf if stroke.onset is None else stroke.onset - AROUND
+        end = np.inf if stroke.lift is None else stroke.lift + AROUND
+        return self._whole.between(*np.searchsorted(self._whole.time, [begin, end]).tolist())
+
+    def _place(self, block: ReadingBlock) -> str:
+        """Return file and data set of readings, with the rows they have there."""
+        folder = self._recording.folder
+        if not len(block):
+            return f"{folder.name}: no readings"
+        first = self._row(int(block.sequence[0]), int(block.received_ns[0]))
+        rows = "" if first is None else f", rows {first} to {first + len(block) - 1}"
+        if (folder / SEALED_FILE).is_file():
+            return f"{folder.name}/{SEALED_FILE}, data sets readings/…{rows}"
+        return f"{folder.name}/{LIVE_FILE}, table blocks{rows}"
+
+    def _row(self, sequence: int, received_ns: int) -> int | None:
+        """Return the row of a reading; None where its block is damaged or gone."""
+        if self._before is None:
+            self._before, count = {}, 0
+            for block in self._recording.blocks():
+                self._before[int(block.sequence[0]), int(block.received_ns[0])] = count
+                count += len(block)
+        for block in self._recording.blocks(between=(received_ns, received_ns + 1)):
+            found = np.flatnonzero((block.sequence == sequence) & (block.received_ns == received_ns))
+            if len(found):
+                return self._before[int(block.sequence[0]), int(block.received_ns[0])] + int(found[0])
+        return None
+
+
+def _with_forces(recording: Recording, stroke: StrokeFinding, block: ReadingBlock, place: str) -> RawReadings:
+    """Return readings with the forces that they are, the mean of what came before contact taken off."""
     assert recording.info is not None  # there is a stroke, so there is a transducer
     calibration, rate, onset = recording.info.calibration, recording.info.rate, stroke.onset
-    if stroke.trial is None:
-        begin = -np.inf if onset is None else onset - AROUND
-        end = np.inf if stroke.lift is None else stroke.lift + AROUND
-        block = block.between(*np.searchsorted(block.time, [begin, end]).tolist())
     before = np.flatnonzero(block.time < (-np.inf if onset is None else onset))
     free = before[-max(round(MOST_FOR_ZERO * rate), 1) :]
     zero = block.raw[free].mean(axis=0) if len(free) else np.zeros(6)
     words = f"mean of the {len(free)} readings before contact" if len(free) else "as recorded"
     wrench = in_face_frame(calibration.wrench(block.raw, zero), recording.plan.frame)
     return RawReadings(
-        place=_place(recording, block.sequence),
+        place=place,
         unit=calibration.raw_unit,
         sequence=block.sequence,
         counter=block.counter,
@@ -75,20 +119,3 @@ def raw_readings(recording: Recording, stroke: StrokeFinding) -> RawReadings:
         tangential=np.hypot(wrench[:, 0], wrench[:, 1]),
         zero=words,
     )
-
-
-def _place(recording: Recording, sequence: Whole) -> str:
-    """Return file and data set of readings, with the rows they have there."""
-    if not len(sequence):
-        return f"{recording.folder.name}: no readings"
-    before = 0
-    for block in recording.blocks():
-        found = np.flatnonzero(block.sequence == sequence[0])
-        if len(found):
-            before += int(found[0])
-            break
-        before += len(block)
-    rows = f"rows {before} to {before + len(sequence) - 1}"
-    if (recording.folder / SEALED_FILE).is_file():
-        return f"{recording.folder.name}/{SEALED_FILE}, data sets readings/…, {rows}"
-    return f"{recording.folder.name}/{LIVE_FILE}, table blocks, {rows}"

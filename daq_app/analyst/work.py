@@ -11,7 +11,7 @@ from daq_app.analyst import messages as m
 from daq_app.analyst.compared import NAMES, compared
 from daq_app.analyst.edges import brought_back, decision_meant, decision_of, taken_back
 from daq_app.analyst.pictures import field_at, film_of, finger_of, lost_film
-from daq_app.analyst.raw import raw_readings
+from daq_app.analyst.raw import RawFile
 from daq_app.derived import analysis_document
 from sessions.analysis import analyse
 from sessions.blinding import revealed
@@ -43,6 +43,7 @@ class Work:
         self._say, self._urgent = say, urgent
         say(m.Step(0.0, "opening"))
         self._recording = _opened(folder)
+        self._raw = RawFile(self._recording)
         self._chosen = 0
         self._ways: dict[m.Key, tuple[TrialPrediction, Way]] = {}
         self._sketches: dict[int, Sketch] = {}
@@ -235,7 +236,7 @@ class Work:
 
     def _read(self, number: int) -> None:
         stroke = self._report.strokes[number - 1]
-        self._say(m.Read(number, raw_readings(self._recording, stroke)))
+        self._say(m.Read(number, self._raw.around(stroke)))
 
     def _compare(self, folder: Path) -> None:
         self._say(m.Step(0.0, f"opening {folder.name}"))

@@ -26,7 +26,7 @@ from daq_app.analyst.state import AnalystState, fold, rows
 from daq_app.qt.keys import ANALYST_KEYS, KeysPage
 from daq_app.qt.lineage_label import LineageLabel
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
-from daq_app.qt.parts import button, choice, label, panel, say
+from daq_app.qt.parts import Shortened, button, choice, label, panel
 from daq_app.qt.stroke_column import StrokeColumn
 from daq_app.qt.tokens import GRID, Tokens, font_scale
 from daq_app.qt.trials_column import TrialsColumn
@@ -75,7 +75,7 @@ class AnalystWindow(QMainWindow):
             column.asked.connect(self.ask)
         self.progress = QProgressBar()
         self.progress.setAccessibleName("progress")
-        self._words = label("", "quiet", wrap=True)
+        self._words = Shortened("quiet")
         self.stop = button("Stop  Esc", "stop what is being done", lambda: self.ask(m.Stop()))
         self.go_on = button("Go on", "have the model answer the trials that are left", lambda: self.ask(m.GoOn()))
         self.report = button("Report…", "write the report", self._report)
@@ -210,7 +210,7 @@ class AnalystWindow(QMainWindow):
         busy = state.step is not None
         self.progress.setVisible(busy)
         self.progress.setValue(0 if state.step is None else round(100 * state.step.part))
-        say(self._words, progress_words(state.step) or state.told)
+        self._words.show_whole(progress_words(state.step) or state.told)
         self.stop.setEnabled(busy)
         self.go_on.setVisible(state.halted and not busy)
         for made in (self.report, self.export):

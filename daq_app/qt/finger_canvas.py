@@ -130,7 +130,8 @@ class FingerCanvas(QWidget):
         if self._look.mesh:
             self._paint_mesh(painter, placed(frame.nodes), box)
         for name, outline in frame.outlines.items():
-            painter.setPen(QPen(ink, 1.4 if name == "skin" else 0.7))
+            # what lies on the tissue's colours is black in both themes: they are pale where most lines are
+            painter.setPen(QPen(ink if name in ("skin", "bone") else QColor("black"), 1.4 if name == "skin" else 0.7))
             painter.setBrush(QColor(self._tokens.surface) if name == "bone" else Qt.BrushStyle.NoBrush)
             if name == "bone":
                 painter.drawPolygon(QPolygonF(placed(outline)))

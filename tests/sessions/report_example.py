@@ -1,5 +1,6 @@
 """A made-up report: the published friction, scores near the index, a finger with a field in closed form."""
 
+import functools
 import math
 
 import numpy as np
@@ -235,12 +236,18 @@ def _pairs(points):
 
 
 def example(**changes):
+    return Report(**{**_made(), **changes})
+
+
+@functools.cache
+def _made():
+    """What is in it: made once, for correlations of every subject take a second."""
     score_tables = tables()
     numbered = [(d, i) for d, rows in TABLES.items() for i in rows]
     strokes = tuple(stroke(k, *which) for k, which in enumerate(numbered, 1))
     t = np.arange(0, 110, 0.05)
     force = sum(np.where((t > 10 * k) & (t < 10 * k + 2.4), 3.0, 0.0) for k in range(1, 11))
-    values = {
+    return {
         "title": "sensotact-friction, subject P01",
         "session": "P01-forces",
         "simulated": True,
@@ -268,4 +275,3 @@ def example(**changes):
         "interval_kind": "95 % percentile interval of made-up repeats",
         "afferent": (Fact("static gain", "20 imp/s", "assumed"),),
     }
-    return Report(**{**values, **changes})

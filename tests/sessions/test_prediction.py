@@ -10,7 +10,6 @@ from sessions.analysis import Analysis, AnalysisSettings, FrictionParameters, St
 from sessions.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.plan import Finger as OwnFinger
 from sessions.prediction import PredictionOptions, predict, with_own_finger
-from solver.failures import SolveFailure
 from solver.fields import Sketch
 from solver.film import most_squeezed, stills, way_until
 from solver.reference import INDENTATION, SLIPPERINESS, STICKINESS
@@ -108,8 +107,6 @@ def test_the_pictures_of_the_way_end_at_the_settled_finger_and_show_the_history(
 def test_a_solve_without_an_answer_is_followed_to_its_last_good_state(watched):
     _, _, way = watched[1][0]
     slippery = replace(way.scene, friction=Friction(3.0, None))
-    with pytest.raises(SolveFailure):
-        solve(slippery)
     instants, why = way_until(slippery, way.finger)
     assert why is not None
     assert "mm" in str(why)
