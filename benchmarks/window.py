@@ -150,11 +150,12 @@ class _Watched:
         bridge, now = self.window.bridge, time.monotonic()
         if plot is self.window.live.plots[0]:
             self.painted.append(time.perf_counter())
-            received = int(bridge.feed._take[-1].received_ns[-1])
+            taken = bridge.feed._take
+            received = int(taken[-1].received_ns[-1]) if taken else self._shown
             if received != self._shown:
                 self.age.append(now - (1e-9 * received - bridge.session_offset))
                 self._shown = received
-        elif plot is self.window.live._model_plot and bridge.model.said is not self._said:
+        elif plot is self.window.live._model_plot and bridge.model.said not in (None, self._said):
             self._said = bridge.model.said
             self.model_age.append(now - (1e-9 * self._said.received_ns - bridge.session_offset))
 

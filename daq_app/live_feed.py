@@ -1,13 +1,15 @@
 """From the recorder's live messages to what is drawn, and to the readings of the take in hand."""
 
 from collections import deque
+from collections.abc import Iterable, Iterator
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.bench_load import Load, load_of
 from daq_app.live_trace import CHANNELS, LiveTrace
-from daq_app.recorder.messages import Live
+from daq_app.recorder.messages import Live, Report, Six
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.analysis.forces import centre_of_pressure, in_face_frame
@@ -19,6 +21,34 @@ FLOOR = 0.3  # ratio, speed and centre of pressure mean nothing below this norma
 LAG = 0.1  # the speed is the way of the centre of pressure over this time [s] ...
 SMOOTH = 0.05  # ... between two means over this one [s]
 KEPT = 90.0  # readings of a take that are kept to be looked at, at most [s]
+
+
+def together(reports: Iterable[Report]) -> Iterator[Report]:
+    """Return reports in order, readings that follow each other as one: a window that is late catches up at once."""
+    for key, group in groupby(reports, key=_run):
+        if key is None:
+            yield from group
+            continue
+        lives = [report for report in group if isinstance(report, Live)]
+        yield lives[0] if len(lives) == 1 else _joined(lives)
+
+
+def _run(report: Report) -> tuple[int, Six] | None:
+    """Return what readings must share to be taken as one; None for what are no readings."""
+    return (report.stream, report.zero) if isinstance(report, Live) else None
+
+
+def _joined(lives: list[Live]) -> Live:
+    return Live(
+        lives[0].stream,
+        np.concatenate([live.sequence for live in lives]),
+        np.concatenate([live.time for live in lives]),
+        np.concatenate([live.received_ns for live in lives]),
+        np.concatenate([live.wrench for live in lives]),
+        np.concatenate([live.status for live in lives]),
+        lives[0].zero,
+        sum(live.left_out for live in lives),
+    )
 
 
 class LiveFeed:

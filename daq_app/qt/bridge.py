@@ -11,7 +11,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from daq_app.bench_load import Load
 from daq_app.life import life_of
-from daq_app.live_feed import LiveFeed
+from daq_app.live_feed import LiveFeed, together
 from daq_app.live_model import Settle
 from daq_app.live_model_process import LiveModel
 from daq_app.recorder import messages as m
@@ -124,7 +124,7 @@ class Bridge(QObject):
             self._ticked = now
             self._fold(Tick(now))
             self._tell_load()
-        for report in self._client.poll():
+        for report in together(self._client.poll()):
             try:
                 self._take(report)
             except Exception as error:  # noqa: BLE001  what one report cannot be used for must not cost the others

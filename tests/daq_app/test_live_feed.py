@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from daq_app.live_feed import LiveFeed
+from daq_app.live_feed import LiveFeed, together
 from daq_app.live_trace import CHANNELS
 from daq_app.recorder.messages import Live
 from drivers.calibration import Calibration
@@ -100,6 +100,15 @@ def test_readings_that_are_missing_leave_a_gap_however_few_they_are():
     [gap] = np.flatnonzero(np.isnan(drawn.values[CHANNELS.index("N")]))
     assert drawn.time[gap - 1] == 99 / RATE
     assert drawn.time[gap + 1] == 103 / RATE
+
+
+def test_readings_that_came_in_several_messages_are_taken_as_one_up_to_whatever_came_between():
+    first, second = live(0, sliding(100)), live(100, sliding(50))
+    zeroed, other = live(150, sliding(10), zero=(1.0,) * 6), live(0, sliding(5), stream=2)
+    found = list(together([first, second, "a word", zeroed, other]))
+    assert [len(f.time) if isinstance(f, Live) else f for f in found] == [150, "a word", 10, 5]
+    assert found[0].time.tolist() == [*first.time, *second.time]
+    assert found[0].wrench.tolist() == [*first.wrench.tolist(), *second.wrench.tolist()]
 
 
 def test_a_new_stream_begins_a_new_picture():
