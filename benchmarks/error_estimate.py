@@ -29,7 +29,7 @@ from solver.estimate import FINENESS, coarsest_for, estimates
 from solver.finger import FingerModel
 from solver.mesher import Sizing
 from solver.scene import Finger, Friction, Loading, Material, Materials, Scene
-from solver.solution import numbers_on, settled
+from solver.small_states import numbers_on, settled
 from solver.wedging import WIDE
 
 NAMES = ("SED of the ending", "normal force", "drag")

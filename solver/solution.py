@@ -8,32 +8,29 @@ import numpy as np
 from numpy.linalg import LinAlgError
 
 from solver.audits import audits, course_audits
-from solver.contact import NAMES, SLIP, STICK, Contact, ContactLost, Course
+from solver.contact import NAMES, SLIP, STICK, Contact, ContactLost
 from solver.estimate import DEFAULT, FINENESS, coarsest_for, estimates
 from solver.evidence import model, warnings
-from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure, beyond_friction
+from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure
 from solver.finger import FingerModel
-from solver.friction import FrictionLaw
 from solver.grid import MeshError
-from solver.matching import DEEPEST, expected_depth
+from solver.matching import expected_depth
 from solver.measured import measured
 from solver.mesh import Array
 from solver.mesher import Sizing
 from solver.prediction import History, Prediction, Row, Skin
-from solver.pressing import depth_of, sliding_under
 from solver.receptor import ROW
 from solver.relaxing import RelaxingBody, RelaxingWay, march_relaxing
 from solver.scene import Scene, SceneError
+from solver.small_states import NUDGE, indentation, laid, law_of, nearest, numbers_on, rubbed_more, settled
 from solver.stepping import March, march
 from solver.tissues import relaxing_laws
 from solver.wedging import WIDE, deepest, followed
 
 UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]
 DOUBTED = 1e-8  # and from which it is told
-ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
 PIERCED = 1e-7  # part of the indentation by which skin may lie too low without it being told [-]
 SAME = 1e-6  # relative difference of normal forces up to which two states under a given force are one
-NUDGE = 1e-4  # of the coefficient of friction, to see what it does
 ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements
 LOW = 1e-8  # part of the indentation by which skin may lie too low before it is laid on the surface again [-]
 
@@ -213,42 +210,6 @@ def _meshed(scene: Scene, sizing: Sizing) -> FingerModel:
         raise SceneError("finger", scene.finger, f"no mesh fits it ({bad})") from bad
 
 
-def _law(scene: Scene) -> FrictionLaw:
-    return FrictionLaw(float(scene.friction.mu), scene.friction.cap)
-
-
-def settled(scene: Scene, finger: FingerModel) -> Contact:
-    """Return the settled state, without its history where it has none left.
-
-    Raises ContactLost, NotConverged, and NoSteadyState where a given drag is more than friction carries.
-    """
-    law, touch, loading = _law(scene), finger.body.touchable, scene.loading_per_mm
-    if loading.direction == 0 and not law.frictionless:
-        return march(touch, law, loading).instants[-1].contact
-    if loading.normal_force is None:
-        return Course(touch, law).sliding(loading.depth, loading.direction or 1)
-    deepest = DEEPEST * scene.finger.pulp_thickness()
-    try:
-        found = sliding_under(touch, law, loading.normal_force, loading.direction or 1, deepest)
-    except ContactLost:
-        if loading.tangential_force is None:
-            raise
-        return march(touch, law, loading).instants[-1].contact  # the drag may be met where sliding would wedge
-    if loading.tangential_force is None:
-        return found
-    most = float(np.abs(found.tangential.sum()))
-    if loading.tangential_force > most * (1.0 + 1e-9):
-        raise beyond_friction(loading.tangential_force, most, loading.normal_force)
-    if loading.tangential_force >= most * (1.0 - ALL_SLIPS):
-        return found
-    return march(touch, law, loading).instants[-1].contact
-
-
-def indentation(scene: Scene, contact: Contact) -> float:
-    """Return the depth [mm] of a state of `scene`: the one asked for, or the one found under a given force."""
-    return scene.loading.depth if scene.normal_force is None else depth_of(contact)
-
-
 def _direct(scene: Scene, shared: _Shared) -> Contact | None:
     """Return the settled state; None where contact must be looked for on more of the skin.
 
@@ -270,7 +231,7 @@ def _direct(scene: Scene, shared: _Shared) -> Contact | None:
     if direction == 0 or (scene.normal_force is not None and contact is None):
         raise _no_answer(scene, why, 0.0)
     depth = scene.loading.depth if contact is None else indentation(scene, contact)
-    reached, limit = followed(finger.body.touchable, _law(scene), depth, direction)
+    reached, limit = followed(finger.body.touchable, law_of(scene), depth, direction)
     if scene.normal_force is not None and contact is not None:
         # the way leads to sliding at that depth: is that the state that the forces lead to?
         if reached is None or abs(reached.normal.sum() / scene.normal_force - 1.0) > SAME:
@@ -286,7 +247,7 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
 
     None where contact must be looked for on more of the skin.
     """
-    finger, law = shared.fine, _law(scene)
+    finger, law = shared.fine, law_of(scene)
     begun = perf_counter()
     contact = _direct(scene, shared)
     if contact is None:
@@ -309,7 +270,7 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
         checks = audits(finger, law, contact, depth, displacement)
         slides = way is None and scene.normal_force is None and not (contact.state == STICK).any()
         if slides and checks["penetration"] > LOW:
-            contact, displacement = _laid(finger, law, contact, depth, displacement)
+            contact, displacement = laid(finger, law, contact, depth, displacement)
             checks = audits(finger, law, contact, depth, displacement)
     unbalanced = _unbalanced(checks)
     sed = finger.sed_ending(displacement)
@@ -359,28 +320,6 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
     return found, way if over_time is None else None
 
 
-def _laid(
-    finger: FingerModel, law: FrictionLaw, contact: Contact, depth: float, displacement: Array
-) -> tuple[Contact, Array]:
-    """Return a settled slide once more, the skin on the surface where its refined `displacement` puts it.
-
-    What refinement has moved the skin by is taken as displaced before any contact; the states stay if they can.
-    """
-    body = finger.body
-    normal, tangential = np.split(finger.skin_displacement(contact)[:, 0], 2)
-    skin, touch = displacement[finger.geometry.mesh.skin], body.touchable
-    free = {"normal_free": skin[:, 1] - normal, "tangential_free": skin[:, 0] - tangential}
-    direction = -int(np.sign(contact.sense[contact.touching][0]))
-    try:
-        again = Course(replace(touch, **free), law).sliding(depth, direction, contact.state)
-    except ContactLost:
-        return contact, displacement
-    change = np.concatenate([again.normal - contact.normal, again.tangential - contact.tangential])[:, None]
-    moved = displacement[:, :, None] + body.displacement(body.skin_displacement(change))
-    forces = np.concatenate([again.normal, again.tangential])[:, None]
-    return again, body.balanced(moved, forces)[:, :, 0]
-
-
 def _unbalanced(checks: dict[str, float]) -> float:
     return max(checks[name] for name in ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance"))
 
@@ -411,57 +350,15 @@ def _error_estimates(scene: Scene, shared: _Shared, contact: Contact, numbers: A
     """
     first, second = shared.coarse
     try:
-        near, far = _nearest(scene, first), _nearest(scene, second)
+        near, far = nearest(scene, first), nearest(scene, second)
     except (ContactLost, SolveFailure):
         return 1.0, 1.0, 1.0  # so near a limit that a coarser mesh has no state: nothing is known of the error
-    beside = _rubbed_more(scene, first, near)
+    beside = rubbed_more(scene, first, near)
     here = numbers_on(first, [near] if beside is None else [near, beside])
     felt = np.zeros(3) if beside is None else (here[1] / here[0] - 1.0) / NUDGE
     others = np.concatenate([here[:1], numbers_on(second, [far])])
     found = estimates(scene.driven(indentation(scene, contact)), shared.fineness, numbers, others, felt)
     return float(found[0]), float(found[1]), float(found[2])
-
-
-def _rubbed_more(scene: Scene, finger: FingerModel, contact: Contact) -> Contact | None:
-    """Return the state beside a settled slide, its coefficient of friction a little larger; None where there is none.
-
-    Nor is there one where forces are given, since those do not grow without bound.
-    """
-    law, direction = _law(scene), scene.loading.direction
-    if law.frictionless or direction == 0 or scene.normal_force is not None:
-        return None
-    more = replace(law, mu=(1.0 + NUDGE) * law.mu)
-    try:
-        return Course(finger.body.touchable, more).sliding(scene.loading.depth, direction, contact.state)
-    except ContactLost:
-        return None
-
-
-def _nearest(scene: Scene, finger: FingerModel) -> Contact:
-    """Return the settled state on a coarser mesh, whose friction limit may lie just below the drag asked for.
-
-    Where no guess leads to it, as with large coefficients, it is followed from mu = 0. Raises as `settled`.
-    """
-    try:
-        return settled(scene, finger)
-    except NoSteadyState:
-        if not scene.loading.dragged:
-            raise
-        return settled(scene.undragged(), finger)
-    except ContactLost:
-        if scene.normal_force is not None or scene.loading.direction == 0:
-            raise
-        touch, loading = finger.body.touchable, scene.loading
-        reached, _ = followed(touch, _law(scene), loading.depth, loading.direction)
-        if reached is None:
-            raise
-        return reached
-
-
-def numbers_on(finger: FingerModel, contacts: Sequence[Contact]) -> Array:
-    """Return what errors are estimated of (c, 3): SED of the ending, normal and tangential force along +x."""
-    forces = [(c.normal.sum(), c.tangential.sum()) for c in contacts]
-    return np.column_stack([finger.sed_endings(contacts), forces])
 
 
 def skin_of(finger: FingerModel, contact: Contact, skin: Array) -> Skin:
@@ -479,7 +376,7 @@ def skin_of(finger: FingerModel, contact: Contact, skin: Array) -> Skin:
 
 def _marched(scene: Scene, finger: FingerModel, progress: Progress | None) -> tuple[March, Array | None]:
     """Return the whole way, and where tissues relax the SED of ending and point at each instant (m, 2) [MPa]."""
-    law, loading = _law(scene), scene.loading_per_mm
+    law, loading = law_of(scene), scene.loading_per_mm
     if not scene.materials.relax:
         return march(finger.body.touchable, law, loading, progress), None
     body = RelaxingBody(finger.geometry.mesh, relaxing_laws(scene.materials))
@@ -535,7 +432,7 @@ def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotCo
         at += f" with tau_max = {scene.friction.tau_max:g} MPa"
     if scene.loading.direction == 0 or limit_mu <= 0.0:
         return NotConverged(f"No settled state was found at {at}: {why}, from every first guess tried.")
-    limit_depth = deepest(scene, _law(scene))
+    limit_depth = deepest(scene, law_of(scene))
     message = (
         f"There is no steady sliding at {at}: the drag presses the finger against the surface faster than it yields, "
         f"so it wedges; followed from mu = 0, steady sliding at this depth ends at mu = {limit_mu:.3g}"

@@ -17,7 +17,7 @@ from solver.mesh import Array
 from solver.mesher import Sizing
 from solver.newton import Newton, Pull, Shape
 from solver.scene import Friction, Scene
-from solver.solution import numbers_on, settled
+from solver.small_states import numbers_on, settled
 
 Kinematics = Literal["small", "finite"]
 State = Any  # of contact at small strain, of the body, with its mesh or not, at finite strain; only handed back

@@ -12,7 +12,7 @@ from solver.finite_finger import FiniteFinger
 from solver.finite_states import settled as finite_settled
 from solver.mesher import Sizing
 from solver.reference import SLIPPERINESS, STICKINESS, scene
-from solver.solution import numbers_on, settled
+from solver.small_states import numbers_on, settled
 
 Errors = Sequence[float]
 
