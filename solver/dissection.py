@@ -153,6 +153,7 @@ class Reduced:
 
         Raises LinAlgError where the inner stiffness is not positive definite.
         """
+        loaded = loads is not None
         loads = np.zeros((tree.size, 0)) if loads is None else loads
         follow: list[Array] = []
         own: list[Array] = []
@@ -168,17 +169,20 @@ class Reduced:
                     below = passed[child]
                     assert below is not None  # children come first, and each has one parent
                     flat[spots] += below[0].ravel()
-                    force[place] += below[1]
+                    if loaded:
+                        force[place] += below[1]
                     passed[child] = None
             else:
                 values = stiffness[tree.order[part.elements]].ravel()
                 flat = np.bincount(part.entries, values, total * total + 1).astype(np.float64, copy=False)[:-1]
             matrix = flat.reshape(total, total)
-            factor, solution = _solved(matrix[:k, :k], np.concatenate([matrix[:k, k:], force[:k]], axis=1))
+            right = np.concatenate([matrix[:k, k:], force[:k]], axis=1) if loaded else matrix[:k, k:]
+            factor, solution = _solved(matrix[:k, :k], right)
             factors.append(factor)
             own.append(solution[:, total - k :])
             follow.append(solution[:, : total - k])
-            passed.append((matrix[k:, k:] - matrix[k:, :k] @ follow[-1], force[k:] - matrix[k:, :k] @ own[-1]))
+            left = force[k:] - matrix[k:, :k] @ own[-1] if loaded else force[k:]
+            passed.append((matrix[k:, k:] - matrix[k:, :k] @ follow[-1], left))
         assert passed[-1] is not None
         root, load = passed[-1]
         return Reduced(tree, (root + root.T) / 2.0, load + loads[tree.kept], tuple(follow), tuple(own), tuple(factors))

@@ -53,7 +53,7 @@ def answers(
             rough[sizing] = FiniteFinger.of(scene, sizing)
         return rough[sizing]
 
-    for number in sorted(range(len(scenes)), key=lambda number: _alike(scenes[number])):
+    for number in sorted(range(len(scenes)), key=lambda number: alike(scenes[number])):
         scene, part = scenes[number], len(found) / len(scenes)
 
         def stop(part: float = part) -> bool:
@@ -70,7 +70,7 @@ def answers(
     return [found[number] for number in range(len(scenes))]
 
 
-def _alike(scene: Scene) -> tuple[float, str, float]:
+def alike(scene: Scene) -> tuple[float, str, float]:
     """Return what scenes are sorted by, so that neighbours are alike."""
     return scene.loading.indentation or 0.0, str(scene.loading.slide), float(scene.friction.mu)
 

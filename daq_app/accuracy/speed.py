@@ -11,6 +11,7 @@ from daq_app.accuracy.methods import FINITE, METHODS, PLAIN, SMALL, Meshed, Meth
 from daq_app.accuracy.truth import JUDGED, Truth, cases, known
 from solver.contact import ContactLost
 from solver.failures import SolveFailure
+from solver.finite_solution import alike
 from solver.scene import Scene
 
 MESHES = {  # elements to a tip radius; 840 to 15,000 unknowns, and 1,370 to 11,000 where meshes follow the contact
@@ -99,8 +100,9 @@ def _row(method: Method, fineness: float, truths: dict[str, Truth]) -> Speed:
 def _onward(mesh: Meshed, scenes: list[Scene]) -> list[float]:
     """Return what each surface took that was begun at one solved just before, pressed as deep and moved the same way.
 
-    Medians over passes through all of `scenes`, after one in which meshes are made.
+    Medians over passes through all of `scenes`, in the order the solver takes them, after one in which meshes are made.
     """
+    scenes = sorted(scenes, key=alike)
     spans: dict[str, list[float]] = {}
     began = clock()
     for turn in range(6):
