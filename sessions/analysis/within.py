@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 CONFIDENCE = 0.95
 
@@ -67,6 +66,8 @@ def within_means(table: Table) -> tuple[WithinMean, ...]:
         return ()
     levelled = scores - scores.mean(axis=1, keepdims=True) + scores.mean()
     deviation = levelled.std(axis=0, ddof=1) * math.sqrt(c / (c - 1))
+    from scipy import stats  # slow to load, and a window that opens waits for it
+
     half = float(stats.t.ppf((1 + CONFIDENCE) / 2, n - 1)) * deviation / math.sqrt(n)
     means = scores.mean(axis=0)
     return tuple(
@@ -93,6 +94,8 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
     if 1.0 - abs(r) < 1e-12:
         return RepeatedCorrelation(r, r, r, 0.0, dof)
     t = r * math.sqrt(dof / (1.0 - r * r))
+    from scipy import stats
+
     half = float(stats.norm.ppf((1 + CONFIDENCE) / 2)) / math.sqrt(dof - 1)
     z = math.atanh(r)
     p = 2.0 * float(stats.t.sf(abs(t), dof))
@@ -105,6 +108,8 @@ def agreement(table: Table) -> Agreement | None:
     n, c = scores.shape
     if n < 2 or c < 3 or np.all(np.ptp(scores, axis=1) == 0):
         return None
+    from scipy import stats
+
     friedman = stats.friedmanchisquare(*scores.T)
     page = stats.page_trend_test(scores)
     return Agreement(
@@ -128,6 +133,8 @@ class Difference:
 
 def differences(table: Table) -> tuple[Difference, ...]:
     """Return the difference of each pair of stimuli, of the subjects who scored both; at least three of them."""
+    from scipy import stats
+
     indices = sorted({index for row in table.values() for index in row})
     found: list[Difference] = []
     for a, b in itertools.combinations(indices, 2):
