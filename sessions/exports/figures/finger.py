@@ -93,9 +93,6 @@ def _tissue(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSe
         line = np.asarray(outline)
         if name == "bone":
             axes.fill(line[:, 0], line[:, 1], facecolor="#f2f2f2", edgecolor=INK, linewidth=0.4)
-            axes.text(
-                float(line[:, 0].mean()), float(line[:, 1].mean()), "bone", ha="center", va="center", clip_on=True
-            )
         else:
             axes.plot(line[:, 0], line[:, 1], color=INK, linewidth=0.8 if name == "skin" else 0.4)
     patch = np.asarray([*field.patch, field.patch[0]])
@@ -121,7 +118,10 @@ def _bar(drawn: Sheet, filled: TriContourSet, levels: tuple[float, ...]) -> None
 
 
 def _name_layers(axes: Axes, field: Field) -> None:
-    """Write the layers' names beside the finger's back, each with a line into its layer."""
+    """Write the layers' names beside the finger's back, each with a line into its layer, and the bone's on it."""
+    if "bone" in field.outlines:
+        x, y = np.asarray(field.outlines["bone"]).mean(axis=0).tolist()
+        axes.text(x, y, "bone", ha="center", va="center", clip_on=True)
     lines = [
         np.asarray(field.outlines[name]) for name in ("skin", "epidermis", "dermis", "bone") if name in field.outlines
     ]
