@@ -98,7 +98,10 @@ def synthetic_study(out: Path, seed: int, console: Console, subjects: int = SUBJ
             "score": {"gain": GAIN, "drift": PEOPLE.drift, "carry_over": PEOPLE.carry_over},
             "people": asdict(PEOPLE),
             "calibration_sd": CALIBRATION,
-            "spoilt": {**{code: spoilt.expected for code, spoilt in SPOILT.items()}, DAMAGED: "the file is damaged"},
+            "spoilt": {
+                **{code: asdict(spoilt) for code, spoilt in SPOILT.items() if int(code[1:]) <= subjects},
+                DAMAGED: asdict(Spoilt(expected="the file is damaged")),
+            },
             "strokes": [row for rows in planted for row in rows],
         },
     )

@@ -23,7 +23,7 @@ def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
         "surfaces": (_surfaces(study), _forces(study)),
         "relation": (_relation(study), _models(study)),
         "paths": (paths_table((one.descriptor, one.paths) for one in study.descriptors),),
-        "planted": (_planted(study),),
+        "planted": (_planted(study), _flaws(study)),
         "trials": (trials_table(study),),
     }
     return {
@@ -352,6 +352,12 @@ def _planted(study: StudyFindings) -> Table:
     columns = ("descriptor", "effect on the score", "planted", "found", "95 % interval", "inside")
     caption = "Planted effects and what the mixed model on the index finds of them; one interval in twenty misses."
     return _table("table-planted", caption, columns, [("", rows)])
+
+
+def _flaws(study: StudyFindings) -> Table:
+    rows = tuple((Cell(one.session), Cell(one.expected), Cell("yes" if one.found else "no")) for one in study.flaws)
+    caption = "What was spoilt in the simulated sessions, and whether the analysis, which does not know of it, says so."
+    return _table("table-planted-flaws", caption, ("session", "planted", "found"), [("", rows)])
 
 
 def _by_descriptor(

@@ -115,6 +115,15 @@ class PlantedFriction:
 
 
 @dataclass(frozen=True, slots=True)
+class PlantedFlaw:
+    """What was spoilt in one session, and whether the study says so."""
+
+    session: str
+    expected: str  # for people
+    found: bool
+
+
+@dataclass(frozen=True, slots=True)
 class StudyFindings:
     """The result of a study."""
 
@@ -127,6 +136,7 @@ class StudyFindings:
     descriptors: tuple[DescriptorFindings, ...]
     effects: tuple[Recovered, ...]  # planted, where the study is synthetic
     friction: PlantedFriction | None
+    flaws: tuple[PlantedFlaw, ...] = ()  # planted, where the study is synthetic
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -164,6 +174,7 @@ def pooled(
         descriptors=found,
         effects=() if planted is None else _recovered(found, planted["score"]),
         friction=None if planted is None else _friction(ordered, planted["strokes"]),
+        flaws=() if planted is None else _flaws(ordered, dict(failed), planted.get("spoilt", {})),
     )
 
 
@@ -289,6 +300,30 @@ def _recovered(found: Sequence[DescriptorFindings], score: Mapping[str, float]) 
         for term in one.on_index.terms
         if term.name in effects
     )
+
+
+_FLAWS = {"lost": "lost_readings", "frozen": "frozen_sensor", "light": "too_little_force"}
+
+
+def _flaws(
+    visits: Sequence[Visit], failed: Mapping[str, str], spoilt: Mapping[str, Mapping[str, Any]]
+) -> tuple[PlantedFlaw, ...]:
+    """Return for each session that was spoilt whether what it brings, or that it brings nothing, says so."""
+    named = {visit.session: visit for visit in visits}
+    backwards = {subject for subject, _, _ in reversed_subjects([_table(visit, visit.rows) for visit in visits])}
+    found: list[PlantedFlaw] = []
+    for session, told in spoilt.items():
+        visit = named.get(session)
+        if visit is None:
+            found.append(PlantedFlaw(session, told["expected"], session in failed))
+            continue
+        rows = {row.trial: row for row in visit.rows}
+        seen = [flaw in rows[told[name]].flaws for name, flaw in _FLAWS.items() if told.get(name)]
+        seen += [rows[told["unanswered"]].score is None] if told.get("unanswered") else []
+        seen += [rows[told["aborted"]].outcome == "open" and not visit.complete] if told.get("aborted") else []
+        seen += [visit.subject in backwards] if told.get("reversed") else []
+        found.append(PlantedFlaw(session, told["expected"], bool(seen) and all(seen)))
+    return tuple(found)
 
 
 def _friction(visits: Sequence[Visit], strokes: Sequence[Mapping[str, Any]]) -> PlantedFriction | None:

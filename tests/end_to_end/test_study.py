@@ -43,6 +43,10 @@ def test_the_damaged_session_is_named_and_stops_nothing(pool):
     assert [visit["session"] for visit in pool["visits"]] == ["S01", "S02"]
 
 
+def test_each_planted_flaw_stands_beside_whether_it_was_found(pool):
+    assert [(flaw["session"], flaw["found"]) for flaw in pool["flaws"]] == [("S02", True), ("S11", True)]
+
+
 def test_readings_lost_in_one_stroke_withhold_its_numbers_and_no_others(pool):
     found = rows(pool, "S02")
     assert found[3]["flaws"] == ["lost_readings"]
@@ -179,3 +183,5 @@ def test_the_whole_synthetic_study_names_everything_that_was_spoilt(tmp_path):
     assert [name for name, _ in pool["failed"]] == ["S11"]
     assert "S07" in Path(folder / "pooled" / "study.html").read_text()
     assert pool["friction"]["strokes"] >= 90
+    assert len(pool["flaws"]) == 7
+    assert all(flaw["found"] for flaw in pool["flaws"]), pool["flaws"]

@@ -140,6 +140,23 @@ def test_magnitude_estimates_of_any_modulus_come_to_the_same_means_at_one_modulu
     assert pooled([estimated(1, 1.0), none]).descriptors[0].estimates.left_out == ("S04",)
 
 
+def test_a_planted_flaw_that_nobody_names_is_told_as_not_found():
+    spoilt = {
+        "S01": {"lost": 2, "expected": "trial 2: lost_readings"},
+        "S02": {"unanswered": 3, "expected": "trial 3 has no score"},
+        "S03": {"reversed": True, "expected": "backwards"},
+        "S99": {"expected": "damaged"},
+    }
+    planted = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": [], "spoilt": spoilt}
+    made = [*VISITS[:2], visit(3, gain=-0.8)]
+    assert [flaw.found for flaw in pooled(made, planted=planted).flaws] == [False, False, True, False]
+    lost = replace(
+        made[0], rows=tuple(replace(r, flaws=("lost_readings",)) if r.trial == 2 else r for r in made[0].rows)
+    )
+    found = pooled([lost, *made[1:]], [("S99", "damaged")], planted=planted).flaws
+    assert [flaw.found for flaw in found] == [True, False, True, True]
+
+
 def test_what_was_excluded_is_told_with_who_and_why_and_trials_alike_together():
     told = " ".join(excluded(study()))
     assert "Subject S03: every trial left out by E02: used the scale backwards" in told
