@@ -17,7 +17,9 @@ import pytest
 from report_session import record
 
 from daq_app.cli import run
+from daq_app.pooling import Shelf
 from sessions.analysis import AnalysisSettings, forces
+from sessions.pooling.visit import VisitOptions
 from sessions.recording.archive import seal
 from sessions.recording.schema import COLUMNS
 
@@ -376,3 +378,10 @@ def test_a_law_of_the_contact_area_is_recorded_and_verify_goes_by_it(small, caps
 def test_a_law_of_the_area_that_is_none_is_refused_with_exit_code_2(recorded, capsys, words):
     assert run(["analyse", str(recorded), *words]) == 2
     assert "--area" in capsys.readouterr().err
+
+
+def test_a_study_computes_a_session_again_once_something_was_decided_about_it(small, tmp_path):
+    shelf = Shelf(tmp_path / "results", VisitOptions())
+    before = shelf.key(small)
+    run(["decide", str(small), "--trial", "2", "--keep", "--by", "E02", "--why", "looked at"])
+    assert shelf.key(small) != before
