@@ -6,6 +6,7 @@ whole tangential force is taken to act along the finger, in the sense of its par
 """
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -127,36 +128,16 @@ class Follower:
 
     def settle(self, asked: Settle) -> Settled:
         """Return the full solve of a stroke, beside the mean of what was said of it."""
+        return self.settling(asked)()
+
+    def settling(self, asked: Settle) -> Callable[[], Settled]:
+        """Return what solves a stroke in full; it may run while more is taken, and knows what was said until now."""
         first, last = asked.steady
         said = np.array([sed for time, sed in self._said if first <= time <= last])
         said = said[np.isfinite(said)]
         provisional = float(said.mean()) if len(said) else None
-        scene = settled_scene(asked.plan, asked.friction, asked.normal_force, self._kinematics)
-        try:
-            found = None if scene is None else solve(scene)
-        except SolveFailure as failure:
-            return self._unsettled(asked, provisional, str(failure.in_a_sentence()), failed=True)
-        if found is None:
-            return self._unsettled(asked, provisional, "The stroke gives no friction.")
-        fields = fields_of(found)
-        sed = fields.sed[fields.triangles].mean(axis=1)
-        picture = Picture(fields.nodes, fields.triangles, sed, fields.outlines["skin"])
-        return Settled(
-            asked.trial, found.sed_ending, found.error_estimate, provisional, found.row.sed, picture,
-            found.indentation, self._kinematics,
-        )  # fmt: skip
-
-    def _unsettled(self, asked: Settle, provisional: float | None, why: str, *, failed: bool = False) -> Settled:
-        """Return why there is no full solve, with the last state that was followed in the steady window."""
-        first, last = asked.steady
         seen = next((seen for seen in reversed(self._seen) if first <= seen.time <= last), None)
-        if seen is None:
-            unknown = np.full(len(ROW), np.nan)
-            return Settled(asked.trial, None, None, provisional, unknown, None, None, self._kinematics, why)
-        picture = seen.picture
-        if failed:
-            picture = replace(picture, lost=most_squeezed(seen.rest, picture.nodes, picture.faces))
-        return Settled(asked.trial, None, None, provisional, seen.row, picture, seen.depth, self._kinematics, why)
+        return lambda: _settled(asked, self._kinematics, provisional, seen)
 
     def _step(self, normal: float, pull: float) -> tuple[float, bool]:
         """Return the SED under forces [N], and whether finite strain told it; nothing that touches is within reach."""
@@ -193,6 +174,37 @@ class Follower:
         forces = self._small.forces()
         nodes = self._drawn.nodes(forces, self._small.depth)
         return Picture(nodes, self._drawn.faces, self._drawn.sed(forces), self._small.outline()), self._drawn.rest
+
+
+def _settled(asked: Settle, kinematics: Kinematics, provisional: float | None, seen: _Seen | None) -> Settled:
+    scene = settled_scene(asked.plan, asked.friction, asked.normal_force, kinematics)
+    try:
+        found = None if scene is None else solve(scene)
+    except SolveFailure as failure:
+        return _unsettled(asked, kinematics, provisional, seen, str(failure.in_a_sentence()), failed=True)
+    if found is None:
+        return _unsettled(asked, kinematics, provisional, seen, "The stroke gives no friction.")
+    fields = fields_of(found)
+    sed = fields.sed[fields.triangles].mean(axis=1)
+    picture = Picture(fields.nodes, fields.triangles, sed, fields.outlines["skin"])
+    return Settled(
+        asked.trial, found.sed_ending, found.error_estimate, provisional, found.row.sed, picture,
+        found.indentation, kinematics,
+    )  # fmt: skip
+
+
+def _unsettled(
+    asked: Settle, kinematics: Kinematics, provisional: float | None, seen: _Seen | None, why: str, *,
+    failed: bool = False,
+) -> Settled:  # fmt: skip
+    """Return why there is no full solve, with the last state that was followed in the steady window."""
+    if seen is None:
+        unknown = np.full(len(ROW), np.nan)
+        return Settled(asked.trial, None, None, provisional, unknown, None, None, kinematics, why)
+    picture = seen.picture
+    if failed:
+        picture = replace(picture, lost=most_squeezed(seen.rest, picture.nodes, picture.faces))
+    return Settled(asked.trial, None, None, provisional, seen.row, picture, seen.depth, kinematics, why)
 
 
 def most_squeezed(rest: Array, moved: Array, faces: Indices) -> tuple[float, float]:

@@ -1,6 +1,11 @@
-"""The live model's own process, and its client in the window: one batch is under way at a time, nothing ever waits."""
+"""The live model's own process, and its client in the window: one batch is under way at a time, nothing ever waits.
+
+The full solve of a stroke runs beside, in a thread of that process: the next stroke is followed meanwhile.
+"""
 
 import signal
+import threading
+from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.process import BaseProcess
@@ -25,6 +30,15 @@ def run(connection: Connection) -> None:
     from solver.scene import SceneError
 
     follower: Follower | None = None
+    speaking = threading.Lock()
+
+    def say(message: Ready | Provisional | Settled) -> None:
+        with speaking, suppress(OSError):  # a window that is gone is noticed below
+            connection.send(message)
+
+    def solve(solving: Callable[[], Settled]) -> None:
+        say(solving())
+
     with suppress(EOFError, OSError):
         while True:
             match connection.recv():
@@ -35,13 +49,14 @@ def run(connection: Connection) -> None:
                         problem = ""
                     except (SceneError, MeshError) as error:
                         follower, problem = None, str(error)
-                    connection.send(Ready(problem))
+                    say(Ready(problem))
                 case Forces() as forces if follower is not None:
-                    connection.send(follower.take(forces))
-                case Settle() as asked if follower is not None:
-                    connection.send(follower.settle(asked))
+                    say(follower.take(forces))
+                case Settle() as asked:
+                    if follower is not None:  # beside the next stroke, which is followed meanwhile
+                        threading.Thread(target=solve, args=(follower.settling(asked),), daemon=True).start()
                 case _:
-                    connection.send(Ready("no finger to follow"))
+                    say(Ready("no finger to follow"))
 
 
 class LiveModel:
@@ -128,8 +143,9 @@ class LiveModel:
         self._news = []
         try:
             while self._connection.poll():
-                self._under_way -= 1
-                self._heard(self._connection.recv())
+                message = self._connection.recv()
+                self._under_way -= not isinstance(message, Settled)  # it comes when it comes
+                self._heard(message)
             if not self._under_way:
                 self._send(self._connection)
         except (EOFError, OSError):
@@ -152,7 +168,10 @@ class LiveModel:
 
     def _send(self, connection: Connection) -> None:
         if self._asked:
-            connection.send(self._asked.pop(0))
+            asked = self._asked.pop(0)
+            connection.send(asked)
+            if isinstance(asked, Settle):
+                return
         elif self._waiting and not self.problem:
             connection.send(joined(self._waiting))
             self._waiting = []

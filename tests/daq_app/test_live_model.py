@@ -208,7 +208,7 @@ def until(condition):
         time.sleep(0.005)
 
 
-def test_a_process_of_its_own_answers_batches_and_then_the_full_solve():
+def test_a_process_of_its_own_answers_batches_and_the_full_solve_beside_them():
     model = LiveModel()
     model.prepare()
     news: list[Provisional] = []
@@ -216,7 +216,9 @@ def test_a_process_of_its_own_answers_batches_and_then_the_full_solve():
         model.add(stroke(1.5), FRAME)
         until(lambda: news.extend(model.poll()) or news)
         model.settle(Settle(1, PLAN, FRICTION, NORMAL, (1.2, 1.5)))
-        until(lambda: model.poll() or model.settled is not None)
+        model.add(live(2.0 + np.arange(20) / 200, np.zeros((20, 6))), FRAME)
+        said = model.predictions
+        until(lambda: (model.poll(), model.settled is not None and model.predictions > said)[1])
         assert abs(model.settled.difference) < 0.02
         model._process.terminate()
         until(lambda: model.poll() or model.problem)
