@@ -30,6 +30,7 @@ class StrokeColumn(QWidget):
         """Show nothing yet."""
         super().__init__()
         self._stroke: StrokeFinding | None = None
+        self._moving = False  # an edge was let go elsewhere, and what came of it is not known yet
         self._read: m.Read | None = None
         self._wanted: tuple[int, int] | None = None  # readings that were asked for: stroke, and version of the report
         self.stroke = StrokeView(tokens)
@@ -73,6 +74,9 @@ class StrokeColumn(QWidget):
             self.save.set_name("" if stroke is None else f"stroke {stroke.number}")
             self.decisions.show_decided(() if stroke is None else tuple(stroke.decided.values()))
             self._read = None
+        elif self._moving and state.step is None:  # it was not recorded: the sentence below says why
+            self.stroke.put_back()
+        self._moving = self._moving and state.step is not None
         self._show_readings(state)
         self.friction.show_lines(friction_table(state.report), state.row)
         told = numbers(state)
@@ -142,6 +146,7 @@ class StrokeColumn(QWidget):
 
     def _dragged(self, edge: Edge, time: float) -> None:
         if self._stroke is not None:
+            self._moving = True
             by, why = self.decisions.who(), self.decisions.reason()
             self.asked.emit(m.Move(self._stroke.number, edge, time, by, why))
 

@@ -91,6 +91,10 @@ class StrokeView(QWidget):
             known = self._columns[2][np.isfinite(self._columns[2])]
             self._plots[1].setYRange(0.0, max(float(known.max()), 0.01) if len(known) else 1.0, padding=0.04)
 
+    def put_back(self) -> None:
+        """Show every edge where it is."""
+        self._show_edges()
+
     def show_readings(self, readings: RawReadings | None) -> None:
         """Show the readings as they were recorded, thin, behind the stroke."""
         self._raw = readings
