@@ -156,6 +156,13 @@ def test_an_error_that_no_mesh_met_is_missed_and_the_best_is_told(example):
     assert "0.2 %" in row.how
 
 
+def test_an_error_that_finer_meshes_might_meet_is_not_missed_where_time_was_over_before_them():
+    coarse = Found([speed("finite", 900, 0.02, 4e-3)])
+    rows = [row for row in targets.measure(FOREVER, coarse) if row.work.startswith("finite strain, one")]
+    assert {row.verdict for row in rows} == {"not measured"}
+    assert all("2 %" in row.how for row in rows)
+
+
 def test_a_mesh_that_gives_no_answer_for_one_of_the_surfaces_meets_nothing():
     lame = speed("finite", 900, 1e-6, 1e-3, failed=("slipperiness 55",))
     assert lame.judged_error is None
