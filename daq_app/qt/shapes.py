@@ -50,9 +50,11 @@ def draw_line(painter: QPainter, x: Array, y: Array) -> None:
 
 def lines(x: Array, y: Array) -> list[QPolygonF]:
     """Return the line through points (n,) in pieces: it is broken where a coordinate is nan."""
-    known = np.isfinite(x) & np.isfinite(y)
-    edges = np.flatnonzero(np.diff(known, prepend=False, append=False))
-    points = np.column_stack([x, y])
+    points = np.empty((len(x), 2))
+    points[:, 0], points[:, 1] = x, y
+    known = np.zeros(len(x) + 2, np.bool_)
+    known[1:-1] = np.isfinite(x) & np.isfinite(y)
+    edges = np.flatnonzero(known[1:] != known[:-1])
     return [_polygon(points[a:b]) for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)]
 
 
