@@ -82,7 +82,7 @@ def measure(asked: Asked, found: Found) -> Iterator[Cold | Memory | LeftOut]:
                 yield LeftOut(f"The cold start of {what} could not be measured: {bad}.")
     kinds: list[Kinematics] = ["small", "finite"]
     for kinematics in kinds:
-        if asked.quick or asked.left <= 0.0:
+        if asked.quick:
             yield LeftOut(f"Memory of a solve at {kinematics} strain is left to a full run.")
             continue
         yield _memory(kinematics)
