@@ -41,8 +41,8 @@ def _forces(seconds: float, rate: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _alone(kinematics: str, repeats: int) -> None:
-    from daq_app.live_follower import Follower
-    from daq_app.live_model import Forces, Use
+    from daq_app.window.live_follower import Follower
+    from daq_app.window.live_model import Forces, Use
 
     follower = Follower(Use(None, kinematics))
     at, wrench = _forces(5.0, 200)
@@ -59,8 +59,8 @@ def _alone(kinematics: str, repeats: int) -> None:
 
 
 def _beside(seconds: float) -> None:
-    from daq_app.live_model_process import LiveModel
     from daq_app.recorder.messages import Live
+    from daq_app.window.live_model_process import LiveModel
     from sessions.plan import Frame
 
     model = LiveModel()

@@ -153,10 +153,10 @@ def draw(rate: int, pipe: Connection) -> None:
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     from PySide6.QtWidgets import QApplication
 
-    from daq_app.live_trace import CHANNELS, LiveTrace
     from daq_app.qt.live_panel import AXES
     from daq_app.qt.live_plot import LivePlot
     from daq_app.qt.tokens import LIGHT
+    from daq_app.window.live_trace import CHANNELS, LiveTrace
 
     application = QApplication([])
     trace = LiveTrace(float(rate))

@@ -1,1 +1,1 @@
-"""The window: Qt shows what `daq_app.view` derives and hands back what people do. Nothing here decides."""
+"""The window: Qt shows what `daq_app.window.view` derives and hands back what people do. Nothing here decides."""

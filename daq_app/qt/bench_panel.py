@@ -13,14 +13,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.bench_load import AXES
 from daq_app.qt.indicators import Lamp, LoadBar
 from daq_app.qt.parts import Shortened, button, choice, label, regrade, say
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
-from daq_app.view_bench import BenchView
-from daq_app.view_life import NAMES
-from daq_app.window_messages import Message
+from daq_app.window.bench_load import AXES
+from daq_app.window.messages import Message
+from daq_app.window.view_bench import BenchView
+from daq_app.window.view_life import NAMES
 
 SHOWN_COUNTERS = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated", "lag")
 

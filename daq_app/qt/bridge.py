@@ -9,17 +9,17 @@ from typing import Protocol
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from daq_app.bench_load import Load
 from daq_app.life import life_of
-from daq_app.live_feed import LiveFeed, together
-from daq_app.live_model import Settle
-from daq_app.live_model_process import LiveModel
 from daq_app.recorder import messages as m
 from daq_app.recorder.messages import REQUESTS, Report, Request
-from daq_app.state import AppState, fold
-from daq_app.take_watch import Judge
-from daq_app.view import View, derive_view
-from daq_app.window_messages import DrawingFailed, Judged, LifeKnown, Loaded, Message, Tick
+from daq_app.window.bench_load import Load
+from daq_app.window.live_feed import LiveFeed, together
+from daq_app.window.live_model import Settle
+from daq_app.window.live_model_process import LiveModel
+from daq_app.window.messages import DrawingFailed, Judged, LifeKnown, Loaded, Message, Tick
+from daq_app.window.state import AppState, fold
+from daq_app.window.take_watch import Judge
+from daq_app.window.view import View, derive_view
 from sessions.plan import Frame
 
 FRAME = 16  # between two looks at the recorder [ms]: 60 a second

@@ -19,8 +19,8 @@ from PySide6.QtWidgets import (
 
 from daq_app.qt.parts import button, label, say
 from daq_app.qt.tokens import GRID, TARGET, Tokens
-from daq_app.view_course import Button, CourseView, PlanRow
-from daq_app.window_messages import Message
+from daq_app.window.messages import Message
+from daq_app.window.view_course import Button, CourseView, PlanRow
 from sessions import steps
 
 QUESTIONS = {

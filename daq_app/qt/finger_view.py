@@ -6,12 +6,12 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from daq_app.live_model import Picture
-from daq_app.plot_scale import PlotScale
 from daq_app.qt.indicators import paint_lost
 from daq_app.qt.shapes import draw_line, faces, fine
 from daq_app.qt.tokens import MODEL, SMALL, Tokens, font
-from daq_app.view_model import ModelWords
+from daq_app.window.live_model import Picture
+from daq_app.window.plot_scale import PlotScale
+from daq_app.window.view_model import ModelWords
 from solver.receptor import ROW
 
 Array = NDArray[np.float64]

@@ -8,9 +8,9 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QWidget
 
-from daq_app.answer import Choice
 from daq_app.qt.parts import button
 from daq_app.qt.tokens import GRID
+from daq_app.window.answer import Choice
 from sessions.plan import Hand
 from sessions.steps import Event
 

@@ -8,9 +8,9 @@ from PySide6.QtWidgets import QApplication, QFrame, QHBoxLayout, QWidget
 from daq_app.qt.indicators import Arrow, Lamp
 from daq_app.qt.parts import Shortened, button, label, regrade, say
 from daq_app.qt.tokens import GRID, Tokens
-from daq_app.view import Banner, View
-from daq_app.view_course import Button
-from daq_app.window_messages import Message
+from daq_app.window.messages import Message
+from daq_app.window.view import Banner, View
+from daq_app.window.view_course import Button
 
 
 class Header(QWidget):

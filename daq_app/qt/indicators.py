@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from daq_app.qt.tokens import GRID, Tokens
-from daq_app.view_bench import Bar
+from daq_app.window.view_bench import Bar
 
 Grade = Literal["off", "on", "well", "look", "wrong"]
 

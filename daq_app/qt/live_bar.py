@@ -8,9 +8,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
 
-from daq_app.live_trace import CHANNELS
 from daq_app.qt.parts import button, choice, label, say
 from daq_app.qt.tokens import GRID, MU, TITLE, N, T, font
+from daq_app.window.live_trace import CHANNELS
 
 LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
 READ = (("N", "N", 2, N), ("T", "N", 2, T), ("mu", "", 2, MU), ("speed", "mm/s", 0, ""))

@@ -4,11 +4,6 @@ import numpy as np
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QGridLayout, QVBoxLayout, QWidget
 
-from daq_app.course_state import Mark
-from daq_app.live_feed import LiveFeed
-from daq_app.live_model_process import LiveModel
-from daq_app.live_trace import CHANNELS
-from daq_app.plot_scale import PlotScale
 from daq_app.qt.contact_map import ContactMap
 from daq_app.qt.curve import Curve
 from daq_app.qt.finger_view import FingerView
@@ -16,8 +11,13 @@ from daq_app.qt.live_bar import LENGTHS, LiveBar
 from daq_app.qt.live_plot import LivePlot
 from daq_app.qt.screens import settings
 from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, N, T, Tokens
-from daq_app.view_model import CHANNELS as MODEL_CHANNELS
-from daq_app.view_model import ModelTrace, model_words
+from daq_app.window.course_state import Mark
+from daq_app.window.live_feed import LiveFeed
+from daq_app.window.live_model_process import LiveModel
+from daq_app.window.live_trace import CHANNELS
+from daq_app.window.plot_scale import PlotScale
+from daq_app.window.view_model import CHANNELS as MODEL_CHANNELS
+from daq_app.window.view_model import ModelTrace, model_words
 
 LEAST_FOR_SPEED = 280  # a lower panel shows force and ratio alone
 LEAST_FOR_MODEL = 430  # a lower panel shows what is measured alone

@@ -12,12 +12,12 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QPixmap, QResizeEvent, QStaticText
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from daq_app.course_state import Mark
-from daq_app.live_trace import CHANNELS, Columns
-from daq_app.plot_scale import MARGIN, PlotScale, ticks, times
 from daq_app.qt.curve import Curve
 from daq_app.qt.shapes import blank, draw_line, fine
 from daq_app.qt.tokens import SMALL, Tokens, font
+from daq_app.window.course_state import Mark
+from daq_app.window.live_trace import CHANNELS, Columns
+from daq_app.window.plot_scale import MARGIN, PlotScale, ticks, times
 
 Array = NDArray[np.float64]
 

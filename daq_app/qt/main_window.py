@@ -18,7 +18,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.new_session import Bench, Refused, checked, is_code, unfinished
 from daq_app.qt.bench_panel import BenchPanel, BenchStrip
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.course_panel import CoursePanel
@@ -32,9 +31,10 @@ from daq_app.qt.screens import millimetres
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Tare
-from daq_app.view import View
-from daq_app.view_course import Button
-from daq_app.window_messages import DevicesFound, Message, NewSession, Searching
+from daq_app.window.messages import DevicesFound, Message, NewSession, Searching
+from daq_app.window.new_session import Bench, Refused, checked, is_code, unfinished
+from daq_app.window.view import View
+from daq_app.window.view_course import Button
 from drivers.catalog import reachable
 from sessions.recording import Setting
 

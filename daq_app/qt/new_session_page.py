@@ -19,13 +19,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.new_session import AXES, Bench, SessionForm, Unfinished, enrolled, enrolment, offered
 from daq_app.qt.parts import button, choice, label, regrade, say
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.recorder.messages import ResumeSession
-from daq_app.window_messages import Message
+from daq_app.window.messages import Message
+from daq_app.window.new_session import AXES, Bench, SessionForm, Unfinished, enrolled, enrolment, offered
 from sessions.plan import Hand
 from sessions.protocols import protocol_names
 

@@ -5,8 +5,8 @@ from PySide6.QtCore import QRectF
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget
 
-from daq_app.live_trace import CHANNELS, LiveTrace
 from daq_app.qt.tokens import GRID, Tokens
+from daq_app.window.live_trace import CHANNELS, LiveTrace
 
 FULL = 5.0  # of the bar [N]
 OVER = 0.1  # the mean of so long is shown: an eye follows it, and noise does not move it [s]

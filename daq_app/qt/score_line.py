@@ -15,8 +15,8 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from daq_app.answer import LEAP, STEP, Answer, Device
 from daq_app.qt.tokens import Tokens
+from daq_app.window.answer import LEAP, STEP, Answer, Device
 from sessions.plan import Hand
 from sessions.steps import Scored
 

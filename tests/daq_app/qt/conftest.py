@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication
 from daq_app.qt.start import opened
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Stop
-from daq_app.window_messages import Dismissed, NewSession
+from daq_app.window.messages import Dismissed, NewSession
 
 PACE = 20.0  # told seconds in a real one
 PATIENCE = 60.0  # far beyond what anything takes [s]

@@ -9,11 +9,11 @@ from PySide6.QtGui import QColor, QKeyEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLineEdit, QListWidget, QWidget
 
-from daq_app.live_trace import CHANNELS, LiveTrace
 from daq_app.qt import score_line, screens, tokens
 from daq_app.qt.keys import KEYS, act_of
 from daq_app.qt.live_panel import FINITE, LivePanel
 from daq_app.qt.press_bar import FULL, PressBar
+from daq_app.window.live_trace import CHANNELS, LiveTrace
 
 pytestmark = pytest.mark.qt
 

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass, field, replace
 
-from daq_app.bench_state import BenchState, bench_after
-from daq_app.course_state import SessionState, session_after, session_begun
 from daq_app.recorder import messages as m
-from daq_app.window_messages import Dismissed, DrawingFailed, Message, NewSession, Tick
+from daq_app.window.bench_state import BenchState, bench_after
+from daq_app.window.course_state import SessionState, session_after, session_begun
+from daq_app.window.messages import Dismissed, DrawingFailed, Message, NewSession, Tick
 
 _FROM_RECORDER = frozenset(m.REPORTS)
 

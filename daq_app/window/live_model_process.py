@@ -11,9 +11,9 @@ from multiprocessing import get_context
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from daq_app.live_model import Forces, Kinematics, Provisional, Ready, Settle, Settled, Use, forces_of, joined
-from daq_app.priority import give_way
 from daq_app.recorder.messages import Live
+from daq_app.window.live_model import Forces, Kinematics, Provisional, Ready, Settle, Settled, Use, forces_of, joined
+from daq_app.window.priority import give_way
 from sessions.plan import Frame, SessionPlan
 
 Connection = Any  # one end of a pipe; its type is another one on each system
@@ -25,7 +25,7 @@ def run(connection: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the window decides when this ends
     give_way()
     # Loaded in the process alone: the window has no need of the solver, and opens sooner without it.
-    from daq_app.live_follower import Follower
+    from daq_app.window.live_follower import Follower
     from solver.grid import MeshError
     from solver.scene import SceneError
 

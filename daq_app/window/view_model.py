@@ -5,8 +5,8 @@ from typing import Literal
 
 import numpy as np
 
-from daq_app.live_model import STEP, Provisional, Settled
-from daq_app.live_trace import Columns, LiveTrace
+from daq_app.window.live_model import STEP, Provisional, Settled
+from daq_app.window.live_trace import Columns, LiveTrace
 
 GAP = 0.1  # predictions further apart have a gap between them [s]
 CHANNELS = ("SED", "SED instead")  # the latter at small strain, where finite strain is asked for and out of reach

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from daq_app.live_model import Forces, Kinematics, Picture, Provisional, Settle, Settled, Use
+from daq_app.window.live_model import Forces, Kinematics, Picture, Provisional, Settle, Settled, Use
 from sessions.analysis import FrictionParameters
 from sessions.plan import SessionPlan
 from sessions.prediction import DEFAULT_SPEED, SLIDES, PredictionOptions, with_own_finger
@@ -29,7 +29,7 @@ from solver.solution import solve
 from solver.stepper import FINENESS, MARGIN
 
 if TYPE_CHECKING:
-    from daq_app.live_finite import LiveFinite
+    from daq_app.window.live_finite import LiveFinite
 
 TOUCH = 0.05  # less normal force is no touch [N]
 FLOOR = 0.3  # a ratio means nothing below this normal force [N]
@@ -230,6 +230,6 @@ def _finger(use: Use) -> tuple[Scene, float, Kinematics]:
 
 def _finite(scene: Scene) -> "LiveFinite":
     # Imported here: only what is asked for is loaded, compiled loops of finite strain are not.
-    from daq_app.live_finite import LiveFinite
+    from daq_app.window.live_finite import LiveFinite
 
     return LiveFinite(scene, LEAST_MU)

@@ -7,9 +7,9 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.bench_load import Load, load_of
-from daq_app.live_trace import CHANNELS, LiveTrace
 from daq_app.recorder.messages import Live, Report, Six
+from daq_app.window.bench_load import Load, load_of
+from daq_app.window.live_trace import CHANNELS, LiveTrace
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.analysis.forces import centre_of_pressure, in_face_frame

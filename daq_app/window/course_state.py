@@ -6,8 +6,8 @@ from typing import Any, Literal, cast, get_args
 
 from daq_app.recorder import messages as m
 from daq_app.recorder.messages import Kind
-from daq_app.stroke_quality import Quality
-from daq_app.window_messages import Judged, Message
+from daq_app.window.messages import Judged, Message
+from daq_app.window.stroke_quality import Quality
 from sessions import steps
 from sessions.plan import Block, SessionPlan, Trial
 from sessions.recording import LoggedEvent

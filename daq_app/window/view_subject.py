@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from daq_app.course_state import SessionState
+from daq_app.window.course_state import SessionState
 from sessions import steps
 from sessions.plan import Hand
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from daq_app.live_trace import CHANNELS, LiveTrace
+from daq_app.window.live_trace import CHANNELS, LiveTrace
 
 
 def fed(trace, time, first_channel, *, block=117):

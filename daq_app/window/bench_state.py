@@ -5,10 +5,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from daq_app.bench_load import Load
 from daq_app.life import Life
 from daq_app.recorder import messages as m
-from daq_app.window_messages import DevicesFound, LifeKnown, Loaded, Message, Searching
+from daq_app.window.bench_load import Load
+from daq_app.window.messages import DevicesFound, LifeKnown, Loaded, Message, Searching
 from drivers.catalog import Found
 from drivers.transducer import Health, TransducerInfo
 from sessions.plan import Frame

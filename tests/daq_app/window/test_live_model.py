@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from daq_app.live_follower import Follower, settled_scene
-from daq_app.live_model import Forces, Provisional, Settle, Settled, Use, forces_of, joined
-from daq_app.live_model_process import LiveModel
 from daq_app.recorder.messages import Live
-from daq_app.view_model import ModelTrace, model_words
+from daq_app.window.live_follower import Follower, settled_scene
+from daq_app.window.live_model import Forces, Provisional, Settle, Settled, Use, forces_of, joined
+from daq_app.window.live_model_process import LiveModel
+from daq_app.window.view_model import ModelTrace, model_words
 from sessions.analysis import FrictionParameters
 from sessions.plan import Frame
 from sessions.protocols import plan, protocol
@@ -119,7 +119,7 @@ def test_forces_beyond_its_reach_are_marked_and_the_next_touch_is_followed_again
 
 
 def test_the_full_solve_is_told_beside_the_mean_of_what_was_shown_over_the_steady_window(follower, monkeypatch):
-    monkeypatch.setattr("daq_app.live_follower.solve", solved)
+    monkeypatch.setattr("daq_app.window.live_follower.solve", solved)
     said = follower.take(forces_of(stroke(), FRAME))
     settled = follower.settle(Settle(1, PLAN, FRICTION, NORMAL, (1.2, 2.0)))
     steady = said.sed[(said.time >= 1.2) & (said.time <= 2.0)]
@@ -146,7 +146,7 @@ def test_a_solve_that_finds_nothing_is_marked_in_the_last_state_that_was_followe
     def wedged(_scene):
         raise NoSteadyState("at 1.5 mm of indentation the finger wedges")
 
-    monkeypatch.setattr("daq_app.live_follower.solve", wedged)
+    monkeypatch.setattr("daq_app.window.live_follower.solve", wedged)
     follower.take(forces_of(stroke(), FRAME))
     settled = follower.settle(Settle(1, PLAN, FRICTION, NORMAL, (1.2, 2.0)))
     x, y = settled.picture.lost  # squeezed most between bone and surface, above the contact

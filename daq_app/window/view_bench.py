@@ -4,11 +4,11 @@ from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Literal
 
-from daq_app.bench_load import AXES
-from daq_app.bench_state import BenchState
 from daq_app.recorder import messages as m
-from daq_app.view_life import life_rows
-from daq_app.window_messages import Message
+from daq_app.window.bench_load import AXES
+from daq_app.window.bench_state import BenchState
+from daq_app.window.messages import Message
+from daq_app.window.view_life import life_rows
 
 UNITS = ("N", "N", "N", "N mm", "N mm", "N mm")
 COUNTED = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated")

@@ -5,12 +5,12 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from importlib import import_module
 from multiprocessing import get_context
 
-from daq_app.live_feed import LiveFeed
-from daq_app.priority import give_way
 from daq_app.recorder import messages as m
-from daq_app.state import AppState
-from daq_app.stroke_quality import Quality, in_newtons, stroke_quality
-from daq_app.window_messages import DrawingFailed, Judged
+from daq_app.window.live_feed import LiveFeed
+from daq_app.window.messages import DrawingFailed, Judged
+from daq_app.window.priority import give_way
+from daq_app.window.state import AppState
+from daq_app.window.stroke_quality import Quality, in_newtons, stroke_quality
 from sessions import steps
 from sessions.recording import LoggedEvent
 

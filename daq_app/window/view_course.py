@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from daq_app.bench_state import BenchState
-from daq_app.course_state import SessionState, TrialState
 from daq_app.recorder import messages as m
-from daq_app.stroke_quality import Quality
-from daq_app.window_messages import Message, NewSession
+from daq_app.window.bench_state import BenchState
+from daq_app.window.course_state import SessionState, TrialState
+from daq_app.window.messages import Message, NewSession
+from daq_app.window.stroke_quality import Quality
 from sessions import steps
 from sessions.plan import PROXIMAL_TO_DISTAL, Trial
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from daq_app.bench_load import Load
 from daq_app.life import Life
 from daq_app.recorder import messages as m
-from daq_app.state import AppState, fold
-from daq_app.stroke_quality import Quality
-from daq_app.view import derive_view
-from daq_app.window_messages import Dismissed, DrawingFailed, Judged, LifeKnown, Loaded, NewSession, Tick
+from daq_app.window.bench_load import Load
+from daq_app.window.messages import Dismissed, DrawingFailed, Judged, LifeKnown, Loaded, NewSession, Tick
+from daq_app.window.state import AppState, fold
+from daq_app.window.stroke_quality import Quality
+from daq_app.window.view import derive_view
 from drivers.calibration import Calibration
 from drivers.transducer import Health, TransducerInfo
 from sessions import steps

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from daq_app.live_feed import LiveFeed, together
-from daq_app.live_trace import CHANNELS
 from daq_app.recorder.messages import Live
+from daq_app.window.live_feed import LiveFeed, together
+from daq_app.window.live_trace import CHANNELS
 from drivers.calibration import Calibration
 from drivers.transducer import TransducerInfo
 from sessions.plan import Frame

@@ -3,8 +3,8 @@ from datetime import datetime
 
 import pytest
 
-from daq_app.new_session import Bench, Refused, SessionForm, checked, enrolled, enrolment, offered
 from daq_app.recorder.messages import People, StartSession
+from daq_app.window.new_session import Bench, Refused, SessionForm, checked, enrolled, enrolment, offered
 from sessions.plan import Frame
 from sessions.protocols import Body, protocol_file
 from sessions.study_file import create_study, enrol, study_key, withdraw

@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from daq_app.recorder.messages import Kind, People, StartSession
-from daq_app.sentences import sentence
+from daq_app.window.sentences import sentence
 from sessions.plan import Frame, Hand, Phase
 from sessions.protocols import Body, Protocol, StudyPlace, plan, protocol
 from sessions.protocols.protocol import LARGEST_SEED, phases_before

@@ -1,0 +1,1 @@
+"""What the window knows, decides and says, without Qt."""
