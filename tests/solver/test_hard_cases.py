@@ -117,6 +117,7 @@ def ended(kinematics, finger, tissues, depth, mu, bound, slide, course):
     return found
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=12, derandomize=True, phases=[Phase.generate])
 @given(**scene_parts)
 def test_any_scene_at_small_strain_ends_in_an_answer_or_in_one_sentence(
