@@ -22,6 +22,7 @@ class Step:
     part: float  # of all of it, 0 to 1
     words: str
     left: float | None = None  # about how long it will still take [s]; None: not known
+    load_steps: int = 0  # of which `part` are done; 0: it is not done in load steps
 
 
 @dataclass(frozen=True, slots=True)

@@ -155,11 +155,15 @@ def progress_words(step: Step | None) -> str:
 
     >>> progress_words(Step(0.5, "predicting", 3.2))
     'predicting  50 %, about 4 s left'
+    >>> progress_words(Step(0.5, "drawing the history", None, 60))
+    'drawing the history  load step 30 of 60'
     """
     if step is None:
         return ""
     left = "" if step.left is None else f", about {int(step.left) + 1} s left"
-    return f"{step.words}  {100 * step.part:.0f} %{left}"
+    steps = step.load_steps
+    done = f"load step {round(step.part * steps)} of {steps}" if steps else f"{100 * step.part:.0f} %"
+    return f"{step.words}  {done}{left}"
 
 
 def _named(of: StrokeFinding | PredictionFinding) -> str:

@@ -87,7 +87,7 @@ class Work:
             case _:
                 pass
 
-    def timed(self, words: str) -> Callable[[float], bool]:
+    def timed(self, words: str, load_steps: int = 0) -> Callable[[float], bool]:
         """Return a listener to progress that says part done and time left, and stops for what is urgent."""
         began = said = time.monotonic()
 
@@ -96,7 +96,8 @@ class Work:
             now = time.monotonic()
             if now - said > 0.05:
                 said, took = now, now - began
-                self._say(m.Step(part, words, took * (1.0 - part) / part if part > 0.05 and took > 1.0 else None))
+                left = took * (1.0 - part) / part if part > 0.05 and took > 1.0 else None
+                self._say(m.Step(part, words, left, load_steps))
             return not self._urgent()
 
         return told
@@ -222,14 +223,14 @@ class Work:
         if found is None:
             raise NothingToShow("The model has no way to show for this trial: it was not solved.")
         prediction, way = found
-        told = self.timed("drawing the history")
         if way.march is not None:
+            told = self.timed("drawing the history", len(way.march.instants))
             self._filmed = m.Filmed(key, film_of(way, way.march.instants, self._sketch(way), told))
             self._say(self._filmed)
             return
         if prediction.prediction is not None or way.scene.materials.relax:
             raise NothingToShow("The way of tissues that relax is not kept as states that can be drawn.")
-        film, why = lost_film(way, self._sketch(way), told)
+        film, why = lost_film(way, self._sketch(way), self.timed("drawing the history"))
         first = prediction.reasons.get("sed", "")
         self._filmed = m.Filmed(key, film, f"{first} Followed from first touch: {why}" if why else first)
         self._say(self._filmed)
