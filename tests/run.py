@@ -18,8 +18,9 @@ STATIC = [
     ("imports go one way", ["lint-imports", "--no-cache"]),
     ("types agree (strict)", ["basedpyright", "--level", "error", *PACKAGES]),
 ]
-# A file's tests stay together, so that what they share is made once.
-PARALLEL = ["pytest", "-n", "2", "--dist", "loadfile"]
+# A file's tests stay together, so that what they share is made once. On two cores a third worker runs while the others
+# wait for devices, whose tests go by the clock.
+PARALLEL = ["pytest", "-n", "3", "--dist", "loadfile"]
 QUICK = [("every sentence a test proves", [*PARALLEL, "-m", "not slow and not hardware"])]
 LONG = [
     ("every slow sentence", [*PARALLEL, "-m", "slow", "--ignore", "tests/endurance", "tests"]),
