@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 from daq_app.qt.screen_check import missing_library, what_is_missing
 
 if TYPE_CHECKING:  # Qt is loaded only once it is known that it can be
-    from PySide6.QtWidgets import QApplication
+    from PySide6.QtWidgets import QApplication, QWidget
 
+    from daq_app.qt.analyst_window import AnalystWindow
     from daq_app.qt.bridge import Client
     from daq_app.qt.main_window import MainWindow
     from daq_app.qt.tokens import Tokens
@@ -23,16 +24,7 @@ WRONG = 2  # likewise: the command line was wrong
 
 def main() -> int:
     """Open the window and return the exit code. What is missing is told in one sentence."""
-    if missing := what_is_missing():
-        return _said(missing)
-    try:
-        from PySide6.QtWidgets import QApplication
-    except ImportError as error:
-        return _said(missing_library(error))
-    application = QApplication(sys.argv[:1])
-    window = opened(application)
-    window.show()
-    return application.exec()
+    return _shown(opened)
 
 
 def look_at(arguments: list[str]) -> int:
@@ -45,24 +37,16 @@ def look_at(arguments: list[str]) -> int:
     folder = Path(arguments[0])
     if not folder.is_dir():
         return _said(f"{folder} is no folder: give a session's folder")
-    if missing := what_is_missing():
-        return _said(missing)
-    try:
-        from PySide6.QtWidgets import QApplication
-    except ImportError as error:
-        return _said(missing_library(error))
-    application = QApplication(sys.argv[:1])
-    from daq_app.qt.analyst_window import AnalystWindow
-    from daq_app.qt.tokens import current_tokens, font_scale, palette, style_sheet
 
-    application.setApplicationName("daq-app")
-    application.setStyle("Fusion")
-    tokens = current_tokens()
-    application.setPalette(palette(tokens))
-    application.setStyleSheet(style_sheet(tokens, font_scale()))
-    window = AnalystWindow(folder, tokens)
-    window.show()
-    return application.exec()
+    def analyst(application: "QApplication") -> "AnalystWindow":
+        from daq_app.qt.analyst_window import AnalystWindow
+        from daq_app.qt.tokens import current_tokens, font_scale
+
+        tokens = current_tokens()
+        _dress(application, tokens, font_scale())
+        return AnalystWindow(folder, tokens)
+
+    return _shown(analyst)
 
 
 def opened(
@@ -89,22 +73,18 @@ def _opened(application: "QApplication", start: "Callable[[], Client] | None", t
     recorder.send(Connect(SIMULATED_BENCH))
     from daq_app.qt.bridge import Bridge
     from daq_app.qt.main_window import MainWindow
-    from daq_app.qt.tokens import current_tokens, font_scale, palette, style_sheet
+    from daq_app.qt.tokens import current_tokens, font_scale
 
-    application.setApplicationName("daq-app")
     application.setQuitOnLastWindowClosed(False)
-    application.setStyle("Fusion")  # the one style that draws alike, and takes our colours, everywhere
     scale, tokens = font_scale(), theme or current_tokens()
-    application.setPalette(palette(tokens))
-    application.setStyleSheet(style_sheet(tokens, scale))
+    _dress(application, tokens, scale)
     bridge = Bridge(recorder, start or Recorder.start)
     bridge.connecting(SIMULATED_BENCH)
     window = MainWindow(bridge, tokens, scale)
 
     def theme_changed() -> None:
         chosen = current_tokens()
-        application.setPalette(palette(chosen))
-        application.setStyleSheet(style_sheet(chosen, scale))
+        _dress(application, chosen, scale)
         window.set_tokens(chosen)
 
     if theme is None:
@@ -118,6 +98,30 @@ def _opened(application: "QApplication", start: "Callable[[], Client] | None", t
     sys.excepthook = slipped
     bridge.begin()
     return window
+
+
+def _shown(made: "Callable[[QApplication], QWidget]") -> int:
+    """Show the window that is made until it is closed; return the exit code, or say what is missing."""
+    if missing := what_is_missing():
+        return _said(missing)
+    try:
+        from PySide6.QtWidgets import QApplication
+    except ImportError as error:
+        return _said(missing_library(error))
+    application = QApplication(sys.argv[:1])
+    window = made(application)
+    window.show()
+    return application.exec()
+
+
+def _dress(application: "QApplication", tokens: "Tokens", scale: float) -> None:
+    """Give every window the colours and type of a theme."""
+    from daq_app.qt.tokens import palette, style_sheet
+
+    application.setApplicationName("daq-app")
+    application.setStyle("Fusion")  # the one style that draws alike, and takes our colours, everywhere
+    application.setPalette(palette(tokens))
+    application.setStyleSheet(style_sheet(tokens, scale))
 
 
 def _said(sentence: str) -> int:

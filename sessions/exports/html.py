@@ -8,13 +8,13 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
 from sessions.exports import report_tables
 from sessions.exports.figures import Panel, Plate, plates
 from sessions.exports.report_prose import question, summary
 from sessions.exports.report_tables import Table
+from sessions.exports.templates import template
 from sessions.report import Report
 
 HEAD = "<!DOCTYPE html>"
@@ -28,14 +28,7 @@ def page(report: Report) -> str:
     """Return the page: no script, nothing asked of any network; the same report gives the same bytes."""
     figures = {plate.name: plate for plate in plates(report)}
     tables = report_tables.tables(report)
-    environment = Environment(
-        loader=PackageLoader("sessions.exports", "."),
-        autoescape=select_autoescape(default=True, default_for_string=True),
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
-    return environment.get_template("report.html.jinja").render(
+    return template("report.html.jinja").render(
         report=report,
         question=question(report),
         summary=summary(report),

@@ -3,12 +3,11 @@
 from functools import partial
 from itertools import chain
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
-
 from sessions.exports.figures.study import study_plates
 from sessions.exports.html import data_address, drawn
 from sessions.exports.study_prose import again, command, excluded, modelled, sealed, summary, versions, who
 from sessions.exports.study_tables import study_tables
+from sessions.exports.templates import template
 from sessions.pooling.pooled import StudyFindings
 
 QUESTION = (
@@ -19,18 +18,11 @@ QUESTION = (
 
 def study_page(study: StudyFindings, name: str) -> str:
     """Return the page of the study called `name`; the same findings give the same bytes."""
-    environment = Environment(
-        loader=PackageLoader("sessions.exports", "."),
-        autoescape=select_autoescape(default=True, default_for_string=True),
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
     figures = {plate.name: plate for plate in study_plates(study)}
     tables = study_tables(study)
     numbers = {plate: n for n, plate in enumerate(figures, 1)}
     numbers |= {table.name: n for n, table in enumerate(chain.from_iterable(tables.values()), 1)}
-    return environment.get_template("study.html.jinja").render(
+    return template("study.html.jinja").render(
         study=study,
         name=name,
         question=QUESTION,
