@@ -1,19 +1,17 @@
 """The score as a straight line of the predicted energy, subjects differing in level, with what the order adds."""
 
-import importlib
 import math
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy import stats
 
+from sessions.analysis.restricted import Fit, restricted_fit
+from sessions.analysis.spread import Spreads, spreads
+
 CONFIDENCE = 0.95
 INTERCEPT = "intercept"
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,12 +30,14 @@ class MixedModel:
     """A linear mixed model by restricted maximum likelihood: each subject has a level, perhaps a slope, of its own."""
 
     terms: tuple[Term, ...]
+    middle: float  # mean of the first covariate, at which the intercept and the subjects' levels are told
     between_sd: float  # of the subjects' levels
     within_sd: float  # of what is left
     n: int
     subjects: int
     slope_sd: float | None  # of the subjects' slopes on the first covariate; None where one slope was fitted for all
-    singular: bool  # the subjects' levels do not differ beyond what is left: between_sd is 0 or nearly
+    singular: bool  # subjects differ in fewer ways than were fitted: a spread is 0, or level and slope go as one
+    spreads: Spreads | None  # the same standard deviations by least squares, with intervals; None where too few say so
 
     def term(self, name: str) -> Term:
         """Return one fixed effect. Raises KeyError for one that was not in the model."""
@@ -56,41 +56,45 @@ def mixed_model(
     With `slopes_differ` each subject also has its own slope on the first covariate. Without it the interval of that
     slope is too narrow where subjects use more or less of the scale. Intervals are then t intervals, with as many
     degrees of freedom as subjects less one for terms that differ between subjects, and for the others as many as a fit
-    to each subject alone would leave; without it they are Wald's.
+    to each subject alone would leave; without it they are Wald's. The first covariate counts from its mean, so that an
+    offset of it changes nothing.
 
     Carry-over and drift enter as covariates: the index scored before, and the trial's place in its block. None where
     there are fewer than two subjects, a covariate does not vary, or covariates determine each other.
     """
-    # Slow to load, and only studies need it.
-    library: Any = importlib.import_module("statsmodels.regression.mixed_linear_model")
     names = [INTERCEPT, *covariates]
     columns = np.column_stack([np.ones(len(score)), *covariates.values()])
     count = len(set(subjects))
-    if count < 2 or len(score) <= len(names) + count or np.linalg.matrix_rank(columns) < len(names):
+    if count < 2 or len(score) <= len(names) + count:
         return None
+    middle = float(columns[:, 1].mean())
+    columns[:, 1] -= middle
     scale = np.abs(columns).max(axis=0)  # covariates in any unit are fitted alike well
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of fits at the boundary; `singular` tells
-        varying = columns[:, : 2 if slopes_differ else 1] / scale[: 2 if slopes_differ else 1]
-        model = library.MixedLM(
-            np.array(score, np.float64), columns / scale, groups=np.array(subjects), exog_re=varying
-        )
-        fit = model.fit(reml=True, method=["lbfgs", "powell"])
-    among = np.asarray(fit.cov_re, np.float64)
-    within = float(np.sqrt(fit.scale))
-    spread = np.sqrt(np.maximum(np.diag(among), 0.0)) / scale[: len(among)]
-    scaled: Array = columns / scale
-    information: Array = scaled.T @ np.linalg.solve(_covariance(subjects, varying, among, within), scaled)
-    errors = np.sqrt(np.diag(np.linalg.inv(information))) / scale
-    estimates = np.asarray(fit.fe_params, np.float64) / scale
-    dof = max(len(score) - len(names) - (count - 1) * len(among), 1)
+    if not scale.all() or np.linalg.matrix_rank(columns / scale) < len(names):
+        return None
+    own = 2 if slopes_differ else 1
+    fit: Fit = restricted_fit(np.array(score, np.float64), columns / scale, np.array(subjects), own)
+    spread = np.sqrt(np.diag(fit.among)) / scale[:own]
+    dof = max(len(score) - len(names) - (count - 1) * own, 1)
     terms = tuple(
-        _term(name, b, e, dof if i >= len(among) else count - 1) if slopes_differ else _term(name, b, e, None)
-        for i, (name, b, e) in enumerate(zip(names, estimates.tolist(), errors.tolist(), strict=True))
+        _term(name, b, e, dof if i >= own else count - 1) if slopes_differ else _term(name, b, e, None)
+        for i, (name, b, e) in enumerate(
+            zip(names, (fit.estimates / scale).tolist(), (fit.errors / scale).tolist(), strict=True)
+        )
     )
-    between = float(spread[0])
-    slope_sd = float(spread[1]) if slopes_differ else None
-    return MixedModel(terms, between, within, len(score), count, slope_sd, between < 0.02 * within)
+    first, *common = covariates.values()
+    differ = spreads(subjects, score, common, first) if slopes_differ else spreads(subjects, score, [first, *common])
+    return MixedModel(
+        terms=terms,
+        middle=middle,
+        between_sd=float(spread[0]),
+        within_sd=fit.within,
+        n=len(score),
+        subjects=count,
+        slope_sd=float(spread[1]) if slopes_differ else None,
+        singular=fit.singular,
+        spreads=differ,
+    )
 
 
 def _term(name: str, estimate: float, error: float, dof: int | None) -> Term:
@@ -100,13 +104,3 @@ def _term(name: str, estimate: float, error: float, dof: int | None) -> Term:
     else:
         half, p = float(stats.t.ppf((1 + CONFIDENCE) / 2, dof)), 2.0 * float(stats.t.sf(abs(estimate / error), dof))
     return Term(name, estimate, estimate - half * error, estimate + half * error, p)
-
-
-def _covariance(subjects: Sequence[str], varying: Array, among: Array, within: float) -> Array:
-    """Return the covariance (n, n) of scores whose fixed part is known.
-
-    `varying` (n, k) are the columns whose coefficients differ between subjects, with covariance `among` (k, k).
-    """
-    codes = np.array(subjects)
-    same = codes[:, None] == codes[None, :]
-    return within**2 * np.eye(len(codes)) + (varying @ among @ varying.T) * same

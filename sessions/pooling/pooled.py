@@ -1,5 +1,6 @@
 """What the visits of a study say together: means, agreement, and how predictions go with scores. Plain data."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -17,6 +18,7 @@ from sessions.analysis.scores import (
     reversed_subjects,
     score_matrix,
 )
+from sessions.analysis.spread import Spread, spreads
 from sessions.analysis.within import (
     Agreement,
     Difference,
@@ -38,6 +40,10 @@ SED = "SED [kPa]"
 INDEX = "index − 50"
 DRIFT = "trials before in the block"
 CARRY_OVER = "index stroked before − 50"
+LEVELS = "spread of subjects' levels"
+SLOPES = "spread of subjects' slopes on the index"
+NOISE = "noise of single scores"
+FINGERS = "spread of log µ between fingers and transducers"
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +89,7 @@ class DescriptorFindings:
     estimates: Estimates | None
     on_sed: MixedModel | None  # score on SED [kPa], drift and carry-over
     on_index: MixedModel | None  # score on the maker's index, drift and carry-over
+    fingers: Spread | None  # how fingers differ: of the logarithm of mu between subjects, surfaces taken away [-]
     paths: tuple[PathFinding, ...]  # () where they were not asked for
 
 
@@ -172,7 +179,7 @@ def pooled(
         excluded=exclusions,
         reversed=reversed_subjects(tables),
         descriptors=found,
-        effects=() if planted is None else _recovered(found, planted["score"]),
+        effects=() if planted is None else _recovered(found, planted),
         friction=None if planted is None else _friction(ordered, planted["strokes"]),
         flaws=() if planted is None else _flaws(ordered, dict(failed), planted.get("spoilt", {})),
     )
@@ -226,6 +233,7 @@ def _descriptor(
         estimates=estimates(trials),
         on_sed=_model([p[0] for p in points], [p[1] for p in points], [p[3] for p in points], SED),
         on_index=_model([p[0] for p in scored], [p[1] for p in scored], [p[2] for p in scored], INDEX),
+        fingers=_fingers([(v.subject, row.index, row.mu) for v, row in trials if row.mu is not None]),
         paths=path_findings(
             [PathTrial(v.subject, row.index, row.score, row.rule, row.paths) for v, row in trials],
             score_of,
@@ -247,6 +255,14 @@ def _model(subjects: Sequence[str], rows: Sequence[TrialRow], scores: Sequence[f
     }
     varied = {name: values for name, values in order.items() if np.ptp(values) > 0.0}
     return mixed_model(subjects, scores, {what: x, **varied}, slopes_differ=True)
+
+
+def _fingers(trials: Sequence[tuple[str, int, float]]) -> Spread | None:
+    """Return how far subjects' friction differs from one another, of trials' subject, index and mu."""
+    indices = sorted({index for _, index, _ in trials})
+    surfaces = [[float(index == one) for _, index, _ in trials] for one in indices[1:]]
+    found = spreads([subject for subject, _, _ in trials], [math.log(mu) for _, _, mu in trials], surfaces)
+    return None if found is None else found.level
 
 
 def _surface(index: int, trials: Sequence[tuple[Visit, TrialRow]]) -> SurfaceMean:
@@ -290,16 +306,35 @@ def _normalised(
     )
 
 
-def _recovered(found: Sequence[DescriptorFindings], score: Mapping[str, float]) -> tuple[Recovered, ...]:
-    """Return the planted effects on scores beside what the mixed model on the index finds."""
+def _recovered(found: Sequence[DescriptorFindings], planted: Mapping[str, Any]) -> tuple[Recovered, ...]:
+    """Return the planted effects beside what the mixed model on the index, and the spread of friction, find."""
+    score, people = planted["score"], planted.get("people", {})
     effects = {INDEX: score["gain"], DRIFT: score["drift"], CARRY_OVER: score["carry_over"]}
-    return tuple(
-        Recovered(one.descriptor, term.name, effects[term.name], term.estimate, term.low, term.high)
-        for one in found
-        if one.on_index is not None
-        for term in one.on_index.terms
-        if term.name in effects
-    )
+    told: list[Recovered] = []
+    for one in found:
+        model = one.on_index
+        for term in () if model is None else model.terms:
+            if term.name in effects:
+                told.append(
+                    Recovered(one.descriptor, term.name, effects[term.name], term.estimate, term.low, term.high)
+                )
+        differ = None if model is None else model.spreads
+        if people and differ is not None:
+            pairs = (
+                (LEVELS, people["offset_spread"], differ.level),
+                (SLOPES, people["gain_spread"], differ.slope),
+                (NOISE, people["judgement_noise"], differ.left),
+            )
+            told += [_spread(one, name, sd, spread) for name, sd, spread in pairs if spread is not None]
+        if people and one.fingers is not None:
+            # A transducer's gains, of drag and of press, differ between visits as fingers do.
+            sd = math.hypot(people["moisture"], math.sqrt(2.0) * planted.get("calibration_sd", 0.0))
+            told.append(_spread(one, FINGERS, sd, one.fingers))
+    return tuple(told)
+
+
+def _spread(one: DescriptorFindings, name: str, planted: float, found: Spread) -> Recovered:
+    return Recovered(one.descriptor, name, planted, found.sd, found.low, found.high)
 
 
 _FLAWS = {"lost": "lost_readings", "frozen": "frozen_sensor", "light": "too_little_force"}

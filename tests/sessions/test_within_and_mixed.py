@@ -5,9 +5,11 @@ from itertools import chain
 
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import optimize, stats
 
 from sessions.analysis.mixed import mixed_model
+from sessions.analysis.restricted import restricted_fit
+from sessions.analysis.spread import difference_of_squares, spreads
 from sessions.analysis.within import (
     agreement,
     differences,
@@ -146,3 +148,114 @@ def test_differences_between_stimuli_are_paired_and_leave_each_subjects_level_ou
     # t(0.975, 2) = 4.302653 times 2 / sqrt(3), by tables
     assert (one.low, one.high) == pytest.approx((6.0 - 4.968275, 6.0 + 4.968275), abs=1e-5)
     assert one.p_holm == one.p
+
+
+# Distance of pituitary to pterygomaxillary fissure of 27 children at 8, 10, 12 and 14 years [mm]: Potthoff & Roy 1964
+# (Biometrika 51:313), table 1.
+DISTANCE = """26 25 29 31|21.5 22.5 23 26.5|23 22.5 24 27.5|25.5 27.5 26.5 27|20 23.5 22.5 26|24.5 25.5 27 28.5|
+22 22 24.5 26.5|24 21.5 24.5 25.5|23 20.5 31 26|27.5 28 31 31.5|23 23 23.5 25|21.5 23.5 24 28|17 24.5 26 29.5|
+22.5 25.5 25.5 26|23 24.5 26 30|22 21.5 23.5 25|21 20 21.5 23|21 21.5 24 25.5|20.5 24 24.5 26|23.5 24.5 25 26.5|
+21.5 23 22.5 23.5|20 21 21 22.5|21.5 22.5 23 25|23 23 23.5 24|20 21 22 21.5|16.5 19 19 19.5|24.5 25 28 28"""
+
+
+def children():
+    """Return child, distance and age of each visit."""
+    rows = [[float(word) for word in part.split()] for part in DISTANCE.split("|")]
+    return [str(k) for k in range(27) for _ in range(4)], [*chain(*rows)], [8.0, 10.0, 12.0, 14.0] * 27
+
+
+def test_the_mixed_model_with_slopes_of_their_own_is_the_published_one():
+    # Pinheiro & Bates 2000, Mixed-Effects Models in S and S-PLUS, section 4.2: lme of distance on age - 11.
+    child, distance, age = children()
+    model = mixed_model(child, distance, {"age": age}, slopes_differ=True)
+    level, slope = model.term("intercept"), model.term("age")
+    t = stats.t.ppf(0.975, 26)
+    assert (level.estimate, slope.estimate) == pytest.approx((24.023, 0.66019), abs=6e-4)
+    assert ((level.high - level.low) / 2 / t, (slope.high - slope.low) / 2 / t) == pytest.approx(
+        (0.42966, 0.07125), abs=6e-6
+    )
+    assert (model.between_sd, model.slope_sd, model.within_sd) == pytest.approx((2.1343, 0.22643, 1.31004), abs=6e-5)
+    assert not model.singular
+
+
+def offset_by(c, seed=5):
+    """Return the model of scores on an SED that lies `c` kPa up and spreads by half of one."""
+    rng = np.random.default_rng(seed)
+    subjects = [str(k) for k in range(10) for _ in range(5)]
+    x = c + np.tile(np.linspace(-0.7, 0.7, 5), 10) * np.repeat(rng.normal(1.0, 0.1, 10), 5)
+    place = np.concatenate([rng.permutation(5) for _ in range(10)])
+    score = 50.0 + 40.0 * (x - c) + place + np.repeat(rng.normal(0, 3, 10), 5) + rng.normal(0, 5, 50)
+    return mixed_model(subjects, score.tolist(), {"sed": x.tolist(), "place": place.tolist()}, slopes_differ=True)
+
+
+def test_an_offset_of_the_predictions_changes_no_number_of_the_model():
+    near, far = offset_by(0.0), offset_by(1000.0)
+    assert far.middle - near.middle == pytest.approx(1000.0)
+    for a, b in zip(near.terms, far.terms, strict=True):
+        assert (b.estimate, b.low, b.high) == pytest.approx((a.estimate, a.low, a.high), rel=1e-8)
+    assert (far.between_sd, far.slope_sd, far.within_sd) == pytest.approx(
+        (near.between_sd, near.slope_sd, near.within_sd), rel=1e-6, abs=1e-6
+    )
+
+
+def restricted_deviance(theta, y, columns, codes):
+    """Return half the restricted deviance written out with the whole covariance matrix (Harville 1977)."""
+    factor = np.array([[theta[0], 0.0], [theta[1], theta[2]]])
+    v = np.eye(len(y)) + (columns[:, :2] @ factor @ factor.T @ columns[:, :2].T) * (codes[:, None] == codes)
+    inverse = np.linalg.inv(v)
+    information = columns.T @ inverse @ columns
+    left = y - columns @ np.linalg.solve(information, columns.T @ inverse @ y)
+    dof = len(y) - columns.shape[1]
+    return 0.5 * sum(np.linalg.slogdet(m)[1] for m in (v, information)) + 0.5 * dof * np.log(left @ inverse @ left)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 4])
+def test_nothing_is_likelier_than_the_fit_singular_or_not_and_rounding_moves_its_last_bits_alone(seed):
+    rng = np.random.default_rng(seed)
+    codes = np.repeat(np.arange(10), 5)
+    columns = np.column_stack([np.ones(50), np.tile(np.linspace(-1, 1, 5), 10), rng.uniform(-1, 1, 50)])
+    y = columns @ [50.0, 30.0, 2.0] + (seed > 2) * np.repeat(rng.normal(0, 5, 10), 5) + rng.normal(0, 4, 50)
+    fit, again = (restricted_fit(y * (1.0 + step), columns, codes, 2) for step in (0.0, rng.uniform(-1, 1, 50) * 2e-16))
+    assert fit.criterion == pytest.approx(
+        min(
+            optimize.minimize(restricted_deviance, start, (y, columns, codes), "Nelder-Mead", tol=1e-10).fun
+            for start in ([1.0, 0.0, 1.0], [0.3, 0.1, 0.1])
+        ),
+        abs=1e-8,
+    )
+    for name in ("estimates", "errors", "among"):
+        one, other = getattr(fit, name), getattr(again, name)
+        assert np.abs(one - other).max() <= 1e-12 * np.abs(one).max()
+
+
+@pytest.mark.slow
+def test_a_kept_library_comes_to_the_same_model():
+    from statsmodels.regression.mixed_linear_model import MixedLM
+
+    child, distance, age = children()
+    columns = np.column_stack([np.ones(108), np.array(age) - 11.0])
+    theirs = MixedLM(np.array(distance), columns, np.array(child), columns).fit(reml=True, method="lbfgs")
+    ours = restricted_fit(np.array(distance), columns, child, 2)
+    assert ours.estimates == pytest.approx(theirs.fe_params, rel=1e-6)
+    assert ours.errors == pytest.approx(theirs.bse_fe, rel=1e-4)
+    assert ours.among == pytest.approx(theirs.cov_re, rel=1e-3)
+
+
+def test_the_spread_of_subjects_has_the_closed_forms_of_its_limits():
+    # A mean square alone: chi squared with 9 degrees of freedom, 2.7004 and 19.0228 by tables.
+    alone = difference_of_squares(1.0, 9, 0.0, 10**8)
+    assert (alone.low, alone.high) == pytest.approx((math.sqrt(9 / 19.0228), math.sqrt(9 / 2.7004)), rel=1e-5)
+    # The lower end leaves 0 where an F test tells the two apart: F(0.975; 9, 20) is 2.8365 by tables.
+    assert difference_of_squares(2.836, 9, 1.0, 20).low == 0.0
+    assert difference_of_squares(2.838, 9, 1.0, 20).low > 0.0
+
+
+def test_in_a_balanced_design_the_spreads_are_those_of_the_analysis_of_variance():
+    rng = np.random.default_rng(3)
+    y = rng.normal(0, 4, (10, 5)) + rng.normal(0, 6, (10, 1))
+    found = spreads([str(k) for k in range(10) for _ in range(5)], y.ravel().tolist(), [])
+    within = ((y - y.mean(axis=1, keepdims=True)) ** 2).sum() / 40
+    assert found.left.sd**2 == pytest.approx(within)
+    assert found.level.sd**2 == pytest.approx(y.mean(axis=1).var(ddof=1) - within / 5)
+    assert found.slope is None
+    assert spreads(["a", "a", "b", "b"], [1.0, 2.0, 3.0, 4.0], []) is None
