@@ -3,11 +3,12 @@
 import math
 from collections.abc import Callable, Iterable, Sequence
 
-from sessions.analysis.mixed import MixedModel
 from sessions.analysis.scores import Relation
 from sessions.analysis.within import RepeatedCorrelation
-from sessions.exports.report_tables.cells import Cell, Column, Group, Notes, Table
+from sessions.exports.report_tables.cells import Cell, Column, Notes, Table
 from sessions.exports.report_tables.paths import paths_table
+from sessions.exports.study_cells import between, correlations, interval, p_value, study_table
+from sessions.exports.study_models import flaws_table, models_table, planted_table
 from sessions.exports.study_trials import trials_table
 from sessions.exports.wording import NONE, correlation, digits, significant
 from sessions.pooling.averages import Average
@@ -21,9 +22,9 @@ def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
         "visits": (_visits(study),),
         "scores": (_scores(study), _normalised(study), _differences(study), _agreement(study), _estimates(study)),
         "surfaces": (_surfaces(study), _forces(study)),
-        "relation": (_relation(study), _models(study)),
+        "relation": (_relation(study), models_table(study)),
         "paths": (paths_table((one.descriptor, one.paths) for one in study.descriptors),),
-        "planted": (_planted(study), _flaws(study)),
+        "planted": (planted_table(study), flaws_table(study)),
         "trials": (trials_table(study),),
     }
     return {
@@ -35,7 +36,7 @@ def _visits(study: StudyFindings) -> Table:
     rows = tuple(_visit_row(visit, study) for visit in study.visits)
     columns = ("session", "subject", "answers", "strokes with SED", "ended as planned", "flawed trials", "counted")
     caption = "Visits in the order of their names; flawed: doubtful or worse, the table of trials names each flaw."
-    return _table("table-visits", caption, columns, [("", rows)])
+    return study_table("table-visits", caption, columns, [("", rows)])
 
 
 def _visit_row(visit: Visit, study: StudyFindings) -> tuple[Cell, ...]:
@@ -64,8 +65,8 @@ def _scores(study: StudyFindings) -> Table:
                 Cell(str(mean.n)),
                 Cell(digits(mean.mean, 1)),
                 notes.number(mean.sd, lambda v: digits(v, 1), mean.reason),
-                _interval(mean.low, mean.high, 1),
-                _interval(None, None, 1) if inner is None else _interval(inner.low, inner.high, 1),
+                interval(mean.low, mean.high, 1),
+                interval(None, None, 1) if inner is None else interval(inner.low, inner.high, 1),
             )
 
     columns = ("index", "subjects", "mean score", "standard deviation", "95 % interval of the mean", "within subjects")
@@ -75,7 +76,7 @@ def _scores(study: StudyFindings) -> Table:
         f"comparing surfaces with one another, of the subjects who scored every surface ({complete or 'none'})."
     )
     groups = _by_descriptor(study, rows)
-    return _table("table-scores", caption, columns, groups, notes)
+    return study_table("table-scores", caption, columns, groups, notes)
 
 
 def _agreement(study: StudyFindings) -> Table:
@@ -84,8 +85,8 @@ def _agreement(study: StudyFindings) -> Table:
             Cell(one.descriptor),
             Cell(str(found.n)),
             Cell(digits(found.kendall_w, 2)),
-            Cell(_p(found.friedman_p)),
-            Cell(_p(found.page_p)),
+            Cell(p_value(found.friedman_p)),
+            Cell(p_value(found.page_p)),
         )
         for one in study.descriptors
         if (found := one.agreement) is not None
@@ -94,7 +95,7 @@ def _agreement(study: StudyFindings) -> Table:
     caption = (
         "Agreement on the order of the surfaces; Friedman: that they differ; Page: that scores rise with the index."
     )
-    return _table("table-agreement", caption, columns, [("", rows)])
+    return study_table("table-agreement", caption, columns, [("", rows)])
 
 
 def _normalised(study: StudyFindings) -> Table:
@@ -106,10 +107,10 @@ def _normalised(study: StudyFindings) -> Table:
                 Cell(str(index)),
                 Cell(str(given.n)),
                 Cell(digits(given.mean, 1)),
-                _interval(given.low, given.high, 1),
+                interval(given.low, given.high, 1),
                 Cell(str(mean.n)),
                 Cell(digits(mean.mean, 2)),
-                _interval(mean.low, mean.high, 2),
+                interval(mean.low, mean.high, 2),
             )
 
     columns = ("index", "subjects", "as given", "95 % interval", "subjects", "standardised", "95 % interval")
@@ -118,7 +119,7 @@ def _normalised(study: StudyFindings) -> Table:
         "own standard deviation over the surfaces it scored, which takes away what part of the scale a subject uses. "
         "t intervals of the mean over subjects."
     )
-    return _table("table-normalised", caption, columns, _by_descriptor(study, rows))
+    return study_table("table-normalised", caption, columns, _by_descriptor(study, rows))
 
 
 def _differences(study: StudyFindings) -> Table:
@@ -128,9 +129,9 @@ def _differences(study: StudyFindings) -> Table:
                 Cell(f"{pair.high_index} − {pair.low_index}"),
                 Cell(str(pair.n)),
                 Cell(digits(pair.mean, 1)),
-                _interval(pair.low, pair.high, 1),
-                Cell(_p(pair.p)),
-                Cell(_p(pair.p_holm)),
+                interval(pair.low, pair.high, 1),
+                Cell(p_value(pair.p)),
+                Cell(p_value(pair.p_holm)),
             )
 
     columns = ("index", "subjects", "difference of scores", "95 % interval", "p", "p, Holm")
@@ -138,7 +139,7 @@ def _differences(study: StudyFindings) -> Table:
         "How much higher one surface was scored than another, within subjects: mean and t interval of the differences, "
         "paired t test, and its p corrected for all pairs of the descriptor (Holm 1979)."
     )
-    return _table("table-differences", caption, columns, _by_descriptor(study, rows))
+    return study_table("table-differences", caption, columns, _by_descriptor(study, rows))
 
 
 def _estimates(study: StudyFindings) -> Table:
@@ -155,7 +156,7 @@ def _estimates(study: StudyFindings) -> Table:
                 if mean.low is None or mean.high is None:
                     cells.append(notes.number(None, str, "one subject alone has no interval"))
                 else:
-                    cells.append(Cell(_to(math.exp(mean.low), math.exp(mean.high))))
+                    cells.append(Cell(between(math.exp(mean.low), math.exp(mean.high))))
             yield tuple(cells)
 
     columns = ("index", "subjects", "geometric mean", "95 % interval", "at one modulus", "95 % interval")
@@ -166,7 +167,7 @@ def _estimates(study: StudyFindings) -> Table:
         f"the logarithms, as they were given and with every subject's own modulus taken away (Stevens 1957).{left}"
     )
     groups = _by_descriptor(study, rows)
-    return _table("table-estimates", caption, columns, groups, notes)
+    return study_table("table-estimates", caption, columns, groups, notes)
 
 
 def _without_logarithm(study: StudyFindings) -> list[tuple[str, tuple[str, ...]]]:
@@ -201,7 +202,7 @@ def _surfaces(study: StudyFindings) -> Table:
         f"intervals. Model: {_model_in_short(study)}."
     )
     groups = [(one.descriptor, tuple(row(one))) for one in study.descriptors if any(s.subjects for s in one.surfaces)]
-    return _table("table-surfaces", caption, columns, groups, notes)
+    return study_table("table-surfaces", caption, columns, groups, notes)
 
 
 def _model_in_short(study: StudyFindings) -> str:
@@ -235,7 +236,7 @@ def _forces(study: StudyFindings) -> Table:
         "of its block (times the finger's width, assumed unless it was measured), and the depth at which the model "
         "would press as hard as the subject did. Means over subjects with t intervals."
     )
-    return _table(
+    return study_table(
         "table-forces", caption, columns, [(one.descriptor, tuple(row(one))) for one in study.descriptors], notes
     )
 
@@ -254,7 +255,7 @@ def _mean(mean: Average | None, decimals: int, notes: Notes) -> tuple[Cell, Cell
         return missing, missing
     if mean.low is None or mean.high is None:
         return Cell(digits(mean.mean, decimals)), notes.number(None, str, "one subject alone has no interval")
-    return Cell(digits(mean.mean, decimals)), _interval(mean.low, mean.high, decimals)
+    return Cell(digits(mean.mean, decimals)), interval(mean.low, mean.high, decimals)
 
 
 def _relation(study: StudyFindings) -> Table:
@@ -265,9 +266,9 @@ def _relation(study: StudyFindings) -> Table:
                 Cell(name),
                 Cell(f"{related.n} surfaces"),
                 Cell(correlation(related.pearson)),
-                _correlations(related.low, related.high),
+                correlations(related.low, related.high),
                 Cell(rho),
-                Cell(NONE if related.spearman_p is None else _p(related.spearman_p)),
+                Cell(NONE if related.spearman_p is None else p_value(related.spearman_p)),
                 Cell(NONE),
                 _without([(f"index {label}", r) for label, r in related.without if r is not None]),
             )
@@ -280,10 +281,10 @@ def _relation(study: StudyFindings) -> Table:
                 Cell(name),
                 Cell(f"{found.dof} d.f."),
                 Cell(correlation(found.r)),
-                _correlations(found.low, found.high),
+                correlations(found.low, found.high),
                 Cell(NONE),
-                Cell(_p(found.p)),
-                Cell(NONE if adjusted is None else _p(adjusted)),
+                Cell(p_value(found.p)),
+                Cell(NONE if adjusted is None else p_value(adjusted)),
                 _without(without),
             )
 
@@ -304,7 +305,7 @@ def _relation(study: StudyFindings) -> Table:
         "strokes (Bakdash and Marusich 2017), and its p corrected for the descriptors that have one (Holm 1979). Last "
         "column: least and greatest r when one surface, or one subject, is left out, and which."
     )
-    return _table("table-relation", caption, columns, [(one.descriptor, rows(one)) for one in study.descriptors])
+    return study_table("table-relation", caption, columns, [(one.descriptor, rows(one)) for one in study.descriptors])
 
 
 def _without(left_out: Sequence[tuple[str, float]]) -> Cell:
@@ -314,86 +315,7 @@ def _without(left_out: Sequence[tuple[str, float]]) -> Cell:
     return Cell(", ".join(f"{correlation(r)} ({name})" for name, r in (least, greatest)))
 
 
-def _models(study: StudyFindings) -> Table:
-    groups = [
-        (f"{one.descriptor}: score on {what}", _terms(model))
-        for one in study.descriptors
-        for what, model in (("SED", one.on_sed), ("index", one.on_index))
-        if model is not None
-    ]
-    caption = (
-        "Mixed models of the score, fitted by restricted maximum likelihood: level and first slope differ between "
-        "subjects; drift is the slope on the trials before in the block, carry-over that on the index stroked before. "
-        "t intervals."
-    )
-    return _table("table-models", caption, ("term", "estimate", "95 % interval", "p"), groups)
-
-
-def _terms(model: MixedModel) -> tuple[tuple[Cell, ...], ...]:
-    shown = tuple(
-        (Cell(t.name), Cell(significant(t.estimate, 3)), Cell(_to(t.low, t.high)), Cell(_p(t.p))) for t in model.terms
-    )
-    told = f"{model.n} scores of {model.subjects} subjects{'; singular fit' if model.singular else ''}"
-    return (*shown, (Cell(f"what is left ({told})"), Cell(significant(model.within_sd, 3)), Cell(NONE), Cell(NONE)))
-
-
-def _planted(study: StudyFindings) -> Table:
-    rows = tuple(
-        (
-            Cell(one.descriptor),
-            Cell(one.effect),
-            Cell(significant(one.planted, 3)),
-            Cell(significant(one.found, 3)),
-            Cell(_to(one.low, one.high)),
-            Cell("yes" if one.covered else "no"),
-        )
-        for one in study.effects
-    )
-    columns = ("descriptor", "effect on the score", "planted", "found", "95 % interval", "inside")
-    caption = "Planted effects and what the mixed model on the index finds of them; one interval in twenty misses."
-    return _table("table-planted", caption, columns, [("", rows)])
-
-
-def _flaws(study: StudyFindings) -> Table:
-    rows = tuple((Cell(one.session), Cell(one.expected), Cell("yes" if one.found else "no")) for one in study.flaws)
-    caption = "What was spoilt in the simulated sessions, and whether the analysis, which does not know of it, says so."
-    return _table("table-planted-flaws", caption, ("session", "planted", "found"), [("", rows)])
-
-
 def _by_descriptor(
     study: StudyFindings, rows: Callable[[DescriptorFindings], Iterable[tuple[Cell, ...]]]
 ) -> list[tuple[str, tuple[tuple[Cell, ...], ...]]]:
     return [(one.descriptor, tuple(rows(one))) for one in study.descriptors]
-
-
-def _table(
-    name: str,
-    caption: str,
-    columns: Iterable[str | Column],
-    groups: Iterable[tuple[str, tuple[tuple[Cell, ...], ...]]],
-    notes: Notes | None = None,
-) -> Table:
-    kept = tuple(Group(head, rows) for head, rows in groups if rows)
-    heads = tuple(column if isinstance(column, Column) else Column(column) for column in columns)
-    return Table(name, caption, heads, kept, () if notes is None else notes.listed())
-
-
-def _interval(low: float | None, high: float | None, decimals: int) -> Cell:
-    return Cell(NONE if low is None or high is None else f"{digits(low, decimals)} to {digits(high, decimals)}")
-
-
-def _correlations(low: float | None, high: float | None) -> Cell:
-    return Cell(NONE if low is None or high is None else f"{correlation(low)} to {correlation(high)}")
-
-
-def _to(low: float, high: float) -> str:
-    return f"{significant(low, 3)} to {significant(high, 3)}"
-
-
-def _p(p: float) -> str:
-    """Return a p value as people write it.
-
-    >>> _p(0.0321), _p(1e-9)
-    ('0.032', '< 0.001')
-    """
-    return "< 0.001" if p < 0.001 else digits(p, 3)

@@ -44,6 +44,16 @@ LEVELS = "spread of subjects' levels"
 SLOPES = "spread of subjects' slopes on the index"
 NOISE = "noise of single scores"
 FINGERS = "spread of log µ between fingers and transducers"
+UNITS = {
+    INDEX: "points per index",
+    SED: "points per kPa",
+    DRIFT: "points per trial",
+    CARRY_OVER: "points per index",
+    LEVELS: "points",
+    SLOPES: "points per index",
+    NOISE: "points",
+    FINGERS: "1",
+}  # of effects on the score, and of the spreads
 
 
 @dataclass(frozen=True, slots=True)

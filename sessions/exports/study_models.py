@@ -1,0 +1,89 @@
+"""Tables of a study's page: mixed models, and what was planted beside what was found."""
+
+from sessions.analysis.mixed import INTERCEPT, MixedModel
+from sessions.exports.report_tables.cells import Cell, Table
+from sessions.exports.study_cells import between, p_value, study_table
+from sessions.exports.wording import NONE, digits, plural, significant
+from sessions.pooling.pooled import LEVELS, NOISE, SED, UNITS, StudyFindings
+
+
+def models_table(study: StudyFindings) -> Table:
+    """Return the mixed models of scores on SED and on index, with how far subjects differ."""
+    groups = [
+        (f"{one.descriptor}: score on {what}, {_fitted(model)}", _terms(model))
+        for one in study.descriptors
+        for what, model in (("SED", one.on_sed), ("index", one.on_index))
+        if model is not None
+    ]
+    caption = (
+        "Mixed models of the score, fitted by restricted maximum likelihood: level and first slope differ between "
+        "subjects; drift is the slope on the trials before in the block, carry-over that on the index stroked before. "
+        "The level is that at the mean of SED or index. t intervals. Standard deviations of the subjects' own levels "
+        "and slopes, and of single scores about them: by least squares, the error of each subject's own line taken "
+        "away; intervals by modified large sample (Ting et al. 1990), of single scores by chi squared. A singular fit "
+        "finds that subjects differ in fewer ways than it allows."
+    )
+    return study_table("table-models", caption, ("term", "unit", "estimate", "95 % interval", "p"), groups)
+
+
+def _fitted(model: MixedModel) -> str:
+    singular = ", singular fit" if model.singular else ""
+    return f"{model.n} scores of {plural(model.subjects, 'subject')}{singular}"
+
+
+def _terms(model: MixedModel) -> tuple[tuple[Cell, ...], ...]:
+    first = model.terms[1].name
+    middle = f"{digits(model.middle, 3)} kPa" if first == SED else f"index {digits(50 + model.middle, 1)}"
+
+    def row(name: str, unit: str, estimate: float, low: float, high: float, p: float | None) -> tuple[Cell, ...]:
+        told = NONE if p is None else p_value(p)
+        return Cell(name), Cell(unit), Cell(significant(estimate, 3)), Cell(between(low, high)), Cell(told)
+
+    rows = [
+        row(
+            f"level at {middle}" if t.name == INTERCEPT else t.name,
+            UNITS.get(t.name, "points"),
+            t.estimate,
+            t.low,
+            t.high,
+            t.p,
+        )
+        for t in model.terms
+    ]
+    if model.spreads is not None:
+        told = (
+            (LEVELS, "points", model.spreads.level),
+            ("spread of subjects' slopes", UNITS[first], model.spreads.slope),
+            (NOISE, "points", model.spreads.left),
+        )
+        rows += [row(name, unit, s.sd, s.low, s.high, None) for name, unit, s in told if s is not None]
+    return tuple(rows)
+
+
+def planted_table(study: StudyFindings) -> Table:
+    """Return what was planted in a simulated study beside what was found."""
+    rows = tuple(
+        (
+            Cell(one.descriptor),
+            Cell(one.effect),
+            Cell(UNITS[one.effect]),
+            Cell(significant(one.planted, 3)),
+            Cell(significant(one.found, 3)),
+            Cell(between(one.low, one.high)),
+            Cell("yes" if one.covered else "no"),
+        )
+        for one in study.effects
+    )
+    columns = ("descriptor", "effect", "unit", "planted", "found", "95 % interval", "inside")
+    caption = (
+        "Planted effects on the score, and what the mixed model on the index finds of them; spreads are standard "
+        "deviations. One interval in twenty misses."
+    )
+    return study_table("table-planted", caption, columns, [("", rows)])
+
+
+def flaws_table(study: StudyFindings) -> Table:
+    """Return what was spoilt in a simulated study, and whether it was found."""
+    rows = tuple((Cell(one.session), Cell(one.expected), Cell("yes" if one.found else "no")) for one in study.flaws)
+    caption = "What was spoilt in the simulated sessions, and whether the analysis, which does not know of it, says so."
+    return study_table("table-planted-flaws", caption, ("session", "planted", "found"), [("", rows)])
