@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from sessions.analysis.restricted import Fit, restricted_fit
+from sessions.analysis.restricted import Array, Fit, restricted_fit
 from sessions.analysis.spread import Spreads, spreads
 
 CONFIDENCE = 0.95
@@ -50,7 +50,7 @@ def mixed_model(
     covariates: Mapping[str, Sequence[float]],
     *,
     slopes_differ: bool = False,
-) -> MixedModel | None:
+) -> MixedModel | str:
     """Return score (n) as intercept + sum of slopes times covariates (n each) + the subject's level + what is left.
 
     With `slopes_differ` each subject also has its own slope on the first covariate. Without it the interval of that
@@ -59,20 +59,22 @@ def mixed_model(
     to each subject alone would leave; without it they are Wald's. The first covariate counts from its mean, so that an
     offset of it changes nothing.
 
-    Carry-over and drift enter as covariates: the index scored before, and the trial's place in its block. None where
-    there are fewer than two subjects, a covariate does not vary, or covariates determine each other.
+    Carry-over and drift enter as covariates: the index scored before, and the trial's place in its block. Where
+    nothing can be said a sentence says why.
     """
     names = [INTERCEPT, *covariates]
     columns = np.column_stack([np.ones(len(score)), *covariates.values()])
     count = len(set(subjects))
     if count < 2 or len(score) <= len(names) + count:
-        return None
+        return f"{len(score)} scores of {count} subjects are too few for {len(names)} terms and a level of each subject"
     middle = float(columns[:, 1].mean())
     columns[:, 1] -= middle
     scale = np.abs(columns).max(axis=0)  # covariates in any unit are fitted alike well
     if not scale.all() or np.linalg.matrix_rank(columns / scale) < len(names):
-        return None
+        return "a term does not vary, or others determine it"
     own = 2 if slopes_differ else 1
+    if _exact(np.array(score, np.float64), columns / scale, subjects):
+        return "all scores lie on the line but for round-off: there is nothing to tell an error from"
     fit: Fit = restricted_fit(np.array(score, np.float64), columns / scale, np.array(subjects), own)
     spread = np.sqrt(np.diag(fit.among)) / scale[:own]
     dof = max(len(score) - len(names) - (count - 1) * own, 1)
@@ -95,6 +97,14 @@ def mixed_model(
         singular=fit.singular,
         spreads=differ,
     )
+
+
+def _exact(score: Array, columns: Array, subjects: Sequence[str]) -> bool:
+    """Say whether levels of the subjects and common slopes leave nothing of the scores."""
+    whose = np.array(subjects)[:, None] == np.unique(np.array(subjects))[None, :]
+    design = np.hstack([whose.astype(np.float64), columns[:, 1:]])
+    left = score - design @ np.linalg.lstsq(design, score, rcond=None)[0]
+    return float(np.abs(left).max()) <= 1e-9 * (1.0 + float(np.abs(score).max()))
 
 
 def _term(name: str, estimate: float, error: float, dof: int | None) -> Term:

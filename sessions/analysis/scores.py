@@ -63,6 +63,8 @@ class Relation:
     low: float | None  # 95 % interval of pearson (Fisher's z)
     high: float | None
     spearman: float | None
+    spearman_low: float | None  # 95 % interval of spearman (Fisher's z, its error by Bonett & Wright 2000)
+    spearman_high: float | None
     spearman_p: float | None  # exact, two-sided: the share of all orders at least as far from 0
     slope: float | None  # least-squares line y = intercept + slope x
     intercept: float | None
@@ -153,14 +155,15 @@ def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> R
     r = _pearson(x, y)
     if r is None:
         why = f"{n} points are too few for a correlation" if n < 3 else "one of the two does not vary"
-        return Relation(n, None, None, None, None, None, None, None, without, why)
+        return Relation(n, None, None, None, None, None, None, None, None, None, without, why)
     slope, intercept = np.polyfit(x, y, 1)
     low, high = _fisher_interval(x, y)
     why = None if low is not None else f"no interval of r from {n} points" if n < 4 else "no interval of a perfect r"
     from scipy import stats  # slow to load, and a window that opens waits for it
 
     rho = float(stats.spearmanr(x, y).statistic)
-    return Relation(n, r, low, high, rho, _exact_p(x, y, rho), float(slope), float(intercept), without, why)
+    ends = _rank_interval(rho, n)
+    return Relation(n, r, low, high, rho, *ends, _exact_p(x, y, rho), float(slope), float(intercept), without, why)
 
 
 def reversed_subjects(tables: Iterable[ScoreTable]) -> tuple[tuple[str, str, float], ...]:
@@ -227,6 +230,19 @@ def _fisher_interval(x: Sequence[float], y: Sequence[float]) -> tuple[float | No
         return None, None
     interval = result.confidence_interval(CONFIDENCE)
     return float(interval.low), float(interval.high)
+
+
+def _rank_interval(rho: float, n: int) -> tuple[float | None, float | None]:
+    """Return the 95 % interval of Spearman's rho (Bonett & Wright 2000, Psychometrika 65:23, equation 4).
+
+    None for fewer than four points, or where both orders agree wholly or are each other's reverse.
+    """
+    if n < 4 or abs(rho) > 1 - 1e-12:
+        return None, None
+    from scipy import stats
+
+    half = float(stats.norm.ppf((1 + CONFIDENCE) / 2)) * math.sqrt((1 + rho * rho / 2) / (n - 3))
+    return math.tanh(math.atanh(rho) - half), math.tanh(math.atanh(rho) + half)
 
 
 def _exact_p(x: Sequence[float], y: Sequence[float], rho: float) -> float | None:

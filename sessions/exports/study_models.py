@@ -1,5 +1,7 @@
 """Tables of a study's page: mixed models, and what was planted beside what was found."""
 
+from collections import defaultdict
+
 from sessions.analysis.mixed import INTERCEPT, MixedModel
 from sessions.exports.report_tables.cells import Cell, Table
 from sessions.exports.study_cells import between, p_value, study_table
@@ -9,12 +11,12 @@ from sessions.pooling.pooled import LEVELS, NOISE, SED, UNITS, StudyFindings
 
 def models_table(study: StudyFindings) -> Table:
     """Return the mixed models of scores on SED and on index, with how far subjects differ."""
-    groups = [
-        (f"{one.descriptor}: score on {what}, {_fitted(model)}", _terms(model))
+    models = [
+        (f"{one.descriptor}: score on {what}", model)
         for one in study.descriptors
         for what, model in (("SED", one.on_sed), ("index", one.on_index))
-        if model is not None
     ]
+    groups = [(f"{name}, {_fitted(model)}", _terms(model)) for name, model in models if not isinstance(model, str)]
     caption = (
         "Mixed models of the score, fitted by restricted maximum likelihood: level and first slope differ between "
         "subjects; drift is the slope on the trials before in the block, carry-over that on the index stroked before. "
@@ -24,6 +26,24 @@ def models_table(study: StudyFindings) -> Table:
         "finds that subjects differ in fewer ways than it allows."
     )
     return study_table("table-models", caption, ("term", "unit", "estimate", "95 % interval", "p"), groups)
+
+
+def missing_models(study: StudyFindings) -> list[str]:
+    """Return why there is no correlation of means, and no mixed model: a sentence for each reason."""
+    told: defaultdict[str, list[str]] = defaultdict(list)
+    for one in study.descriptors:
+        for what, model in (("SED", one.on_sed), ("index", one.on_index)):
+            if isinstance(model, str):
+                told[model].append(f"{one.descriptor} on {what}")
+    related = [(one.descriptor, one.mean_relation) for one in study.descriptors]
+    return [
+        *(
+            f"No correlation of means on {name}: {r.reason}."
+            for name, r in related
+            if r is not None and r.pearson is None
+        ),
+        *(f"No mixed model of {', '.join(names)}: {why}." for why, names in told.items()),
+    ]
 
 
 def _fitted(model: MixedModel) -> str:

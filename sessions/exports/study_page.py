@@ -5,6 +5,7 @@ from itertools import chain
 
 from sessions.exports.figures.study import study_plates
 from sessions.exports.html import data_address, drawn
+from sessions.exports.study_models import missing_models
 from sessions.exports.study_prose import again, command, excluded, modelled, sealed, summary, versions, who
 from sessions.exports.study_tables import study_tables
 from sessions.exports.templates import template
@@ -34,6 +35,7 @@ def study_page(study: StudyFindings, name: str) -> str:
         versions=versions(),
         again=again(study),
         command=command(study, name),
+        unmodelled=missing_models(study),
         figures=figures,
         tables=tables,
         numbers=numbers,

@@ -57,7 +57,13 @@ def excluded(study: StudyFindings) -> list[str]:
     said = [f"Session {folder} could not be read, and nothing of it counts: {why}." for folder, why in study.failed]
     for one in study.excluded:
         what = f"trials on {one.descriptor}" if one.descriptor else "every trial"
-        said.append(f"Subject {one.subject}: {what} left out by {one.who}: {one.why}.")
+        if any(v.subject == one.subject and one.descriptor in ("", r.descriptor) for v in study.visits for r in v.rows):
+            said.append(f"Subject {one.subject}: {what} left out by {one.who}: {_stopped(one.why)}")
+        else:
+            said.append(
+                f"Nothing, by a decision that fits nothing here: {one.who} left out {what} of subject {one.subject} "
+                f"({one.why}), and no session read has such trials; see exclusions.toml."
+            )
     said += [f"Session {visit.session}: {_stopped(decision)}" for visit in study.visits for decision in visit.decisions]
     said += [
         f"Session {visit.session} ended before its last trial; what it holds counts."

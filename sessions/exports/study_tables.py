@@ -268,6 +268,7 @@ def _relation(study: StudyFindings) -> Table:
                 Cell(correlation(related.pearson)),
                 correlations(related.low, related.high),
                 Cell(rho),
+                correlations(related.spearman_low, related.spearman_high),
                 Cell(NONE if related.spearman_p is None else p_value(related.spearman_p)),
                 Cell(NONE),
                 _without([(f"index {label}", r) for label, r in related.without if r is not None]),
@@ -282,6 +283,7 @@ def _relation(study: StudyFindings) -> Table:
                 Cell(f"{found.dof} d.f."),
                 Cell(correlation(found.r)),
                 correlations(found.low, found.high),
+                Cell(NONE),
                 Cell(NONE),
                 Cell(p_value(found.p)),
                 Cell(NONE if adjusted is None else p_value(adjusted)),
@@ -298,12 +300,23 @@ def _relation(study: StudyFindings) -> Table:
             *within("within, log estimates", estimated, None, ()),
         )
 
-    columns = ("scores", "n", "r", "95 % interval", "rho", "p", "p, Holm", "r with one left out")
+    columns = (
+        "scores",
+        "n",
+        "r",
+        "95 % interval",
+        "rho",
+        "95 % interval of rho",
+        "p",
+        "p, Holm",
+        "r with one left out",
+    )
     caption = (
-        "Predicted SED with scores. Means: Pearson's r of means over subjects, interval by Fisher's z, p of Spearman's "
-        "rho exact. Within subjects: repeated-measures correlation of each subject's scores with the SEDs of its own "
-        "strokes (Bakdash and Marusich 2017), and its p corrected for the descriptors that have one (Holm 1979). Last "
-        "column: least and greatest r when one surface, or one subject, is left out, and which."
+        f"Predicted SED ({_model_in_short(study)}) with scores. Means: Pearson's r of means over the subjects who have "
+        "both, interval by Fisher's z; Spearman's rho with an interval likewise (Bonett and Wright 2000) and exact p. "
+        "Within subjects: repeated-measures correlation of each subject's scores with the SEDs of its own strokes "
+        "(Bakdash and Marusich 2017), and its p corrected for the descriptors that have one (Holm 1979). Last column: "
+        "least and greatest r when one surface, or one subject, is left out, and which."
     )
     return study_table("table-relation", caption, columns, [(one.descriptor, rows(one)) for one in study.descriptors])
 

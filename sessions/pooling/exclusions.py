@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from sessions.toml_file import load_toml
+from sessions.toml_file import NotAllowed, load_toml
 
 EXCLUSIONS = "exclusions.toml"
 
@@ -16,6 +16,12 @@ class Exclusion:
     why: str
     who: str
     descriptor: str = ""  # "" for all
+
+    def __post_init__(self) -> None:
+        """Refuse a decision that nobody made or nobody can follow."""
+        for key, allowed in (("subject", "a subject's code"), ("why", "the reason"), ("who", "who decided it")):
+            if not getattr(self, key).strip():
+                raise NotAllowed(key, getattr(self, key), f"{allowed}, not empty")
 
 
 @dataclass(frozen=True, slots=True)

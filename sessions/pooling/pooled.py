@@ -97,8 +97,8 @@ class DescriptorFindings:
     normalised: Normalised
     differences: tuple[Difference, ...]
     estimates: Estimates | None
-    on_sed: MixedModel | None  # score on SED [kPa], drift and carry-over
-    on_index: MixedModel | None  # score on the maker's index, drift and carry-over
+    on_sed: MixedModel | str  # score on SED [kPa], drift and carry-over; or why there is no model
+    on_index: MixedModel | str  # score on the maker's index, drift and carry-over
     fingers: Spread | None  # how fingers differ: of the logarithm of mu between subjects, surfaces taken away [-]
     paths: tuple[PathFinding, ...]  # () where they were not asked for
 
@@ -224,7 +224,6 @@ def _descriptor(
     points = [(v.subject, r, r.sed, r.score) for v, r in trials if r.sed is not None and r.score is not None]
     scored = [(v.subject, r, r.score) for v, r in trials if r.score is not None]
     score_of = {mean.index: mean.mean for mean in means}
-    both = {s.index: s.sed.mean for s in surfaces if s.sed is not None and s.index in score_of}
     return DescriptorFindings(
         descriptor=name,
         indices=indices,
@@ -234,11 +233,11 @@ def _descriptor(
         surfaces=surfaces,
         answers={subject: tuple(row.get(index) for index in indices) for subject, row in matrix.items()},
         points=tuple((subject, row.index, sed, score) for subject, row, sed, score in points),
-        mean_relation=_related(both, score_of),
+        mean_relation=_related([(p[0], p[1].index, p[2], p[3]) for p in points]),
         repeated=repeated_correlation([p[0] for p in points], [p[2] for p in points], [p[3] for p in points]),
         repeated_holm=None,
         without_subject=_without_subject([(p[0], p[2], p[3]) for p in points]),
-        normalised=_normalised(level, both, [(p[0], p[1].index, p[2]) for p in points]),
+        normalised=_normalised(level, [(p[0], p[1].index, p[2]) for p in points]),
         differences=differences(matrix),
         estimates=estimates(trials),
         on_sed=_model([p[0] for p in points], [p[1] for p in points], [p[3] for p in points], SED),
@@ -254,10 +253,11 @@ def _descriptor(
     )
 
 
-def _model(subjects: Sequence[str], rows: Sequence[TrialRow], scores: Sequence[float], what: str) -> MixedModel | None:
-    """Return the mixed model of scores on SED or index, with drift and carry-over; None where they say too little."""
+def _model(subjects: Sequence[str], rows: Sequence[TrialRow], scores: Sequence[float], what: str) -> MixedModel | str:
+    """Return the mixed model of scores on SED or index, with drift and carry-over, or why there is none."""
     if len(set(subjects)) < 3:
-        return None
+        what = "scores and strokes of their own" if what == SED else "scores"
+        return f"it takes three subjects with {what}, and there {_are(len(set(subjects)))}"
     x = [1e3 * (row.sed or 0.0) if what == SED else row.index - 50.0 for row in rows]
     order = {
         DRIFT: [float(row.place) for row in rows],
@@ -265,6 +265,10 @@ def _model(subjects: Sequence[str], rows: Sequence[TrialRow], scores: Sequence[f
     }
     varied = {name: values for name, values in order.items() if np.ptp(values) > 0.0}
     return mixed_model(subjects, scores, {what: x, **varied}, slopes_differ=True)
+
+
+def _are(n: int) -> str:
+    return "is 1" if n == 1 else f"are {n or 'none'}"
 
 
 def _fingers(trials: Sequence[tuple[str, int, float]]) -> Spread | None:
@@ -286,10 +290,15 @@ def _surface(index: int, trials: Sequence[tuple[Visit, TrialRow]]) -> SurfaceMea
     return SurfaceMean(index, 0 if sed is None else sed.n, mu, sed, normal, model, depth)
 
 
-def _related(seds: Mapping[int, float], scores: Mapping[int, float]) -> Relation | None:
-    """Return how mean scores go with mean SEDs, by index."""
-    both = [index for index in seds if index in scores]
-    return relation([seds[i] for i in both], [scores[i] for i in both], both) if both else None
+def _related(points: Sequence[tuple[str, int, float, float]]) -> Relation | None:
+    """Return how mean scores go with mean SEDs, of points that have both: subject, index, SED and score."""
+    if not points:
+        return None
+    indices = sorted({index for _, index, _, _ in points})
+    each = [[(subject, sed, score) for subject, i, sed, score in points if i == index] for index in indices]
+    seds = [float(np.mean(by_subject([(subject, sed) for subject, sed, _ in own]))) for own in each]
+    scores = [float(np.mean(by_subject([(subject, score) for subject, _, score in own]))) for own in each]
+    return relation(seds, scores, indices)
 
 
 def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[str, float], ...]:
@@ -303,17 +312,12 @@ def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[
     return tuple(told)
 
 
-def _normalised(
-    table: Mapping[str, Mapping[int, float]], seds: Mapping[int, float], points: Sequence[tuple[str, int, float]]
-) -> Normalised:
+def _normalised(table: Mapping[str, Mapping[int, float]], points: Sequence[tuple[str, int, float]]) -> Normalised:
     """Return what scores say that were standardised; `points` are subject, index and SED [MPa] of its own stroke."""
     means = averages(table)
-    pairs = [(subject, sed, table[subject][i]) for subject, i, sed in points if i in table.get(subject, {})]
-    return Normalised(
-        means,
-        _related(seds, {index: mean.mean for index, mean in means.items()}),
-        repeated_correlation(*zip(*pairs, strict=True)) if pairs else None,
-    )
+    both = [(subject, i, sed, table[subject][i]) for subject, i, sed in points if i in table.get(subject, {})]
+    within = repeated_correlation([p[0] for p in both], [p[2] for p in both], [p[3] for p in both])
+    return Normalised(means, _related(both), within)
 
 
 def _recovered(found: Sequence[DescriptorFindings], planted: Mapping[str, Any]) -> tuple[Recovered, ...]:
@@ -323,12 +327,12 @@ def _recovered(found: Sequence[DescriptorFindings], planted: Mapping[str, Any]) 
     told: list[Recovered] = []
     for one in found:
         model = one.on_index
-        for term in () if model is None else model.terms:
+        for term in () if isinstance(model, str) else model.terms:
             if term.name in effects:
                 told.append(
                     Recovered(one.descriptor, term.name, effects[term.name], term.estimate, term.low, term.high)
                 )
-        differ = None if model is None else model.spreads
+        differ = None if isinstance(model, str) else model.spreads
         if people and differ is not None:
             pairs = (
                 (LEVELS, people["offset_spread"], differ.level),

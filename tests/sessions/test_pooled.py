@@ -53,7 +53,7 @@ def test_visits_that_only_scored_give_means_and_no_relation():
     found = pooled([visit(number, sed=None) for number in range(1, 5)]).descriptors[0]
     assert found.mean_relation is None
     assert found.repeated is None
-    assert found.on_sed is None
+    assert "three subjects with scores and strokes of their own" in found.on_sed
     assert [mean.n for mean in found.scores] == [4] * 5
 
 
@@ -80,9 +80,36 @@ def test_decisions_are_read_from_their_file_and_a_wrong_one_is_named(tmp_path):
     path = tmp_path / "exclusions.toml"
     path.write_text('[[exclude]]\nsubject = "S1"\nwhy = "ill"\nwho = "me"\n')
     assert exclusions_in(tmp_path) == (Exclusion("S1", "ill", "me"),)
-    path.write_text('[[exclude]]\nsubject = "S1"\nwhy = "ill"\n')
-    with pytest.raises(SettingsError, match="who"):
-        exclusions_in(tmp_path)
+    for wrong in ('why = "ill"', 'why = "ill"\nwho = " "', 'why = ""\nwho = "me"'):
+        path.write_text(f'[[exclude]]\nsubject = "S1"\n{wrong}\n')
+        with pytest.raises(SettingsError, match="why" if '""' in wrong else "who"):
+            exclusions_in(tmp_path)
+
+
+def test_a_decision_that_fits_no_trial_is_told_as_such():
+    out = (Exclusion("S99", "ill", "E1"), Exclusion("S01", "bad", "E1", "sticky"), Exclusion("S02", "ill", "E1"))
+    told = excluded(pooled(VISITS[:3], exclusions=out))
+    assert [sentence.split(":")[0] for sentence in told[:3]] == [
+        "Nothing, by a decision that fits nothing here",
+        "Nothing, by a decision that fits nothing here",
+        "Subject S02",
+    ]
+
+
+def test_scores_that_are_all_the_same_leave_a_reason_and_no_model():
+    flat = [replace(v, rows=tuple(replace(row, score=50.0) for row in v.rows)) for v in VISITS]
+    found = pooled(flat)
+    assert "nothing to tell an error from" in found.descriptors[0].on_index
+    page = study_page(found, "x")
+    assert "No mixed model of stickiness on SED, stickiness on index" in page
+
+
+def test_means_that_are_related_are_those_of_subjects_with_both():
+    # The one subject whose stroke gives no SED scores far off: it must not move the other half of the comparison.
+    odd = replace(VISITS[0], rows=tuple(replace(row, sed=None, score=99.0 - 0.9 * row.index) for row in VISITS[0].rows))
+    related = pooled([odd, *VISITS[1:]]).descriptors[0].mean_relation
+    without = pooled(VISITS[1:]).descriptors[0].mean_relation
+    assert related.pearson == pytest.approx(without.pearson, rel=1e-12)
 
 
 def test_scores_stand_raw_and_standardised_side_by_side():

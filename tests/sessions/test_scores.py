@@ -88,6 +88,17 @@ def test_the_published_slipperiness_friction_is_out_of_order_at_55_only():
     assert dict(found.without)[55] < found.pearson < 0
 
 
+def test_the_interval_of_rho_is_bonett_and_wrights():
+    x = list(range(10))
+    y = [1, 0, 2, 4, 3, 5, 6, 9, 7, 8]  # sum of d^2: 1 + 1 + 1 + 1 + 4 + 1 + 1 = 10, rho = 1 - 60 / 990
+    found = relation(x, y, labels=x)
+    rho = 1 - 60 / 990
+    half = 1.959964 * ((1 + rho * rho / 2) / 7) ** 0.5
+    assert found.spearman == pytest.approx(rho)
+    expected = [math.tanh(math.atanh(rho) + side * half) for side in (-1, 1)]
+    assert [found.spearman_low, found.spearman_high] == pytest.approx(expected, rel=1e-6)
+
+
 def test_the_line_is_the_least_squares_line():
     found = relation([0, 1, 2, 3], [1, 3, 5, 7], labels=(0, 1, 2, 3))
     assert (found.slope, found.intercept) == (pytest.approx(2), pytest.approx(1))

@@ -77,16 +77,24 @@ def relation_table(report: Report) -> Table | None:
         Column("Pearson's r"),
         Column("95 % interval"),
         Column("Spearman's rho"),
+        Column("rho's 95 % interval"),
         Column("exact p of rho"),
         Column("slope", "Pa a point"),
         Column("r without one"),
     )
     caption = (
         "Relation of the predicted SED to scores and to the stimuli's indices. The forces are those of one subject: "
-        "a case study. Interval: Fisher's z. p: two-sided, counted over all orders. Last column: r when the stimulus "
-        "of that index is left out."
+        "a case study. Intervals: Fisher's z, for rho as by Bonett and Wright (2000). p: two-sided, counted over "
+        "all orders. Last column: r when the stimulus of that index is left out."
     )
     return Table("table-relation", caption, columns, tuple(groups), notes.listed())
+
+
+def _rank(related: Relation, notes: Notes) -> Cell:
+    if related.spearman_low is None or related.spearman_high is None:
+        alike = "no interval of a perfect rho" if related.n > 3 else f"no interval of rho from {related.n} points"
+        return notes.number(None, str, alike if related.spearman is not None else related.reason)
+    return Cell(f"{correlation(related.spearman_low)} to {correlation(related.spearman_high)}")
 
 
 def _relation_row(name: str, related: Relation, notes: Notes) -> tuple[Cell, ...]:
@@ -103,6 +111,7 @@ def _relation_row(name: str, related: Relation, notes: Notes) -> tuple[Cell, ...
         notes.number(related.pearson, correlation, related.reason),
         interval,
         notes.number(related.spearman, correlation, related.reason),
+        _rank(related, notes),
         notes.number(related.spearman_p, places(3), related.reason or "too many orders to count"),
         notes.number(related.slope, lambda v: significant(1e6 * v, 3), related.reason),
         Cell(left_out),
