@@ -31,6 +31,7 @@ OF_STROKE: Mapping[str, str] = {
     "lift": "an instant [s]",
     "steady": "two instants [s]: where the mean of T/N and the speed are taken",
     "stick": "two instants [s]: the stick phase, whose greatest T/N is mu_static and whose end the break-away",
+    "slide_onset": "an instant [s]: from which the contact slides; a static peak is looked for up to then",
     "direction": "1 (proximal to distal) or -1 (distal to proximal)",
     "kept": "true, or false where the stroke is left out",
 }
@@ -331,6 +332,7 @@ _FITS: Mapping[str, Callable[[object], bool]] = {
     "lift": _number,
     "steady": _span,
     "stick": _span,
+    "slide_onset": _number,
     "direction": _way,
     "kept": _flag,
     "choice": _count,

@@ -18,6 +18,7 @@ from sessions.recording import Recording
 EXAMPLE = "daq-app analyse recordings/P07 --json"
 HEAD = ["trial", "onset [s]", "steady [s]", "mu static", "mu dynamic", "mu max", "tau_max [kPa]", "speed [mm/s]", "way"]
 INTERVALS = ["trial", "mu static", "mu dynamic", "mu max", "tau_max [kPa]", "speed [mm/s]"]
+COURSES = ["trial", "N [N]", "T [N]", "heading [°]", "same way", "break-away [s]", "slide onset [s]"]
 WAYS = {1: "p → d", -1: "d → p", None: "–"}
 
 
@@ -61,8 +62,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.say(f"* {decision.sentence}")
     if rows:
         console.say(f"\n{chosen.kind}:")
-        intervals = (stroke_intervals(stroke, at, chosen) for at, stroke in enumerate(analysis.strokes))
+        intervals = [stroke_intervals(stroke, at, chosen) for at, stroke in enumerate(analysis.strokes)]
         console.say(table([_row(found) for found in intervals], head=INTERVALS))
+        console.say("\nof the same repeats; same way: share of them with the direction told:")
+        console.say(table([_course(found) for found in intervals], head=COURSES))
+        for name, kind in chosen.kinds.items():
+            console.say(f"  {name.replace('_', ' ')}: {kind}")
     if analysis.tilt is not None:
         console.say(_leaning(analysis.tilt, analysis.settings.tilt))
     for flaw in analysis.flaws:
@@ -96,7 +101,16 @@ def _bootstrap(options: argparse.Namespace) -> BootstrapSettings:
 def _row(found: StrokeIntervals) -> list[str]:
     kilo = None if found.tau_max is None else (1e3 * found.tau_max[0], 1e3 * found.tau_max[1])
     pairs = (found.mu_static, found.mu_dynamic, found.mu_max, kilo, found.speed)
-    return [
-        "–" if found.trial is None else str(found.trial),
-        *("–" if pair is None else f"{number(pair[0])} to {number(pair[1])}" for pair in pairs),
-    ]
+    return ["–" if found.trial is None else str(found.trial), *map(_ends, pairs)]
+
+
+def _course(found: StrokeIntervals) -> list[str]:
+    share = "–" if found.direction_agrees is None else f"{100 * found.direction_agrees:.3g} %"
+    forces = map(_ends, (found.normal_force, found.tangential_force))
+    instants = (_ends(pair, 5) for pair in (found.break_away, found.slide_onset))
+    trial = "–" if found.trial is None else str(found.trial)
+    return [trial, *forces, _ends(found.heading), share, *instants]
+
+
+def _ends(pair: tuple[float, float] | None, figures: int = 3) -> str:
+    return "–" if pair is None else f"{number(pair[0], figures)} to {number(pair[1], figures)}"

@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         what.add_argument(name, type=float, nargs=2, metavar=("FROM", "TO"), help=does)
     what.add_argument("--onset", type=float, metavar="S", help="contact onset [s]")
     what.add_argument("--lift", type=float, metavar="S", help="end of contact [s]")
+    what.add_argument("--slide-onset", type=float, metavar="S", help="where the slide begins, for mu_static [s]")
     what.add_argument("--direction", type=int, choices=[1, -1], help="1 proximal to distal, -1 distal to proximal")
     what.add_argument(
         "--drop", action="store_true", help="the stroke stays out: it is shown, the model does not get it"
@@ -96,7 +97,7 @@ def _asked(options: argparse.Namespace) -> Decision:
         span: list[float] | None = getattr(options, what)
         if span is not None:
             return replace(decision, what=what, new=(span[0], span[1]))
-    what = next(name for name in ("onset", "lift", "direction") if getattr(options, name) is not None)
+    what = next(name for name in ("onset", "lift", "slide_onset", "direction") if getattr(options, name) is not None)
     return replace(decision, what=what, new=getattr(options, what))
 
 
@@ -141,5 +142,5 @@ def _changes(before: Analysis, after: Analysis) -> list[str]:
 
 
 def _numbers(old: Stroke, new: Stroke) -> list[tuple[str, str, str]]:
-    names = ("mu_static", "mu_dynamic", "mu_max", "tau_max", "speed", "direction")
+    names = ("mu_static", "mu_dynamic", "mu_max", "tau_max", "speed", "direction", "break_away", "slide_onset")
     return [(name, number(getattr(old, name), 4), number(getattr(new, name), 4)) for name in names]

@@ -13,12 +13,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.analysis.friction import Rule
+from sessions.analysis.instants import break_away_draws, slide_onset_draws
 from sessions.analysis.stroke import Interval, Stroke, StrokeCurve
 
 Array = NDArray[np.float64]
 
 _FEWEST_BLOCKS = 4
 _FEWEST_QUIET = 10  # readings before onset from which noise is told
+NUMBERS = (  # of a stroke that have an interval
+    "mu_static",
+    "mu_dynamic",
+    "mu_max",
+    "tau_max",
+    "speed",
+    "normal_force",
+    "tangential_force",
+    "peak_normal",
+    "peak_tangential",
+    "heading",
+    "break_away",
+    "slide_onset",
+)
 _TOP = 0.97  # of the peak: readings above this share of it may be the peak
 
 
@@ -30,6 +45,7 @@ class BootstrapSettings:
     seed: int = 0
     block: float = 0.1  # [s]
     inwards: float = 0.2  # the steady window may begin or end so much of its length further inwards [-]
+    slide_share: tuple[float, float] = (0.1, 0.3)  # of the steady speed: at any between them the slide has begun [-]
     gain_error: float = 0.01  # standard uncertainty of each axis' gain [-]
     gain_error_origin: str = "assumed"  # nobody stated it for this transducer; "set" where somebody did
     confidence: float = 0.95
@@ -44,6 +60,21 @@ class BootstrapSettings:
             f"{100 * self.inwards:g} % inwards)"
         )
 
+    @property
+    def kinds(self) -> Mapping[str, str]:
+        """What the intervals hold of the numbers that are no plain means, for people."""
+        low, high = (100 * share for share in self.slide_share)
+        return {
+            "normal_force": "zero and its drift, calibration, choice of window; that the force changes along the "
+            "stroke is no uncertainty of its mean; of tangential_force likewise",
+            "heading": "noise, zero, choice of window, and gains of the axes that differ; not a transducer that is "
+            "turned; with it the share of repeats whose direction is the one told",
+            "break_away": "deviations from the fitted climb turned at random (wild bootstrap, the same blocks), zero, "
+            "and where the fit ends; a gain moves no instant; none where a person decided it",
+            "slide_onset": f"the share of the steady speed that tells it, {low:g} to {high:g} %, and noise and "
+            "unevenness of the speed; none where a person decided it",
+        }
+
 
 @dataclass(frozen=True, slots=True)
 class StrokeIntervals:
@@ -56,6 +87,14 @@ class StrokeIntervals:
     mu_max: Interval | None  # [-]
     tau_max: Interval | None  # [MPa]; the contact area, or its law, is taken as given
     speed: Interval | None  # [mm/s]
+    normal_force: Interval | None  # mean over the steady window [N]
+    tangential_force: Interval | None  # mean over the steady window [N]
+    peak_normal: Interval | None  # [N]
+    peak_tangential: Interval | None  # [N]
+    heading: Interval | None  # about the angle told: an end may lie beyond 180 [degrees]
+    direction_agrees: float | None  # share of repeats in which the direction is the one told [-]
+    break_away: Interval | None  # [s, device time]
+    slide_onset: Interval | None  # [s, device time]
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -75,18 +114,22 @@ def stroke_intervals(stroke: Stroke, number: int, settings: BootstrapSettings | 
         low, high = np.quantile(found[name], [(1 - chosen.confidence) / 2, (1 + chosen.confidence) / 2]).tolist()
         return low, high
 
-    return StrokeIntervals(
-        number,
-        stroke.trial,
-        *(interval(name) for name in ("mu_static", "mu_dynamic", "mu_max", "tau_max", "speed")),
-    )
+    told = {name: interval(name) for name in NUMBERS}
+    return StrokeIntervals(number, stroke.trial, **told, direction_agrees=_agreeing(stroke, found))
+
+
+def _agreeing(stroke: Stroke, found: Mapping[str, Array]) -> float | None:
+    """Return the share of repeats whose heading lies within 60 degrees of the direction told, as the analysis asks."""
+    if stroke.direction is None or "heading" not in found:
+        return None
+    return float(np.mean(stroke.direction * np.cos(np.radians(found["heading"])) >= 0.5))
 
 
 def intervals_of(strokes: Sequence[Stroke], settings: BootstrapSettings | None = None) -> dict[str, Any]:
     """Return the intervals of all strokes as plain data, with what they are and the settings they were drawn with."""
     chosen = settings or BootstrapSettings()
     found = [stroke_intervals(stroke, at, chosen).to_dict() for at, stroke in enumerate(strokes)]
-    return {"kind": chosen.kind, "settings": asdict(chosen), "strokes": found}
+    return {"kind": chosen.kind, "kinds": dict(chosen.kinds), "settings": asdict(chosen), "strokes": found}
 
 
 def friction_draws(
@@ -122,7 +165,8 @@ class _Repeats:
         # The zero's drift was seen as one length of three axes; within it the zero may lie anywhere.
         drift = (stroke.zero_drift or 0.0) / np.sqrt(3.0 * 12.0)
         few = np.sqrt(max(1.0, quiet.sum() * self._step / settings.block)) if enough else 1.0
-        self._zero_t = np.hypot(drift, self._noise_t / few) * draw.standard_normal(n)
+        self._zero_t_sd = float(np.hypot(drift, self._noise_t / few))
+        self._zero_t = self._zero_t_sd * draw.standard_normal(n)
         self._zero_n = np.hypot(drift, self._noise_n / few) * draw.standard_normal(n)
 
     def all(self) -> dict[str, Array]:
@@ -130,8 +174,10 @@ class _Repeats:
         found: dict[str, Array] = {}
         if self._stroke.tau_max is not None and self._stroke.peak_tangential:
             area = self._stroke.contact_area or self._stroke.peak_tangential / self._stroke.tau_max
-            peak = self._stroke.tau_max * area * self._gain_t + self._zero_t + self._top()
+            moved = self._zero_t + self._top(self._curve.tangential, self._noise_t)
+            peak = self._stroke.tau_max * area * self._gain_t + moved
             found["tau_max"] = peak / (area * self._gain_n**self._stroke.area_exponent)
+            found["peak_tangential"] = self._stroke.peak_tangential * self._gain_t + moved
         for name in ("mu_static", "mu_max"):
             value = getattr(self._stroke, name)
             if value is not None:
@@ -139,15 +185,17 @@ class _Repeats:
         window = self._window()
         if window is not None:
             found |= window
-        return found
+        if self._stroke.peak_normal is not None:
+            top = self._top(self._curve.normal, self._noise_n)
+            found["peak_normal"] = self._stroke.peak_normal * self._gain_n + self._zero_n + top
+        return found | self._instants(found.get("speed"))
 
-    def _top(self) -> Array:
-        """Return how far noise moves the greatest tangential force (repeats,) [N], about its mean."""
-        tangential = self._curve.tangential
-        high = tangential[tangential >= _TOP * np.nanmax(tangential)]
+    def _top(self, force: Array, noise: float) -> Array:
+        """Return how far noise moves the greatest force (repeats,) [N], about its mean."""
+        high = force[force >= _TOP * np.nanmax(force)]
         every = max(1, round(self._settings.block / 4 / self._step))  # filtered readings nearer than this are alike
         high = high[::every]
-        tops = (high + self._noise_t * self._draw.standard_normal((self._settings.repeats, len(high)))).max(axis=1)
+        tops = (high + noise * self._draw.standard_normal((self._settings.repeats, len(high)))).max(axis=1)
         return tops - tops.mean()
 
     def _single(self, value: float) -> Array:
@@ -165,31 +213,72 @@ class _Repeats:
         if steady is None or self._stroke.mu_dynamic is None:
             return None
         inside = (self._curve.time >= steady[0]) & (self._curve.time <= steady[1]) & np.isfinite(self._curve.ratio)
-        columns = np.column_stack([self._curve.ratio, 1.0 / self._curve.normal, self._curve.time, self._curve.position])
+        curve = self._curve
+        columns = np.column_stack(
+            [curve.ratio, 1.0 / curve.normal, curve.time, curve.position, curve.normal, curve.tangential, curve.force]
+        )
         length = max(1, round(settings.block / self._step))
         held = columns[inside]
         count = len(held) // length
         if count < _FEWEST_BLOCKS:
             return None
-        blocks = held[: count * length].reshape(count, length, 5).mean(axis=1)
-        chosen, weight = self._chosen(count)
-        drawn = blocks[chosen]  # (repeats, blocks, 5)
+        blocks = held[: count * length].reshape(count, length, columns.shape[1]).mean(axis=1)
+        chosen, weight, kept = self._chosen(count)
+        drawn = blocks[chosen]  # (repeats, blocks, 9)
         total = weight.sum(axis=1)
-        means = (drawn[:, :, 0] * weight).sum(axis=1) / total
+        means = np.einsum("rbc,rb->rc", drawn, weight) / total[:, None]
         spread = np.sqrt(total / np.maximum(total - 1.0, 1.0))  # a mean of few blocks strays further than drawing shows
-        centre = float(blocks[:, 0].mean())
+        off = (means - blocks.mean(axis=0)) * spread[:, None]
         lightness = float(blocks[:, 1].mean())
-        mu = self._stroke.mu_dynamic + (means - centre) * spread
+        mu = self._stroke.mu_dynamic + off[:, 0]
         found = {
             "mu_dynamic": mu * self._gain_t / self._gain_n
             + (self._zero_t - self._stroke.mu_dynamic * self._zero_n) * lightness
         }
-        if self._stroke.speed is not None and np.isfinite(blocks[:, 3:]).all():
-            found["speed"] = self._speeds(drawn, weight) * self._gain_torque / self._gain_n
+        if self._stroke.normal_force is not None and self._stroke.tangential_force is not None:
+            # A force may change along the stroke: its mean is that of a window, not of blocks drawn again. Windows are
+            # drawn inwards, where N may be greater, but might have been wider too: about their own mean.
+            other = kept @ blocks[:, 5:7] / total[:, None]
+            other -= other.mean(axis=0)
+            found["normal_force"] = (self._stroke.normal_force + other[:, 0]) * self._gain_n + self._zero_n
+            found["tangential_force"] = (self._stroke.tangential_force + other[:, 1]) * self._gain_t + self._zero_t
+        way = means[:, 7:] + self._zero_t_sd * self._draw.standard_normal((len(means), 2))
+        if self._stroke.speed is not None and np.isfinite(blocks[:, 3:5]).all():
+            way = self._slopes(drawn, weight) * self._gain_torque[:, None]
+            found["speed"] = np.hypot(way[:, 0], way[:, 1]) / self._gain_n
+        if self._stroke.heading is not None:
+            found["heading"] = self._headings(way, self._stroke.heading)
         return found
 
-    def _chosen(self, count: int) -> tuple[NDArray[np.int64], Array]:
-        """Return blocks drawn for each repeat (repeats, count), and 1 for those that fit into its window, else 0."""
+    def _headings(self, way: Array, told: float) -> Array:
+        """Return the angles (repeats,) [degrees] of ways (repeats, 2), as near the angle told as whole turns allow."""
+        uneven = 1.0 + self._settings.gain_error * np.sqrt(2.0) * self._draw.standard_normal(len(way))  # of two gains
+        angle = np.degrees(np.arctan2(way[:, 1] * uneven, way[:, 0]))
+        return told + (angle - told + 180.0) % 360.0 - 180.0
+
+    def _instants(self, speed: Array | None) -> dict[str, Array]:
+        """Return the instants (repeats,) that the analysis told and nobody decided."""
+        stroke, curve, found = self._stroke, self._curve, dict[str, Array]()
+        if stroke.steady is None:
+            return found
+        inside = (curve.time >= stroke.steady[0]) & (curve.time <= stroke.steady[1])
+        if stroke.break_away is not None and "stick" not in stroke.decided:
+            part = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[1])
+            columns = (curve.time[part], curve.ratio[part], curve.normal[part])
+            shortest = stroke.steady[1] - self._settings.inwards * (stroke.steady[1] - stroke.steady[0])
+            zero = (self._zero_t, self._zero_n)
+            draws = break_away_draws(columns, shortest, self._settings.block, zero, self._draw)
+            found |= {} if draws is None else {"break_away": draws}
+        if stroke.slide_onset is not None and speed is not None and "slide_onset" not in stroke.decided:
+            part = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[0])
+            noise = float(np.nanstd(curve.speed[inside])) * self._draw.standard_normal(len(speed))
+            told = self._draw.uniform(*self._settings.slide_share, len(speed)) * speed
+            draws = slide_onset_draws(curve.time[part], curve.speed[part], told, noise)
+            found |= {} if draws is None else {"slide_onset": draws}
+        return found
+
+    def _chosen(self, count: int) -> tuple[NDArray[np.int64], Array, Array]:
+        """Return blocks drawn for each repeat (repeats, count); 1 for those that fit into its window; 1 for its own."""
         repeats = self._settings.repeats
         trim = self._settings.inwards * count * self._draw.uniform(size=(2, repeats))
         first, stop = np.floor(trim[0]), count - np.floor(trim[1])
@@ -198,12 +287,13 @@ class _Repeats:
         held = stop - first
         chosen = first[:, None] + np.floor(self._draw.uniform(size=(repeats, count)) * held[:, None])
         weight = (np.arange(count) < held[:, None]).astype(np.float64)
-        return np.clip(chosen, 0, count - 1).astype(np.int64), weight
+        places = np.arange(count)
+        own = (places >= first[:, None]) & (places < stop[:, None])
+        return np.clip(chosen, 0, count - 1).astype(np.int64), weight, own.astype(np.float64)
 
-    def _speeds(self, drawn: Array, weight: Array) -> Array:
-        """Return the slope of position on time (repeats,) [mm/s] over the blocks drawn."""
+    def _slopes(self, drawn: Array, weight: Array) -> Array:
+        """Return the slope of position on time (repeats, 2) [mm/s] over the blocks drawn."""
         total = weight.sum(axis=1)[:, None]
-        time, moved = drawn[:, :, 2], drawn[:, :, 3:]
+        time, moved = drawn[:, :, 2], drawn[:, :, 3:5]
         t = time - (time * weight).sum(axis=1)[:, None] / total
-        slope = ((t * weight)[:, :, None] * moved).sum(axis=1) / np.maximum((t**2 * weight).sum(axis=1), 1e-9)[:, None]
-        return np.hypot(slope[:, 0], slope[:, 1])
+        return ((t * weight)[:, :, None] * moved).sum(axis=1) / np.maximum((t**2 * weight).sum(axis=1), 1e-9)[:, None]

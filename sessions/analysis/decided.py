@@ -42,6 +42,5 @@ def tried(recording: Recording, decision: Decision, before: Decisions, now: Anal
 
 def _stands(stroke: Stroke, what: str) -> Value:
     if what == "stick":
-        ended = stroke.break_away if stroke.stick_end is None else stroke.stick_end
-        return None if stroke.onset is None or ended is None else (stroke.onset, ended)
+        return None if stroke.onset is None or stroke.break_away is None else (stroke.onset, stroke.break_away)
     return getattr(stroke, what)

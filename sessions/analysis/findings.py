@@ -10,8 +10,8 @@ COEFFICIENTS = ("mu_static", "mu_dynamic", "mu_dynamic_sd", "mu_dynamic_interval
 LOADS = ("normal_force", "tangential_force", "peak_normal", "peak_tangential")
 PEAKS = ("mu_max", "tau_max", "contact_area", "peak_normal", "peak_tangential")
 SPEED = ("speed", "speed_error")
-DIRECTION = ("direction", "direction_from")
-EVERYTHING = (*COEFFICIENTS, *LOADS, *SPEED, *DIRECTION, "steady", "readings", "break_away", "stick_end")
+DIRECTION = ("direction", "direction_from", "heading")
+EVERYTHING = (*COEFFICIENTS, *LOADS, *SPEED, *DIRECTION, "steady", "readings", "break_away", "slide_onset")
 
 
 @dataclass

@@ -10,7 +10,7 @@ from sessions.analysis.settings import AnalysisSettings
 from sessions.analysis.sliding import slide
 from sessions.analysis.span import Span, ZeroInForce
 from sessions.analysis.steady import mean_of
-from sessions.analysis.stick import stick_end
+from sessions.analysis.stick import break_away
 from sessions.analysis.stroke import Stroke
 from sessions.analysis.track import Track, curve_of, mean_vector, track_of
 from sessions.decisions import Decided
@@ -19,7 +19,7 @@ from sessions.plan import PROXIMAL_TO_DISTAL, Frame, Trial
 Array = NDArray[np.float64]
 
 _AFTER_PEAK = 0.2  # what a static peak is held against [s]
-_LATE_PEAK = 0.1  # a static peak may come so long after break-away began [s]
+_LATE_PEAK = 0.1  # a static peak may come so long after the slide began [s]
 _NO_PEAK = "no static peak stands out"
 _STICK_WITHOUT = (_NO_PEAK, FlawName.NO_STEADY_SLIDING, FlawName.RATIO_ABOVE_ONE)  # a stick phase needs none of these
 
@@ -48,10 +48,11 @@ def measured(
         _judge_gaps(found, span, contact, settings)
         _judge_loads(found, track, contact_area, settings)
         window = slide(found, span, track, frame, settings, decided.span("steady"))
+        _take_slide_onset(found, decided)
         if window is not None:
             _friction(found, track, window, zero, settings)
             _static_peak(found, track, window, zero, settings)
-            found.numbers["stick_end"] = stick_end(track.time[: window.stop], track.ratio[: window.stop], settings)
+            found.numbers["break_away"] = break_away(track.time[: window.stop], track.ratio[: window.stop], settings)
             _judge_way(found, track, window, settings)
         _take_decided(found, track, decided)
         _judge_drift(found, zero, settings)
@@ -234,8 +235,8 @@ def _judge_task(found: Findings, trial: Trial) -> None:
 
 def _static_peak(found: Findings, track: Track, window: slice, zero: ZeroInForce, settings: AnalysisSettings) -> None:
     """Give the static peak where one stands out of what follows it by its noise and by a share."""
-    broken = found.numbers.get("break_away", track.time[window.start])
-    last = int(np.searchsorted(track.time, float(broken + _LATE_PEAK)))
+    began = found.numbers.get("slide_onset", track.time[window.start])
+    last = int(np.searchsorted(track.time, float(began + _LATE_PEAK)))
     before = track.ratio[:last]
     found.reasons.setdefault("mu_static", _NO_PEAK)
     if not np.isfinite(before).any():
@@ -252,6 +253,13 @@ def _static_peak(found: Findings, track: Track, window: slice, zero: ZeroInForce
             del found.reasons["mu_static"]
 
 
+def _take_slide_onset(found: Findings, decided: Decided) -> None:
+    """Give the instant from which the contact slides, where a person decided it."""
+    onset = decided.instant("slide_onset")
+    if onset is not None:
+        found.numbers["slide_onset"] = onset
+
+
 def _take_decided(found: Findings, track: Track, decided: Decided) -> None:
     """Give the stick phase and the direction that a person decided."""
     stick = decided.span("stick")
@@ -259,7 +267,7 @@ def _take_decided(found: Findings, track: Track, decided: Decided) -> None:
         inside = track.ratio[(track.time >= stick[0]) & (track.time <= stick[1])]
         inside = inside[np.isfinite(inside)]
         if len(inside):
-            found.numbers |= {"mu_static": float(inside.max()), "break_away": stick[1], "stick_end": stick[1]}
+            found.numbers |= {"mu_static": float(inside.max()), "break_away": stick[1]}
             if found.reasons.get("mu_static") in _STICK_WITHOUT:
                 del found.reasons["mu_static"]
         else:

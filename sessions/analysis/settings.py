@@ -23,7 +23,7 @@ class AnalysisSettings:
     light_share: float = 0.2  # a contact whose peak is below this share of the greatest is a light touch [-]
     shortest_stroke: float = 0.2  # a shorter contact is a tap [s]
     sliding_share: float = 0.5  # sliding: the centre of pressure is faster than this share of its greatest speed [-]
-    break_away_share: float = 0.2  # broken away: faster than this share of the steady speed [-]
+    slide_share: float = 0.2  # the slide has begun: faster than this share of the steady speed [-]
     steady_spread: float = 0.10  # steady: standard deviation of T/N over its mean [-] ...
     steady_trend: float = 0.05  # ... and the means of its four quarters differ from it by no more than this [-]
     steady_share: float = 0.25  # shortest steady window, as a share of the stroke [-] ...

@@ -58,7 +58,7 @@ def slide(
         found.flaw(trouble[0], trouble[1], "doubtful", SPEED)
     elif moved is not None:
         found.numbers |= {"speed": moved.speed, "speed_error": moved.error}
-        _break_away(found, track, moved, settings)
+        _slide_onset(found, track, moved, settings)
     _direction(found, track, window, moved if trouble is None else None)
     if trouble is None and moved is not None:
         _side_load(found, track, window, moved, settings)
@@ -134,15 +134,15 @@ def _speed_trouble(
     return None
 
 
-def _break_away(found: Findings, track: Track, moved: Movement, settings: AnalysisSettings) -> None:
+def _slide_onset(found: Findings, track: Track, moved: Movement, settings: AnalysisSettings) -> None:
     """Give the first instant from which the centre of pressure keeps a share of its steady speed."""
     start = int(np.searchsorted(track.time, float(found.numbers["steady"][0])))
     with np.errstate(invalid="ignore"):
-        slow = ~(track.speed[: start + 1] >= settings.break_away_share * moved.speed)
+        slow = ~(track.speed[: start + 1] >= settings.slide_share * moved.speed)
     last_slow = np.flatnonzero(slow)
     first = int(last_slow[-1]) + 1 if len(last_slow) else 0
     if first <= start:
-        found.numbers["break_away"] = float(track.time[first])
+        found.numbers["slide_onset"] = float(track.time[first])
 
 
 def _side_load(found: Findings, track: Track, window: slice, moved: Movement, settings: AnalysisSettings) -> None:
@@ -172,7 +172,10 @@ def _direction(found: Findings, track: Track, window: slice, moved: Movement | N
             "is wrong, so neither speed nor direction is given."
         )
         found.flaw(FlawName.DIRECTION_DISAGREES, sentence, "doubtful", (*SPEED, *DIRECTION))
-    elif by_movement is not None:
+        return
+    way = drag if moved is None else np.array(moved.along)
+    found.numbers["heading"] = float(np.degrees(np.arctan2(way[1], way[0])))
+    if by_movement is not None:
         found.numbers |= {"direction": by_movement, "direction_from": "centre of pressure"}
     elif by_drag is not None:
         found.numbers |= {"direction": by_drag, "direction_from": "tangential force"}

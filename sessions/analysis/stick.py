@@ -1,4 +1,4 @@
-"""Where the stick phase ends: the change point at which T/N stops climbing.
+"""Where the stick phase ends, the break-away: the change point at which T/N stops climbing.
 
 Pushed against a surface that holds it, a finger's T/N climbs in about a straight line until the contact slips and then
 stays: a line and a level that meet, fitted by least squares for every instant at which they may meet (Hinkley 1969,
@@ -14,11 +14,24 @@ from sessions.analysis.settings import AnalysisSettings
 
 Array = NDArray[np.float64]
 
-_CANDIDATES = 40  # instants at which line and level may meet; then as many about the best of them
+_CANDIDATES = 41  # instants at which line and level may meet; then as many about the best of them, twice
 _FEWEST = 5  # readings of the climb, and of the level
 
 
-def stick_end(time: Array, ratio: Array, settings: AnalysisSettings) -> float | None:
+class Climb(NamedTuple):
+    """A line that climbs to a level and stays there."""
+
+    meets: float  # instant at which line and level meet [s]
+    slope: float  # of the line [1/s]
+    level: float  # [-]
+    left: float  # sum of squares that the fit leaves
+
+    def at(self, time: Array) -> Array:
+        """Return T/N (n,) [-] as fitted at `time` (n,) [s]."""
+        return self.level - self.slope * np.maximum(self.meets - time, 0.0)
+
+
+def break_away(time: Array, ratio: Array, settings: AnalysisSettings) -> float | None:
     """Return the instant [s] at which T/N (n,) [-] stops climbing; None where it does not climb first.
 
     `time` (n,) [s] reaches from the contact to the end of the steady window; nan of the ratio is left out. A climb
@@ -26,29 +39,32 @@ def stick_end(time: Array, ratio: Array, settings: AnalysisSettings) -> float | 
     """
     held = np.isfinite(ratio)
     t, y = time[held], ratio[held]
-    if len(t) < 2 * _FEWEST:
+    fit = climb(t, y)
+    if fit is None:
         return None
-    rough = _best(t, y, _FEWEST, len(t) - _FEWEST)
-    step = -(-len(t) // _CANDIDATES)
-    fit = _best(t, y, max(rough.place - step, _FEWEST), min(rough.place + step, len(t) - _FEWEST))
-    meets = float(t[fit.place])
-    climbs = fit.slope > 0.0 and fit.slope * (meets - float(t[0])) >= settings.stick_rise * fit.level
-    return meets if climbs and fit.left <= settings.stick_left * float(((y - y.mean()) ** 2).sum()) else None
+    climbs = fit.slope > 0.0 and fit.slope * (fit.meets - float(t[0])) >= settings.stick_rise * fit.level
+    return fit.meets if climbs and fit.left <= settings.stick_left * float(((y - y.mean()) ** 2).sum()) else None
 
 
-class _Fit(NamedTuple):
-    place: int  # reading at which line and level meet
-    slope: float  # of the line [1/s]
-    level: float  # [-]
-    left: float  # sum of squares that the fit leaves
+def climb(t: Array, y: Array) -> Climb | None:
+    """Return the climb and level that fit T/N `y` (n,) [-] at `t` (n,) [s] best; None of too few readings."""
+    if len(t) < 2 * _FEWEST + 1:
+        return None
+    first, last = float(t[_FEWEST]), float(t[-_FEWEST - 1])
+    step = (last - first) / (_CANDIDATES - 1)
+    fit = _best(t, y, first, last)
+    for _ in range(2):
+        fit = _best(t, y, max(fit.meets - step, first), min(fit.meets + step, last))
+        step *= 2.0 / (_CANDIDATES - 1)
+    return fit
 
 
-def _best(t: Array, y: Array, first: int, last: int) -> _Fit:
-    """Return the best fit whose line and level meet between two readings, at one of some of them."""
-    places = np.unique(np.linspace(first, last, _CANDIDATES).round().astype(int))
-    slope, level, left = _fits(t, y, t[places])
+def _best(t: Array, y: Array, first: float, last: float) -> Climb:
+    """Return the best fit whose line and level meet between two instants, at one of some of them."""
+    meets = np.linspace(first, last, _CANDIDATES)
+    slope, level, left = _fits(t, y, meets)
     best = int(np.argmin(left))
-    return _Fit(int(places[best]), float(slope[best]), float(level[best]), float(left[best]))
+    return Climb(float(meets[best]), float(slope[best]), float(level[best]), float(left[best]))
 
 
 def _fits(t: Array, y: Array, meets: Array) -> tuple[Array, Array, Array]:

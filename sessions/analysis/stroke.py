@@ -18,6 +18,7 @@ class StrokeCurve:
     time: Array  # (n,) [s, device time]
     normal: Array  # (n,) filtered normal force [N]
     tangential: Array  # (n,) filtered tangential force [N]
+    force: Array  # (n, 2) filtered force along x and y of the face [N]
     ratio: Array  # (n,) T/N [-]
     position: Array  # (n, 2) centre of pressure [mm]
     speed: Array  # (n,) of the centre of pressure [mm/s]
@@ -38,9 +39,11 @@ class Stroke:
     onset: float | None  # [s, device time]; None where the recording begins in contact
     lift: float | None  # [s, device time]; None where it ends in contact
     steady: Interval | None  # steady window [s, device time]
-    break_away: float | None  # from here on the centre of pressure slides [s, device time], where that is seen
+    break_away: float | None  # where T/N stops climbing, by a change point [s, device time]; None: no stick phase
+    slide_onset: float | None  # from here on the centre of pressure slides [s, device time], where that is seen
     direction: int | None  # +1 proximal to distal (along +x of the face frame), -1 back
     direction_from: str | None  # "centre of pressure", "tangential force" or "decision"
+    heading: float | None  # angle of the movement, or else of the drag, from +x towards +y of the face [degrees]
     speed: float | None  # slope of the centre of pressure on time over the steady window [mm/s]
     speed_error: float | None  # its standard error [mm/s]
     mu_static: float | None  # height of the static peak [-]; None where none stands out
@@ -58,7 +61,6 @@ class Stroke:
     zero_drift: float | None  # how far the forces' zero moved from before the stroke to after it [N]
     flaws: tuple[str, ...]
     reasons: Mapping[str, str]  # for each number withheld, the flaw that forbids it
-    stick_end: float | None = None  # where T/N stops climbing, by a change point [s, device time]; None: no stick phase
     contact_area: float | None = None  # by which tau_max was told [mm2]
     area_exponent: float = 0.0  # with which that area follows the normal force [-]
     number: int = 1  # within its trial, or within a recording without trials, from 1

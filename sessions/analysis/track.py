@@ -77,4 +77,5 @@ def curve_of(span: Span, contact: Contact, zero: ZeroInForce, height: float, set
     first = int(np.searchsorted(span.time, float(span.time[contact.start]) - _AROUND[0]))
     last = int(np.searchsorted(span.time, float(span.time[contact.stop - 1]) + _AROUND[1]))
     shown = track_of(span, Contact(first, last, None, None), zero, height, settings)
-    return StrokeCurve(shown.time, shown.normal, shown.tangential, shown.ratio, shown.position, shown.speed)
+    force = shown.wrench[:, :2]
+    return StrokeCurve(shown.time, shown.normal, shown.tangential, force, shown.ratio, shown.position, shown.speed)

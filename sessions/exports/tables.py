@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
+from sessions.analysis.bootstrap import NUMBERS
 from sessions.exports import ExportSource
 from sessions.recording import Recording
 from sessions.recording.log import ANSWERS, OUTCOMES
@@ -13,13 +14,12 @@ Cell = str | int | float | None
 
 AXES = (("Fx", "N"), ("Fy", "N"), ("Fz", "N"), ("Tx", "N mm"), ("Ty", "N mm"), ("Tz", "N mm"))
 _SUFFIXES = {"mm/s": "mm_per_s", "N/mm": "N_per_mm", "N mm": "Nmm", "mm2": "mm2"}
-_BOOTSTRAPPED = ("mu_static", "mu_dynamic", "mu_max", "tau_max", "speed")
 _PAIRS = {
     "steady": ("start", "stop"),
     "mu_interval": ("low", "high"),
     "sed_interval": ("low", "high"),
     "mu_dynamic_interval": ("low", "high"),
-} | {f"{name}_bootstrap": ("low", "high") for name in _BOOTSTRAPPED}
+} | {f"{name}_bootstrap": ("low", "high") for name in NUMBERS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +169,10 @@ def _strokes(analysis: Mapping[str, Any]) -> list[dict[str, Any]]:
     told: Sequence[Mapping[str, Any]] = held.get("strokes") or ()
     if not told:
         return list(strokes)
-    ends: list[dict[str, Any]] = [{f"{name}_bootstrap": one[name] for name in _BOOTSTRAPPED} for one in told]
+    ends: list[dict[str, Any]] = [
+        {**{f"{name}_bootstrap": one[name] for name in NUMBERS}, "direction_agrees": one["direction_agrees"]}
+        for one in told
+    ]
     return [{**stroke, **end} for stroke, end in zip(strokes, ends, strict=True)]
 
 
@@ -219,10 +222,12 @@ _STROKE = {
     "onset": ("s", "first contact, device clock"),
     "lift": ("s", "end of contact, device clock"),
     "steady": ("s", "steady window, device clock"),
-    "break_away": ("s", "from here on the centre of pressure slides, device clock"),
-    "stick_end": ("s", "where T/N stops climbing, a change point, device clock"),
+    "break_away": ("s", "end of the stick phase: where T/N stops climbing, a change point, device clock"),
+    "slide_onset": ("s", "from here on the centre of pressure slides, device clock"),
     "direction": ("", "+1 proximal to distal, -1 back, as measured"),
     "direction_from": ("", "what the direction was told from"),
+    "direction_agrees": ("", "share of bootstrap repeats with that direction"),
+    "heading": ("deg", "angle of the movement, or else of the drag, from +x towards +y of the face"),
     "speed": ("mm/s", "of the centre of pressure over the steady window"),
     "speed_error": ("mm/s", "standard error of the speed"),
     "mu_static": ("", "height of the static peak of T/N"),
@@ -243,8 +248,20 @@ _STROKE = {
         f"{n}_bootstrap": ("", f"95 % bootstrap interval of {n}, in its unit")
         for n in ("mu_static", "mu_dynamic", "mu_max")
     },
-    "tau_max_bootstrap": ("MPa", "95 % bootstrap interval of tau_max"),
-    "speed_bootstrap": ("mm/s", "95 % bootstrap interval of the speed"),
+    **{
+        f"{n}_bootstrap": (unit, f"95 % bootstrap interval of {n}")
+        for n, unit in {
+            "tau_max": "MPa",
+            "speed": "mm/s",
+            "normal_force": "N",
+            "tangential_force": "N",
+            "peak_normal": "N",
+            "peak_tangential": "N",
+            "heading": "deg",
+            "break_away": "s",
+            "slide_onset": "s",
+        }.items()
+    },
     "contact_area": ("mm2", "by which tau_max was told"),
     "area_exponent": ("", "with which that area follows the normal force"),
     "number": ("", "of the stroke within its trial, from 1"),

@@ -103,6 +103,7 @@ def findings(
         commands=facts.commands(recording, predicted=prediction is not None),
         width=None if prediction is None else prediction.width,
         interval_kind=BootstrapSettings().kind,
+        interval_kinds=dict(BootstrapSettings().kinds),
         afferent=more.afferent,
     )
 

@@ -83,6 +83,10 @@ class StrokeFinding:
     reasons: dict[str, str]
     trace: Trace | None
     bootstrap: dict[str, tuple[float, float]]  # intervals by the number's name; see `Report.interval_kind`
+    break_away: float | None = None  # where T/N stops climbing [s, device time]
+    slide_onset: float | None = None  # from when the centre of pressure slides [s, device time]
+    heading: float | None = None  # from +x towards +y [degrees]
+    direction_agrees: float | None = None  # share of the bootstrap's repeats with that direction [-]
     within: int = 1  # its number within its trial, from 1; without trials within the recording
     decided: dict[str, str] = field(default_factory=dict[str, str])  # what a person decided of it, with who and why
 
@@ -191,6 +195,7 @@ class Report:
     commands: tuple[str, ...]  # ... and what to type
     width: float | None  # of the finger [mm], where forces per mm met forces
     interval_kind: str = ""  # what the intervals in `StrokeFinding.bootstrap` are
+    interval_kinds: dict[str, str] = field(default_factory=dict[str, str])  # what else they hold, by a number's name
     afferent: tuple[Fact, ...] = ()  # every parameter of the afferent, where its rates are told
 
     def to_dict(self) -> dict[str, object]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.analysis.analysis import Analysis
-from sessions.analysis.bootstrap import stroke_intervals
+from sessions.analysis.bootstrap import NUMBERS, stroke_intervals
 from sessions.analysis.flaws import Flaw
 from sessions.analysis.forces import in_face_frame
 from sessions.analysis.stroke import Stroke
@@ -25,6 +25,7 @@ def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ..
     found: list[StrokeFinding] = []
     for position, stroke in enumerate(analysis.strokes):
         trial = None if stroke.trial is None else planned.get(stroke.trial)
+        intervals = stroke_intervals(stroke, position)
         found.append(
             StrokeFinding(
                 number=position + 1,
@@ -48,18 +49,16 @@ def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ..
                 flaws=stroke.flaws,
                 reasons=_reasons(stroke, position, analysis.flaws),
                 trace=_trace(stroke),
-                bootstrap=_bootstrap(stroke, position),
+                bootstrap={name: ends for name in NUMBERS if (ends := getattr(intervals, name)) is not None},
+                break_away=stroke.break_away,
+                slide_onset=stroke.slide_onset,
+                heading=stroke.heading,
+                direction_agrees=intervals.direction_agrees,
                 within=stroke.number,
                 decided=dict(stroke.decided),
             )
         )
     return tuple(found)
-
-
-def _bootstrap(stroke: Stroke, position: int) -> dict[str, tuple[float, float]]:
-    found = stroke_intervals(stroke, position)
-    told = {name: getattr(found, name) for name in ("mu_static", "mu_dynamic", "mu_max", "tau_max", "speed")}
-    return {name: interval for name, interval in told.items() if interval is not None}
 
 
 def flaws(analysis: Analysis) -> tuple[Fact, ...]:

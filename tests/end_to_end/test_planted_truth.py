@@ -114,14 +114,14 @@ def test_the_steady_window_lies_in_the_slide(found):
     assert all(truth.slip <= stroke.steady[0] and stroke.steady[1] <= truth.end for stroke, _, truth in found)
 
 
-def test_the_stick_phase_ends_within_fifteen_milliseconds_of_the_slip_and_only_where_the_finger_was_held(found):
-    ends = [(stroke.stick_end, truth.slip) for stroke, _, truth in found if truth.surface.holds]
-    assert max(abs(told - planted) for told, planted in ends) < 0.015
-    assert all(stroke.stick_end is None for stroke, _, truth in found if not truth.surface.holds)
+def test_break_away_is_within_five_milliseconds_of_the_slip_and_told_only_where_the_finger_was_held(found):
+    ends = [(stroke.break_away, truth.slip) for stroke, _, truth in found if truth.surface.holds]
+    assert max(abs(told - planted) for told, planted in ends) < 0.005
+    assert all(stroke.break_away is None for stroke, _, truth in found if not truth.surface.holds)
 
 
-def test_break_away_is_found_where_the_finger_was_held(found):
-    held = [(stroke.break_away, truth.slip) for stroke, _, truth in found if truth.surface.holds]
+def test_the_slides_onset_is_found_where_the_finger_was_held(found):
+    held = [(stroke.slide_onset, truth.slip) for stroke, _, truth in found if truth.surface.holds]
     assert len(held) == 250
     assert max(abs(told - truth) for told, truth in held) < 0.06  # a fifth of full speed comes 50 ms after the slip
 

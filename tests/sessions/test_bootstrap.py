@@ -1,6 +1,7 @@
 """Intervals of a stroke: the same from the same seed, wide for the reasons they name, and true as often as they say."""
 
 import importlib.util
+from collections import defaultdict
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,7 +9,9 @@ import numpy as np
 import pytest
 
 from sessions.analysis.bootstrap import BootstrapSettings, stroke_intervals
+from sessions.analysis.stroke import StrokeCurve
 from simulators.bench import BenchSettings
+from simulators.subject import SimulatedSubject
 
 PLANTED = Path(__file__).parents[1] / "end_to_end" / "test_planted_truth.py"
 _spec = importlib.util.spec_from_file_location("planted_truth", PLANTED)
@@ -18,6 +21,7 @@ planted_truth = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(planted_truth)
 
 NUMBERS = ("mu_dynamic", "mu_max", "tau_max", "speed")
+FORCES = ("normal_force", "tangential_force", "peak_normal", "peak_tangential")
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +43,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_others(strokes):
 def test_every_number_lies_in_its_interval(strokes):
     for number, stroke in enumerate(strokes):
         found = stroke_intervals(stroke, number)
-        for name in NUMBERS:
+        for name in (*NUMBERS, *FORCES, "heading"):
             low, high = getattr(found, name)
             assert low < getattr(stroke, name) < high
 
@@ -64,16 +68,65 @@ def test_a_number_that_was_withheld_has_no_interval(strokes):
     assert stroke_intervals(replace(strokes[0], curve=None), 0).tau_max is None
 
 
+def test_the_instants_of_a_held_finger_have_intervals_and_the_direction_is_sure(strokes):
+    for number, stroke in enumerate(strokes):
+        found = stroke_intervals(stroke, number)
+        assert (found.break_away is None) == (stroke.break_away is None)
+        assert found.direction_agrees == 1.0
+        if found.break_away is not None:
+            assert found.break_away[0] < stroke.break_away < found.break_away[1]
+            assert width(found.break_away) < 0.01
+            assert found.slide_onset[0] <= stroke.slide_onset <= found.slide_onset[1]
+            assert stroke.break_away < found.slide_onset[1]
+
+
+def test_a_movement_nearly_across_leaves_its_sign_in_doubt():
+    rng, t = np.random.default_rng(0), np.arange(400) / 200.0
+    way = np.array([0.5, np.sqrt(0.75)])  # at 60 degrees: as far along x as the analysis asks for
+    position = 25.0 * t[:, None] * way + rng.normal(0.0, 0.3, (400, 2))
+    full = np.ones(400)
+    curve = StrokeCurve(t, 2.0 * full, full, np.outer(full, way), 0.5 * full, position, 25.0 * full)
+    crossing = replace(
+        planted_truth.visit(1).analysed().strokes[0],
+        curve=curve,
+        onset=None,
+        steady=(0.0, 1.99),
+        direction=1,
+        heading=60.0,
+        break_away=None,
+        slide_onset=None,
+    )
+    found = stroke_intervals(crossing, 0)
+    assert found.heading[0] < 60.0 < found.heading[1]
+    assert 0.2 < found.direction_agrees < 0.8
+
+
+def test_an_instant_that_a_person_decided_has_no_interval(strokes):
+    held = next(stroke for stroke in strokes if stroke.break_away is not None)
+    found = stroke_intervals(replace(held, decided={"stick": "by E02", "slide_onset": "by E02"}), 0)
+    assert (found.break_away, found.slide_onset) == (None, None)
+
+
+def truths(seed, truth):
+    slant = SimulatedSubject(seed).stroke(truth.surface).slant
+    yield from (("mu_dynamic", truth.mu), ("tau_max", truth.tau_max), ("speed", truth.speed))
+    yield from (("peak_normal", truth.peak_normal_force), ("peak_tangential", truth.mu * truth.peak_normal_force))
+    yield "heading", slant if truth.direction == 1 else slant + 180.0
+    if truth.surface.holds:
+        yield "break_away", truth.slip
+
+
 def covered(seeds):
     """Return the share of strokes whose intervals hold the truth; each bench's gains are drawn with 1 %."""
-    held = {name: [] for name in ("mu_dynamic", "tau_max", "speed")}
+    held = defaultdict(list)
     for seed in seeds:
         a, b, c, d, e, f = np.random.default_rng([seed, 9]).normal(1.0, 0.01, 6).tolist()
         visit = planted_truth.visit(seed, BenchSettings(gains=(a, b, c, d, e, f)))
         for number, (stroke, truth) in enumerate(zip(visit.analysed().strokes, visit.planted, strict=True)):
             found = stroke_intervals(stroke, number)
-            for name, planted in (("mu_dynamic", truth.mu), ("tau_max", truth.tau_max), ("speed", truth.speed)):
+            for name, planted in truths(seed, truth):
                 low, high = getattr(found, name)
+                planted += 360.0 * round((low - planted) / 360.0) if name == "heading" else 0.0
                 held[name].append(low <= planted <= high)
     return {name: float(np.mean(hits)) for name, hits in held.items()}
 

@@ -228,6 +228,17 @@ def test_the_stick_phase_decided_gives_static_friction_and_break_away():
     assert "mu_static" not in one.reasons
 
 
+def test_a_slide_onset_decided_is_that_of_the_stroke_and_ends_the_search_for_a_static_peak():
+    n = trapezium(T, 1.0, 3.0, 0.1, 2.0)
+    late = 0.5 + 0.2 * (abs(T - 2.0) < 0.05)  # a bump in the slide, no static peak
+    raw = felt(wrench(T, n, late, 25.0 * (T - 2.0)))
+    early, seen = (Decision("E02", "seen", "slide_onset", 1, 1, None, at) for at in (1.3, 2.0))
+    assert decided(early, raw=raw).strokes[0].mu_static is None
+    (one,) = decided(seen, raw=raw).strokes
+    assert one.slide_onset == 2.0
+    assert one.mu_static == pytest.approx(0.7, rel=0.05)
+
+
 def test_onset_lift_and_direction_are_those_decided():
     ends = [Decision("E02", "w", "onset", 1, 1, None, 0.9), Decision("E02", "w", "lift", 1, 1, None, 2.7)]
     (one,) = decided(*ends, Decision("E02", "w", "direction", 1, 1, 1, -1)).strokes

@@ -72,19 +72,19 @@ def test_without_a_static_peak_there_is_none_and_the_reason_says_so():
 
 
 @pytest.mark.parametrize("climb", [0.15, 0.3, 0.6])
-def test_the_stick_phase_ends_where_the_ratio_stops_climbing(climb):
+def test_break_away_is_where_the_ratio_stops_climbing(climb):
     ratio = 0.5 * np.clip((T - 1.0) / climb, 0.0, 1.0)
     found = analysed(block(T, felt(wrench(T, N, ratio, 25.0 * np.maximum(T - 1.0 - climb, 0.0)))))
-    assert found.strokes[0].stick_end == pytest.approx(1.0 + climb, abs=0.02)
+    assert found.strokes[0].break_away == pytest.approx(1.0 + climb, abs=0.005)
 
 
 def test_a_ratio_that_does_not_climb_has_no_stick_phase():
-    assert analysed(block(T, felt(PLAIN))).strokes[0].stick_end is None
+    assert analysed(block(T, felt(PLAIN))).strokes[0].break_away is None
 
 
-def test_break_away_is_where_the_finger_begins_to_move():
+def test_the_slide_begins_where_the_finger_begins_to_move():
     (one,) = analysed(block(T, felt(sticking()))).strokes
-    assert one.break_away == pytest.approx(1.5, abs=0.05)
+    assert one.slide_onset == pytest.approx(1.5, abs=0.05)
     assert one.steady[0] >= 1.45
 
 

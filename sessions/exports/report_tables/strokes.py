@@ -6,6 +6,12 @@ from sessions.exports.report_tables.cells import Cell, Column, Notes, Table, gro
 from sessions.exports.wording import NONE, places, signed, tau, with_error
 from sessions.report import Planted, Report, StrokeFinding
 
+_TOO_SHORT = "the stroke has too few readings for an interval"
+_WITHOUT = {
+    "break_away": "the ratio does not climb before the slide, so there is no stick phase; or a person decided it",
+    "slide_onset": "nothing tells when the slide begins, or a person decided it",
+}
+
 
 def stroke_table(report: Report) -> Table | None:
     """Return the strokes with their friction, speed and flaws."""
@@ -57,19 +63,46 @@ def _stroke_row(stroke: StrokeFinding, notes: Notes, *, planned: bool) -> tuple[
     )
 
 
+Shown = tuple[tuple[str, Column, Callable[[float], str]], ...]
+
+
 def interval_table(report: Report) -> Table | None:
-    """Return the bootstrap intervals of each stroke's numbers."""
-    if not any(stroke.bootstrap for stroke in report.strokes):
-        return None
-    notes = Notes()
-    planned = any(stroke.trial is not None for stroke in report.strokes)
-    shown: tuple[tuple[str, Column, Callable[[float], str]], ...] = (
+    """Return the bootstrap intervals of each stroke's friction and speed."""
+    shown: Shown = (
         ("mu_static", Column("µ static"), places(3)),
         ("mu_dynamic", Column("µ dynamic"), places(3)),
         ("mu_max", Column("µ maximum"), places(3)),
         ("tau_max", Column("τ max", "kPa"), tau),
         ("speed", Column("speed", "mm/s"), places(1)),
     )
+    caption = f"Intervals of the strokes' friction and speed: {report.interval_kind}. The contact area is as given."
+    return _intervals(report, "table-intervals", caption, shown)
+
+
+def course_table(report: Report) -> Table | None:
+    """Return the bootstrap intervals of each stroke's forces, direction and instants."""
+    shown: Shown = (
+        ("normal_force", Column("normal force", "N"), places(2)),
+        ("tangential_force", Column("tangential force", "N"), places(2)),
+        ("heading", Column("heading", "°"), places(1)),
+        ("break_away", Column("break-away", "s"), places(3)),
+        ("slide_onset", Column("slide onset", "s"), places(3)),
+    )
+    kinds = "; ".join(f"{name.replace('_', ' ')}: {what}" for name, what in report.interval_kinds.items())
+    caption = (
+        "Intervals of the strokes' forces, direction and instants, from the same repeats. Forces: means over the "
+        "steady window. Heading: angle of the movement from +x (proximal to distal) towards +y; agree: share of "
+        "repeats with the direction told. Break-away: where T/N stops climbing. Slide onset: from when the centre of "
+        f"pressure keeps a fifth of its steady speed. What each holds: {kinds}."
+    )
+    return _intervals(report, "table-courses", caption, shown, agreeing=True)
+
+
+def _intervals(report: Report, name: str, caption: str, shown: Shown, *, agreeing: bool = False) -> Table | None:
+    if not any(stroke.bootstrap for stroke in report.strokes):
+        return None
+    notes = Notes()
+    planned = any(stroke.trial is not None for stroke in report.strokes)
 
     def row(stroke: StrokeFinding) -> tuple[Cell, ...]:
         cells = [Cell(str(stroke.number))]
@@ -77,16 +110,20 @@ def interval_table(report: Report) -> Table | None:
             cells += [notes.number(v, places(0), "no trial asks for it") for v in (stroke.trial, stroke.index)]
         for name, _, told in shown:
             interval = stroke.bootstrap.get(name)
-            why = stroke.reasons.get(name) or "the stroke has too few readings for an interval"
+            why = stroke.reasons.get(name) or _WITHOUT.get(name, _TOO_SHORT)
             cells.append(
                 notes.number(None, told, why) if interval is None else Cell(" to ".join(told(end) for end in interval))
+            )
+        if agreeing:
+            cells.append(
+                notes.number(stroke.direction_agrees, places(3), stroke.reasons.get("direction") or _TOO_SHORT)
             )
         return tuple(cells)
 
     who = (Column("stroke"), *((Column("trial"), Column("index")) if planned else ()))
-    caption = f"Intervals of the strokes' numbers: {report.interval_kind}. The contact area is taken as given."
     groups = grouped(report, report.strokes, lambda s: s.experiment, row)
-    return Table("table-intervals", caption, (*who, *(column for _, column, _ in shown)), groups, notes.listed())
+    columns = (*who, *(column for _, column, _ in shown), *((Column("agree"),) if agreeing else ()))
+    return Table(name, caption, columns, groups, notes.listed())
 
 
 def planted_table(report: Report) -> Table | None:
