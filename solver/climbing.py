@@ -2,7 +2,9 @@
 
 No element can follow a skin that touches with one half and not with the other: where contact ends inside an element,
 the energy below is wrong by some tenths of a per cent, up or down. So the edges are found on a rough mesh, and the
-meshes that count have lines there. From the rough state they are a few iterations away.
+meshes that count have lines there. From the rough state they are a few iterations away. Where skin slips at the
+traction bound up to an edge, its force is the bound times a length, and lines a third of an element off make it wrong
+by a per cent: there the lines are moved once more, to the edges that the fine mesh itself finds.
 """
 
 from collections.abc import Callable
@@ -16,7 +18,6 @@ from solver.existence import sound
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.finite_finger import FiniteFinger
 from solver.finite_states import roughly, settled
-from solver.kernels import CAP
 from solver.mesh import Array
 from solver.mesher import Sizing
 from solver.newton import Shape
@@ -46,6 +47,7 @@ class Ascent:
 
     foot: Climbed
     top: Climbed
+    first: Climbed | None = None  # of the top's fineness, before its lines were moved to the edges found on it
 
 
 def ascended(
@@ -64,7 +66,10 @@ def ascended(
     """
     low = foot(scene, expected, fineness, stop, make, None if before is None else before.foot)
     near = before if before is not None and before.foot.finger is low.finger else None
-    return Ascent(low, climbed(scene, fineness, low, stop, make, near))
+    top = climbed(scene, fineness, low, stop, make, near)
+    if not top.finger.bounded_at_an_edge(top.shape):
+        return Ascent(low, top)
+    return Ascent(low, climbed(scene, fineness, top, stop, make), top)
 
 
 def foot(
@@ -145,37 +150,46 @@ def _nearest(scene: Scene, fineness: float, at: Climbed, stop: Callable[[], bool
         return climbed(scene.undragged(), fineness, at, stop)
 
 
-def error_estimates(scene: Scene, fineness: float, at: Climbed, stop: Callable[[], bool]) -> tuple[float, float, float]:
-    """Return how far SED, normal and tangential force of the settled state `at` may be off, relative.
+def error_estimates(
+    scene: Scene, fineness: float, way_up: Ascent, stop: Callable[[], bool]
+) -> tuple[float, float, float]:
+    """Return how far SED, normal and tangential force of the settled state at the top may be off, relative.
 
     The same scene is solved on a coarser mesh with lines at the same edges of contact.
     """
+    found = estimates(*compared(scene, fineness, way_up, stop))
+    return float(found[0]), float(found[1]), float(found[2])
+
+
+def compared(
+    scene: Scene, fineness: float, way_up: Ascent, stop: Callable[[], bool]
+) -> tuple[Scene, float, Array, Array, Array]:
+    """Return what `estimates` is asked with: numbers (3,) of the top, of other meshes (n, 3), and what is felt (3,).
+
+    There are no others where one has no state.
+    """
+    at = way_up.top
+    driven, numbers = scene.driven(at.shape.pull.depth), at.finger.numbers(at.shape)
     try:
         coarse = _nearest(scene, COARSER * fineness, at, stop)
     except SolveFailure:
-        return 1.0, 1.0, 1.0  # so near a limit that a coarser mesh has no state: nothing is known of the error
-    others = coarse.finger.numbers(coarse.shape)[None]
-    driven, numbers = scene.driven(at.shape.pull.depth), at.finger.numbers(at.shape)
-    found = estimates(driven, fineness, numbers, others, felt_of_bound(coarse))
-    return float(found[0]), float(found[1]), float(found[2])
+        return driven, fineness, numbers, np.empty((0, 3)), np.zeros(3)
+    others = np.array([other.finger.numbers(other.shape) for other in (coarse, way_up.first) if other is not None])
+    felt = felt_of_bound(coarse) if at.finger.bounded_at_an_edge(at.shape) else np.zeros(3)
+    return driven, fineness, numbers, others, felt
 
 
 def felt_of_bound(at: Climbed) -> Array:
     """Return how SED, normal and tangential force (3,) answer to the traction bound: relative change by its own.
 
-    Zero where nothing slips at the bound, and where no state lies beside this one.
+    Zero where no state lies beside this one.
     """
     newton, shape = at.finger.newton, at.shape
-    if not (shape.state == CAP).any():
+    if shape.pull.sense == 0:  # it does not slide as a whole, and depends on its way
         return np.zeros(3)
-    more = shape.pull._replace(tau=(1.0 + NUDGE) * shape.pull.tau, sense=shape.pull.sense or _sense(shape))
     try:
-        beside = newton.settle(shape, more)
+        beside = newton.settle(shape, shape.pull._replace(tau=(1.0 + NUDGE) * shape.pull.tau))
     except NotConverged:
         return np.zeros(3)
     before = at.finger.numbers(shape)
     return (at.finger.numbers(beside) / before - 1.0) / NUDGE
-
-
-def _sense(shape: Shape) -> int:
-    return 1 if shape.force[0] > 0.0 else -1

@@ -7,10 +7,11 @@ differently between nodes; and under a traction bound the drag is that bound tim
 known to a part of an element; forces have one more term, which matters on the coarsest meshes alone, where all three
 can agree by chance. At finite strain lines follow the edges, and one coarser mesh will do, as long as it has fewer
 layers in the fat than the answer's: from 3.6 to 6 they are three, and meshes of 6 agreed with those of 3.6 where both
-were 4 % off. Where the bound acts, its force depends on how much of the last elements touches: `felt` says what a
-number makes of that. Near the friction limit of small strain numbers grow without bound, and each mesh has its own
-limit: there `felt` says what they make of the coefficient. The factors were chosen and measured with
-benchmarks/error_estimate.py and finite_error_estimate.py; docs/solver.md has the figures.
+were 4 % off. What is left at the edges falls with the power 3/2 of fineness. Where skin slips at the bound up to an
+edge, the mesh before its lines were moved there is one of the others, and `felt` says what a number makes of the bound.
+Near the friction limit of small strain numbers grow without bound, and each mesh has its own limit: there `felt` says
+what they make of the coefficient. The factors were chosen and measured with benchmarks/error_estimate.py and
+finite_error_estimate.py; docs/solver.md and docs/solver-finite-strain.md have the figures.
 """
 
 from math import sqrt
@@ -21,33 +22,36 @@ from solver.mesh import Array
 from solver.mesher import ANYWHERE, EDGE, FINEST, SHORT
 from solver.scene import Scene
 
-FINENESS = {"small": (5, 6, 8, 10, 12, 16, 20, 24), "finite": (7, 10, 12, 16, 20, 24)}  # meshes that can be asked for
+FINENESS = {"small": (5, 6, 8, 10, 12, 16, 20, 24), "finite": (7, 10, 14, 20, 24)}  # meshes that can be asked for
 DEFAULT = {"small": 8, "finite": 10}
 FROM_MESHES = {"small": 0.15, "finite": 0.35}
-FROM_FINENESS = {"small": 0.07, "finite": 0.15}
+FROM_FINENESS = {"small": ((0.07, 2.0),), "finite": ((0.15, 2.0), (0.06, 1.5))}  # the largest, by the power given
 FROM_COARSE = 1.0  # of both forces at small strain, by fineness to the fourth power
 FROM_LIMIT, CALM = 1.5, 2.0  # of the mesh's own part, for every relative change by friction's beyond that many
-FROM_BOUND = 0.2  # of an element that touches, at small strain
-FROM_EDGE = 0.15  # of an element at the edge of contact, at finite strain, as if the bound acted on so much more skin
+FROM_BOUND = {"small": 0.2, "finite": 0.08}  # of an element that touches, in the drag under a bound
+FROM_EDGE = 0.06  # the same in all numbers, at finite strain where skin slips at the bound up to an edge of contact
 
 
 def estimates(scene: Scene, fineness: float, numbers: Array, others: Array, felt: Array | float = 0.0) -> Array:
     """Return the estimated errors (3,), relative, of SED, normal and tangential force `numbers` (3,).
 
-    `others` (n, 3) are those of the coarser meshes. `felt` (3,) is the relative change of each by that of the friction
-    coefficient (small strain) or of the traction bound (finite strain). A number that is 0 on all meshes, as the drag
-    without friction, is exact.
+    `others` (n, 3) are those of the other meshes; where there are none, so near a limit that a coarser mesh has no
+    state, nothing is known of the errors. `felt` (3,) is the relative change of each by that of the friction
+    coefficient (small strain) or, where skin slips at the bound up to an edge of contact, of the bound (finite strain).
+    A number that is 0 on all meshes, as the drag without friction, is exact.
     """
+    if not len(others):
+        return np.ones(len(numbers))
     kind = scene.solve.kinematics
     size = np.abs(numbers)
     largest = np.abs(others - numbers).max(axis=0)
     found = FROM_MESHES[kind] * largest / np.maximum(size, np.finfo(float).tiny) + _least(scene, fineness)
+    found[2] += _of_bound(scene, fineness, float(size[1]), float(size[2]))
     if kind == "small":
         found[1:] += FROM_COARSE / _resolved(scene, fineness) ** 4
-        found[2] += _of_bound(scene, fineness, float(size[1]), float(size[2]))
         found += FROM_LIMIT * _least(scene, fineness) * np.maximum(np.abs(felt) - CALM, 0.0)
-    else:
-        found += FROM_EDGE * _element(scene, fineness) / (2.0 * _half(scene) * scene.finger.tip_radius) * np.abs(felt)
+    elif np.any(felt):
+        found += FROM_EDGE * scene.friction.cap * _element(scene, fineness) / size[2] * np.abs(felt)
     return np.where((size == 0.0) & (largest == 0.0), 0.0, np.minimum(found, 1.0))
 
 
@@ -59,7 +63,8 @@ def coarsest_for(scene: Scene, tolerance: float) -> float:
 
 def _least(scene: Scene, fineness: float) -> float:
     """Return the part of an estimate that the mesh alone decides."""
-    return FROM_FINENESS[scene.solve.kinematics] / _resolved(scene, fineness) ** 2
+    resolved = _resolved(scene, fineness)
+    return max(part / resolved**order for part, order in FROM_FINENESS[scene.solve.kinematics])
 
 
 def _resolved(scene: Scene, fineness: float) -> float:
@@ -73,8 +78,9 @@ def _half(scene: Scene) -> float:
 
 
 def _element(scene: Scene, fineness: float) -> float:
-    """Return the length of an element at a known edge of contact [mm]."""
-    return EDGE * scene.finger.tip_radius / fineness * min(1.0, _half(scene) / SHORT[1])
+    """Return the length of an element at an edge of contact [mm]."""
+    long, short = (ANYWHERE, SHORT[0]) if scene.solve.kinematics == "small" else (EDGE, SHORT[1])
+    return long * scene.finger.tip_radius / fineness * min(1.0, _half(scene) / short)
 
 
 def _of_bound(scene: Scene, fineness: float, normal: float, drag: float) -> float:
@@ -82,5 +88,5 @@ def _of_bound(scene: Scene, fineness: float, normal: float, drag: float) -> floa
     bound, most = scene.friction.tau_max, scene.friction.mu * normal
     if bound is None or drag == 0.0 or drag >= most:
         return 0.0
-    element = ANYWHERE * scene.finger.tip_radius / fineness * min(1.0, _half(scene) / SHORT[0])
-    return FROM_BOUND * (1.0 - drag / most) * bound * element / drag
+    part = FROM_BOUND[scene.solve.kinematics] * (1.0 - drag / most)
+    return part * bound * _element(scene, fineness) / drag

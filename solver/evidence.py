@@ -33,7 +33,7 @@ def _laws(scene: Scene) -> str:
 def _ogden(tissue: Material) -> str:
     if tissue.stiffening is not None:
         return f"Ogden, exponent {tissue.stiffening:g}"
-    return f"Ogden, exponent {HUMAN_SKIN:g} (default: human skin, Shergold and Fleck 2004)"
+    return f"Ogden, exponent {HUMAN_SKIN:g} (default: human skin, ascribed to Shergold and Fleck 2004)"
 
 
 def _held(scene: Scene) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from solver.carrying import Places, carried, carried_fields
 from solver.finite_body import FiniteBody, FiniteProbes
 from solver.grid import MeshError
+from solver.kernels import CAP
 from solver.mesh import Array
 from solver.mesher import FingerMesh, Sizing, finger_mesh, with_middles
 from solver.newton import Newton, Shape
@@ -86,6 +87,12 @@ class FiniteFinger:
         high = _edge(arcs, force, touching)
         low = _edge(-arcs[::-1], force[::-1], touching[::-1])
         return None if high is None or low is None or high <= -low else (-low, high)
+
+    def bounded_at_an_edge(self, shape: Shape) -> bool:
+        """Return whether skin slips at the traction bound at the last two nodes of an edge of contact that is known."""
+        on = np.flatnonzero(shape.touching)
+        last = np.concatenate([on[:2], on[-2:]])
+        return bool((shape.state[last] == CAP).any()) and self.edges(shape) is not None
 
 
 def _edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float | None:

@@ -77,7 +77,8 @@ def alike(scene: Scene) -> tuple[float, str, float]:
 
 def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[], bool], begun: float) -> Prediction:
     at = way_up.top
-    finger, shape, setup = at.finger, at.shape, way_up.foot.setup_s + at.setup_s
+    finger, shape = at.finger, at.shape
+    setup = sum(state.setup_s for state in (way_up.foot, way_up.first, at) if state is not None)
     way: list[Shape] = []
     relaxing: RelaxingCourse | None = None
     if scene.solve.course == "history":
@@ -93,7 +94,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
     if way and (relaxing is None or _sticking(shape) == 0.0):  # stuck and relaxing, the end depends on the way
         checks["course_against_direct"] = abs(finger.sed_ending(at.shape) / sed - 1.0)
     solved = perf_counter()
-    errors = error_estimates(scene, fineness, at, stop)
+    errors = error_estimates(scene, fineness, way_up, stop)
     estimated = perf_counter()
     width = _contact_width(skin)
     model = evidence.finite_model(

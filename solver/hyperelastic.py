@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 PLAIN = 2.0  # Ogden's exponent of the neo-Hookean law
-HUMAN_SKIN = 9.0  # and that of human skin (Shergold and Fleck 2004)
+HUMAN_SKIN = 9.0  # and that of human skin (ascribed to Shergold and Fleck 2004; docs/scene-file.md)
 NEAR = 0.04  # Q up to which the series serves: further on, nothing is lost by differences
 TERMS = 14  # of it: enough up to an exponent of 20
 
@@ -74,9 +74,10 @@ class Ogden:
     """W = 2 G/a^2 (l^a + l^-a - 2) + lambda/2 (ln J)^2, with l^2 + l^-2 - 2 = Q: skin, that stiffens as it is strained.
 
     Ogden's law of one term (1972, Proc. R. Soc. Lond. A 326, 565) in plane strain, where l and 1/l are the stretches as
-    long as the volume stays; made compressible like the neo-Hookean law, which it is for a = 2. Shergold and Fleck
-    (2004, Proc. R. Soc. Lond. A 460, 3037) fit human skin with a = 9. P = G f(Q) (F - F^-T) + lambda ln J F^-T with
-    f = 2/a sinh(a s)/sinh(2 s), l = exp(s). Pulled to twice its length, with a = 4: 2 G/16 (16 + 1/16 - 2):
+    long as the volume stays; made compressible like the neo-Hookean law, which it is for a = 2. That human skin has
+    a = 9 is ascribed to Shergold and Fleck (2004, Proc. R. Soc. Lond. A 460, 3037).
+    P = G f(Q) (F - F^-T) + lambda ln J F^-T with f = 2/a sinh(a s)/sinh(2 s), l = exp(s). Pulled to twice its length,
+    with a = 4: 2 G/16 (16 + 1/16 - 2):
 
     >>> law = Ogden(0.08, 0.48, 4.0)
     >>> float((energy(law, np.diag([2.0, 0.5])) / law.shear).round(6))
