@@ -169,7 +169,7 @@ def predict(
     matches = asked.kinematics == "small"
     forces = [_force_per_mm(prepared[n]) if matches else None for n in solved]
     wanted = [(scene, force) for scene, force in zip(scenes, forces, strict=True) if force is not None]
-    matched = iter(matching_depths([scene for scene, _ in wanted], [force for _, force in wanted]))
+    matched = iter(matching_depths([scene for scene, _ in wanted], [force for _, force in wanted], in_loops=True))
     depths = [None if force is None else next(matched) for force in forces]
     ways: dict[int, Way] = {}
     found: dict[int, Prediction | SolveFailure] = {}
@@ -186,7 +186,7 @@ def predict(
             told(solved[at], known(at), ways.get(at))
 
     both = [one for scene in scenes for one in (scene, _opposite(scene))]
-    found |= dict(enumerate(answers(both, progress, seen if watch else None)))
+    found |= dict(enumerate(answers(both, progress, seen if watch else None, in_loops=True)))
     for at, number in enumerate(solved):
         rows[number] = known(at)
     base = asked.scene
@@ -227,12 +227,12 @@ def seds_with(
 
 def settled(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | None, ...]:
     """Return what the solver finds of each scene, None where it finds no settled state. Raises Cancelled."""
-    return tuple(None if isinstance(one, SolveFailure) else one for one in answers(scenes, progress))
+    return tuple(None if isinstance(one, SolveFailure) else one for one in answers(scenes, progress, in_loops=True))
 
 
 def solved(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | str, ...]:
     """Return what the solver finds of each scene, or why it finds no settled state. Raises Cancelled."""
-    return tuple(str(one) if isinstance(one, SolveFailure) else one for one in answers(scenes, progress))
+    return tuple(str(one) if isinstance(one, SolveFailure) else one for one in answers(scenes, progress, in_loops=True))
 
 
 def scene_along(row: TrialPrediction, variant: Variant, options: PredictionOptions) -> Scene | str:

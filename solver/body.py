@@ -1,8 +1,8 @@
 """A body of any shape: a mesh with its materials and loads, reduced to what the surface feels of it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -12,6 +12,9 @@ from solver.dissection import Reduced, Tree, places
 from solver.elements import line
 from solver.mesh import Array, Indices, Mesh
 from solver.stiffness import Elastic, Isotropic
+
+if TYPE_CHECKING:
+    from solver.in_loops import ReducedInLoops
 
 Motion = Literal["x", "y", "turn"]
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -25,7 +28,7 @@ class Body:
 
     mesh: Mesh
     elastic: Elastic
-    reduced: Reduced
+    reduced: "Reduced | ReducedInLoops"
     touchable: Touchable
     prescribed: Array  # (nodes, 2) displacement of the held nodes relative to the drive, 0 elsewhere [mm]
 
@@ -37,14 +40,18 @@ class Body:
         prescribed: Array | None = None,
         free: Sequence[Motion] = (),
         tree: Tree | None = None,
+        *,
+        in_loops: bool = False,
     ) -> "Body":
         """Reduce a body of `materials` by region under dead `loads` (nodes, 2) [N/mm].
 
         Held nodes move with the drive, and by `prescribed` (held, 2) [mm] relative to it. A body that nothing holds
         names in `free` the motions along which the surface alone balances the loads. `tree` is the `elimination` of the
-        mesh, where it was made before. Raises LinAlgError where the body is not held and not free.
+        mesh, where it was made before. With `in_loops` compiled loops do all that, and find its contact: to round-off
+        the same, many times as fast once they are loaded. Raises LinAlgError where the body is not held and not free.
         """
-        elastic = Elastic.of(mesh, materials)
+        whole = _in_loops(mesh, materials) if in_loops else None
+        elastic = Elastic.of(mesh, materials) if whole is None else whole.elastic
         moved = np.zeros(mesh.nodes.shape)
         force = np.zeros(mesh.nodes.size) if loads is None else loads.ravel().copy()
         if prescribed is not None:
@@ -52,9 +59,13 @@ class Body:
             unknowns = _unknowns(mesh)
             pushed = elastic.stiffness @ moved.ravel()[unknowns][:, :, None]
             np.subtract.at(force, unknowns.ravel(), pushed.ravel())
-        tree = elimination(mesh) if tree is None else tree
-        reduced = Reduced.of(tree, elastic.stiffness, force[:, None] if force.any() else None)
-        return Body(mesh, elastic, reduced, _touchable(mesh, reduced, free), moved)
+        if whole is not None:
+            reduced = whole.loaded(force) if force.any() else whole
+        else:
+            tree = elimination(mesh) if tree is None else tree
+            reduced = Reduced.of(tree, elastic.stiffness, force[:, None] if force.any() else None)
+        touchable = replace(_touchable(mesh, reduced.stiffness, reduced.load, free), in_loops=in_loops)
+        return Body(mesh, elastic, reduced, touchable, moved)
 
     @property
     def dofs(self) -> int:
@@ -108,6 +119,13 @@ class Body:
         return out
 
 
+def _in_loops(mesh: Mesh, materials: Sequence[Isotropic]) -> "ReducedInLoops":
+    # Imported here: who solves once need not wait for the compiled loops to be loaded.
+    from solver.in_loops import ReducedInLoops
+
+    return ReducedInLoops(mesh, materials)
+
+
 def _unknowns(mesh: Mesh) -> Indices:
     """Return the numbers (e, 18) of the elements' unknowns: x of node n is 2 n, y is 2 n + 1."""
     return (2 * mesh.elements[:, :, None] + np.arange(2)).reshape(len(mesh.elements), 18)
@@ -120,12 +138,21 @@ def elimination(mesh: Mesh) -> Tree:
     return Tree.of(_unknowns(mesh), places(mesh.elements), fixed, kept)
 
 
-def _touchable(mesh: Mesh, reduced: Reduced, free: Sequence[Motion]) -> Touchable:
-    """Turn the skin's stiffness into its compliance, split by direction."""
+def planned(mesh: Mesh, *, in_loops: bool) -> Tree | None:
+    """Return the `elimination` of `mesh`; None where it is that of the loops, which is kept where they find it."""
+    if not in_loops:
+        return elimination(mesh)
+    from solver.elimination import Plan
+
+    Plan.of(mesh)
+    return None
+
+
+def _touchable(mesh: Mesh, stiffness: Array, loads: Array, free: Sequence[Motion]) -> Touchable:
+    """Turn the skin's `stiffness` (2 k, 2 k) into its compliance, split by direction; `loads` (2 k, l) it feels."""
     k = len(mesh.skin)
     x, y = mesh.nodes[mesh.skin].T
     one, zero = np.ones(k), np.zeros(k)
-    stiffness = reduced.stiffness
     if not len(mesh.held):
         # Rigid motions cost no energy: a spring on each makes the matrix invertible, and stays unloaded, since the
         # surface's forces are asked to balance the loads along every motion that anything drives.
@@ -135,16 +162,16 @@ def _touchable(mesh: Mesh, reduced: Reduced, free: Sequence[Motion]) -> Touchabl
     if k and not np.abs(stiffness).max() * np.abs(compliance).max() < UNHELD:
         raise LinAlgError("the body is neither held nor balanced")
     compliance = (compliance + compliance.T) / 2.0
-    load = reduced.load.sum(axis=1)
+    load = loads.sum(axis=1)
     moved = compliance @ load
     shapes = {"x": np.r_[zero, one], "y": np.r_[one, zero], "turn": np.r_[x, -y]}
     motions = np.stack([shapes[name] for name in free], axis=1) if free else np.zeros((2 * k, 0))
     return Touchable(
-        gap=y,
+        gap=y.copy(),
         length=skin_lengths(mesh),
-        normal_by_normal=compliance[:k, :k],
-        normal_by_tangential=compliance[:k, k:],
-        tangential_by_tangential=compliance[k:, k:],
+        normal_by_normal=compliance[:k, :k].copy(),
+        normal_by_tangential=compliance[:k, k:].copy(),
+        tangential_by_tangential=compliance[k:, k:].copy(),
         normal_free=moved[:k],
         tangential_free=moved[k:],
         motions=motions,

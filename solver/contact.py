@@ -24,6 +24,9 @@ SMALL = 1e-11  # a contradiction smaller than this, relative to the largest of i
 ROUNDS = 12  # systems after which the short way to settled sliding is given up
 HERTZ = 0.5  # part of the depth below which skin is first thought to touch: half as deep is half the overlap's square
 
+AMBIGUOUS = "the touching points have no unique forces"
+CONTRADICTORY = "the states of the touching points still contradicted each other after {} corrections"
+
 
 class ContactLost(Exception):
     """No set of states was found that contradicts nothing; the message says what was tried."""
@@ -45,6 +48,7 @@ class Touchable:
     tangential_free: Array  # (k,)
     motions: Array  # (2 k, r) displacement of the points, normal ones first, by each free motion
     resultants: Array  # (r,) what the surface's forces must amount to along each free motion [N/mm]
+    in_loops: bool = False  # whether compiled loops find its contact, `solver.kernels.rubbing`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,8 +128,10 @@ class Course:
         guesses = [np.where(low, SLIP, OPEN)] if guess is None else [guess]
         if guess is None and np.isfinite(self.law.tau_max):
             guesses.append(np.where(low, CAP, OPEN))
-        if guess is None and not self.body.motions.shape[1] and (found := self._slid(depth, -float(direction))):
-            return found
+        if guess is None and not self.body.motions.shape[1]:
+            found = self._slid(depth, -float(direction))
+            if found is not None:
+                return found
         for number, first in enumerate(guesses):
             try:
                 return self._consistent(depth, 0.0, np.zeros(count), first.astype(np.int8), sense, free=False)
@@ -139,6 +145,10 @@ class Course:
 
         Points are then open, slipping or slipping at the bound, and the drag follows from the pressure.
         """
+        if self.body.in_loops:
+            from solver.contact_in_loops import slid
+
+            return slid(self.body, self.law, depth, sense, ROUNDS, HERTZ)
         body, mu = self.body, self.law.mu
         slips = body.normal_by_normal + sense * mu * body.normal_by_tangential
         above, bound = body.gap + body.normal_free - depth, self.law.bound(body.length)
@@ -194,6 +204,14 @@ class Course:
         self, depth: float, travel: float, anchor: Array, state: States, sense: Array, *, free: bool
     ) -> Contact:
         """Change states until none contradicts the solution; with `free`, points may stick and turn round."""
+        if self.body.in_loops:
+            from solver.contact_in_loops import consistent
+
+            entering = self._entering if free else None
+            guess = state, sense
+            return consistent(
+                self.body, self.law, (depth, travel), self._resultants, anchor, guess, entering, self._patience
+            )
         seen: set[bytes] = set()
         one_by_one = resticked = False
         for iteration in range(1, self._patience + 1):
@@ -202,7 +220,7 @@ class Course:
             if self._system.singular:
                 touching = state != OPEN
                 if not free or resticked or (state == STICK).any() or not touching.any():
-                    raise ContactLost("the touching points have no unique forces")
+                    raise ContactLost(AMBIGUOUS)
                 # a body that is free along x needs a point that holds it: all are asked again, one by one
                 state = np.where(touching, STICK, OPEN).astype(np.int8)
                 resticked = one_by_one = True
@@ -222,9 +240,7 @@ class Course:
                 one_by_one = True
                 seen.clear()
             seen.add(key)
-        raise ContactLost(
-            f"the states of the touching points still contradicted each other after {self._patience} corrections"
-        )
+        raise ContactLost(CONTRADICTORY.format(self._patience))
 
     def _solved(
         self,

@@ -7,7 +7,7 @@ from time import perf_counter
 
 import numpy as np
 
-from solver.body import Body, elimination
+from solver.body import Body, planned
 from solver.contact import Contact
 from solver.elements import Q2P1
 from solver.mesh import Array
@@ -29,15 +29,15 @@ class FingerModel:
     solve_s: float  # what assembling and reducing took, beside mesh and tables [s]
 
     @staticmethod
-    def of(scene: Scene, sizing: Sizing) -> "FingerModel":
+    def of(scene: Scene, sizing: Sizing, *, in_loops: bool = False) -> "FingerModel":
         """Mesh and reduce the finger of `scene`, whose friction and loading do not matter here.
 
-        Raises MeshError where the outline cannot be meshed.
+        `in_loops` as in `Body.of`. Raises MeshError where the outline cannot be meshed.
         """
         geometry = finger_mesh(scene.finger, scene.receptor, sizing)
-        tree = elimination(geometry.mesh)
+        tree = planned(geometry.mesh, in_loops=in_loops)
         begun = perf_counter()
-        body = Body.of(geometry.mesh, settled_moduli(scene.materials), tree=tree)
+        body = Body.of(geometry.mesh, settled_moduli(scene.materials), tree=tree, in_loops=in_loops)
         took = perf_counter() - begun
         at_touch = endings(geometry, body.elastic, scene.receptor, np.zeros(1))
         return FingerModel(scene.receptor, geometry, body, at_touch, took)

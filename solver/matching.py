@@ -13,24 +13,27 @@ FINENESS = 6.0  # good to some tenths of a per cent of the depth
 DEEPEST = 0.85  # of the tissue between first touch and bone: beyond, a small-strain depth means nothing
 
 
-def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> tuple[float | None, ...]:
+def matching_depths(
+    scenes: Sequence[Scene], normal_forces: Sequence[float], *, in_loops: bool = False
+) -> tuple[float | None, ...]:
     """Return for each scene the indentation [mm] at which its settled normal force is the given one [N/mm].
 
     Found directly, with the depth as an unknown and the force given. All scenes share the finger, materials and
-    receptor of the first. None where the finger would be pressed to its bone, or has no such settled state.
+    receptor of the first. None where the finger would be pressed to its bone, or has no such settled state. `in_loops`
+    as in `solver.solution.answers`.
     """
     if not scenes:
         return ()
     deepest = DEEPEST * scenes[0].finger.pulp_thickness()
-    finger = FingerModel.of(scenes[0], Sizing(FINENESS, deepest))
+    finger = FingerModel.of(scenes[0], Sizing(FINENESS, deepest), in_loops=in_loops)
     return tuple(_depth(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True))
 
 
-def expected_depth(scene: Scene) -> float:
+def expected_depth(scene: Scene, *, in_loops: bool = False) -> float:
     """Return the indentation [mm], or about what a given force will lead to, for which meshes are made."""
     if scene.normal_force is None:
         return scene.loading.depth
-    depth = matching_depths((scene,), (scene.normal_force,))[0]
+    depth = matching_depths((scene,), (scene.normal_force,), in_loops=in_loops)[0]
     return DEEPEST * scene.finger.pulp_thickness() if depth is None else depth
 
 

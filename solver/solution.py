@@ -39,24 +39,26 @@ Watch = Callable[[int, _Answer, FingerModel, March | None], None]  # told each a
 Progress = Callable[[float], bool]  # told the part done, 0 to 1; returns False to stop the work (Cancelled is raised)
 
 
-def solve(scene: Scene, progress: Progress | None = None) -> Prediction:
-    """Return the prediction of one scene.
+def solve(scene: Scene, progress: Progress | None = None, *, in_loops: bool = False) -> Prediction:
+    """Return the prediction of one scene; `in_loops` as in `answers`.
 
     Raises NoSteadyState where the scene has no settled sliding, NotConverged where none was found, SceneError where
     its finger cannot be meshed, Cancelled where `progress` says so.
     """
-    return solve_together((scene,), progress)[0]
+    return solve_together((scene,), progress, in_loops=in_loops)[0]
 
 
-def solve_together(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction, ...]:
-    """Return the predictions of several scenes, in their order.
+def solve_together(
+    scenes: Sequence[Scene], progress: Progress | None = None, *, in_loops: bool = False
+) -> tuple[Prediction, ...]:
+    """Return the predictions of several scenes, in their order; `in_loops` as in `answers`.
 
     Scenes with the same finger, materials and receptor share one mesh, fine enough for the strictest tolerance among
     them, so that differences between them are more accurate than each of them; at finite strain each has a mesh for
     its own contact. Raises as `solve` does.
     """
     done: list[Prediction] = []
-    for answer in answers(scenes, progress):
+    for answer in answers(scenes, progress, in_loops=in_loops):
         if isinstance(answer, SolveFailure):
             raise answer
         done.append(answer)
@@ -64,9 +66,12 @@ def solve_together(scenes: Sequence[Scene], progress: Progress | None = None) ->
 
 
 def answers(
-    scenes: Sequence[Scene], progress: Progress | None = None, watch: Watch | None = None
+    scenes: Sequence[Scene], progress: Progress | None = None, watch: Watch | None = None, *, in_loops: bool = False
 ) -> tuple[Prediction | SolveFailure, ...]:
     """Return the prediction of each scene or why it has none, as `solve_together` does.
+
+    With `in_loops` small strain is solved by compiled loops, as finite strain always is: to round-off the same, and
+    what a process should ask for that solves again and again. To load them takes longer than one solve without them.
 
     At small strain `watch` is told each answer, by the position of its scene, as soon as it is found, with the finger
     and the way that led to it; where another mesh is needed it is told once more. Raises SceneError where a finger
@@ -74,16 +79,17 @@ def answers(
     """
     out: dict[int, Prediction | SolveFailure] = {}
     for group in _groups(scenes):
-        out |= dict(zip(group, _solve_group([scenes[i] for i in group], progress, _within(watch, group)), strict=True))
+        found = _solve_group([scenes[i] for i in group], progress, _within(watch, group), in_loops)
+        out |= dict(zip(group, found, strict=True))
     told = {i: answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer for i, answer in out.items()}
-    return tuple(_with_evidence(told[i], progress) for i in range(len(scenes)))
+    return tuple(_with_evidence(told[i], progress, in_loops) for i in range(len(scenes)))
 
 
-def _with_evidence(found: _Answer, progress: Progress | None) -> _Answer:
+def _with_evidence(found: _Answer, progress: Progress | None, in_loops: bool) -> _Answer:
     """Return the answer with its evidence measured, where its scene asks for that."""
     if not isinstance(found, Prediction) or found.scene.solve.evidence == "estimated":
         return found
-    return measured(found, lambda scenes: answers(scenes, progress))
+    return measured(found, lambda scenes: answers(scenes, progress, in_loops=in_loops))
 
 
 def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
@@ -100,7 +106,7 @@ def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
     return lambda number, answer, finger, way: watch(group[number], answer, finger, way)
 
 
-def _solve_group(scenes: list[Scene], progress: Progress | None, watch: Watch | None) -> list[_Answer]:
+def _solve_group(scenes: list[Scene], progress: Progress | None, watch: Watch | None, in_loops: bool) -> list[_Answer]:
     """Refine until every scene's estimate meets its tolerance, or the finest mesh is reached.
 
     Where scenes share a mesh, all are solved again on the finer one; at finite strain those alone that need it.
@@ -108,12 +114,12 @@ def _solve_group(scenes: list[Scene], progress: Progress | None, watch: Watch | 
     asked = [s.solve.tolerance for s in scenes]
     kind = scenes[0].solve.kinematics
     strictest = min((a for a in asked if a is not None), default=None)
-    depth = max(expected_depth(scene) for scene in scenes)
+    depth = max(expected_depth(scene, in_loops=in_loops) for scene in scenes)
     fineness = DEFAULT[kind] if strictest is None else coarsest_for(scenes[0].driven(depth), strictest)
     found: dict[int, _Answer] = {}
     todo = list(range(len(scenes)))
     while True:
-        found |= zip(todo, _on_mesh([scenes[i] for i in todo], depth, fineness, progress, watch), strict=True)
+        found |= zip(todo, _on_mesh([scenes[i] for i in todo], depth, fineness, progress, watch, in_loops), strict=True)
         missed = [_misses(found[i], asked[i]) for i in range(len(scenes))]
         finer = [n for n in FINENESS[kind] if n > fineness]
         if not finer or not any(missed):
@@ -130,14 +136,19 @@ def _solve_group(scenes: list[Scene], progress: Progress | None, watch: Watch | 
 
 
 def _on_mesh(
-    scenes: list[Scene], depth: float, fineness: float, progress: Progress | None, watch: Watch | None
+    scenes: list[Scene],
+    depth: float,
+    fineness: float,
+    progress: Progress | None,
+    watch: Watch | None,
+    in_loops: bool,
 ) -> list[_Answer]:
     if scenes[0].solve.kinematics == "finite":
         # Imported here: small strain, the default, need not wait for the compiled loops to be loaded.
         from solver.finite_solution import answers as finite_answers
 
         return finite_answers(scenes, depth, fineness, progress)
-    return _solve_on(scenes, depth, fineness, progress, watch)
+    return _solve_on(scenes, depth, fineness, progress, watch, in_loops)
 
 
 def _misses(answer: _Answer, tolerance: float | None) -> bool:
@@ -158,17 +169,22 @@ class _Shared:
 
 
 def _solve_on(
-    scenes: list[Scene], depth: float, fineness: float, progress: Progress | None, watch: Watch | None
+    scenes: list[Scene],
+    depth: float,
+    fineness: float,
+    progress: Progress | None,
+    watch: Watch | None,
+    in_loops: bool,
 ) -> list[_Answer]:
     """Solve all scenes on one mesh, and on two coarser ones for the estimate; look wider where contact reaches out."""
     done: list[_Answer | None] = []
     for margin in (1.0, 4.0, WIDE):
         begun = perf_counter()
-        fine = _meshed(scenes[0], Sizing(fineness, depth, margin=margin))
+        fine = _meshed(scenes[0], Sizing(fineness, depth, margin=margin), in_loops)
         setup = perf_counter() - begun - fine.solve_s
         begun = perf_counter()
         coarse = tuple(
-            _meshed(scenes[0], Sizing(fineness / 2.0, depth, shift, margin=margin)) for shift in (False, True)
+            _meshed(scenes[0], Sizing(fineness / 2.0, depth, shift, margin=margin), in_loops) for shift in (False, True)
         )
         estimate = (perf_counter() - begun) / len(scenes)
         shared = _Shared(fineness, fine, coarse, setup, fine.solve_s / len(scenes), estimate, widest=margin == WIDE)
@@ -203,9 +219,9 @@ def _report(progress: Progress | None, part: float) -> None:
         raise Cancelled
 
 
-def _meshed(scene: Scene, sizing: Sizing) -> FingerModel:
+def _meshed(scene: Scene, sizing: Sizing, in_loops: bool) -> FingerModel:
     try:
-        return FingerModel.of(scene, sizing)
+        return FingerModel.of(scene, sizing, in_loops=in_loops)
     except (MeshError, LinAlgError) as bad:
         raise SceneError("finger", scene.finger, f"no mesh fits it ({bad})") from bad
 
@@ -229,16 +245,16 @@ def _direct(scene: Scene, shared: _Shared) -> Contact | None:
     if not shared.widest:
         return None
     if direction == 0 or (scene.normal_force is not None and contact is None):
-        raise _no_answer(scene, why, 0.0)
+        raise _no_answer(scene, why, 0.0, finger)
     depth = scene.loading.depth if contact is None else indentation(scene, contact)
     reached, limit = followed(finger.body.touchable, law_of(scene), depth, direction)
     if scene.normal_force is not None and contact is not None:
         # the way leads to sliding at that depth: is that the state that the forces lead to?
         if reached is None or abs(reached.normal.sum() / scene.normal_force - 1.0) > SAME:
-            raise _no_answer(scene, why, 0.0)
+            raise _no_answer(scene, why, 0.0, finger)
         return contact
     if reached is None:
-        raise _no_answer(scene, why, limit)
+        raise _no_answer(scene, why, limit, finger)
     return reached
 
 
@@ -424,7 +440,7 @@ def _pressed(scene: Scene) -> str:
     return f"{scene.loading.depth:g} mm indentation" if force is None else f"a normal force of {force:g} N/mm"
 
 
-def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotConverged:
+def _no_answer(scene: Scene, why: str, limit_mu: float, finger: FingerModel) -> NoSteadyState | NotConverged:
     """Return the failure that says what is known."""
     mu = float(scene.friction.mu)
     at = f"{_pressed(scene)} and mu = {mu:g}"
@@ -432,7 +448,7 @@ def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotCo
         at += f" with tau_max = {scene.friction.tau_max:g} MPa"
     if scene.loading.direction == 0 or limit_mu <= 0.0:
         return NotConverged(f"No settled state was found at {at}: {why}, from every first guess tried.")
-    limit_depth = deepest(scene, law_of(scene))
+    limit_depth = deepest(scene, law_of(scene), in_loops=finger.body.touchable.in_loops)
     message = (
         f"There is no steady sliding at {at}: the drag presses the finger against the surface faster than it yields, "
         f"so it wedges; followed from mu = 0, steady sliding at this depth ends at mu = {limit_mu:.3g}"

@@ -43,10 +43,11 @@ def followed(body: Touchable, law: FrictionLaw, depth: float, direction: int) ->
     return (state if reached == law.mu else None), reached
 
 
-def deepest(scene: Scene, law: FrictionLaw) -> float | None:
+def deepest(scene: Scene, law: FrictionLaw, *, in_loops: bool = False) -> float | None:
     """Return the largest indentation [mm] below the scene's with settled sliding under `law`, to 4 %.
 
     None where there is none, or where a finer mesh puts it elsewhere, as it does at coefficients far beyond the limit.
+    `in_loops` as in `Body.of`.
     """
     body: Touchable | None = None
     meshed = 0.0  # depth that the body's mesh was made for [mm]
@@ -54,7 +55,7 @@ def deepest(scene: Scene, law: FrictionLaw) -> float | None:
     def slides(depth: float) -> bool:
         nonlocal body, meshed
         if body is None or not NEAR[0] * meshed <= depth <= NEAR[1] * meshed:
-            body, meshed = _body(scene, depth, FINENESS), depth
+            body, meshed = _body(scene, depth, FINENESS, in_loops), depth
         return followed(body, law, depth, scene.loading.direction)[0] is not None
 
     low, high = 1e-3 * scene.loading.depth, scene.loading.depth
@@ -63,10 +64,10 @@ def deepest(scene: Scene, law: FrictionLaw) -> float | None:
     while high > 1.02 * low:
         middle = sqrt(low * high)
         low, high = (middle, high) if slides(middle) else (low, middle)
-    body, meshed = _body(scene, low, 1.6 * FINENESS), low
+    body, meshed = _body(scene, low, 1.6 * FINENESS, in_loops), low
     return low if slides(0.97 * low) and not slides(1.05 * low) else None
 
 
-def _body(scene: Scene, depth: float, fineness: float) -> Touchable:
+def _body(scene: Scene, depth: float, fineness: float, in_loops: bool) -> Touchable:
     mesh = finger_mesh(scene.finger, scene.receptor, Sizing(fineness, depth, margin=WIDE)).mesh
-    return Body.of(mesh, settled_moduli(scene.materials)).touchable
+    return Body.of(mesh, settled_moduli(scene.materials), in_loops=in_loops).touchable

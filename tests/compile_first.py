@@ -10,6 +10,6 @@ if __name__ == "__main__":
     for kinematics in ("small", "finite"):
         published = scene(SLIPPERINESS[-1])
         asked = replace(published, solve=replace(published.solve, kinematics=kinematics))
-        solve(asked)
-        solve(replace(asked, solve=replace(asked.solve, course="history")))
+        solve(asked, in_loops=True)
+        solve(replace(asked, solve=replace(asked.solve, course="history")), in_loops=True)
         stepper(asked).step(0.05, 0.01)

@@ -113,7 +113,7 @@ def small_finger(quick: bool) -> Iterator[Order]:
         asked = scene(surface)
 
         def sed(fineness: float, shift: bool) -> float:
-            model = FingerModel.of(asked, Sizing(fineness, 2.0, shift))  # noqa: B023  called before the next surface
+            model = FingerModel.of(asked, Sizing(fineness, 2.0, shift), in_loops=True)  # noqa: B023  called before the next surface
             return float(numbers_on(model, [settled(asked, model)])[0, 0])  # noqa: B023
 
         yield _finger(asked.title, "small", sed, 20.0, (3.0, 4.0, 5.0, 7.0, 10.0), 1.8)

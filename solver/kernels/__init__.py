@@ -1,6 +1,7 @@
-"""The compiled loops of the finite-strain solver, and the only modules that are compiled (numba, cached on disk).
+"""The compiled loops of the solver, and the only modules that are compiled (numba, cached on disk).
 
-`solver.kernels_numpy` says the same in plain NumPy; the tests compare the two.
+`solver.kernels_numpy` says the same of finite strain in plain NumPy, `solver.stiffness`, `solver.dissection` and
+`solver.contact` of small strain (`hooke`, `rubbing`, `following`); the tests compare them.
 """
 
 from solver.kernels.compiling import CAP, OPEN, SLIP, STICK

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Narrow = NDArray[np.int32]
 Wide = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+States = NDArray[np.int8]
 Compiled = TypeVar("Compiled", bound=Callable[..., Any])
 
 OPEN, STICK, SLIP, CAP = 0, 1, 2, 3  # states of a node of the skin

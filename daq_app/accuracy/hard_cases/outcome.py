@@ -29,7 +29,7 @@ class Outcome:
 
 def of_scene(asked: Scene) -> Outcome:
     """Solve a scene of the finger through the solver's front door."""
-    (found,) = answers([asked])
+    (found,) = answers([asked], in_loops=True)
     return _refused(found) if isinstance(found, SolveFailure) else _answered(found)
 
 
