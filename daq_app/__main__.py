@@ -1,9 +1,11 @@
 """Start of the program."""
 
+import multiprocessing
 import os
 import sys
+from typing import NoReturn
 
-from daq_app.cli import run
+from daq_app.cli import STOPPED, run
 
 
 def main() -> None:
@@ -19,7 +21,16 @@ def main() -> None:
         from daq_app.qt.start import look_at
 
         sys.exit(look_at(sys.argv[2:]))
-    sys.exit(run(sys.argv[1:]))
+    _leave(run(sys.argv[1:]))
+
+
+def _leave(code: int) -> NoReturn:
+    """Leave with an exit code; at once where the user asked to stop and nothing is left to be ended."""
+    if code == STOPPED and not multiprocessing.active_children():
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)  # taking the loaded libraries apart first takes longer than Ctrl-C may
+    sys.exit(code)
 
 
 if __name__ == "__main__":

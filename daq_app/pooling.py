@@ -28,6 +28,7 @@ from sessions.recording.whole_file import write_whole
 from sessions.sealing import SEAL
 
 LOOK = 0.1  # between two looks whether something is done [s]
+WITHOUT_WORKERS = 30.0  # that a cluster may have no worker before it is given up [s]
 CONTENT = (LIVE_FILE, f"{LIVE_FILE}-wal", UNBLINDING, SEAL, DECISIONS)  # all that a visit's numbers come from
 
 Answer = tuple[str, dict[str, Any] | str]  # session, and what it brings or why it brings nothing
@@ -97,7 +98,8 @@ def visits(
     begun = time.monotonic()
     if missing:
         console.progress(0.0, f"0 of {len(missing)} sessions")
-    answers = _local(missing, options, workers) if scheduler is None else _dask(missing, options, scheduler)
+    here = scheduler is None or not missing
+    answers = _local(missing, options, workers) if here else _dask(missing, options, scheduler or "")
     try:
         for count, (name, answer) in enumerate(answers, 1):
             if isinstance(answer, str):
@@ -165,8 +167,11 @@ def _in_pool(folders: Sequence[Path], options: VisitOptions, workers: int) -> It
         pool.shutdown()
     except BaseException:
         pool.shutdown(wait=False, cancel_futures=True)
-        for process in multiprocessing.active_children():
-            process.terminate()
+        ended = multiprocessing.active_children()
+        for process in ended:
+            process.kill()  # they hold nothing that is not computed again
+        for process in ended:
+            process.join(LOOK)
         raise
 
 
@@ -195,18 +200,35 @@ def _dask(folders: Sequence[Path], options: VisitOptions, address: str) -> Itera
         raise SchedulerError(
             f"{address}: no Dask scheduler answers there ({error}); start one, or give no address"
         ) from error
-    futures: list[Any] = []
+    names: dict[Any, str] = {}
+    waiting = list(reversed(folders))
+    under_way: dict[str, Any] = {}
+    answers: Any = library.as_completed(loop=client.loop)
+    seen = time.monotonic()  # when a worker was last there
     try:
-        names: dict[Any, str] = {}
-        for folder in folders:
-            future = client.submit(computed_from, folder.name, content_of(folder), options, pure=False, retries=1)
-            futures.append(future)
-            names[future.key] = folder.name
-        for future in library.as_completed(futures, loop=client.loop):
+        while waiting or under_way:
+            threads = sum(client.nthreads().values())
+            seen = time.monotonic() if threads else seen
+            if time.monotonic() - seen > WITHOUT_WORKERS:
+                raise SchedulerError(
+                    f"{address}: the scheduler has had no worker for {WITHOUT_WORKERS:.0f} s; start some and run this "
+                    "again: what is done is kept"
+                )
+            # Files are read and sent as workers come free: never those of a thousand sessions at once.
+            while waiting and threads and len(under_way) < 2 * threads:
+                folder = waiting.pop()
+                future = client.submit(computed_from, folder.name, content_of(folder), options, pure=False, retries=1)
+                names[future.key], under_way[future.key] = folder.name, future
+                answers.add(future)
+            if not answers.has_ready():
+                time.sleep(LOOK)
+                continue
+            future = next(answers)
+            del under_way[future.key]
             if future.status == "finished":
                 yield future.result()
             else:
                 yield names[future.key], f"no worker could compute it ({future.exception()})"
     finally:
-        client.cancel(futures)
+        client.cancel(list(under_way.values()))
         client.close()

@@ -8,6 +8,7 @@ With --synthetic a study of ten simulated subjects is made first, and what was p
 
 import argparse
 import json
+import re
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -90,6 +91,8 @@ def _places(options: argparse.Namespace, console: Console) -> tuple[Path, Path]:
         raise WrongValue("give a FOLDER of sessions, or --synthetic SEED, and not both")
     if options.workers is not None and options.workers < 1:
         raise WrongValue(f"--workers {options.workers} is not allowed: 1 or more")
+    if options.scheduler is not None and re.fullmatch(r"[a-z]+://[^/\s]+:\d+", options.scheduler) is None:
+        raise WrongValue(f"--scheduler {options.scheduler} is not allowed: scheme, host and port, as tcp://host:8786")
     if options.synthetic is None:
         return options.folder, options.out or options.folder / "pooled"
     if not 0 <= options.synthetic <= LARGEST_SEED:

@@ -152,6 +152,8 @@ def test_a_study_is_refused_in_a_sentence_where_there_is_none(tmp_path, capsys):
     assert "holds no session" in capsys.readouterr().err
     assert run(["study"]) == 2
     assert run(["study", str(tmp_path), "--synthetic", "1"]) == 2
+    assert run(["study", str(tmp_path), "--scheduler", "foo"]) == 2
+    assert "tcp://host:8786" in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -168,6 +170,24 @@ def test_a_dask_cluster_gives_the_same_bits_as_this_computer(study, tmp_path):
         )
     here = [Visit.from_dict(json.loads(json.dumps(computed(study / name, STEADY)[1]))) for name in ("S01", "S02")]
     assert sorted(far, key=lambda visit: visit.session) == here
+
+
+@pytest.mark.slow
+def test_a_cluster_without_workers_is_given_up_in_a_sentence(study, tmp_path, monkeypatch):
+    import distributed
+
+    monkeypatch.setattr(pooling, "WITHOUT_WORKERS", 0.5)
+    asked = ([study / "S01"], STEADY, Shelf(tmp_path, STEADY), Console(as_json=True))
+    with distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster:  # noqa: SIM117
+        with pytest.raises(pooling.SchedulerError, match="no worker"):
+            visits(*asked, scheduler=cluster.scheduler_address)
+
+
+@pytest.mark.usefixtures("pool")
+def test_a_cluster_is_not_asked_for_what_is_kept(study):
+    kept = Shelf(study / "pooled" / "results", STEADY)
+    done, failed = visits([study / "S01"], STEADY, kept, Console(as_json=True), scheduler="tcp://127.0.0.1:9")
+    assert ([visit.session for visit in done], failed) == (["S01"], [])
 
 
 @pytest.mark.slow
