@@ -6,7 +6,7 @@ import numpy as np
 
 from solver import kernels
 from solver.elements import Q2P1
-from solver.finite_body import VALUES, FiniteBody
+from solver.finite_body import VALUES, FiniteBody, Narrow
 from solver.mesh import Array, Indices
 from solver.mesher import FingerMesh, with_middles
 from solver.newton import Shape
@@ -39,42 +39,64 @@ class Places:
         return Places(body, arcs, heights, _inner(arcs[::2]), _inner(heights[::2]), points, skin, lengths)
 
 
-def carried(shape: Shape, old: Places, new: Places) -> Shape:
-    """Return `shape`, found on the mesh of `old`, as a start on that of `new`, a mesh of the same finger.
+@dataclass(frozen=True, slots=True, eq=False)
+class Bridge:
+    """The way from one mesh to another of the same finger: what depends on where their lines lie, made once."""
 
-    The states of skin nodes follow from interpolated pressures.
-    """
-    u, pressure = carried_fields(shape, old, new)
-    traction = np.where(shape.touching[:, None], shape.reaction / old.lengths[:, None], 0.0)
-    reaction = np.stack([np.interp(new.skin, old.skin, traction[:, a], 0.0, 0.0) for a in (0, 1)], axis=1)
-    nearest = np.abs(new.skin[:, None] - old.skin).argmin(axis=1)
-    touching = np.interp(new.skin, old.skin, shape.touching.astype(float)) > 0.5
-    state = np.where(touching, np.maximum(shape.state[nearest], kernels.SLIP), kernels.OPEN).astype(np.int32)
-    sense = shape.sense[nearest].copy()
-    return Shape(u, pressure, state, sense, reaction * new.lengths[:, None], shape.pull, shape.iterations)
+    old: Places
+    new: Places
+    along: Narrow  # (2 a + 1,) first of the three old lines that a new line takes its values from
+    along_parts: Array  # (2 a + 1, 3) its part of each
+    across: Narrow  # (2 b + 1,) the same of rows
+    across_parts: Array  # (2 b + 1, 3)
+    station: Narrow  # (a, 3) old elements along the skin that hold the new quadrature points
+    layer: Narrow  # (b, 3) and across it
+    onto: Array  # (k, old k) the new skin's values by the old skin's, between whose nodes they are linear
+    nearest: Indices  # (k,) old node of the skin
 
+    @staticmethod
+    def of(old: Places, new: Places) -> "Bridge":
+        """Find for each place of the `new` mesh where it lies in the `old` one."""
+        along, across = _interpolation(old.arcs, new.arcs), _interpolation(old.heights, new.heights)
+        station = _piece(old.arcs[::2], new.inner_arcs).astype(np.int32)
+        layer = _piece(old.heights[::2], new.inner_heights).astype(np.int32)
+        onto = np.stack([np.interp(new.skin, old.skin, one, 0.0, 0.0) for one in np.eye(len(old.skin))], axis=1)
+        nearest = np.abs(new.skin[:, None] - old.skin).argmin(axis=1)
+        return Bridge(old, new, *along, *across, station, layer, onto, nearest)
 
-def carried_fields(shape: Shape, old: Places, new: Places) -> tuple[Array, Array]:
-    """Return displacements (nodes, 2) [mm] and pressure modes (e, 3) of `shape` on the mesh of `new`.
+    def carried(self, shape: Shape) -> Shape:
+        """Return `shape`, found on the old mesh, as a start on the new one.
 
-    Displacements are interpolated by the elements' own functions in arc position and height, so a mesh carries its
-    state to itself unchanged. Pressures are those of the elements they come from: what interpolated displacements
-    change in volume, small as it is, a stiff body would answer strongly.
-    """
-    along, across = _interpolation(old.arcs, new.arcs), _interpolation(old.heights, new.heights)
-    grid = shape.u.reshape(len(old.arcs), len(old.heights), 2)
-    lines = (along @ grid.reshape(len(grid), -1)).reshape(len(along), -1, 2)
-    u = (across @ lines).reshape(-1, 2)
-    u[new.body.mesh.held] = 0.0
+        The states of skin nodes follow from interpolated pressures.
+        """
+        u, pressure = self.fields(shape)
+        values = np.zeros((len(shape.state), 3))
+        touching = shape.touching
+        values[:, :2] = shape.reaction / self.old.lengths[:, None]
+        values[:, 2] = 1.0
+        values[~touching] = 0.0
+        found = self.onto @ values
+        state = np.where(found[:, 2] > 0.5, np.maximum(shape.state[self.nearest], kernels.SLIP), kernels.OPEN)
+        reaction = found[:, :2] * self.new.lengths[:, None]
+        return Shape(
+            u, pressure, state.astype(np.int32), shape.sense[self.nearest], reaction, shape.pull, shape.iterations
+        )
 
-    station = _piece(old.arcs[::2], new.inner_arcs)  # (a, 3)
-    layer = _piece(old.heights[::2], new.inner_heights)  # (b, 3)
-    host = (station[:, None, :, None] * (len(old.heights) // 2) + layer[None, :, None, :]).reshape(-1, 9)
-    # each element's pressure is c + cx x + cy y
-    slopes = (shape.pressure[:, None] @ old.body.combination)[:, 0]
-    start = slopes[:, 0] - slopes[:, 1] * old.body.centre[:, 0] - slopes[:, 2] * old.body.centre[:, 1]
-    field = start[host] + slopes[host, 1] * new.points[..., 0] + slopes[host, 2] * new.points[..., 1]
-    return u, ((new.body.weight * field)[:, None] @ new.body.modes)[:, 0]
+    def fields(self, shape: Shape) -> tuple[Array, Array]:
+        """Return displacements (nodes, 2) [mm] and pressure modes (e, 3) of `shape` on the new mesh.
+
+        Displacements are interpolated by the elements' own functions in arc position and height, so a mesh carries its
+        state to itself unchanged. Pressures are those of the elements they come from: what interpolated displacements
+        change in volume, small as it is, a stiff body would answer strongly.
+        """
+        old, new = self.old.body, self.new.body
+        u, pressure = np.empty(new.mesh.nodes.shape), np.empty((len(new.nodes), 3))
+        kernels.carry(
+            shape.u, shape.pressure, old.combination, old.centre, self.along, self.along_parts, self.across,
+            self.across_parts, self.station, self.layer, self.new.points, new.weight, new.modes, u, pressure,
+        )  # fmt: skip
+        u[new.mesh.held] = 0.0
+        return u, pressure
 
 
 def _inner(lines: Array) -> Array:
@@ -98,14 +120,10 @@ def _piece(ends: Array, points: Array) -> Indices:
     return np.searchsorted(ends[1:-1], points, side="right")
 
 
-def _interpolation(nodes: Array, points: Array) -> Array:
-    """Return the matrix (p, n) that takes values at `nodes` (n,) of quadratic lines to `points` (p,)."""
+def _interpolation(nodes: Array, points: Array) -> tuple[Narrow, Array]:
+    """Return which three of `nodes` (n,) of quadratic lines values at `points` (p,) come from, first (p,) and parts."""
     ends = nodes[::2]
     piece = _piece(ends, points)
     local = 2.0 * (points - ends[piece]) / (ends[piece + 1] - ends[piece]) - 1.0
-    out = np.zeros((len(points), len(nodes)))
-    row, first = np.arange(len(points)), 2 * piece
-    out[row, first] = local * (local - 1.0) / 2.0
-    out[row, first + 1] = 1.0 - local * local
-    out[row, first + 2] = local * (local + 1.0) / 2.0
-    return out
+    parts = [local * (local - 1.0) / 2.0, 1.0 - local * local, local * (local + 1.0) / 2.0]
+    return (2 * piece).astype(np.int32), np.stack(parts, axis=1)

@@ -7,7 +7,7 @@ traction bound up to an edge, its force is the bound times a length, and lines a
 by a per cent: there the lines are moved once more, to the edges that the fine mesh itself finds.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -19,7 +19,7 @@ from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.finite_finger import FiniteFinger
 from solver.finite_states import roughly, settled
 from solver.mesh import Array
-from solver.mesher import Sizing
+from solver.mesher import Sizing, sharing, still_sharing
 from solver.newton import Shape
 from solver.scene import Scene
 
@@ -65,11 +65,7 @@ def ascended(
     NoSteadyState, NotConverged, Cancelled.
     """
     low = foot(scene, expected, fineness, stop, make, None if before is None else before.foot)
-    near = before if before is not None and before.foot.finger is low.finger else None
-    top = climbed(scene, fineness, low, stop, make, near)
-    if not top.finger.bounded_at_an_edge(top.shape):
-        return Ascent(low, top)
-    return Ascent(low, climbed(scene, fineness, top, stop, make), top)
+    return risen(scene, fineness, low, stop, make, before)
 
 
 def foot(
@@ -102,6 +98,44 @@ def foot(
     return _on(scene, Sizing(fineness, depth, margin=MARGIN), None, stop, make)
 
 
+def risen(
+    scene: Scene,
+    fineness: float,
+    low: Climbed,
+    stop: Callable[[], bool],
+    make: Maker = FiniteFinger.of,
+    before: Ascent | None = None,
+    sizing: Sizing | None = None,
+) -> Ascent:
+    """Return the settled state above `low`, `foot` of the same scene; for the arguments see `climbed`."""
+    sizing = sizing or sized(fineness, low)
+    top = climbed(scene, fineness, low, stop, make, before, sizing)
+    if not top.finger.bounded_at_an_edge(top.shape):
+        return Ascent(low, top)
+    again = still_sharing(scene.finger, scene.receptor, sized(fineness, top), sizing)
+    return Ascent(low, climbed(scene, fineness, top, stop, make, None, again), top)
+
+
+def sized(fineness: float, below: Climbed) -> Sizing:
+    """Return the sizing of a mesh of `fineness` whose lines follow the edges of contact found `below`."""
+    edges = below.finger.edges(below.shape)
+    return Sizing(fineness, below.shape.pull.depth, margin=MARGIN, edges=edges)
+
+
+def sized_together(scene: Scene, fineness: float, feet: Sequence[Climbed]) -> list[Sizing]:
+    """Return the same for surfaces that are pressed alike: one mesh for all, its lines moved to the edges of each.
+
+    `scene` is that of any of them. Where contact is too short to tell its edges, a surface has a mesh of its own.
+    """
+    sizings = [sized(fineness, below) for below in feet]
+    known = [number for number, sizing in enumerate(sizings) if sizing.edges is not None]
+    if known:
+        shared = sharing(scene.finger, scene.receptor, [sizings[number] for number in known])
+        for number, sizing in zip(known, shared, strict=True):
+            sizings[number] = sizing
+    return sizings
+
+
 def climbed(
     scene: Scene,
     fineness: float,
@@ -109,15 +143,16 @@ def climbed(
     stop: Callable[[], bool],
     make: Maker = FiniteFinger.of,
     before: Ascent | None = None,
+    sizing: Sizing | None = None,
 ) -> Climbed:
     """Return the settled state on a mesh of `fineness` whose lines follow the edges of contact found `below`.
 
-    It is begun at the state `below`, or at what that has changed by since `before` added to the state found then.
-    Raises NoSteadyState, NotConverged, Cancelled.
+    With `sizing` on the mesh of `sized_together`. It is begun at the state `below`, or at what that has changed by
+    since `before`, of a surface that shares the rough mesh, added to the state found then. Raises NoSteadyState,
+    NotConverged, Cancelled.
     """
-    edges = below.finger.edges(below.shape)
-    sizing = Sizing(fineness, below.shape.pull.depth, margin=MARGIN, edges=edges)
-    return _on(scene, sizing, below, stop, make, before)
+    near = before if before is not None and before.foot.finger is below.finger else None
+    return _on(scene, sizing or sized(fineness, below), below, stop, make, near)
 
 
 def _on(
@@ -130,6 +165,9 @@ def _on(
 ) -> Climbed:
     begun = perf_counter()
     finger = make(scene, sizing)
+    for other in (below, before.top if before is not None else None):
+        if other is not None:
+            finger.bridge(other.finger)
     setup = perf_counter() - begun
     start = None
     if below is not None and before is None:

@@ -142,6 +142,7 @@ class Elimination:
         skin = int(plan.border[-1])
         self.plan = plan
         self.stiffness = np.zeros((skin, skin))  # what is left of the tangent for the skin
+        self.found: Array | None = None  # the displacements found with the tangent that is eliminated
         self.carried = np.zeros(plan.size)  # L^-1 force, the skin's condensed forces at the end
         self._still = np.zeros(plan.size)
         self._factors, self._waiting = np.empty(plan.factors), np.empty(plan.waiting)

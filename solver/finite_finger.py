@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 
-from solver.carrying import Places, carried, carried_fields
+from solver.carrying import Bridge, Places
 from solver.finite_body import FiniteBody, FiniteProbes
 from solver.grid import MeshError
 from solver.kernels import CAP
@@ -29,15 +30,18 @@ class FiniteFinger:
     ending: FiniteProbes  # the reference ending alone
 
     @staticmethod
-    def of(scene: Scene, sizing: Sizing) -> "FiniteFinger":
-        """Mesh the finger of `scene`. Raises SceneError where its outline cannot be meshed."""
+    def of(scene: Scene, sizing: Sizing, beside: "FiniteFinger | None" = None) -> "FiniteFinger":
+        """Mesh the finger of `scene`; `beside` is one whose memory it may share, since both are never used at once.
+
+        Raises SceneError where its outline cannot be meshed.
+        """
         try:
             made = finger_mesh(scene.finger, scene.receptor, sizing)
             body = FiniteBody.of(made.mesh, finite_laws(scene.materials))
         except (MeshError, LinAlgError) as bad:
             raise SceneError("finger", scene.finger, f"no mesh fits it ({bad})") from bad
         at_touch = FiniteProbes.of(body, endings(made, body, scene.receptor, np.zeros(1)))
-        return FiniteFinger(scene.receptor, made, Newton(body), at_touch)
+        return FiniteFinger(scene.receptor, made, Newton(body, None if beside is None else beside.newton), at_touch)
 
     @cached_property
     def point(self) -> FiniteProbes:
@@ -61,14 +65,24 @@ class FiniteFinger:
 
     def brought(self, shape: Shape, other: "FiniteFinger") -> Shape:
         """Return `shape`, found on `other`, as a start on this mesh."""
-        return carried(shape, other.places, self.places)
+        return self.bridge(other).carried(shape)
 
     def brought_on(self, now: Shape, before: Shape, other: "FiniteFinger", top: Shape, finest: "FiniteFinger") -> Shape:
         """Return `top`, found on `finest`, with what has changed from `before` to `now` on `other`, as a start here."""
         change = replace(now, u=now.u - before.u, pressure=now.pressure - before.pressure)
-        start = carried(change, other.places, self.places)
-        u, pressure = carried_fields(top, finest.places, self.places)
+        start = self.bridge(other).carried(change)
+        u, pressure = self.bridge(finest).fields(top)
         return replace(start, u=u + start.u, pressure=pressure + start.pressure)
+
+    def bridge(self, other: "FiniteFinger") -> Bridge:
+        """Return the way here from the mesh of `other`, made when first asked for."""
+        if other not in self._bridges:
+            self._bridges[other] = Bridge.of(other.places, self.places)
+        return self._bridges[other]
+
+    @cached_property
+    def _bridges(self) -> "WeakKeyDictionary[FiniteFinger, Bridge]":
+        return WeakKeyDictionary()
 
     @cached_property
     def places(self) -> Places:

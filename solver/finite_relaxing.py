@@ -42,7 +42,7 @@ class RelaxingNewton(Newton):
     def ready(self, step: float) -> None:
         """Prepare a step in time [s]."""
         self._tensor = self.past.over(step).reshape(self._tensor.shape)
-        self._tangent_at = None
+        self.inside.found = None
 
     def took(self, shape: Shape, step: float) -> None:
         """Remember the step that was made ready and led to `shape`."""

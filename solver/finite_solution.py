@@ -5,12 +5,13 @@ where tissues relax, in time (`solver.finite_relaxing`).
 """
 
 from collections.abc import Callable, Sequence
+from itertools import groupby
 from time import perf_counter
 
 import numpy as np
 
 from solver import evidence, kernels_numpy
-from solver.climbing import Ascent, ascended, error_estimates
+from solver.climbing import Ascent, Climbed, error_estimates, foot, risen, sized_together
 from solver.failures import Cancelled, SolveFailure
 from solver.finite_finger import FiniteFinger
 from solver.finite_relaxing import RelaxingCourse, RelaxingNewton
@@ -36,43 +37,65 @@ def answers(
 ) -> list[Answer]:
     """Return the predictions of scenes, or why there is none, on meshes of that fineness.
 
-    Those pressed alike and moved the same way are solved one after the other, friction rising, each begun at the one
-    before. `expected` is the depth [mm] that they reach, or about it where forces are given. Raises SceneError where
-    the finger cannot be meshed, Cancelled where `progress` (told the part done) says so.
+    Those pressed alike and moved the same way share one mesh, of which only the lines at the edges of contact lie
+    elsewhere for each, and are solved one after the other, friction rising, each begun at the one before. `expected` is
+    the depth [mm] that they reach, or about it where forces are given. Raises SceneError where the finger cannot be
+    meshed, Cancelled where `progress` (told the part done) says so.
     """
     found: dict[int, Answer] = {}
-    before: Ascent | None = None
-    rough: dict[Sizing, FiniteFinger] = {}
 
-    def make(scene: Scene, sizing: Sizing) -> FiniteFinger:
-        """Mesh the finger, or take its rough mesh again: surfaces that share it begin one at the other."""
-        if sizing.edges is not None:
-            return FiniteFinger.of(scene, sizing)
-        if sizing not in rough:
-            rough.clear()
-            rough[sizing] = FiniteFinger.of(scene, sizing)
-        return rough[sizing]
+    def stop() -> bool:
+        return progress is not None and not progress(len(found) / len(scenes))
 
-    for number in sorted(range(len(scenes)), key=lambda number: alike(scenes[number])):
-        scene, part = scenes[number], len(found) / len(scenes)
-
-        def stop(part: float = part) -> bool:
-            return progress is not None and not progress(part)
-
-        if stop():
-            raise Cancelled
-        try:
+    meshes = _Meshes()
+    keys = [alike(scene) for scene in scenes]
+    for _, group in groupby(sorted(range(len(scenes)), key=lambda n: keys[n]), lambda n: keys[n][0]):
+        feet: dict[int, tuple[Climbed, float]] = {}  # and what each took [s]
+        low: Climbed | None = None
+        for number in group:
+            if stop():
+                raise Cancelled
             begun = perf_counter()
-            before = ascended(scene, expected, fineness, stop, make, before)
-            found[number] = _predicted(scene, before, fineness, stop, begun)
-        except SolveFailure as failure:
-            found[number] = failure
+            try:
+                low = foot(scenes[number], expected, fineness, stop, meshes.make, low)
+                feet[number] = low, perf_counter() - begun
+            except SolveFailure as failure:
+                found[number] = failure
+        sizings = sized_together(scenes[0], fineness, [below for below, _ in feet.values()])
+        before: Ascent | None = None
+        for (number, (below, took)), sizing in zip(feet.items(), sizings, strict=True):
+            if stop():
+                raise Cancelled
+            begun = perf_counter() - took
+            try:
+                before = risen(scenes[number], fineness, below, stop, meshes.make, before, sizing)
+                found[number] = _predicted(scenes[number], before, fineness, stop, begun)
+            except SolveFailure as failure:
+                found[number] = failure
     return [found[number] for number in range(len(scenes))]
 
 
-def alike(scene: Scene) -> tuple[float, str, float]:
-    """Return what scenes are sorted by, so that neighbours are alike."""
-    return scene.loading.indentation or 0.0, str(scene.loading.slide), float(scene.friction.mu)
+class _Meshes:
+    """Makes the meshes of one finger: rough ones once, that surfaces begin one at the other; others with one memory."""
+
+    def __init__(self) -> None:
+        self._rough: dict[Sizing, FiniteFinger] = {}
+        self._last: FiniteFinger | None = None
+
+    def make(self, scene: Scene, sizing: Sizing) -> FiniteFinger:
+        """Mesh the finger, or take its rough mesh again."""
+        if sizing.edges is not None:
+            self._last = FiniteFinger.of(scene, sizing, self._last)
+            return self._last
+        if sizing not in self._rough:
+            self._rough.clear()
+            self._rough[sizing] = FiniteFinger.of(scene, sizing)
+        return self._rough[sizing]
+
+
+def alike(scene: Scene) -> tuple[tuple[float, float, str], float]:
+    """Return what scenes are sorted by, so that neighbours are alike: how they are pressed, then their friction."""
+    return scene.pressed, float(scene.friction.mu)
 
 
 def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[], bool], begun: float) -> Prediction:

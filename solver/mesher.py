@@ -1,6 +1,7 @@
 """The finger's mesh: a half-O from the bone to the skin, fine along the skin where it may touch."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil
 
@@ -30,6 +31,15 @@ FINEST = 1e-3  # smallest element by tip radius: thinner ones across the whole f
 
 
 @dataclass(frozen=True, slots=True)
+class Sharing:
+    """What meshes have in common that differ only in where contact ends: their elements, and how these are joined."""
+
+    narrowest: float  # half of the narrowest of their contacts [mm]
+    gaps: tuple[int, ...]  # elements between each two of the lines that have their place
+    skin: tuple[int, int]  # first and last line between elements where the skin may touch
+
+
+@dataclass(frozen=True, slots=True)
 class Sizing:
     """How fine the mesh is, and where."""
 
@@ -38,6 +48,7 @@ class Sizing:
     shift: bool = False  # move the mesh along the skin by half an element
     margin: float = 1.0  # contact is looked for where undeformed skin lies lower than (1 + margin/4) indentation
     edges: tuple[float, float] | None = None  # arc positions where contact ends, where they are known: lines lie there
+    sharing: Sharing | None = None  # with the meshes of other surfaces
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,12 +71,10 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     Raises MeshError where the outline cannot be meshed.
     """
     outline = Outline.of(finger)
-    contact = sizing.edges or _lower_than(outline, sizing.indentation)
     size = finger.tip_radius / sizing.fineness
-    half = (contact[1] - contact[0]) / 2.0
-    along, short = (ANYWHERE, SHORT[0]) if sizing.edges is None else (EDGE, SHORT[1])
-    fine = max(size * along * min(1.0, half / (short * finger.tip_radius)), FINEST * finger.tip_radius)
-    arcs = _stations(outline, contact, fine, size, receptor, sizing)
+    fine = _fine(outline, sizing)
+    row = _Row.of(outline, fine, receptor, sizing)
+    arcs = row.lines(row.gaps() if sizing.sharing is None else sizing.sharing.gaps, shift=sizing.shift)
     lines, fat = _layers(finger, fine, size, receptor)
     every_arc = with_middles(arcs)
     depths = with_middles(lines)
@@ -81,9 +90,7 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
         points = np.concatenate([outline.bone(every_arc[:, None], parts), points], axis=1)
         layers = np.concatenate([np.full(len(parts) // 2, BONE), layers])
         below += len(parts) // 2
-    touching = _lower_than(outline, sizing.indentation * (1.0 + 0.25 * sizing.margin))
-    low = max(int(np.searchsorted(arcs, touching[0])) - 1, 0)
-    high = min(int(np.searchsorted(arcs, touching[1])), len(arcs) - 1)
+    low, high = _touchable(outline, arcs, sizing) if sizing.sharing is None else sizing.sharing.skin
     long, wide = points.shape[0], points.shape[1]
     number: Indices = np.arange(long * wide, dtype=np.int64).reshape(long, wide)
     held = [number[:, 0]]
@@ -108,6 +115,27 @@ def _lower_than(outline: Outline, height: float) -> tuple[float, float]:
     return ends[0], ends[1]
 
 
+def _touchable(outline: Outline, arcs: Array, sizing: Sizing) -> tuple[int, int]:
+    """Return the first and last of the lines at `arcs` between which the skin may touch."""
+    touching = _lower_than(outline, sizing.indentation * (1.0 + 0.25 * sizing.margin))
+    low = max(int(np.searchsorted(arcs, touching[0])) - 1, 0)
+    return low, min(int(np.searchsorted(arcs, touching[1])), len(arcs) - 1)
+
+
+def _fine(outline: Outline, sizing: Sizing) -> float:
+    """Return the size of the smallest elements along the skin [mm]."""
+    contact, radius = _contact(outline, sizing), outline.finger.tip_radius
+    half = (contact[1] - contact[0]) / 2.0
+    if sizing.sharing is not None:
+        half = sizing.sharing.narrowest
+    along, short = (ANYWHERE, SHORT[0]) if sizing.edges is None else (EDGE, SHORT[1])
+    return max(radius / sizing.fineness * along * min(1.0, half / (short * radius)), FINEST * radius)
+
+
+def _contact(outline: Outline, sizing: Sizing) -> tuple[float, float]:
+    return sizing.edges or _lower_than(outline, sizing.indentation)
+
+
 def _middles(lines: Array) -> Array:
     return (lines[1:] + lines[:-1]) / 2.0
 
@@ -119,25 +147,124 @@ def with_middles(lines: Array) -> Array:
     return out
 
 
-def _spaced(
-    place: Array, size: Array, ends: tuple[float, ...], least: tuple[int, ...], spare: float, *, shift: bool
-) -> list[Array]:
-    """Return lines between each two of `ends`, spaced as `size` at `place` asks, at least so many gaps in each.
+def _counted(place: Array, size: Array) -> Array:
+    """Return how many elements of `size` at `place` (n,) lie before each of these places (n,)."""
+    return np.concatenate([[0.0], np.cumsum((1.0 / size[1:] + 1.0 / size[:-1]) / 2.0 * np.diff(place))])
 
-    The last `spare` part of a gap is spread over the others. With `shift` they lie half a gap further, save the ends.
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Row:
+    """Elements in a row: how many are asked for before each place, and where lines between them must lie."""
+
+    place: Array  # (n,)
+    number: Array  # (n,) of elements before it
+    ends: tuple[float, ...]
+    least: tuple[int, ...]  # elements between each two of them
+    spare: float  # part of an element that is spread over the others
+    edges: tuple[int, ...] = ()  # which of the ends are edges of contact
+
+    @staticmethod
+    def of(outline: Outline, fine: float, receptor: Receptor, sizing: Sizing) -> "_Row":
+        """Return the row along the skin: fine in the contact, coarser with the distance from it.
+
+        Lines always lie where straight edge and arc meet, since an element cannot follow a jump in curvature, at the
+        ends of the ending and of a nail plate, and where contact is known to end, since no element can follow a skin
+        half of which touches.
+        """
+        low, high = _contact(outline, sizing)
+        scale = 1.0 / sizing.fineness
+        away = np.concatenate([[0.0], np.geomspace(1e-9, 1.0, 1000)])
+        palmar, dorsal = low + (outline.palmar_cut - low) * away, high + (outline.dorsal_cut - high) * away
+        arc = np.unique(np.concatenate([palmar, np.linspace(low, high, 1000), dorsal]))
+        asked = fine + scale * (AWAY[0] * np.maximum(low - arc, 0.0) + AWAY[1] * np.maximum(arc - high, 0.0))
+        if sizing.edges is not None:
+            inside = np.maximum(np.minimum(arc - low, high - arc), 0.0)
+            asked += np.minimum(scale * TOWARDS * inside, (MIDDLE / EDGE - 1.0) * fine)
+        half = receptor.ending[1] / 2.0
+        frame = outline.along(0.0, receptor.depth, np.array([-half, half])).tolist()
+        ends = [outline.palmar_cut, outline.palmar, *frame, outline.dorsal, outline.dorsal_cut]
+        if outline.finger.nail_length > 0.0:
+            ends.append(outline.nail_end)
+        ends = _distinct(*ends)
+        apart: list[float] = []
+        if sizing.edges is not None:
+            apart = [e for e in sizing.edges if min(abs(e - end) for end in ends) > NEAR * fine]
+            ends = tuple(sorted((*ends, *apart)))
+        least = tuple(2 if end in (outline.palmar_cut, outline.dorsal) else 1 for end in ends[:-1])
+        return _Row(arc, _counted(arc, asked), ends, least, 0.2, tuple(ends.index(edge) for edge in apart))
+
+    def asked(self) -> Array:
+        """Return how many elements, and which part of one, are asked for between each two of the ends."""
+        return np.diff(np.interp(self.ends, self.place, self.number))
+
+    def outside(self, contact: tuple[float, float]) -> Array:
+        """Return the same, 0 where the middle between two ends lies in the `contact`."""
+        middles = _middles(np.array(self.ends))
+        return np.where((middles > contact[0]) & (middles < contact[1]), 0.0, self.asked())
+
+    def gaps(self) -> tuple[int, ...]:
+        """Return how many elements there are between each two of the ends."""
+        return tuple(max(few, ceil(n - self.spare)) for few, n in zip(self.least, self.asked().tolist(), strict=True))
+
+    def lines(self, gaps: Sequence[int], *, shift: bool = False) -> Array:
+        """Return the lines between elements, so many between each two ends; with `shift` half an element further."""
+        out: list[Array] = []
+        at = np.interp(self.ends, self.place, self.number)
+        for (first, last), (start, stop), count in zip(pairwise(at), pairwise(self.ends), gaps, strict=True):
+            steps = np.arange(count + 1.0)
+            if shift:  # save the ends
+                steps = np.concatenate([[0.0], steps[:-1] + 0.5, [float(count)]])
+            lines = np.interp(first + (last - first) * steps / count, self.number, self.place)
+            lines[0], lines[-1] = start, stop
+            out.append(lines if not out else lines[1:])
+        return np.concatenate(out)
+
+
+def sharing(finger: Finger, receptor: Receptor, sizings: Sequence[Sizing]) -> list[Sizing]:
+    """Return the sizings of meshes that share their elements and move only the lines between them.
+
+    They differ in the edges of contact, which are known. Everywhere there are as many elements as any of them has
+    alone.
     """
-    number = np.concatenate([[0.0], np.cumsum((1.0 / size[1:] + 1.0 / size[:-1]) / 2.0 * np.diff(place))])
-    out: list[Array] = []
-    for start, stop, few in zip(ends[:-1], ends[1:], least, strict=True):
-        first, last = np.interp([start, stop], place, number)
-        count = max(few, ceil(last - first - spare))
-        steps = np.arange(count + 1.0)
-        if shift:
-            steps = np.concatenate([[0.0], steps[:-1] + 0.5, [float(count)]])
-        lines = np.interp(first + (last - first) * steps / count, number, place)
-        lines[0], lines[-1] = start, stop
-        out.append(lines)
-    return out
+    outline = Outline.of(finger)
+    narrowest = min((edges[1] - edges[0]) / 2.0 for edges in (_contact(outline, sizing) for sizing in sizings))
+    joined = [replace(sizing, sharing=Sharing(narrowest, (), (0, 0))) for sizing in sizings]
+    rows = [_Row.of(outline, _fine(outline, sizing), receptor, sizing) for sizing in joined]
+    gaps: dict[tuple[int, ...], Array] = {}  # by which of the lines are edges
+    for row in rows:
+        gaps[row.edges] = np.maximum(gaps.get(row.edges, 0), row.gaps())
+    behind = sum(end > outline.dorsal + 1e-9 for end in rows[0].ends)  # gaps behind the tip's arc: those of a nail too
+    tail = np.max([count[-behind:] for count in gaps.values()], axis=0)
+    for count in gaps.values():
+        count[-behind:] = tail
+    most = max(int(count.sum()) for count in gaps.values())
+    for edges, count in gaps.items():
+        alike = [(row, sizing) for row, sizing in zip(rows, joined, strict=True) if row.edges == edges]
+        large = np.max([row.outside(_contact(outline, sizing)) for row, sizing in alike], axis=0)
+        large[-behind:] = 0.0
+        while count.sum() < most:  # outside the contact, where elements are largest by what is asked for
+            count[int(np.argmax(large / count))] += 1
+    arcs = [row.lines(gaps[row.edges].tolist()) for row in rows]
+    skins = [_touchable(outline, lines, sizing) for lines, sizing in zip(arcs, sizings, strict=True)]
+    skin = min(low for low, _ in skins), max(high for _, high in skins)
+    if finger.nail_length > 0.0:
+        skin = skin[0], min(skin[1], *(int(np.searchsorted(lines, outline.dorsal - 1e-9)) - 1 for lines in arcs))
+    return [
+        replace(sizing, sharing=Sharing(narrowest, tuple(gaps[row.edges].tolist()), skin))
+        for sizing, row in zip(sizings, rows, strict=True)
+    ]
+
+
+def still_sharing(finger: Finger, receptor: Receptor, sizing: Sizing, before: Sizing) -> Sizing:
+    """Return `sizing`, of edges found anew, with what the mesh of `before` shares with those of other surfaces.
+
+    Where an edge of contact has passed a line that keeps its place, nothing is shared.
+    """
+    if before.sharing is None or sizing.edges is None:
+        return sizing
+    kept, outline = replace(sizing, sharing=before.sharing), Outline.of(finger)
+    one, other = (_Row.of(outline, _fine(outline, each), receptor, each) for each in (before, kept))
+    return kept if (one.edges, len(one.ends)) == (other.edges, len(other.ends)) else sizing
 
 
 def _layers(finger: Finger, fine: float, size: float, receptor: Receptor) -> tuple[Array, Array]:
@@ -153,8 +280,10 @@ def _layers(finger: Finger, fine: float, size: float, receptor: Receptor) -> tup
     ends = _distinct(0.0, finger.epidermis, skin, skin + thick, receptor.depth - half, receptor.depth + half)
     # one element between epidermis and ending would be too stiff in shear whatever its size
     least = [2 if end < receptor.depth - half <= after and end > 0.0 else 1 for end, after in pairwise(ends[:-1])]
-    *inside, fat = _spaced(depth, asked, ends, (*least, 2), 0.1, shift=False)
-    lines = np.concatenate([inside[0], *(lines[1:] for lines in inside[1:])])
+    row = _Row(depth, _counted(depth, asked), ends, (*least, 2), 0.1)
+    gaps = row.gaps()
+    every = row.lines(gaps)
+    lines, fat = every[: -gaps[-1]], every[-gaps[-1] - 1 :]
     return lines[::-1].copy(), (1.0 - (fat - skin) / thick)[::-1].copy()
 
 
@@ -162,35 +291,3 @@ def _distinct(*ends: float) -> tuple[float, ...]:
     """Return the ends in order, leaving out those that repeat another to a thousandth of a millimetre."""
     ordered = sorted(ends)
     return (ordered[0], *(b for a, b in pairwise(ordered) if b - a > 1e-3))
-
-
-def _stations(
-    outline: Outline, contact: tuple[float, float], fine: float, size: float, receptor: Receptor, sizing: Sizing
-) -> Array:
-    """Return the arc positions of the lines across the mesh: fine in the contact, coarser with the distance from it.
-
-    Lines always lie where straight edge and arc meet, since an element cannot follow a jump in curvature, at the ends
-    of the ending and of a nail plate, and where contact is known to end, since no element can follow a skin half of
-    which touches.
-    """
-    low, high = contact
-    scale = size / outline.finger.tip_radius
-    away = np.concatenate([[0.0], np.geomspace(1e-9, 1.0, 1000)])
-    palmar, dorsal = low + (outline.palmar_cut - low) * away, high + (outline.dorsal_cut - high) * away
-    arc = np.unique(np.concatenate([palmar, np.linspace(low, high, 1000), dorsal]))
-    asked = fine + scale * (AWAY[0] * np.maximum(low - arc, 0.0) + AWAY[1] * np.maximum(arc - high, 0.0))
-    if sizing.edges is not None:
-        inside = np.maximum(np.minimum(arc - low, high - arc), 0.0)
-        asked += np.minimum(scale * TOWARDS * inside, (MIDDLE / EDGE - 1.0) * fine)
-    half = receptor.ending[1] / 2.0
-    frame = outline.along(0.0, receptor.depth, np.array([-half, half])).tolist()
-    ends = [outline.palmar_cut, outline.palmar, *frame, outline.dorsal, outline.dorsal_cut]
-    if outline.finger.nail_length > 0.0:
-        ends.append(outline.nail_end)
-    ends = _distinct(*ends)
-    if sizing.edges is not None:
-        apart = [e for e in sizing.edges if min(abs(e - end) for end in ends) > NEAR * fine]
-        ends = tuple(sorted((*ends, *apart)))
-    least = [2 if end in (outline.palmar_cut, outline.dorsal) else 1 for end in ends[:-1]]
-    lines = _spaced(arc, asked, ends, tuple(least), 0.2, shift=sizing.shift)
-    return np.concatenate([lines[0], *(more[1:] for more in lines[1:])])

@@ -80,23 +80,28 @@ class Shape:
 class Newton:
     """The iterations on one body, with the memory they need."""
 
-    def __init__(self, body: FiniteBody) -> None:
-        """Set memory aside for `body`."""
+    def __init__(self, body: FiniteBody, beside: "Newton | None" = None) -> None:
+        """Set memory aside for `body`, or share that of `beside` where both are eliminated by one plan.
+
+        What is there then belongs to whichever was linearised last.
+        """
         count, skin = len(body.nodes), len(body.skin)
         self.body = body
-        self.tangent = np.zeros((count, 16, 16))
-        self.force = np.zeros(body.size)
         self.load = np.zeros(body.size)  # dead loads on the body, of `solver.dead_loads`
-        self.fold, self.dilate = np.zeros((count, 2, 17)), np.zeros((count, 3, 18))
-        self.core, self.volume = np.zeros((count, 3)), np.zeros((count, 3))
-        self.inside = Elimination(body.plan)
+        self.force = np.zeros(body.size)
+        if beside is not None and beside.body.plan is body.plan:
+            self.tangent, self.inside = beside.tangent, beside.inside
+            self.fold, self.dilate, self.core, self.volume = beside.fold, beside.dilate, beside.core, beside.volume
+        else:
+            self.tangent, self.inside = np.zeros((count, 16, 16)), Elimination(body.plan)
+            self.fold, self.dilate = np.zeros((count, 2, 17)), np.zeros((count, 3, 18))
+            self.core, self.volume = np.zeros((count, 3)), np.zeros((count, 3))
         self.steps = np.zeros((2 * skin, 4))  # of the skin
         self.length = np.zeros(skin)
         self._bulk = float((body.lame / body.shear).max())  # how much stiffer the body is to a change of volume [-]
         self.skin_x, self.skin_y = body.mesh.nodes[body.skin].T.copy()
         self._felt, self._reaction = np.zeros(2 * skin), np.zeros((skin, 2))
         self._state, self._sense = np.zeros(skin, np.int32), np.zeros(skin, np.int32)
-        self._tangent_at: Array | None = None  # the displacements found with the tangent that is there
         self._free = np.zeros(2 * skin, np.int32)
         self._matrix, self._right = np.zeros(4 * skin * skin), np.zeros((2 * skin, 4))
 
@@ -106,7 +111,7 @@ class Newton:
         `anchor` (k,) are the positions along x where nodes stick [mm]. The states of contact are changed up to `rounds`
         times until none contradicts the linearised body.
         """
-        self._tangent_at = None
+        self.inside.found = None
         if not self._assembled(shape) > 0.0 or not self.inside.factorise(self.tangent):
             return False
         return self._touch(shape, pull, anchor, rounds)
@@ -177,7 +182,7 @@ class Newton:
         """
         anchor = start.place(self.body)[:, 0] + (pull.travel - start.pull.travel)
         shape = before = self._entered(start, pull)
-        kept = self._tangent_at is start.u
+        kept = self.inside.found is start.u
         scale, last, new = 1.0, 0.0, False
         for _ in range(limit):
             if kept:
@@ -198,7 +203,7 @@ class Newton:
             fall = min(largest / last, 1.0) if last > 0.0 else 1.0
             left = min((2.0 * fall) ** 2 if not kept else 4.0 * fall if new else 2.0 * fall, 1.0)
             if largest * left < MARGIN * tolerance and not changed and scale == 1.0:
-                self._tangent_at = shape.u
+                self.inside.found = shape.u
                 return shape
             new = not kept
             still = largest < NEAR if last == 0.0 else fall < SLOW

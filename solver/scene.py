@@ -341,6 +341,11 @@ class Scene:
         return self._per_mm(self.loading.normal_force)
 
     @property
+    def pressed(self) -> tuple[float, float, str]:
+        """How deep [mm] or hard [N/mm] the finger is pressed, and which way it slides: what like scenes share."""
+        return self.loading.indentation or 0.0, self.normal_force or 0.0, str(self.loading.slide)
+
+    @property
     def tangential_force(self) -> float | None:
         """The drag asked for, opposing the slide [N/mm], None where the bone slides until nothing changes."""
         return self._per_mm(self.loading.tangential_force)

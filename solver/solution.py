@@ -54,8 +54,8 @@ def solve_together(
     """Return the predictions of several scenes, in their order; `in_loops` as in `answers`.
 
     Scenes with the same finger, materials and receptor share one mesh, fine enough for the strictest tolerance among
-    them, so that differences between them are more accurate than each of them; at finite strain each has a mesh for
-    its own contact. Raises as `solve` does.
+    them, so that differences between them are more accurate than each of them; at finite strain those do that are
+    pressed alike, its lines moved to the edges of contact of each. Raises as `solve` does.
     """
     done: list[Prediction] = []
     for answer in answers(scenes, progress, in_loops=in_loops):
@@ -109,7 +109,7 @@ def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
 def _solve_group(scenes: list[Scene], progress: Progress | None, watch: Watch | None, in_loops: bool) -> list[_Answer]:
     """Refine until every scene's estimate meets its tolerance, or the finest mesh is reached.
 
-    Where scenes share a mesh, all are solved again on the finer one; at finite strain those alone that need it.
+    Scenes that share a mesh are solved again together on the finer one.
     """
     asked = [s.solve.tolerance for s in scenes]
     kind = scenes[0].solve.kinematics
@@ -126,7 +126,8 @@ def _solve_group(scenes: list[Scene], progress: Progress | None, watch: Watch | 
             break
         fineness = finer[0]
         if kind == "finite":
-            todo = [i for i in todo if missed[i]]
+            again = {scenes[i].pressed for i in todo if missed[i]}
+            todo = [i for i in todo if scenes[i].pressed in again]
     done = [found[i] for i in range(len(scenes))]
     told = "The finest mesh leaves an error estimate above the tolerance asked for."
     return [

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from time import perf_counter
 from typing import Any, Literal, Protocol
 
@@ -9,11 +10,12 @@ import numpy as np
 
 from daq_app.accuracy.asked import clock
 from solver.body import Body
-from solver.climbing import MARGIN, Ascent, Climbed, ascended, climbed
+from solver.climbing import MARGIN, Ascent, Climbed, climbed, foot, risen, sized, sized_together
 from solver.elements import Q2P1
 from solver.existence import steady
 from solver.finger import FingerModel
 from solver.finite_finger import FiniteFinger
+from solver.finite_solution import alike
 from solver.mesh import Array
 from solver.mesher import Sizing
 from solver.newton import Newton, Pull, Shape
@@ -37,6 +39,10 @@ class Meshed(Protocol):
 
         Raises SolveFailure or ContactLost where there is none.
         """
+        ...
+
+    def share(self, scenes: Sequence[Scene]) -> None:
+        """Make what surfaces solved together share; those that are not among `scenes` stay as they were."""
         ...
 
     def numbers(self, state: State) -> Array:
@@ -83,6 +89,9 @@ class SmallMeshed:
         del before
         return settled(scene, self.finger)
 
+    def share(self, scenes: Sequence[Scene]) -> None:
+        """Do nothing: all surfaces share one mesh."""
+
     def numbers(self, state: State) -> Array:
         """Return SED, normal force and drag."""
         return self.numbers_together([state])[0]
@@ -102,7 +111,8 @@ class SmallMeshed:
 class ClimbingMeshed:
     """Finite strain as answers are made: a rough mesh finds the edges of contact, a mesh with lines there counts.
 
-    Every surface has meshes of its own. They are kept, so that solving the same surface again makes none.
+    Meshes are kept, so that solving the same surface again makes none. Surfaces that `share` have one mesh, its lines
+    moved to the edges of each.
     """
 
     prepared_s = 0.0
@@ -111,6 +121,8 @@ class ClimbingMeshed:
         """Make the meshes of the finger of `scene` without friction, which stand for those of all surfaces."""
         self._fineness, self._shift = fineness, shift
         self._made: dict[Sizing, FiniteFinger] = {}
+        self._shared: dict[Scene, Sizing] = {}
+        self._last: FiniteFinger | None = None
         self.setup_s = 0.0
         finger = self.solve(replace(scene, friction=Friction(0.0))).top.finger
         self._newton = finger.newton
@@ -120,13 +132,30 @@ class ClimbingMeshed:
         sizing = replace(sizing, shift=self._shift)
         if sizing not in self._made:
             begun = clock()
-            self._made[sizing] = FiniteFinger.of(scene, sizing)
+            beside = None if sizing.edges is None else self._last
+            self._made[sizing] = made = FiniteFinger.of(scene, sizing, beside)
+            self._last = beside if sizing.edges is None else made
             self.setup_s += clock() - begun
         return self._made[sizing]
 
+    def share(self, scenes: Sequence[Scene]) -> None:
+        """Find the edges of contact of surfaces, and one mesh for those of them that are pressed alike."""
+        for _, group in groupby(sorted(scenes, key=alike), lambda scene: scene.pressed):
+            together = list(group)
+            feet = [foot(s, s.loading.depth, self._fineness, _going_on, self._make) for s in together]
+            sizings = sized_together(together[0], self._fineness, feet)
+            self._shared |= zip(together, sizings, strict=True)
+            newton = self._make(together[0], sizings[0]).newton
+            if newton.body.dofs >= self.dofs:
+                self._newton, self.dofs = newton, newton.body.dofs
+
     def solve(self, scene: Scene, before: State | None = None) -> Ascent:
         """Return the settled state, from undeformed or from `before`, of another surface at the same depth."""
-        return ascended(scene, scene.loading.depth, self._fineness, _going_on, self._make, before)
+        below = foot(
+            scene, scene.loading.depth, self._fineness, _going_on, self._make, None if before is None else before.foot
+        )
+        sizing = sized(self._fineness, below)  # what it costs to find the edges is counted
+        return risen(scene, self._fineness, below, _going_on, self._make, before, self._shared.get(scene, sizing))
 
     def numbers(self, state: State) -> Array:
         """Return SED, normal force and drag."""
@@ -157,6 +186,9 @@ class FiniteMeshed:
         """Return the settled shape, from `before` where it is given."""
         newton, outline = self.finger.newton, self.finger.geometry.whole
         return steady(newton, pull_of(scene), outline, start=before)
+
+    def share(self, scenes: Sequence[Scene]) -> None:
+        """Do nothing: all surfaces share one mesh."""
 
     def numbers(self, state: State) -> Array:
         """Return SED, normal force and drag."""

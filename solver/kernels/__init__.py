@@ -4,6 +4,7 @@
 `solver.contact` of small strain (`hooke`, `rubbing`, `following`); the tests compare them.
 """
 
+from solver.kernels.carrying import carry
 from solver.kernels.compiling import CAP, OPEN, SLIP, STICK
 from solver.kernels.elements import advance, assemble, energies, forces
 from solver.kernels.fronts import condense, eliminate, unfold
@@ -18,6 +19,7 @@ __all__ = [
     "add_overstress",
     "advance",
     "assemble",
+    "carry",
     "condense",
     "eliminate",
     "energies",

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from solver.elements import ELEMENTS, Q2P1
 from solver.grid import MeshError, grid_mesh, quality
-from solver.mesher import DERMIS, EPIDERMIS, FAT, Sizing, finger_mesh
+from solver.mesher import DERMIS, EPIDERMIS, FAT, Sizing, finger_mesh, sharing
 from solver.outline import Outline
 from solver.scene import Finger, Receptor
 
@@ -65,6 +65,31 @@ def test_lines_lie_where_contact_ends_and_elements_are_shortest_there():
         assert np.abs(made.arcs - edge).min() < 1e-12
     inside = np.diff(made.arcs[(made.arcs > -3.2 - 1e-9) & (made.arcs < 1.4 + 1e-9)])
     assert max(inside[0], inside[-1]) < inside[1:-1].mean()
+
+
+@settings(deadline=None, max_examples=10)
+@given(
+    edges=st.lists(st.tuples(st.floats(-5.0, -0.5), st.floats(0.05, 4.5)), min_size=1, max_size=4),
+    fineness=st.sampled_from([4.0, 7.0, 10.0]),
+    angle=st.floats(30, 75),
+    nail=st.sampled_from([0.0, 4.0]),
+)
+def test_meshes_of_surfaces_solved_together_differ_only_in_where_their_lines_lie(edges, fineness, angle, nail):
+    finger = Finger(contact_angle=angle, nail_length=nail)
+    sizings = [Sizing(fineness, 1.8, margin=3.0, edges=each) for each in edges]
+    alone = [finger_mesh(finger, Receptor(), sizing) for sizing in sizings]
+    together = [finger_mesh(finger, Receptor(), sizing) for sizing in sharing(finger, Receptor(), sizings)]
+    first = together[0]
+    for each, own, made in zip(edges, alone, together, strict=True):
+        for name in ("elements", "region", "skin", "held"):
+            np.testing.assert_array_equal(getattr(made.mesh, name), getattr(first.mesh, name))
+        np.testing.assert_array_equal(made.depths, first.depths)
+        assert len(made.arcs) >= len(own.arcs)
+        for edge in each:  # as near as alone: a line of the ending may stand for it
+            assert np.abs(made.arcs - edge).min() <= np.abs(own.arcs - edge).min() + 1e-12
+        quality(made.mesh)
+    if len(edges) == 1:
+        np.testing.assert_array_equal(first.mesh.nodes, alone[0].mesh.nodes)
 
 
 def test_the_lowest_point_of_the_skin_touches_the_surface():
