@@ -105,8 +105,14 @@ class _Watched:
 class RelaxingCourse:
     """A course from first touch on: `shapes`, and at each of them `times` [s] and `sed` of ending and point [MPa]."""
 
-    def __init__(self, scene: Scene, finger: FiniteFinger, stop: Callable[[], bool] = lambda: False) -> None:
-        """March the whole course. Raises NotConverged, and Cancelled where `stop` says so."""
+    def __init__(
+        self,
+        scene: Scene,
+        finger: FiniteFinger,
+        stop: Callable[[], bool] = lambda: False,
+        aims: Sequence[Aim] | None = None,
+    ) -> None:
+        """March the whole course, or to `aims` alone. Raises NotConverged, and Cancelled where `stop` says so."""
         self._laws = relaxing_laws(scene.materials)
         self.newton = RelaxingNewton(finger.newton.body, self._laws)
         self._watched = [_Watched(probes, self.newton.body, self._laws) for probes in (finger.ending, finger.point)]
@@ -115,7 +121,11 @@ class RelaxingCourse:
         mu, tau = float(scene.friction.mu), scene.friction.cap
         self.shapes = [finite_forced.untouched(self.newton, mu, tau)]
         self.times, self.sed = [0.0], [(0.0, 0.0)]
-        self._march()
+        if aims is None:
+            self._march()
+        else:
+            for aim in aims:
+                self._go(aim)
         del self.shapes[0], self.times[0], self.sed[0]
 
     def _march(self) -> None:

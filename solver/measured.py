@@ -10,12 +10,10 @@ from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
-import numpy as np
-
-from solver.evidence import RELAXATION, warnings
+from solver.evidence import warnings
 from solver.failures import NoSteadyState, SolveFailure
 from solver.prediction import Prediction
-from solver.scene import Materials, Relaxation, Scene, Solve
+from solver.scene import Materials, Scene, Solve
 
 COARSE = 0.5  # tolerance that asks for the coarsest mesh
 Answer = Prediction | SolveFailure
@@ -40,7 +38,7 @@ def measured(found: Prediction, answers: Answers) -> Prediction:
         found,
         model={**found.model, "left_out": left_out},
         warnings=(*kept, *warnings(found.scene, left_out)),
-        evidence_s=perf_counter() - begun,
+        evidence_s=perf_counter() - begun + (found.evidence_s or 0.0),
     )
 
 
@@ -55,7 +53,6 @@ def _differences(scene: Scene, base: Prediction, answers: Answers) -> dict[str, 
     if scene.loading.directions and not scene.loading.dragged and not scene.materials.relax:
         marched = replace(scene, solve=replace(scene.solve, course="history"))
         out["history"] = _difference(base, answers((marched,))[0], "when the whole course is marched")
-        out |= _viscosity(scene, base, answers)
     return out
 
 
@@ -76,39 +73,3 @@ def _difference(base: Prediction, other: Answer, how: str) -> dict[str, Any]:
 def _at_finite_strain(scene: Scene) -> Scene:
     tissues = (replace(tissue, law=None) for tissue in scene.materials.by_region)
     return replace(scene, materials=Materials(*tissues), solve=Solve("finite", "steady", COARSE))
-
-
-def _viscosity(scene: Scene, base: Prediction, answers: Answers) -> dict[str, dict[str, Any]]:
-    """Measure what tissues with the times of the fingerpad would still hold when an elastic slide has settled.
-
-    Their relaxed moduli are the scene's, so that both end alike.
-    """
-    stays = 1.0 - sum(g for _, g in RELAXATION)
-    terms = tuple(Relaxation(g, tau) for tau, g in RELAXATION)
-    soft: dict[str, Any] = {}
-    for name in ("epidermis", "dermis", "fat"):
-        tissue = scene.materials.of(name)
-        shear, bulk = tissue.E / (2.0 * (1.0 + tissue.nu)) / stays, tissue.E / (3.0 * (1.0 - 2.0 * tissue.nu))
-        nu = (3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear))
-        if nu < 0.0:
-            return {}
-        soft[name] = replace(tissue, E=2.0 * shear * (1.0 + nu), nu=nu, prony=terms)
-    marched = replace(scene.solve, course="history")
-    elastic, viscous = answers(
-        (replace(scene, solve=marched), replace(scene, materials=replace(scene.materials, **soft), solve=marched))
-    )
-    if not isinstance(elastic, Prediction) or not isinstance(viscous, Prediction):
-        return {}
-    if elastic.history is None or viscous.history is None:
-        return {}
-    slips = np.flatnonzero((elastic.history.slipping >= 1.0) & (elastic.history.time > 1.0))
-    when = float(elastic.history.time[slips[0]]) if len(slips) else float(elastic.history.time[-1])
-    then = float(np.interp(when, viscous.history.time, viscous.history.sed_ending))
-    return {
-        "viscosity": {
-            "estimate": abs(then / base.sed_ending - 1.0) if base.sed_ending else None,
-            "from": {"at_s": when, "elastic_MPa": base.sed_ending, "then_MPa": then},
-            "how": TOLD + "when the slide of an elastic finger has settled, all soft tissues relaxing to the moduli of "
-            "the scene with the times of Pawluk and Howe (1999) and assumed weights of a fifth each",
-        }
-    }

@@ -72,7 +72,7 @@ class Prediction:
     mesh: Mesh
     displacement: Array  # (nodes, 2) relative to the bone [mm]
     history: History | None = None
-    evidence_s: float | None = None  # what measuring the evidence in `model` took [s]; None: it was estimated
+    evidence_s: float | None = None  # what marching and measuring the evidence in `model` took [s]; None: nothing was
     normal_force_error: float | None = None  # estimated, of normal_force, relative [-]; None: not estimated
     tangential_force_error: float | None = None  # likewise of tangential_force; 0 where there is no friction
     warnings: tuple[str, ...] = field(default=())  # one sentence each

@@ -58,6 +58,11 @@ class RelaxingBody:
         self._steps: dict[str, _Ready] = {}
         self._next: tuple[_Ready, Array, float] | None = None
 
+    def rest(self) -> None:
+        """Come to rest for another course; what was made ready for steps of the same lengths still serves."""
+        self.displacement, self._left = np.zeros_like(self.displacement), np.zeros_like(self._left)
+        self._steps, self._next = dict(self._steps), None
+
     def ready(self, step: float, prescribed: Array | None = None) -> Touchable:
         """Return what the surface will feel of the body at the end of a `step` [s], its past as a displacement.
 
@@ -159,11 +164,19 @@ class RelaxingBody:
 class RelaxingWay(Way):
     """The course of a body that relaxes, with the SED of one ending and one point at every instant."""
 
-    def __init__(self, body: RelaxingBody, law: FrictionLaw, loading: Loading, ending: Endings, point: Endings) -> None:
-        """Start at rest."""
+    def __init__(
+        self,
+        body: RelaxingBody,
+        law: FrictionLaw,
+        loading: Loading,
+        ending: Endings,
+        point: Endings,
+        first: float = PRESSING_TIME / PRESSING_STEPS,
+    ) -> None:
+        """Start at rest; `first` is the length of the first step [s]."""
         self.body, self._law = body, law
         self._ending, self._point = ending, point
-        super().__init__(body.ready(PRESSING_TIME / PRESSING_STEPS), law, loading)
+        super().__init__(body.ready(first), law, loading)
         self.sed: list[tuple[float, float]] = [(0.0, 0.0)]
 
     def found(self, before: Contact, aim: Aim) -> Contact:

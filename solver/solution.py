@@ -14,6 +14,7 @@ from solver.evidence import model, warnings
 from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure
 from solver.finger import FingerModel
 from solver.grid import MeshError
+from solver.holding import with_held
 from solver.matching import expected_depth
 from solver.measured import measured
 from solver.mesh import Array
@@ -77,19 +78,40 @@ def answers(
     and the way that led to it; where another mesh is needed it is told once more. Raises SceneError where a finger
     cannot be meshed, Cancelled where `progress` says so.
     """
-    out: dict[int, Prediction | SolveFailure] = {}
+    known: dict[int, tuple[_Answer, _Answer]] = {}  # what was told is not looked into again
+
+    def evident(answer: _Answer) -> _Answer:
+        if id(answer) not in known:
+            known[id(answer)] = answer, _with_evidence(answer, progress, in_loops)
+        return known[id(answer)][1]
+
+    def seen(number: int, answer: _Answer, finger: FingerModel, way: March | None) -> None:
+        assert watch is not None
+        watch(number, evident(answer), finger, way)
+
+    return tuple(evident(answer) for answer in _answers(scenes, progress, seen if watch else None, in_loops=in_loops))
+
+
+def _answers(
+    scenes: Sequence[Scene], progress: Progress | None = None, watch: Watch | None = None, *, in_loops: bool
+) -> tuple[_Answer, ...]:
+    """Do the same, evidence as far as it comes with the answers."""
+    out: dict[int, _Answer] = {}
     for group in _groups(scenes):
         found = _solve_group([scenes[i] for i in group], progress, _within(watch, group), in_loops)
         out |= dict(zip(group, found, strict=True))
     told = {i: answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer for i, answer in out.items()}
-    return tuple(_with_evidence(told[i], progress, in_loops) for i in range(len(scenes)))
+    return tuple(told[i] for i in range(len(scenes)))
 
 
 def _with_evidence(found: _Answer, progress: Progress | None, in_loops: bool) -> _Answer:
-    """Return the answer with its evidence measured, where its scene asks for that."""
-    if not isinstance(found, Prediction) or found.scene.solve.evidence == "estimated":
+    """Return the answer with its evidence marched, and measured where its scene asks for that."""
+    if not isinstance(found, Prediction):
         return found
-    return measured(found, lambda scenes: answers(scenes, progress, in_loops=in_loops))
+    found = with_held(found, lambda: progress is not None and not progress(1.0))
+    if found.scene.solve.evidence == "estimated":
+        return found
+    return measured(found, lambda scenes: _answers(scenes, progress, in_loops=in_loops))
 
 
 def _groups(scenes: Sequence[Scene]) -> list[list[int]]:

@@ -97,8 +97,8 @@ def _published(asked: Asked, found: Found, kinematics: Kinematics) -> Iterator[E
         yield from rows
         if good:
             yield Guaranteed(
-                kinematics, tolerance, len(chosen), good[0].dofs, took, sum(a.wall_s for a in good), good[0].setup_s,
-                sum(a.estimate_s for a in good), max(a.error_estimate for a in good),
+                kinematics, tolerance, len(chosen), max(a.dofs for a in good), took, sum(a.wall_s for a in good),
+                good[0].setup_s, sum(a.estimate_s for a in good), max(a.error_estimate for a in good),
                 max((r.error for r in rows if r.number == NUMBERS[0]), default=None),
             )  # fmt: skip
 

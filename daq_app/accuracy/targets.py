@@ -142,7 +142,7 @@ def _cold(found: Found) -> Target:
 def _guaranteed(row: Guaranteed) -> Target:
     error = "" if row.worst_error is None else f", true error {_percent(row.worst_error)}"
     how = f"{row.dofs} unknowns, estimate {_percent(row.worst_estimate)}{error}"
-    work = f"guaranteed tolerance, {row.kinematics} strain, {row.surfaces} surfaces, mesh and estimate included"
+    work = f"guaranteed tolerance, {row.kinematics} strain, {row.surfaces} surfaces, mesh to evidence included"
     return Target(work, _percent(row.tolerance), "ms", None, None, 1e3 * row.took_s, None, how)
 
 
