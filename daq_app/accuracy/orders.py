@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from solver.finite_finger import FiniteFinger
 from solver.finite_states import settled as finite_settled
 from solver.mesher import Sizing
 from solver.reference import SLIPPERINESS, STICKINESS, scene
+from solver.scene import Scene
 from solver.small_states import numbers_on, settled
 
 Errors = Sequence[float]
@@ -108,15 +110,18 @@ def pressed(quick: bool) -> Iterator[Order]:
 
 def small_finger(quick: bool) -> Iterator[Order]:
     """Yield the SED of the finger's ending at small strain: order 2, over shifted meshes of nearly one size."""
-    del quick
+    models: dict[tuple[float, bool], FingerModel] = {}
+
+    def sed(asked: Scene, fineness: float, shift: bool) -> float:
+        if (fineness, shift) not in models:  # both surfaces are those of one finger
+            models[fineness, shift] = FingerModel.of(asked, Sizing(fineness, 2.0, shift), in_loops=True)
+        model = models[fineness, shift]
+        return float(numbers_on(model, [settled(asked, model)])[0, 0])
+
+    overkill, finenesses = (14.0, (3.0, 4.0, 5.0, 7.0)) if quick else (20.0, (3.0, 4.0, 5.0, 7.0, 10.0))
     for surface in (STICKINESS[0], STICKINESS[4]):
         asked = scene(surface)
-
-        def sed(fineness: float, shift: bool) -> float:
-            model = FingerModel.of(asked, Sizing(fineness, 2.0, shift), in_loops=True)  # noqa: B023  called before the next surface
-            return float(numbers_on(model, [settled(asked, model)])[0, 0])  # noqa: B023
-
-        yield _finger(asked.title, "small", sed, 20.0, (3.0, 4.0, 5.0, 7.0, 10.0), 1.8)
+        yield _finger(asked.title, "small", partial(sed, asked), overkill, finenesses, 1.8)
 
 
 def finite_finger(quick: bool) -> Iterator[Order]:

@@ -74,7 +74,7 @@ def measure(asked: Asked, found: Found) -> Iterator[Cold | Memory | LeftOut]:
         for what, command in _commands(Path(folder)):
             if asked.left <= 0.0 and not what.startswith("daq-app"):
                 continue
-            runs = 2 if asked.quick else 5
+            runs = 5 if not asked.quick else 2 if what.startswith("daq-app") else 1
             try:
                 took, passed = zip(*(_run(command) for _ in range(runs)), strict=True)
                 yield Cold(what, runs, median(took), median(passed))

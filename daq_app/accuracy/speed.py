@@ -19,6 +19,7 @@ MESHES = {  # elements to a tip radius; 840 to 15,000 unknowns, and 1,370 to 11,
     FINITE.name: (6.0, 6.5, 8.0, 10.0, 12.0, 16.0, 20.0),
     PLAIN.name: (3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 14.0),
 }
+LITTLE = 0.25  # patience of a quick run
 QUICK = {SMALL.name: (2.5, 3.0, 5.0, 8.0), FINITE.name: (6.5, 10.0, 20.0), PLAIN.name: (4.0, 8.0)}
 
 
@@ -63,13 +64,14 @@ def measure(asked: Asked, found: Found) -> Iterator[Speed | LeftOut]:
             yield item
         else:
             fineness, method = item
-            yield _row(method, fineness, known(found, method.kinematics))
+            yield _row(method, fineness, known(found, method.kinematics), LITTLE if asked.quick else 1.0)
 
 
-def _row(method: Method, fineness: float, truths: dict[str, Truth]) -> Speed:
+def _row(method: Method, fineness: float, truths: dict[str, Truth], patience: float) -> Speed:
+    """Return the row of one mesh; `patience` is how long its times are repeated, by that of a full run."""
     chosen = [scene for scene in cases(method.kinematics) if scene.title in truths]
     deepest = max(chosen, key=lambda scene: scene.loading.depth)
-    prepared, setup = _made(method, deepest, fineness)
+    prepared, setup = _made(method, deepest, fineness, 0.3 * patience)
     mesh = method.meshed(deepest, fineness, False)
     mesh.share(chosen)
     first: list[float] = []
@@ -86,9 +88,9 @@ def _row(method: Method, fineness: float, truths: dict[str, Truth]) -> Speed:
         off = np.abs(mesh.numbers(state) - true) / np.where(true > 0.0, true, 1.0)
         errors[scene.title] = tuple(off.tolist())
         solved.append(scene)
-        first.append(timed(lambda s=scene: mesh.numbers(mesh.solve(s)), 5, 0.25))
-    together = timed(lambda: mesh.numbers_together([mesh.solve(scene) for scene in solved]), 5, 0.5)
-    onward, floors = _onward(mesh, solved)
+        first.append(timed(lambda s=scene: mesh.numbers(mesh.solve(s)), 5, 0.25 * patience))
+    together = timed(lambda: mesh.numbers_together([mesh.solve(scene) for scene in solved]), 5, 0.5 * patience)
+    onward, floors = _onward(mesh, solved, patience)
     next_s = median(onward) if onward else None
     return Speed(
         method.name, method.kinematics, method.element, method.order, method.linear_solver, method.start,
@@ -97,13 +99,14 @@ def _row(method: Method, fineness: float, truths: dict[str, Truth]) -> Speed:
     )  # fmt: skip
 
 
-def _made(method: Method, scene: Scene, fineness: float) -> tuple[float, float]:
+def _made(method: Method, scene: Scene, fineness: float, most_s: float) -> tuple[float, float]:
     """Return what a mesh's assembly and factorisation, and what the rest of it took: medians.
 
     One is forgotten before the next is made, as in a process that solves again and again, which is given memory once.
     """
     spans: list[tuple[float, float]] = []
-    for _ in range(5):
+    began = clock()
+    while len(spans) < 5 and (not spans or clock() - began < most_s):
         mesh = method.meshed(scene, fineness, False)
         spans.append((mesh.prepared_s, mesh.setup_s))
         del mesh
@@ -111,7 +114,7 @@ def _made(method: Method, scene: Scene, fineness: float) -> tuple[float, float]:
     return median(prepared), median(setup)
 
 
-def _onward(mesh: Meshed, scenes: list[Scene]) -> tuple[list[float], list[float]]:
+def _onward(mesh: Meshed, scenes: list[Scene], most_s: float) -> tuple[list[float], list[float]]:
     """Return what each surface took that was begun at one solved just before, pressed as deep and moved the same way.
 
     Medians over passes through all of `scenes`, in the order the solver takes them, after one in which meshes are made.
@@ -133,6 +136,6 @@ def _onward(mesh: Meshed, scenes: list[Scene]) -> tuple[list[float], list[float]
             if turn:
                 floors.append(mesh.floor())
             way = scene.loading.depth, scene.loading.slide
-        if turn and clock() - began > 1.0:
+        if turn and clock() - began > most_s:
             break
     return [median(span) for span in spans.values()], floors or [mesh.floor()]

@@ -23,6 +23,8 @@ PASSES = 5
 PRESS, SLIDES, DISTANCE = 200, 60, 6.0  # readings of the press and of the slide, and how far it goes [mm]
 FINER: dict[Kinematics, float] = {"small": 10.0, "finite": 8.0}  # fineness of the truth's mesh
 SURFACES = ("slipperiness 100", "slipperiness 55", "slipperiness 0", "stickiness 0")
+FULL: dict[Kinematics, tuple[str, ...]] = {"small": SURFACES, "finite": SURFACES}
+QUICK: dict[Kinematics, tuple[str, ...]] = {"small": SURFACES, "finite": SURFACES[:1]}
 Reading = tuple[float, float, float]  # normal and tangential force [N/mm], SED [MPa]
 
 
@@ -43,8 +45,7 @@ class Warm:
 def measure(asked: Asked, found: Found) -> Iterator[Warm | LeftOut]:
     """Yield a row a surface and kinematics."""
     del found
-    names = SURFACES[:1] + SURFACES[3:] if asked.quick else SURFACES
-    scenes = [s for kind in ("small", "finite") for s in cases(kind) if s.title in names]
+    scenes = [s for kind, names in (QUICK if asked.quick else FULL).items() for s in cases(kind) if s.title in names]
     for scene in within(asked, scenes, "surfaces followed reading by reading"):
         yield scene if isinstance(scene, LeftOut) else _row(replace(scene, friction=Friction(scene.friction.mu)))
 

@@ -9,22 +9,16 @@ from hypothesis import strategies as st
 
 from daq_app.accuracy.hard_cases import cases, judged
 from daq_app.accuracy.hard_cases.outcome import of_scene
-from daq_app.accuracy.hard_cases.suite import Case
+from daq_app.accuracy.hard_cases.suite import TELLING, Case
 from solver.failures import SolveFailure
 from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
 from solver.solution import answers, solve
 
 SUITE = {(case.kinematics, case.name): case for kind in ("small", "finite") for case in cases(kind)}
-# At finite strain a scene takes some tenths of a second: make test runs those that tell most, make test-long all.
-TELLING = {
-    "nu 0.0", "nu 0.4999999", "bone 1e10 times stiffer than fat", "mu 0", "tau_max 0 MPa", "tau_max 1e+09 MPa",
-    "depth 1 mm", "depth 2 mm without friction", "angle 30 degrees", "angle 75 degrees, backwards",
-    "epidermis and dermis of 0.05 mm each", "a part 1e+10 times stiffer", "one node touching", "direction reversal",
-    "contact edge at a mesh node", "elements distorted to 0.45 of an edge", "elements of aspect 50",
-}  # fmt: skip
 
 
 def shown(case: Case):
+    """At finite strain make test runs those that tell most, make test-long all."""
     slow = case.slow or (case.kinematics == "finite" and case.name not in TELLING)
     return pytest.param(case, id=f"{case.kinematics}: {case.name}", marks=[pytest.mark.slow] if slow else [])
 
