@@ -25,9 +25,10 @@ from typing import Any
 
 import numpy as np
 
-from solver.climbing import MARGIN, Climbed, ascended, climbed, compared
+from solver.climbing import MARGIN, Climbed, ascended, climbed
 from solver.estimate import FINENESS, coarsest_for, estimates
 from solver.failures import SolveFailure
+from solver.finite_errors import compared
 from solver.finite_finger import FiniteFinger
 from solver.finite_states import settled
 from solver.mesher import Sizing
@@ -78,8 +79,8 @@ def measured(number: int, *, bounded: bool) -> dict[str, Any]:
         meshes: dict[str, list[Any]] = {}
         for fineness in MESHES:
             way_up = ascended(scene, depth, fineness, going_on)
-            _, _, *found = compared(scene, fineness, way_up, going_on)
-            meshes[f"{fineness:g}"] = [numbers.tolist() for numbers in found]
+            found = compared(scene, fineness, way_up, way_up.top.finger.all_numbers(way_up.top.shape), going_on)
+            meshes[f"{fineness:g}"] = [numbers[..., :3].tolist() for numbers in found[:3]]
     except SolveFailure:
         return {"number": number, "bounded": bounded}
     return {"number": number, "bounded": bounded, "meshes": meshes, "truth": truth}

@@ -11,21 +11,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
-import numpy as np
-
-from solver.estimate import estimates
 from solver.existence import sound
-from solver.failures import NoSteadyState, NotConverged, SolveFailure
+from solver.failures import NoSteadyState, SolveFailure
+from solver.finite_ends import steps_asked
 from solver.finite_finger import FiniteFinger
-from solver.finite_states import roughly, settled
-from solver.mesh import Array
+from solver.finite_states import course, roughly, settled
+from solver.load_steps import Steps
 from solver.mesher import Sizing, sharing, still_sharing
 from solver.newton import Shape
 from solver.scene import Scene
 
 ROUGH = 3.0  # fineness of the mesh that finds the edges
-COARSER = 0.6  # fineness of the mesh that the error is estimated from, by that of the answer
-NUDGE = 1e-3  # of the traction bound, to see what it does
+NEARLY = 0.98  # of the friction limit, from which contact is where it is when the finger slides
 MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
 
 
@@ -48,6 +45,7 @@ class Ascent:
     foot: Climbed
     top: Climbed
     first: Climbed | None = None  # of the top's fineness, before its lines were moved to the edges found on it
+    steps: Steps | None = None  # those that the course takes, where the state depends on its way
 
 
 def ascended(
@@ -78,24 +76,41 @@ def foot(
 ) -> Climbed:
     """Return the settled state on a mesh that does not know the edges of contact, from which others can be climbed.
 
-    `expected` is the depth [mm], or about it where forces are given; a given drag is left for the mesh that counts,
-    since the limit of friction lies a little elsewhere on each. A rough mesh will do where its state is sound.
+    `expected` is the depth [mm], or about it where forces are given. For a drag near the limit of friction, which lies
+    a little elsewhere on each mesh, it is the slide. A rough mesh will do where its state is sound.
     Near a limit, only a mesh of `fineness` itself can tell. From `near`, where it is of the same mesh, it is begun.
     Raises NoSteadyState, NotConverged, Cancelled.
     """
     depth = expected if scene.normal_force is not None else scene.loading.depth
-    scene = scene.undragged() if scene.loading.dragged else scene
     begun = perf_counter()
     finger = make(scene, Sizing(ROUGH, depth, margin=MARGIN))
     setup = perf_counter() - begun
     try:
-        shape = roughly(finger, scene, stop, near.shape if near is not None and near.finger is finger else None)
+        shape = _on_rough(finger, scene, stop, near.shape if near is not None and near.finger is finger else None)
         if sound(finger.newton, shape, finger.geometry.whole):
             return Climbed(finger, shape, setup)
         depth = shape.pull.depth
     except SolveFailure:
         pass
-    return _on(scene, Sizing(fineness, depth, margin=MARGIN), None, stop, make)
+    sizing = Sizing(fineness, depth, margin=MARGIN)
+    try:
+        return _on(scene, sizing, None, stop, make)
+    except NoSteadyState:
+        if not scene.loading.dragged:
+            raise
+        return _on(scene.undragged(), sizing, None, stop, make)
+
+
+def _on_rough(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: Shape | None) -> Shape:
+    """Return the state on the rough mesh, or the slide where a given drag nearly makes the finger slide there."""
+    drag = scene.tangential_force
+    if drag is None:
+        return roughly(finger, scene, stop, near)
+    try:
+        slide = roughly(finger, scene.undragged(), stop, near)
+    except SolveFailure:
+        return course(scene, finger, stop)[-1]  # the drag may be met before sliding would fold the skin
+    return slide if drag >= NEARLY * abs(slide.force[0]) else course(scene, finger, stop)[-1]
 
 
 def risen(
@@ -109,9 +124,10 @@ def risen(
 ) -> Ascent:
     """Return the settled state above `low`, `foot` of the same scene; for the arguments see `climbed`."""
     sizing = sizing or sized(fineness, low)
-    top = climbed(scene, fineness, low, stop, make, before, sizing)
-    if not top.finger.bounded_at_an_edge(top.shape):
-        return Ascent(low, top)
+    steps = steps_asked(scene, low.finger, low.shape, stop)
+    top = climbed(scene, fineness, low, stop, make, before, sizing, 1 if steps is None else steps.times)
+    if top.shape.pull.sense == 0 or not top.finger.bounded_at_an_edge(top.shape):
+        return Ascent(low, top, steps=steps)
     again = still_sharing(scene.finger, scene.receptor, sized(fineness, top), sizing)
     return Ascent(low, climbed(scene, fineness, top, stop, make, None, again), top)
 
@@ -144,15 +160,16 @@ def climbed(
     make: Maker = FiniteFinger.of,
     before: Ascent | None = None,
     sizing: Sizing | None = None,
+    times: int = 1,
 ) -> Climbed:
     """Return the settled state on a mesh of `fineness` whose lines follow the edges of contact found `below`.
 
     With `sizing` on the mesh of `sized_together`. It is begun at the state `below`, or at what that has changed by
-    since `before`, of a surface that shares the rough mesh, added to the state found then. Raises NoSteadyState,
-    NotConverged, Cancelled.
+    since `before`, of a surface that shares the rough mesh, added to the state found then; a
+    course has so many `times` the usual load steps. Raises NoSteadyState, NotConverged, Cancelled.
     """
     near = before if before is not None and before.foot.finger is below.finger else None
-    return _on(scene, sizing or sized(fineness, below), below, stop, make, near)
+    return _on(scene, sizing or sized(fineness, below), below, stop, make, near, times)
 
 
 def _on(
@@ -162,6 +179,7 @@ def _on(
     stop: Callable[[], bool],
     make: Maker,
     before: Ascent | None = None,
+    times: int = 1,
 ) -> Climbed:
     begun = perf_counter()
     finger = make(scene, sizing)
@@ -175,59 +193,4 @@ def _on(
     elif below is not None and before is not None:
         low, top = before.foot.shape, before.top
         start = finger.brought_on(below.shape, low, below.finger, top.shape, top.finger)
-    return Climbed(finger, settled(finger, scene, stop, start), setup)
-
-
-def _nearest(scene: Scene, fineness: float, at: Climbed, stop: Callable[[], bool]) -> Climbed:
-    """Return the settled state on a coarser mesh, whose friction limit may lie just below the drag asked for."""
-    try:
-        return climbed(scene, fineness, at, stop)
-    except NoSteadyState:
-        if not scene.loading.dragged:
-            raise
-        return climbed(scene.undragged(), fineness, at, stop)
-
-
-def error_estimates(
-    scene: Scene, fineness: float, way_up: Ascent, stop: Callable[[], bool]
-) -> tuple[float, float, float]:
-    """Return how far SED, normal and tangential force of the settled state at the top may be off, relative.
-
-    The same scene is solved on a coarser mesh with lines at the same edges of contact.
-    """
-    found = estimates(*compared(scene, fineness, way_up, stop))
-    return float(found[0]), float(found[1]), float(found[2])
-
-
-def compared(
-    scene: Scene, fineness: float, way_up: Ascent, stop: Callable[[], bool]
-) -> tuple[Scene, float, Array, Array, Array]:
-    """Return what `estimates` is asked with: numbers (3,) of the top, of other meshes (n, 3), and what is felt (3,).
-
-    There are no others where one has no state.
-    """
-    at = way_up.top
-    driven, numbers = scene.driven(at.shape.pull.depth), at.finger.numbers(at.shape)
-    try:
-        coarse = _nearest(scene, COARSER * fineness, at, stop)
-    except SolveFailure:
-        return driven, fineness, numbers, np.empty((0, 3)), np.zeros(3)
-    others = np.array([other.finger.numbers(other.shape) for other in (coarse, way_up.first) if other is not None])
-    felt = felt_of_bound(coarse) if at.finger.bounded_at_an_edge(at.shape) else np.zeros(3)
-    return driven, fineness, numbers, others, felt
-
-
-def felt_of_bound(at: Climbed) -> Array:
-    """Return how SED, normal and tangential force (3,) answer to the traction bound: relative change by its own.
-
-    Zero where no state lies beside this one.
-    """
-    newton, shape = at.finger.newton, at.shape
-    if shape.pull.sense == 0:  # it does not slide as a whole, and depends on its way
-        return np.zeros(3)
-    try:
-        beside = newton.settle(shape, shape.pull._replace(tau=(1.0 + NUDGE) * shape.pull.tau))
-    except NotConverged:
-        return np.zeros(3)
-    before = at.finger.numbers(shape)
-    return (at.finger.numbers(beside) / before - 1.0) / NUDGE
+    return Climbed(finger, settled(finger, scene, stop, start, times), setup)

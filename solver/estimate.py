@@ -15,9 +15,11 @@ finite_error_estimate.py; docs/solver.md and docs/solver-finite-strain.md have t
 """
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
+from solver.load_steps import Steps
 from solver.mesh import Array
 from solver.mesher import ANYWHERE, EDGE, FINEST, SHORT
 from solver.scene import Scene
@@ -30,10 +32,54 @@ FROM_COARSE = 1.0  # of both forces at small strain, by fineness to the fourth p
 FROM_LIMIT, CALM = 1.5, 2.0  # of the mesh's own part, for every relative change by friction's beyond that many
 FROM_BOUND = {"small": 0.2, "finite": 0.08}  # of an element that touches, in the drag under a bound
 FROM_EDGE = 0.06  # the same in all numbers, at finite strain where skin slips at the bound up to an edge of contact
+FROM_WIDTH = 0.12  # of an element at the edge of contact, by which either edge may lie elsewhere
+
+
+class Errors(NamedTuple):
+    """How far numbers may be off: relative, but for the shift. None for what was given, or is not there."""
+
+    sed: float
+    normal: float | None
+    tangential: float | None  # 0 where nothing rubs
+    indentation: float | None
+    shift: float | None  # [mm]
+    width: float | None  # of the contact
+
+
+UNKNOWN = Errors(1.0, 1.0, 1.0, 1.0, None, 1.0)
+
+
+def errors(scene: Scene, fineness: float, numbers: Array, others: Array, felt: Array, steps: Steps | None) -> Errors:
+    """Return the errors of SED, normal and tangential force, indentation, shift and contact width, `numbers` (6,).
+
+    `others` (n, 6) and `felt` (6,) are as for `estimates`; but at the end of a course that depends on its way, which
+    has taken `steps`, what is felt is the traction bound at both kinematics.
+    """
+    if not len(others):
+        return _given_none(scene, UNKNOWN)
+    driven = scene.driven(float(numbers[3]))
+    off = _off(driven, fineness, numbers, others, felt, marched=steps is not None)
+    off[5] += 2.0 * FROM_WIDTH * _element(driven, fineness)
+    if steps is not None:
+        off += steps.error(numbers)
+    relative = np.minimum(off / np.maximum(np.abs(numbers), np.finfo(float).tiny), 1.0)
+    return _given_none(scene, Errors(*(float(part) for part in relative))._replace(shift=float(off[4])))
+
+
+def _given_none(scene: Scene, found: Errors) -> Errors:
+    """Return the errors without those of what the scene gives, and of the drag where nothing rubs."""
+    by_force, dragged = scene.normal_force is not None, scene.loading.dragged
+    rubs = scene.friction.mu > 0.0 and scene.friction.cap > 0.0
+    return found._replace(
+        normal=None if by_force else found.normal,
+        tangential=None if dragged else found.tangential if rubs else 0.0,
+        indentation=found.indentation if by_force else None,
+        shift=found.shift if dragged else None,
+    )
 
 
 def estimates(scene: Scene, fineness: float, numbers: Array, others: Array, felt: Array | float = 0.0) -> Array:
-    """Return the estimated errors (3,), relative, of SED, normal and tangential force `numbers` (3,).
+    """Return the estimated errors (3,), relative, of SED, normal and tangential force `numbers` (3,) of a slide.
 
     `others` (n, 3) are those of the other meshes; where there are none, so near a limit that a coarser mesh has no
     state, nothing is known of the errors. `felt` (3,) is the relative change of each by that of the friction
@@ -42,17 +88,27 @@ def estimates(scene: Scene, fineness: float, numbers: Array, others: Array, felt
     """
     if not len(others):
         return np.ones(len(numbers))
+    size = np.maximum(np.abs(numbers), np.finfo(float).tiny)
+    return np.minimum(_off(scene, fineness, numbers, others, np.broadcast_to(felt, numbers.shape)) / size, 1.0)
+
+
+def _off(scene: Scene, fineness: float, numbers: Array, others: Array, felt: Array, *, marched: bool = False) -> Array:
+    """Return how far numbers may be off (n,): those of `estimates`, and maybe others of `errors` after them."""
     kind = scene.solve.kinematics
-    size = np.abs(numbers)
-    largest = np.abs(others - numbers).max(axis=0)
-    found = FROM_MESHES[kind] * largest / np.maximum(size, np.finfo(float).tiny) + _least(scene, fineness)
-    found[2] += _of_bound(scene, fineness, float(size[1]), float(size[2]))
+    size, largest = np.abs(numbers), np.abs(others - numbers).max(axis=0)
+    part = np.full(len(numbers), _least(scene, fineness))
     if kind == "small":
-        found[1:] += FROM_COARSE / _resolved(scene, fineness) ** 4
-        found += FROM_LIMIT * _least(scene, fineness) * np.maximum(np.abs(felt) - CALM, 0.0)
-    elif np.any(felt):
-        found += FROM_EDGE * scene.friction.cap * _element(scene, fineness) / size[2] * np.abs(felt)
-    return np.where((size == 0.0) & (largest == 0.0), 0.0, np.minimum(found, 1.0))
+        part[1:] += FROM_COARSE / _resolved(scene, fineness) ** 4
+    if marched:
+        contact = 2.0 * _half(scene) * scene.finger.tip_radius
+        part += FROM_BOUND[kind] * _element(scene, fineness) / contact * np.abs(felt)
+    else:
+        part[2] += _of_bound(scene, fineness, float(size[1]), float(size[2]))
+    if kind == "small" and not marched:
+        part += FROM_LIMIT * _least(scene, fineness) * np.maximum(np.abs(felt) - CALM, 0.0)
+    elif not marched and np.any(felt):
+        part += FROM_EDGE * scene.friction.cap * _element(scene, fineness) / size[2] * np.abs(felt)
+    return FROM_MESHES[kind] * largest + part * size
 
 
 def coarsest_for(scene: Scene, tolerance: float) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from solver.body import Body, planned
 from solver.contact import Contact
+from solver.edges import width
 from solver.elements import Q2P1
 from solver.mesh import Array
 from solver.mesher import FingerMesh, Sizing, finger_mesh
@@ -104,20 +105,9 @@ class FingerModel:
         return np.stack([(plus - minus) / 2.0, (plus + minus) / 2.0])
 
     def contact_width(self, contact: Contact, skin: Array) -> float:
-        """Return the distance along the surface from the first to the last touching point [mm], 0 where none touches.
-
-        A touching point stands for half the way to its open neighbours.
-        """
-        touching = np.flatnonzero(contact.touching)
-        if not len(touching):
-            return 0.0
-        k = len(contact.state)
-        mesh = self.geometry.mesh
-        x = mesh.nodes[mesh.skin, 0] + skin[k:]
-        first, last = int(touching[0]), int(touching[-1])
-        low = (x[first] + x[max(first - 1, 0)]) / 2.0
-        high = (x[last] + x[min(last + 1, k - 1)]) / 2.0
-        return float(high - low)
+        """Return how long the contact is along the surface [mm]; `skin` (2 k,) its displacement, normal first [mm]."""
+        mesh, k = self.geometry.mesh, len(contact.state)
+        return width(self.geometry, mesh.nodes[mesh.skin, 0] + skin[k:], contact.normal, contact.touching)
 
     def reaches_out(self, contact: Contact, displacement: Array, indentation: float) -> bool:
         """Return whether skin outside the part that may touch would, so that the part must be made larger."""

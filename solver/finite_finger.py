@@ -6,14 +6,14 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.linalg import LinAlgError
-from numpy.typing import NDArray
 
 from solver.carrying import Bridge, Places
+from solver.edges import edges, width
 from solver.finite_body import FiniteBody, FiniteProbes
 from solver.grid import MeshError
 from solver.kernels import CAP
 from solver.mesh import Array
-from solver.mesher import FingerMesh, Sizing, finger_mesh, with_middles
+from solver.mesher import FingerMesh, Sizing, finger_mesh
 from solver.newton import Newton, Shape
 from solver.receptor import ROW, endings, middle
 from solver.scene import Receptor, Scene, SceneError
@@ -63,6 +63,10 @@ class FiniteFinger:
         """Return what errors are estimated of: SED of the ending, normal and tangential force along +x (3,)."""
         return np.array([self.sed_ending(shape), shape.force[1], shape.force[0]])
 
+    def all_numbers(self, shape: Shape) -> Array:
+        """Return them, the depth, the bone's shift along +x and the contact width (6,)."""
+        return np.array([*self.numbers(shape), shape.pull.depth, 0.0 - shape.pull.travel, self.contact_width(shape)])
+
     def brought(self, shape: Shape, other: "FiniteFinger") -> Shape:
         """Return `shape`, found on `other`, as a start on this mesh."""
         return self.bridge(other).carried(shape)
@@ -90,36 +94,15 @@ class FiniteFinger:
         return Places.of(self.geometry, self.newton.body)
 
     def edges(self, shape: Shape) -> tuple[float, float] | None:
-        """Return the arc positions [mm] where contact ends; None where it is too short to tell.
+        """Return the arc positions [mm] where contact ends; None where it is too short to tell."""
+        return edges(self.geometry, shape.reaction[:, 1], shape.touching)
 
-        Near its edge pressure falls like the square root of the distance. The force beyond a line between elements then
-        has its centre at 2/5 of the way from there to the edge.
-        """
-        mesh = self.geometry.mesh
-        arcs = with_middles(self.geometry.arcs)[np.searchsorted(self.geometry.whole, mesh.skin)]
-        force, touching = shape.reaction[:, 1], shape.touching
-        high = _edge(arcs, force, touching)
-        low = _edge(-arcs[::-1], force[::-1], touching[::-1])
-        return None if high is None or low is None or high <= -low else (-low, high)
+    def contact_width(self, shape: Shape) -> float:
+        """Return how long the contact is along the surface [mm]."""
+        return width(self.geometry, shape.place(self.newton.body)[:, 0], shape.reaction[:, 1], shape.touching)
 
     def bounded_at_an_edge(self, shape: Shape) -> bool:
         """Return whether skin slips at the traction bound at the last two nodes of an edge of contact that is known."""
         on = np.flatnonzero(shape.touching)
         last = np.concatenate([on[:2], on[-2:]])
         return bool((shape.state[last] == CAP).any()) and self.edges(shape) is not None
-
-
-def _edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float | None:
-    """Return where contact ends towards the last of the nodes at `arcs` (k,)."""
-    on = np.flatnonzero(touching)
-    if len(on) < 5:
-        return None
-    last = int(on[-1])
-    line = last - 2 if last % 2 == 0 else last - 1  # the last line with contact on both sides
-    beyond = np.arange(line, last + 1)
-    pressed = force[beyond].copy()
-    gaps = arcs[line] - arcs[line - 2], arcs[line + 2] - arcs[line]
-    pressed[0] *= gaps[1] / (gaps[0] + gaps[1])  # the part of the line's own force that stems from beyond
-    reach = 2.5 * float(pressed @ (arcs[beyond] - arcs[line])) / float(pressed.sum())
-    least = arcs[last] - 0.35 * (arcs[last] - arcs[last - 1])
-    return float(np.clip(arcs[line] + reach, least, arcs[min(last + 1, len(arcs) - 1)]))

@@ -6,6 +6,7 @@ nothing flows through it, so that a settled slide stands still in the tissue and
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from math import ceil
 
 import numpy as np
 
@@ -111,12 +112,13 @@ class RelaxingCourse:
         finger: FiniteFinger,
         stop: Callable[[], bool] = lambda: False,
         aims: Sequence[Aim] | None = None,
+        times: float = 1.0,
     ) -> None:
-        """March the whole course, or to `aims` alone. Raises NotConverged, and Cancelled where `stop` says so."""
+        """March the whole course in `times` the usual steps, or to `aims` alone. Raises NotConverged, Cancelled."""
         self._laws = relaxing_laws(scene.materials)
         self.newton = RelaxingNewton(finger.newton.body, self._laws)
         self._watched = [_Watched(probes, self.newton.body, self._laws) for probes in (finger.ending, finger.point)]
-        self._scene, self._stop = scene, stop
+        self._scene, self._stop, self._times = scene, stop, times
         self._aim, self._sense = Aim(0.0, 0.0, 0.0), 0
         mu, tau = float(scene.friction.mu), scene.friction.cap
         self.shapes = [finite_forced.untouched(self.newton, mu, tau)]
@@ -132,13 +134,15 @@ class RelaxingCourse:
         loading, drag = self._scene.loading, self._scene.tangential_force
         force = self._scene.normal_force
         press = loading.depth if force is None else force
-        for number in range(1, PRESSING_STEPS + 1):
-            part = number / PRESSING_STEPS
+        count = round(PRESSING_STEPS * self._times)
+        for number in range(1, count + 1):
+            part = number / count
             self._go(Aim(PRESSING_TIME * part, press * part, 0.0))
         if drag is not None:
             pull = -loading.direction * drag
-            for number in range(1, DRAGGING_STEPS + 1):
-                part = number / DRAGGING_STEPS
+            count = round(DRAGGING_STEPS * self._times)
+            for number in range(1, count + 1):
+                part = number / count
                 self._go(Aim(PRESSING_TIME + DRAGGING_TIME * part, press, pull * part))
         else:
             for direction in loading.directions:
@@ -148,11 +152,11 @@ class RelaxingCourse:
     def _slide(self, speed: float) -> None:
         """Slide until every touching point slips. Raises NotConverged where some never do."""
         depth = self.shapes[-1].pull.depth
-        step, distance = FIRST * depth, 0.0
+        step, distance = FIRST / self._times * depth, 0.0
         while distance < FURTHEST * depth:
             self._go(Aim(self._aim.time + step / abs(speed), self._aim.press, self._aim.along + np.sign(speed) * step))
             distance += step
-            step = min(1.2 * step, LARGEST * depth)
+            step = min(1.2 * step, LARGEST / self._times * depth)
             if not (self.shapes[-1].state == STICK).any():
                 return
         raise NotConverged(f"after {distance:.3g} mm of sliding some skin still stuck: no settled state was reached")
@@ -164,7 +168,7 @@ class RelaxingCourse:
         stays = min(law.stays for law in self._laws)
         end = self._aim.time + RELAXED * self._scene.materials.longest_relaxation / stays
         while self._aim.time < end:
-            for _ in range(EQUAL_STEPS):
+            for _ in range(ceil(EQUAL_STEPS * self._times)):
                 self._go(Aim(self._aim.time + step, self._aim.press, self._aim.along + speed * step))
             step *= 2.0
 

@@ -11,11 +11,12 @@ from time import perf_counter
 import numpy as np
 
 from solver import evidence, kernels_numpy
-from solver.climbing import Ascent, Climbed, error_estimates, foot, risen, sized_together
+from solver.climbing import Ascent, Climbed, foot, risen, sized_together
 from solver.failures import Cancelled, SolveFailure
+from solver.finite_errors import error_estimates
 from solver.finite_finger import FiniteFinger
 from solver.finite_relaxing import RelaxingCourse, RelaxingNewton
-from solver.finite_states import PRESSES, course
+from solver.finite_states import course, presses
 from solver.kernels import CAP, OPEN, SLIP, STICK
 from solver.mesh import Array
 from solver.mesher import Sizing
@@ -102,24 +103,26 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
     at = way_up.top
     finger, shape = at.finger, at.shape
     setup = sum(state.setup_s for state in (way_up.foot, way_up.first, at) if state is not None)
+    times = 1 if way_up.steps is None else way_up.steps.times
     way: list[Shape] = []
     relaxing: RelaxingCourse | None = None
     if scene.solve.course == "history":
-        relaxing = RelaxingCourse(scene, finger, stop) if scene.materials.relax else None
-        way = course(scene, finger, stop) if relaxing is None else relaxing.shapes
+        relaxing = RelaxingCourse(scene, finger, stop, times=times) if scene.materials.relax else None
+        way = course(scene, finger, stop, times) if relaxing is None else relaxing.shapes
         shape = way[-1]
     driven = scene.driven(shape.pull.depth)
     body = finger.newton.body
     newton = finger.newton if relaxing is None else relaxing.newton
     shape, checks = _balanced(newton, shape, lambda found: _audits(driven, finger, found, newton))
-    sed, normal, tangential = (float(number) for number in finger.numbers(shape))
+    numbers = finger.all_numbers(shape)
+    sed, normal, tangential, depth, shift, width = (float(number) for number in numbers)
     skin = _skin(finger, shape)
     if way and (relaxing is None or _sticking(shape) == 0.0):  # stuck and relaxing, the end depends on the way
         checks["course_against_direct"] = abs(finger.sed_ending(at.shape) / sed - 1.0)
+    held = scene.loading.dragged and _sticking(shape) > 0.0  # sliding, a finger may have shifted by anything
     solved = perf_counter()
-    errors = error_estimates(scene, fineness, way_up, stop)
+    errors = error_estimates(scene, fineness, way_up, numbers, stop)
     estimated = perf_counter()
-    width = _contact_width(skin)
     model = evidence.finite_model(
         driven, force=shape.force, width=width, sticking=_sticking(shape), slide=_slide(finger, shape)
     )
@@ -130,11 +133,14 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         normal_force=normal,
         tangential_force=_drag(scene, tangential),
         contact_width=width,
-        indentation=shape.pull.depth,
-        shift=-shape.pull.travel if scene.loading.dragged else None,
-        error_estimate=errors[0],
-        normal_force_error=errors[1],
-        tangential_force_error=errors[2],
+        indentation=depth,
+        shift=shift if held else None,
+        error_estimate=errors.sed,
+        normal_force_error=errors.normal,
+        tangential_force_error=errors.tangential,
+        indentation_error=errors.indentation,
+        shift_error=errors.shift if held else None,
+        contact_width_error=errors.width,
         dofs=body.dofs,
         newton_iterations=shape.iterations,
         wall_s=solved - begun - setup,
@@ -146,13 +152,15 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         skin=skin,
         mesh=finger.geometry.mesh,
         displacement=shape.u,
-        history=_history(scene, finger, way, relaxing) if way else None,
+        history=_history(scene, finger, way, relaxing, times) if way else None,
         warnings=evidence.warnings(driven, model["left_out"]),
     )
 
 
 def _drag(scene: Scene, tangential: float) -> float:
     """Return the drag opposing the slide [N/mm]; without a slide, the size of the tangential force."""
+    if scene.friction.mu == 0.0 or scene.friction.cap == 0.0:
+        return 0.0  # but for round-off
     return abs(tangential) if scene.loading.direction == 0 else 0.0 - scene.loading.direction * tangential  # never -0
 
 
@@ -177,17 +185,6 @@ def _skin(finger: FiniteFinger, shape: Shape) -> Skin:
         traction=shape.reaction[:, 0] / length,
         state=tuple(NAMES[int(state)] for state in shape.state),
     )
-
-
-def _contact_width(skin: Skin) -> float:
-    """Return the distance along the surface from the first to the last touching point, half an edge added [mm]."""
-    touching = np.flatnonzero(np.array(skin.state) != "open")
-    if not len(touching):
-        return 0.0
-    first, last, count = int(touching[0]), int(touching[-1]), len(skin.x)
-    low = (skin.x[first] + skin.x[max(first - 1, 0)]) / 2.0
-    high = (skin.x[last] + skin.x[min(last + 1, count - 1)]) / 2.0
-    return float(high - low)
 
 
 def _balanced(
@@ -254,13 +251,14 @@ def _audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: Newton) ->
     }
 
 
-def _history(scene: Scene, finger: FiniteFinger, way: Sequence[Shape], relaxing: RelaxingCourse | None) -> History:
+def _history(
+    scene: Scene, finger: FiniteFinger, way: Sequence[Shape], relaxing: RelaxingCourse | None, times: float
+) -> History:
     travel = np.array([-shape.pull.travel for shape in way])
     depth = np.array([shape.pull.depth for shape in way])
-    skins = [_skin(finger, shape) for shape in way]
     slipping = np.array([1.0 - _sticking(shape) if shape.touching.any() else 0.0 for shape in way])
     if relaxing is None:
-        time = _times(scene, travel)
+        time = _times(scene, travel, presses(times))
         point = [float(finger.point.average(finger.newton.body, shape.u)[0]) for shape in way]
         sed = np.stack([[finger.sed_ending(shape) for shape in way], point], axis=1)
     else:
@@ -273,16 +271,19 @@ def _history(scene: Scene, finger: FiniteFinger, way: Sequence[Shape], relaxing:
         sed_point=sed[:, 1],
         normal_force=np.array([float(shape.force[1]) for shape in way]),
         tangential_force=np.array([_drag(scene, float(shape.force[0])) for shape in way]),
-        contact_width=np.array([_contact_width(skin) for skin in skins]),
+        contact_width=np.array([finger.contact_width(shape) for shape in way]),
         slipping=slipping,
     )
 
 
-def _times(scene: Scene, travel: Array) -> Array:
-    """Return when a finger that does not relax was where its bone has gone to by `travel` (m,) [mm]."""
+def _times(scene: Scene, travel: Array, count: int) -> Array:
+    """Return when a finger that does not relax was where its bone has gone to by `travel` (m,) [mm].
+
+    It was pressed in `count` steps, and dragged in as many.
+    """
     if scene.loading.dragged:
-        after = np.arange(1, len(travel) - PRESSES + 1) / PRESSES
+        after = np.arange(1, len(travel) - count + 1) / count
     else:
         gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(travel)))])
-        after = gone[PRESSES:] / scene.loading.speed
-    return np.concatenate([np.arange(1, PRESSES + 1) / PRESSES, 1.0 + after])
+        after = gone[count:] / scene.loading.speed
+    return np.concatenate([np.arange(1, count + 1) / count, 1.0 + after])

@@ -27,15 +27,18 @@ LONGEST = 8.0  # slide after which a course that has not settled is given up, by
 SETTLED = 1e-10  # relative change of the ending's SED in a step, with every touching point slipping
 
 
-def settled(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], start: Shape | None = None) -> Shape:
+def settled(
+    finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], start: Shape | None = None, times: float = 1.0
+) -> Shape:
     """Return the settled state of a scene, sought first from `start`, a proven state nearby.
 
+    Where it depends on its way, that has so many `times` the usual load steps; such a state has a pull without sense.
     Raises NoSteadyState, NotConverged, Cancelled.
     """
     if scene.normal_force is not None:
-        return _settled_under(finger, scene, scene.normal_force, stop, start)
+        return _settled_under(finger, scene, scene.normal_force, stop, start, times)
     if scene.loading.direction == 0 and scene.friction.mu > 0.0:
-        return course(scene, finger, stop)[-1]
+        return course(scene, finger, stop, times)[-1]
     return steady(finger.newton, _pull_sliding(scene), finger.geometry.whole, start=start, stop=stop, proven=True)
 
 
@@ -60,24 +63,30 @@ def roughly(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: 
 
 
 def _settled_under(
-    finger: FiniteFinger, scene: Scene, force: float, stop: Callable[[], bool], start: Shape | None
+    finger: FiniteFinger, scene: Scene, force: float, stop: Callable[[], bool], start: Shape | None, times: float
 ) -> Shape:
     """Return the settled state under the forces of a scene, depth and shift found. Raises as `settled`."""
     direction, drag = scene.loading.direction, scene.tangential_force
     if direction == 0 and scene.friction.mu > 0.0:
-        return course(scene, finger, stop)[-1]
+        return course(scene, finger, stop, times)[-1]
+    if start is not None and start.pull.sense == 0:  # the end of a course, and no slide to start from
+        start = None
+        try:
+            return course(scene, finger, stop, times)[-1]
+        except NotConverged:
+            pass
     try:
         slides = _sliding_under(finger, scene, force, stop, start)
     except SolveFailure:
         if drag is None:
             raise
-        return course(scene, finger, stop)[-1]  # the drag may be met before sliding would fold the skin
+        return course(scene, finger, stop, times)[-1]  # the drag may be met before sliding would fold the skin
     most = abs(float(slides.force[0]))
     if drag is None or most * (1.0 - ALL_SLIPS) <= drag <= most * (1.0 + ALL_SLIPS):
         return slides
     if drag > most:
         raise beyond_friction(drag, most, force)
-    return course(scene, finger, stop)[-1]
+    return course(scene, finger, stop, times)[-1]
 
 
 def _sliding_under(
@@ -138,15 +147,28 @@ def pull_of(scene: Scene) -> Pull:
     return Pull(scene.loading.depth, float(scene.friction.mu), scene.friction.cap)
 
 
-def course(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool]) -> list[Shape]:
-    """Return the states from first touch to the last settled slide, or to the end of the press or drag."""
+def presses(times: float) -> int:
+    """Return the load steps of the pre-indentation, or of a drag, so many `times` the usual."""
+    return round(PRESSES * times)
+
+
+def depends_on_way(scene: Scene, shape: Shape) -> bool:
+    """Return whether a state is the end of a course and not a settled slide, found directly."""
+    return shape.pull.sense == 0 and scene.friction.mu > 0.0
+
+
+def course(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], times: float = 1.0) -> list[Shape]:
+    """Return the states from first touch to the last settled slide, or to the end of the press or drag.
+
+    `times` the usual load steps are taken.
+    """
     drag = scene.tangential_force
     if scene.normal_force is None:
         for direction in set(scene.loading.directions[:-1]):  # a slide that never settles is refused with its limits
             steady(finger.newton, pull_of(scene)._replace(sense=-direction), finger.geometry.whole, stop=stop)
-        way = _Driven(scene, finger, stop)
+        way = _Driven(scene, finger, stop, times)
     else:
-        way = _Forced(scene, scene.normal_force, finger, stop)
+        way = _Forced(scene, scene.normal_force, finger, stop, times)
         if drag is not None:
             way.drag(-scene.loading.direction * drag)
             return way.shapes
@@ -159,10 +181,10 @@ def _settle(way: "_Driven | _Forced", scene: Scene, direction: int) -> None:
     """Slide until the response does not change any more. Raises NotConverged where it still does."""
     depth = way.shapes[-1].pull.depth
     sed = way.finger.sed_ending(way.shapes[-1])
-    for _ in range(int(LONGEST / STRIDE)):
-        way.slide(direction * STRIDE * depth)
+    for _ in range(int(LONGEST / STRIDE * way.times)):
+        way.slide(direction * STRIDE / way.times * depth)
         before, sed = sed, way.finger.sed_ending(way.shapes[-1])
-        if not (way.shapes[-1].state == STICK).any() and abs(sed - before) <= SETTLED * sed:
+        if not (way.shapes[-1].state == STICK).any() and abs(sed - before) * way.times <= SETTLED * sed:
             return
     raise NotConverged(
         f"After {LONGEST * depth:.3g} mm of sliding at {depth:.3g} mm of indentation and mu = {scene.friction.mu:.3g} "
@@ -173,10 +195,11 @@ def _settle(way: "_Driven | _Forced", scene: Scene, direction: int) -> None:
 class _Driven:
     """A course driven by depth and travel, pressed when made."""
 
-    def __init__(self, scene: Scene, finger: FiniteFinger, stop: Callable[[], bool]) -> None:
-        self.finger, self._stop = finger, stop
+    def __init__(self, scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], times: float) -> None:
+        self.finger, self._stop, self.times = finger, stop, times
         self._pull = pull_of(scene)
-        pulls = [self._pull._replace(depth=self._pull.depth * (i + 1) / PRESSES) for i in range(PRESSES)]
+        count = presses(times)
+        pulls = [self._pull._replace(depth=self._pull.depth * (i + 1) / count) for i in range(count)]
         self._good = min(GOOD, CLOSE * self._pull.depth)
         self.shapes = list(march(self.finger.newton, pulls, None, self._good, self._stop))
 
@@ -189,11 +212,14 @@ class _Driven:
 class _Forced:
     """A course under a given normal force, and a given travel or drag; pressed when made."""
 
-    def __init__(self, scene: Scene, normal: float, finger: FiniteFinger, stop: Callable[[], bool]) -> None:
-        self.finger, self._stop = finger, stop
+    def __init__(
+        self, scene: Scene, normal: float, finger: FiniteFinger, stop: Callable[[], bool], times: float
+    ) -> None:
+        self.finger, self._stop, self.times = finger, stop, times
         self._given = Given(0.0, 0.0 if scene.loading.dragged else None)
         self.shapes = [finite_forced.untouched(finger.newton, float(scene.friction.mu), scene.friction.cap)]
-        self._go([self._given._replace(normal=normal * (i + 1) / PRESSES) for i in range(PRESSES)])
+        count = presses(times)
+        self._go([self._given._replace(normal=normal * (i + 1) / count) for i in range(count)])
         del self.shapes[0]
 
     def _go(self, aims: list[Given]) -> None:
@@ -206,4 +232,5 @@ class _Forced:
 
     def drag(self, pull: float) -> None:
         """Let the surface's pull along +x grow to `pull` [N/mm]."""
-        self._go([self._given._replace(tangential=pull * (i + 1) / PRESSES) for i in range(PRESSES)])
+        count = presses(self.times)
+        self._go([self._given._replace(tangential=pull * (i + 1) / count) for i in range(count)])

@@ -73,8 +73,11 @@ class Prediction:
     displacement: Array  # (nodes, 2) relative to the bone [mm]
     history: History | None = None
     evidence_s: float | None = None  # what marching and measuring the evidence in `model` took [s]; None: nothing was
-    normal_force_error: float | None = None  # estimated, of normal_force, relative [-]; None: not estimated
+    normal_force_error: float | None = None  # estimated, of normal_force, relative [-]; None: it was given
     tangential_force_error: float | None = None  # likewise of tangential_force; 0 where there is no friction
+    indentation_error: float | None = None  # likewise of indentation; None where that was given
+    shift_error: float | None = None  # estimated, of shift [mm]; None where there is none
+    contact_width_error: float | None = None  # estimated, of contact_width, relative [-]
     warnings: tuple[str, ...] = field(default=())  # one sentence each
 
     def to_dict(self) -> dict[str, Any]:
@@ -92,6 +95,9 @@ class Prediction:
                 "error_estimate",
                 "normal_force_error",
                 "tangential_force_error",
+                "indentation_error",
+                "shift_error",
+                "contact_width_error",
                 "dofs",
                 "newton_iterations",
                 "wall_s",

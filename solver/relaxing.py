@@ -13,6 +13,7 @@ stored in all springs of the solid, G (1 - sum g) e:e + sum g G h:h + K/2 theta^
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 
@@ -191,17 +192,19 @@ class RelaxingWay(Way):
         return contact
 
 
-def march_relaxing(way: RelaxingWay, loading: Loading, longest: float, progress: Progress | None = None) -> None:
+def march_relaxing(
+    way: RelaxingWay, loading: Loading, longest: float, progress: Progress | None = None, times: float = 1.0
+) -> None:
     """Press, slide or drag as `stepping.march` does, and go on until terms of up to `longest` [s] have relaxed.
 
     Raises as `stepping.march`.
     """
-    course(way, loading, progress)
+    course(way, loading, progress, times)
     step = way.instants[-1].time - way.instants[-2].time
     end = way.aim.time + RELAXED * longest
     speed = 0.0 if loading.dragged else loading.direction * loading.speed
     while way.aim.time < end:
-        for _ in range(EQUAL_STEPS):
+        for _ in range(ceil(EQUAL_STEPS * times)):
             aim = way.aim
             way.go(Aim(aim.time + step, aim.press, aim.along + speed * step))
         step *= 2.0

@@ -5,19 +5,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.contact import Contact, ContactLost, Course
+from solver.contact import CAP, STICK, Contact, ContactLost, Course
 from solver.failures import NoSteadyState, beyond_friction
 from solver.finger import FingerModel
 from solver.friction import FrictionLaw
+from solver.load_steps import HALF
 from solver.matching import DEEPEST
 from solver.mesh import Array
 from solver.pressing import depth_of, sliding_under
+from solver.relaxing import RelaxingBody, RelaxingWay, march_relaxing
 from solver.scene import Scene
-from solver.stepping import march
+from solver.stepping import PRESSING_STEPS, PRESSING_TIME, March, Progress, march
+from solver.tissues import relaxing_laws
 from solver.wedging import followed
 
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
 NUDGE = 1e-4  # of the coefficient of friction, to see what it does
+FURTHER = 1e-2  # of the traction bound, to see what it does on a whole course
 
 
 def law_of(scene: Scene) -> FrictionLaw:
@@ -25,14 +29,14 @@ def law_of(scene: Scene) -> FrictionLaw:
     return FrictionLaw(float(scene.friction.mu), scene.friction.cap)
 
 
-def settled(scene: Scene, finger: FingerModel) -> Contact:
-    """Return the settled state, without its history where it has none left.
+def settled(scene: Scene, finger: FingerModel, times: float = 1.0) -> Contact:
+    """Return the settled state, without its history where it has none left, else in `times` the usual load steps.
 
     Raises ContactLost, NotConverged, and NoSteadyState where a given drag is more than friction carries.
     """
     law, touch, loading = law_of(scene), finger.body.touchable, scene.loading_per_mm
     if loading.direction == 0 and not law.frictionless:
-        return march(touch, law, loading).instants[-1].contact
+        return march(touch, law, loading, times=times).instants[-1].contact
     if loading.normal_force is None:
         return Course(touch, law).sliding(loading.depth, loading.direction or 1)
     deepest = DEEPEST * scene.finger.pulp_thickness()
@@ -41,7 +45,9 @@ def settled(scene: Scene, finger: FingerModel) -> Contact:
     except ContactLost:
         if loading.tangential_force is None:
             raise
-        return march(touch, law, loading).instants[-1].contact  # the drag may be met where sliding would wedge
+        return (
+            march(touch, law, loading, times=times).instants[-1].contact
+        )  # the drag may be met where sliding would wedge
     if loading.tangential_force is None:
         return found
     most = float(np.abs(found.tangential.sum()))
@@ -49,7 +55,34 @@ def settled(scene: Scene, finger: FingerModel) -> Contact:
         raise beyond_friction(loading.tangential_force, most, loading.normal_force)
     if loading.tangential_force >= most * (1.0 - ALL_SLIPS):
         return found
-    return march(touch, law, loading).instants[-1].contact
+    return march(touch, law, loading, times=times).instants[-1].contact
+
+
+def depends_on_way(scene: Scene, contact: Contact) -> bool:
+    """Return whether a state is the end of a course and not a settled slide."""
+    pressed = scene.loading.direction == 0 and not law_of(scene).frictionless
+    return pressed or bool((contact.state == STICK).any())
+
+
+def marched(
+    scene: Scene, finger: FingerModel, progress: Progress | None = None, times: float = 1.0
+) -> tuple[March, Array | None]:
+    """Return the whole way, and where tissues relax the SED of ending and point at each instant (m, 2) [MPa]."""
+    law, loading = law_of(scene), scene.loading_per_mm
+    if not scene.materials.relax:
+        return march(finger.body.touchable, law, loading, progress, times), None
+    body = RelaxingBody(finger.geometry.mesh, relaxing_laws(scene.materials))
+    first = PRESSING_TIME / round(PRESSING_STEPS * times)
+    way = RelaxingWay(body, law, loading, finger.ending, finger.point, first)
+    march_relaxing(way, loading, scene.materials.longest_relaxation, progress, times)
+    return way.march(), np.array(way.sed)
+
+
+def end(scene: Scene, finger: FingerModel, times: float = 1.0) -> Contact:
+    """Return the end of a course that it depends on. Raises NotConverged."""
+    if scene.materials.relax and scene.solve.course == "history":
+        return marched(scene, finger, times=times)[0].instants[-1].contact
+    return march(finger.body.touchable, law_of(scene), scene.loading_per_mm, times=times).instants[-1].contact
 
 
 def indentation(scene: Scene, contact: Contact) -> float:
@@ -119,3 +152,29 @@ def numbers_on(finger: FingerModel, contacts: Sequence[Contact]) -> Array:
     """Return what errors are estimated of (c, 3): SED of the ending, normal and tangential force along +x."""
     forces = [(c.normal.sum(), c.tangential.sum()) for c in contacts]
     return np.column_stack([finger.sed_endings(contacts), forces])
+
+
+def all_numbers(scene: Scene, finger: FingerModel, contact: Contact) -> Array:
+    """Return them, indentation, shift (0 where there is none) and contact width (6,) of one state."""
+    shift = shift_of(scene, contact)
+    width = finger.contact_width(contact, np.concatenate([contact.gap, contact.shift]))
+    found = indentation(scene, contact), 0.0 if shift is None else shift, width
+    return np.concatenate([numbers_on(finger, [contact])[0], found])
+
+
+def shift_of(scene: Scene, contact: Contact) -> float | None:
+    """Return how far the bone was shifted along +x [mm] by a given drag; None where it slides or is only pressed."""
+    return float(contact.motion[-1]) if scene.loading.dragged and len(contact.motion) > 1 else None
+
+
+def felt_of_bound(scene: Scene, finger: FingerModel, half: Contact) -> Array:
+    """Return how the numbers (6,) at the end of a course answer to the traction bound: relative change by its own.
+
+    `half` is the end in half the usual steps. Zero where nothing slips at the bound. Raises as `end`.
+    """
+    bound = scene.friction.tau_max
+    if bound is None or not (half.state == CAP).any():
+        return np.zeros(6)
+    more = replace(scene, friction=replace(scene.friction, tau_max=(1.0 + FURTHER) * bound))
+    here, beside = (all_numbers(scene, finger, state) for state in (half, end(more, finger, HALF)))
+    return (beside - here) / np.where(here == 0.0, 1.0, here) / FURTHER

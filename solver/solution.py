@@ -9,23 +9,32 @@ from numpy.linalg import LinAlgError
 
 from solver.audits import audits, course_audits
 from solver.contact import NAMES, SLIP, STICK, Contact, ContactLost
-from solver.estimate import DEFAULT, FINENESS, coarsest_for, estimates
+from solver.estimate import DEFAULT, FINENESS, coarsest_for
 from solver.evidence import model, warnings
 from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure
 from solver.finger import FingerModel
 from solver.grid import MeshError
 from solver.holding import with_held
+from solver.load_steps import Steps
 from solver.matching import expected_depth
 from solver.measured import measured
 from solver.mesh import Array
 from solver.mesher import Sizing
 from solver.prediction import History, Prediction, Row, Skin
 from solver.receptor import ROW
-from solver.relaxing import RelaxingBody, RelaxingWay, march_relaxing
 from solver.scene import Scene, SceneError
-from solver.small_states import NUDGE, indentation, laid, law_of, nearest, numbers_on, rubbed_more, settled
-from solver.stepping import March, march
-from solver.tissues import relaxing_laws
+from solver.small_errors import error_estimates, steps_asked
+from solver.small_states import (
+    all_numbers,
+    depends_on_way,
+    indentation,
+    laid,
+    law_of,
+    marched,
+    settled,
+    shift_of,
+)
+from solver.stepping import March
 from solver.wedging import WIDE, deepest, followed
 
 UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]
@@ -249,18 +258,19 @@ def _meshed(scene: Scene, sizing: Sizing, in_loops: bool) -> FingerModel:
         raise SceneError("finger", scene.finger, f"no mesh fits it ({bad})") from bad
 
 
-def _direct(scene: Scene, shared: _Shared) -> Contact | None:
+def _direct(scene: Scene, shared: _Shared, times: float = 1.0) -> Contact | None:
     """Return the settled state; None where contact must be looked for on more of the skin.
 
-    Near a limit, or beyond it, guesses can end in states that no sliding leads to. Where none was found, or one that is
-    folded, only what is reached by following the state from mu = 0 counts. Raises NoSteadyState, NotConverged.
+    Where it depends on its way, that takes so many `times` the usual load steps. Near a limit, or beyond it, guesses
+    can end in states that no sliding leads to. Where none was found, or one that is folded, only what is reached by
+    following the state from mu = 0 counts. Raises NoSteadyState, NotConverged.
     """
     finger, direction = shared.fine, scene.loading.direction
     contact: Contact | None = None
     try:
-        contact = settled(scene, finger)
-        marched = direction == 0 or bool((contact.state == STICK).any())
-        if marched or not _folded(finger, contact):
+        contact = settled(scene, finger, times)
+        on_way = direction == 0 or bool((contact.state == STICK).any())
+        if on_way or not _folded(finger, contact):
             return contact
         why = "the state found is folded"
     except ContactLost as lost:
@@ -281,6 +291,15 @@ def _direct(scene: Scene, shared: _Shared) -> Contact | None:
     return reached
 
 
+def _in_steps(scene: Scene, shared: _Shared) -> tuple[Contact | None, Steps | None]:
+    """Return the settled state as `_direct` does, and the load steps it took where it depends on its way."""
+    contact = _direct(scene, shared)
+    if contact is None or not depends_on_way(scene, contact):
+        return contact, None
+    steps = steps_asked(scene, shared.coarse[0])
+    return (contact if steps.times == 1 else _direct(scene, shared, steps.times)), steps
+
+
 def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[Prediction, March | None] | None:
     """Return the prediction of one scene, and its way where it has one that can be drawn from forces alone.
 
@@ -288,14 +307,15 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
     """
     finger, law = shared.fine, law_of(scene)
     begun = perf_counter()
-    contact = _direct(scene, shared)
+    contact, steps = _in_steps(scene, shared)
     if contact is None:
         return None
+    times = 1 if steps is None else steps.times
     way: March | None = None
     over_time: Array | None = None
     direct = contact
     if scene.solve.course == "history":
-        way, over_time = _marched(scene, finger, progress)
+        way, over_time = marched(scene, finger, progress, times)
         contact = way.instants[-1].contact
     skin = finger.skin_displacement(contact)
     displacement = finger.body.displacement(skin)[:, :, 0]
@@ -328,20 +348,24 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
     history = None if way is None else _history(scene, finger, way, over_time)
     row = Row(ROW, finger.sed_row(displacement))
     solved = perf_counter()
-    numbers = np.array([sed, contact.normal.sum(), contact.tangential.sum()])
-    of_sed, of_normal, of_tangential = _error_estimates(scene, shared, contact, numbers)
+    numbers, shift = all_numbers(scene, finger, contact), shift_of(scene, contact)
+    numbers[0] = sed
+    off = error_estimates(scene, shared.fineness, shared.coarse, numbers, steps)
     found = Prediction(
         scene=scene,
         sed_ending=sed,
         sed_point=finger.sed_point(displacement),
         normal_force=float(contact.normal.sum()),
         tangential_force=_drag(scene, contact.tangential.sum()),
-        contact_width=finger.contact_width(contact, skin[:, 0]),
+        contact_width=float(numbers[5]),
         indentation=depth,
-        shift=float(contact.motion[-1]) if scene.loading.dragged and len(contact.motion) > 1 else None,
-        error_estimate=of_sed,
-        normal_force_error=of_normal,
-        tangential_force_error=of_tangential,
+        shift=shift,
+        error_estimate=off.sed,
+        normal_force_error=off.normal,
+        tangential_force_error=off.tangential,
+        indentation_error=off.indentation,
+        shift_error=None if shift is None else off.shift,
+        contact_width_error=off.width,
         dofs=finger.body.dofs,
         newton_iterations=contact.iterations if way is None else way.iterations,
         wall_s=solved - begun + shared.solve_s,
@@ -381,25 +405,6 @@ def _drag(scene: Scene, tangential: float) -> float:
     return 0.0 - scene.loading.direction * float(tangential)  # never -0
 
 
-def _error_estimates(scene: Scene, shared: _Shared, contact: Contact, numbers: Array) -> tuple[float, float, float]:
-    """Return how far SED, normal and tangential force `numbers` (3,) of `contact` may be off, relative.
-
-    The same scene is solved on a mesh with elements twice as long, and on that mesh moved along the skin by half an
-    element, so that the edges of contact fall differently between nodes.
-    """
-    first, second = shared.coarse
-    try:
-        near, far = nearest(scene, first), nearest(scene, second)
-    except (ContactLost, SolveFailure):
-        return 1.0, 1.0, 1.0  # so near a limit that a coarser mesh has no state: nothing is known of the error
-    beside = rubbed_more(scene, first, near)
-    here = numbers_on(first, [near] if beside is None else [near, beside])
-    felt = np.zeros(3) if beside is None else (here[1] / here[0] - 1.0) / NUDGE
-    others = np.concatenate([here[:1], numbers_on(second, [far])])
-    found = estimates(scene.driven(indentation(scene, contact)), shared.fineness, numbers, others, felt)
-    return float(found[0]), float(found[1]), float(found[2])
-
-
 def skin_of(finger: FingerModel, contact: Contact, skin: Array) -> Skin:
     """Return the skin that may touch, in a state of contact with its displacement (2 k,), normal first [mm]."""
     mesh, k = finger.geometry.mesh, len(contact.state)
@@ -411,17 +416,6 @@ def skin_of(finger: FingerModel, contact: Contact, skin: Array) -> Skin:
         traction=contact.tangential / length,
         state=tuple(NAMES[int(s)] for s in contact.state),
     )
-
-
-def _marched(scene: Scene, finger: FingerModel, progress: Progress | None) -> tuple[March, Array | None]:
-    """Return the whole way, and where tissues relax the SED of ending and point at each instant (m, 2) [MPa]."""
-    law, loading = law_of(scene), scene.loading_per_mm
-    if not scene.materials.relax:
-        return march(finger.body.touchable, law, loading, progress), None
-    body = RelaxingBody(finger.geometry.mesh, relaxing_laws(scene.materials))
-    way = RelaxingWay(body, law, loading, finger.ending, finger.point)
-    march_relaxing(way, loading, scene.materials.longest_relaxation, progress)
-    return way.march(), np.array(way.sed)
 
 
 def _over_time(finger: FingerModel, contacts: Sequence[Contact]) -> Array:

@@ -53,33 +53,37 @@ class Aim(NamedTuple):
 Progress = Callable[[float], bool]  # told the part done, 0 to 1; False asks to stop
 
 
-def march(body: Touchable, law: FrictionLaw, loading: Loading, progress: Progress | None = None) -> March:
+def march(
+    body: Touchable, law: FrictionLaw, loading: Loading, progress: Progress | None = None, times: float = 1.0
+) -> March:
     """Drive `body` down and along, step by step (backward Euler), until every slide of `loading` has settled.
 
-    Forces of `loading` are per mm. A given drag must be less than what friction carries. Raises NotConverged where a
-    step cannot be made or sliding does not settle, Cancelled where `progress` says so.
+    So many `times` the usual steps are taken. Forces of `loading` are per mm. A given drag must be less than what
+    friction carries. Raises NotConverged where a step cannot be made or sliding does not settle, Cancelled where
+    `progress` says so.
     """
     way = Way(body, law, loading)
-    course(way, loading, progress)
+    course(way, loading, progress, times)
     return way.march()
 
 
-def course(way: "Way", loading: Loading, progress: Progress | None = None) -> None:
-    """Press, and slide or drag, along `way`. Raises as `march`."""
+def course(way: "Way", loading: Loading, progress: Progress | None = None, times: float = 1.0) -> None:
+    """Press, and slide or drag, along `way`, in so many `times` the usual steps. Raises as `march`."""
+    presses, drags = round(PRESSING_STEPS * times), round(DRAGGING_STEPS * times)
     press = loading.depth if loading.normal_force is None else loading.normal_force
-    for number in range(1, PRESSING_STEPS + 1):
-        part = number / PRESSING_STEPS
+    for number in range(1, presses + 1):
+        part = number / presses
         way.go(Aim(PRESSING_TIME * part, press * part, 0.0))
         _report(progress, part / 2.0)
     if loading.tangential_force is not None:
         pull = -loading.direction * loading.tangential_force
-        for number in range(1, DRAGGING_STEPS + 1):
-            part = number / DRAGGING_STEPS
+        for number in range(1, drags + 1):
+            part = number / drags
             way.go(Aim(PRESSING_TIME + DRAGGING_TIME * part, press, pull * part))
             _report(progress, (1.0 + part) / 2.0)
     else:
         for direction in loading.directions:
-            way.settled = slide(way, direction, loading.speed, progress)
+            way.settled = slide(way, direction, loading.speed, progress, times)
 
 
 def _report(progress: Progress | None, part: float) -> None:
@@ -140,11 +144,11 @@ class Way:
         return self.course.step(before, 0.0, aim.along, np.array([aim.press]))
 
 
-def slide(way: Way, direction: int, speed: float, progress: Progress | None) -> float:
+def slide(way: Way, direction: int, speed: float, progress: Progress | None, times: float) -> float:
     """Append the sliding states and return the travel after which they did not change."""
     begun, depth = way.aim, way.instants[-1].depth
-    step, distance = 0.01 * depth, 0.0
-    largest = 0.06 * depth
+    step, distance = 0.01 / times * depth, 0.0
+    largest = 0.06 / times * depth
 
     def at(distance: float) -> Aim:
         return Aim(begun.time + distance / speed, begun.press, begun.along + direction * distance)

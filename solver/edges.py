@@ -1,0 +1,64 @@
+"""Where contact ends: between two nodes, known to about a tenth of an element from how the pressure falls.
+
+Near its edge pressure falls like the square root of the distance. The force beyond a line between elements then has its
+centre at 2/5 of the way from there to the edge.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.mesh import Array
+from solver.mesher import FingerMesh, with_middles
+
+FEWEST = 5  # touching nodes for which the force can tell
+
+
+def edges(geometry: FingerMesh, force: Array, touching: NDArray[np.bool_]) -> tuple[float, float] | None:
+    """Return the arc positions [mm] where contact ends; None where it is too short to tell.
+
+    `force` (k,) [N/mm] are the normal forces on the nodes that may touch.
+    """
+    arcs = arcs_of(geometry)
+    high = _edge(arcs, force, touching)
+    low = _edge(-arcs[::-1], force[::-1], touching[::-1])
+    return None if high is None or low is None or high <= -low else (-low, high)
+
+
+def width(geometry: FingerMesh, x: Array, force: Array, touching: NDArray[np.bool_]) -> float:
+    """Return the distance along the surface from where contact begins to where it ends [mm], 0 where nothing touches.
+
+    `x` (k,) are the deformed positions along the surface [mm]. Where contact is too short to tell its edges, a touching
+    node stands for half the way to its open neighbours.
+    """
+    ends = edges(geometry, force, touching)
+    if ends is not None:
+        low, high = np.interp(ends, arcs_of(geometry), x)
+        return float(high - low)
+    on = np.flatnonzero(touching)
+    if not len(on):
+        return 0.0
+    first, last = int(on[0]), int(on[-1])
+    low = (x[first] + x[max(first - 1, 0)]) / 2.0
+    high = (x[last] + x[min(last + 1, len(x) - 1)]) / 2.0
+    return float(high - low)
+
+
+def arcs_of(geometry: FingerMesh) -> Array:
+    """Return the arc positions (k,) of the nodes that may touch [mm]."""
+    return with_middles(geometry.arcs)[np.searchsorted(geometry.whole, geometry.mesh.skin)]
+
+
+def _edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float | None:
+    """Return where contact ends towards the last of the nodes at `arcs` (k,)."""
+    on = np.flatnonzero(touching)
+    if len(on) < FEWEST:
+        return None
+    last = int(on[-1])
+    line = last - 2 if last % 2 == 0 else last - 1  # the last line with contact on both sides
+    beyond = np.arange(line, last + 1)
+    pressed = force[beyond].copy()
+    gaps = arcs[line] - arcs[line - 2], arcs[line + 2] - arcs[line]
+    pressed[0] *= gaps[1] / (gaps[0] + gaps[1])  # the part of the line's own force that stems from beyond
+    reach = 2.5 * float(pressed @ (arcs[beyond] - arcs[line])) / float(pressed.sum())
+    least = arcs[last] - 0.35 * (arcs[last] - arcs[last - 1])
+    return float(np.clip(arcs[line] + reach, least, arcs[min(last + 1, len(arcs) - 1)]))

@@ -1,0 +1,54 @@
+"""Ends of courses at finite strain that depend on their way: how many load steps they take, what the bound does."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from solver.finite_finger import FiniteFinger
+from solver.finite_relaxing import RelaxingCourse
+from solver.finite_states import course, depends_on_way
+from solver.kernels import CAP
+from solver.load_steps import HALF, Steps
+from solver.mesh import Array
+from solver.newton import Shape
+from solver.scene import Scene
+
+NUDGE = 1e-2  # of the traction bound, to see what it does on a whole course
+
+
+def relaxes(scene: Scene) -> bool:
+    """Return whether the course of a scene is marched in time."""
+    return scene.materials.relax and scene.solve.course == "history"
+
+
+def end(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], times: float = 1.0) -> Shape:
+    """Return the end of a course, in so many `times` the usual load steps. Raises NotConverged, Cancelled."""
+    if relaxes(scene):
+        return RelaxingCourse(scene, finger, stop, times=times).shapes[-1]
+    return course(scene, finger, stop, times)[-1]
+
+
+def steps_asked(scene: Scene, finger: FiniteFinger, shape: Shape, stop: Callable[[], bool]) -> Steps | None:
+    """Return the load steps that a scene asks for, judged on a mesh on which it has led to `shape`.
+
+    None where that is a settled slide. Raises NotConverged, Cancelled.
+    """
+    if not depends_on_way(scene, shape):
+        return None
+    whole = end(finger, scene, stop) if relaxes(scene) else shape
+    half = end(finger, scene, stop, HALF)
+    return Steps.of(finger.all_numbers(whole), finger.all_numbers(half), scene.solve.tolerance)
+
+
+def felt_of_bound(scene: Scene, finger: FiniteFinger, shape: Shape, stop: Callable[[], bool]) -> Array:
+    """Return how the numbers (6,) at the end of a course answer to the traction bound: relative change by its own.
+
+    Zero where nothing slips at the bound in `shape`, the end, or where that is a slide. Raises NotConverged, Cancelled.
+    """
+    bound = scene.friction.tau_max
+    if bound is None or not (shape.state == CAP).any() or not depends_on_way(scene, shape):
+        return np.zeros(6)
+    scenes = [replace(scene, friction=replace(scene.friction, tau_max=most)) for most in (bound, (1.0 + NUDGE) * bound)]
+    here, beside = (finger.all_numbers(end(finger, beside, stop, HALF)) for beside in scenes)
+    return (beside - here) / np.where(here == 0.0, 1.0, here) / NUDGE

@@ -1,0 +1,79 @@
+"""How far the numbers of a scene at finite strain may be off: what another mesh and fewer load steps make of them."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from solver import finite_ends
+from solver.climbing import Ascent, Climbed, climbed
+from solver.estimate import Errors, errors
+from solver.failures import NoSteadyState, NotConverged, SolveFailure
+from solver.finite_states import depends_on_way
+from solver.load_steps import Steps
+from solver.mesh import Array
+from solver.scene import Scene
+
+COARSER = 0.6  # fineness of the mesh that the error is estimated from, by that of the answer
+NUDGE = 1e-3  # of the traction bound, to see what it does
+
+
+def error_estimates(scene: Scene, fineness: float, way_up: Ascent, numbers: Array, stop: Callable[[], bool]) -> Errors:
+    """Return how far the `numbers` (6,) (`finger.all_numbers`) of a scene may be off that was solved by `way_up`.
+
+    The same scene is solved on a coarser mesh with lines at the same edges of contact.
+    """
+    return errors(scene, fineness, *compared(scene, fineness, way_up, numbers, stop))
+
+
+def compared(
+    scene: Scene, fineness: float, way_up: Ascent, numbers: Array, stop: Callable[[], bool]
+) -> tuple[Array, Array, Array, Steps | None]:
+    """Return what errors are estimated from: numbers (6,), those of other meshes (n, 6), what is felt (6,), and steps.
+
+    There are no others where one has no state.
+    """
+    at, steps = way_up.top, way_up.steps
+    on_way = depends_on_way(scene, at.shape)
+    try:
+        if steps is None and on_way:  # since it slid on the rough mesh
+            judged = finite_ends.steps_asked(scene, at.finger, at.shape, stop)
+            steps = None if judged is None else replace(judged, times=1)
+        coarse = _nearest(scene, COARSER * fineness, at, stop)
+        if steps is not None and on_way:
+            shape = finite_ends.end(coarse.finger, scene, stop) if finite_ends.relaxes(scene) else coarse.shape
+            others = steps.taken(coarse.finger.all_numbers(shape))[None]
+            felt = finite_ends.felt_of_bound(scene, way_up.foot.finger, way_up.foot.shape, stop)
+            return numbers, others, felt, steps
+    except SolveFailure:
+        return numbers, np.empty((0, 6)), np.zeros(6), steps
+    both = (coarse, way_up.first)
+    others = np.array([other.finger.all_numbers(other.shape) for other in both if other is not None])
+    felt = felt_of_bound(coarse) if at.finger.bounded_at_an_edge(at.shape) else np.zeros(6)
+    return numbers, others, felt, None
+
+
+def _nearest(scene: Scene, fineness: float, at: Climbed, stop: Callable[[], bool]) -> Climbed:
+    """Return the settled state on a coarser mesh, whose friction limit may lie just below the drag asked for."""
+    try:
+        return climbed(scene, fineness, at, stop)
+    except NoSteadyState:
+        if not scene.loading.dragged:
+            raise
+        return climbed(scene.undragged(), fineness, at, stop)
+
+
+def felt_of_bound(at: Climbed) -> Array:
+    """Return how the numbers (6,) of a settled slide answer to the traction bound: relative change by its own.
+
+    Zero where no state lies beside this one.
+    """
+    newton, shape = at.finger.newton, at.shape
+    if shape.pull.sense == 0:  # it does not slide as a whole, and depends on its way
+        return np.zeros(6)
+    try:
+        beside = newton.settle(shape, shape.pull._replace(tau=(1.0 + NUDGE) * shape.pull.tau))
+    except NotConverged:
+        return np.zeros(6)
+    before = at.finger.all_numbers(shape)
+    return (at.finger.all_numbers(beside) - before) / np.where(before == 0.0, 1.0, before) / NUDGE

@@ -1,0 +1,46 @@
+"""How many load steps a course takes, and by how much its end may be off for not taking more.
+
+A press with friction, or a drag that friction carries, depends on its way: where in a step a point comes to touch is
+where it is held from then on. The error falls with the number of steps, and is nearly the same on every mesh, so that
+it is measured on a coarse one: by how much half as many steps change the end. A settled slide has none.
+"""
+
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+
+from solver.mesh import Array
+
+HALF = 0.5
+MOST = 16  # times the usual steps, at most
+USUAL = 0.003  # tolerance that steps are chosen for where none is asked for
+SHARE = 0.3  # part of a tolerance that the error of the steps may take
+FROM_HALF = 1.5  # of what half as many steps change
+LEAST = np.array([4e-4, 1e-4, 4e-3, 1e-4, 2e-3, 5e-4])  # of each number, since two courses can agree by chance
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Steps:
+    """The steps of one course. Numbers are SED, both forces, indentation, shift and contact width (6,)."""
+
+    times: int  # the usual ones
+    change: Array  # (6,) of the numbers from half the usual steps to the usual ones, on a coarse mesh
+
+    @staticmethod
+    def of(whole: Array, half: Array, tolerance: float | None) -> "Steps":
+        """Return the fewest that a tolerance asks for.
+
+        `whole` (6,) and `half` (6,) are the numbers after the usual steps and after half of them, on a coarse mesh.
+        """
+        once = Steps(1, whole - half)
+        off = float(once.error(whole)[0] / max(abs(float(whole[0])), np.finfo(float).tiny))
+        return Steps(min(max(1, ceil(off / (SHARE * (tolerance or USUAL)))), MOST), once.change)
+
+    def error(self, numbers: Array) -> Array:
+        """Return by how much `numbers` (6,) may be off for not taking more steps (6,)."""
+        return (FROM_HALF * np.abs(self.change) + LEAST * np.abs(numbers)) / self.times
+
+    def taken(self, whole: Array) -> Array:
+        """Return what the numbers (6,) after the usual steps, `whole`, would be after these."""
+        return whole + (1.0 - 1.0 / self.times) * self.change
