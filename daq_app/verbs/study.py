@@ -61,6 +61,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tau", choices=["computed", "as-printed"], default="computed", help="as for 'daq-app predict'"
     )
+    parser.add_argument(
+        "--intervals",
+        action=argparse.BooleanOptionalAction,
+        help="what the uncertainty of friction makes of each SED: five solves a trial instead of one (usual at small "
+        "strain, not at finite strain, where it takes five times as long)",
+    )
     add_area(parser)
 
 
@@ -70,7 +76,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     sessions = sorted(path.parent for path in folder.glob(f"*/{LIVE_FILE}"))
     if not sessions:
         raise RecordingError(f"{folder} holds no session: give the folder that holds a folder for each of them")
-    model = PredictionOptions(tau_reading=options.tau, course="steady", kinematics=options.kinematics)
+    intervals = options.kinematics == "small" if options.intervals is None else options.intervals
+    model = PredictionOptions(options.tau, course="steady", kinematics=options.kinematics, intervals=intervals)
     asked = VisitOptions(model, area_law(options), options.paths)
     shelf = Shelf(out / "results", asked)
     done, failed = visits(sessions, asked, shelf, console, scheduler=options.scheduler, workers=options.workers)
@@ -108,12 +115,13 @@ def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
     """Write page, table and numbers and return where they are."""
     # Imported here: drawing is slow to load.
     from sessions.exports.html import swap_in
-    from sessions.exports.study_csv import paths_csv, trials_csv
+    from sessions.exports.study_csv import COLUMNS, TRIALS, columns_csv, paths_csv, trials_csv
     from sessions.exports.study_page import study_page
 
-    files = {"page": out / "study.html", "table": out / "trials.csv", "numbers": out / "study.json"}
+    files = {"page": out / "study.html", "table": out / TRIALS, "columns": out / COLUMNS, "numbers": out / "study.json"}
     swap_in(files["page"], study_page(study, name))
     swap_in(files["table"], trials_csv(study))
+    swap_in(files["columns"], columns_csv(study))
     write_json(files["numbers"], study.to_dict())
     if study.options.paths != "none":
         files["paths"] = out / "paths.csv"

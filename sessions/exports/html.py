@@ -99,7 +99,12 @@ def drawn(panel: Panel) -> Markup:
 
 def data_address(panel: Panel, head: str) -> str:
     """Return an address that holds the numbers of a picture as CSV, so that a page needs no file beside it."""
-    return "data:text/csv;charset=utf-8;base64," + base64.b64encode(panel_csv(panel, head).encode()).decode()
+    return text_address(panel_csv(panel, head))
+
+
+def text_address(text: str) -> str:
+    """Return an address that holds a CSV file."""
+    return "data:text/csv;charset=utf-8;base64," + base64.b64encode(text.encode()).decode()
 
 
 def panel_csv(panel: Panel, head: str) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 from sessions.exports.report_tables.cells import Cell, Column, Group, Notes, Table
 from sessions.exports.wording import NONE, correlation, digits, significant
+from sessions.pooling.pooled import StudyFindings
 
 
 def study_table(
@@ -45,3 +46,11 @@ def p_value(p: float) -> str:
     ('0.032', '< 0.001')
     """
     return "< 0.001" if p < 0.001 else digits(p, 3)
+
+
+def model_in_short(study: StudyFindings) -> str:
+    """Return which solver model the SEDs are of."""
+    model = study.options.prediction
+    return (
+        f"{model.kinematics} strain, settled sliding, τ max {model.tau_reading}, contact area {study.options.area.law}"
+    )

@@ -4,7 +4,8 @@ from functools import partial
 from itertools import chain
 
 from sessions.exports.figures.study import study_plates
-from sessions.exports.html import data_address, drawn
+from sessions.exports.html import data_address, drawn, text_address
+from sessions.exports.study_csv import columns_csv, trials_csv
 from sessions.exports.study_models import missing_models
 from sessions.exports.study_prose import again, command, excluded, modelled, sealed, summary, versions, who
 from sessions.exports.study_tables import study_tables
@@ -35,6 +36,9 @@ def study_page(study: StudyFindings, name: str) -> str:
         versions=versions(),
         again=again(study),
         command=command(study, name),
+        trials=sum(len(visit.rows) for visit in study.visits),
+        trials_file=text_address(trials_csv(study)),
+        columns_file=text_address(columns_csv(study)),
         unmodelled=missing_models(study),
         figures=figures,
         tables=tables,

@@ -7,7 +7,7 @@ from sessions.analysis.scores import Relation
 from sessions.analysis.within import RepeatedCorrelation
 from sessions.exports.report_tables.cells import Cell, Column, Notes, Table
 from sessions.exports.report_tables.paths import paths_table
-from sessions.exports.study_cells import between, correlations, interval, p_value, study_table
+from sessions.exports.study_cells import between, correlations, interval, model_in_short, p_value, study_table
 from sessions.exports.study_models import flaws_table, models_table, planted_table
 from sessions.exports.study_trials import trials_table
 from sessions.exports.wording import NONE, correlation, digits, significant
@@ -199,18 +199,10 @@ def _surfaces(study: StudyFindings) -> Table:
     )
     caption = (
         "Friction that the model got, and predicted SED: means over subjects, each from its own strokes, with t "
-        f"intervals. Model: {_model_in_short(study)}."
+        f"intervals. Model: {model_in_short(study)}."
     )
     groups = [(one.descriptor, tuple(row(one))) for one in study.descriptors if any(s.subjects for s in one.surfaces)]
     return study_table("table-surfaces", caption, columns, groups, notes)
-
-
-def _model_in_short(study: StudyFindings) -> str:
-    """Return which solver model the SEDs are of."""
-    model = study.options.prediction
-    return (
-        f"{model.kinematics} strain, settled sliding, τ max {model.tau_reading}, contact area {study.options.area.law}"
-    )
 
 
 def _forces(study: StudyFindings) -> Table:
@@ -312,7 +304,7 @@ def _relation(study: StudyFindings) -> Table:
         "r with one left out",
     )
     caption = (
-        f"Predicted SED ({_model_in_short(study)}) with scores. Means: Pearson's r of means over the subjects who have "
+        f"Predicted SED ({model_in_short(study)}) with scores. Means: Pearson's r of means over the subjects who have "
         "both, interval by Fisher's z; Spearman's rho with an interval likewise (Bonett and Wright 2000) and exact p. "
         "Within subjects: repeated-measures correlation of each subject's scores with the SEDs of its own strokes "
         "(Bakdash and Marusich 2017), and its p corrected for the descriptors that have one (Holm 1979). Last column: "

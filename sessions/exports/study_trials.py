@@ -1,13 +1,14 @@
 """The table of every trial of a study: each number with its source, and why one is missing."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from sessions.exports.report_tables.cells import Cell, Column, Group, Notes, Table
-from sessions.exports.wording import digits, places, sed, significant, tau
+from sessions.exports.study_cells import model_in_short
+from sessions.exports.wording import places, sed, significant, tau
 from sessions.pooling.pooled import StudyFindings
 from sessions.pooling.visit import TrialRow, Visit
 
-MOST = 400  # rows on the page; a larger study has them in its file alone
+MOST = 400  # rows on the page; of a larger study they are in the table beside it, and in the page as a file
 
 
 def trials_table(study: StudyFindings) -> Table | None:
@@ -22,9 +23,12 @@ def trials_table(study: StudyFindings) -> Table | None:
         Column("µ"),
         Column("95 % interval"),
         Column("τ max", "kPa"),
+        Column("95 % interval", "kPa"),
         Column("N", "N"),
         Column("speed", "mm/s"),
+        Column("95 % interval", "mm/s"),
         Column("SED", "kPa"),
+        Column("95 % interval", "kPa"),
         Column("error", "%"),
         Column("flaws"),
     )
@@ -34,8 +38,11 @@ def trials_table(study: StudyFindings) -> Table | None:
         for descriptor in dict.fromkeys(row.descriptor for row in visit.rows)
     )
     caption = (
-        "Every trial, from which all numbers above come. µ: what the model got, with its bootstrap interval; τ max, "
-        "normal force N and speed of the stroke; SED with the error estimated from its mesh. A dash says why."
+        "Every trial, from which all numbers above come. µ: what the model got; τ max, normal force N and speed of the "
+        "stroke; intervals of µ, τ max and speed by block bootstrap. SED: at "
+        f"{model_in_short(study)}; its interval is what the uncertainty of friction makes of it, the error that "
+        "estimated from its mesh. A dash says why. Means, correlations and models above take each number as it "
+        "stands: their own intervals come from how subjects and trials differ, which holds these errors too."
     )
     return Table("table-trials", caption, columns, groups, notes.listed())
 
@@ -49,17 +56,26 @@ def _rows(visit: Visit, descriptor: str, notes: Notes) -> Iterable[tuple[Cell, .
 def _row(row: TrialRow, notes: Notes) -> tuple[Cell, ...]:
     given = row.score if row.score is not None else row.estimate
     why = row.why or "withheld: the flaws say why"
-    interval = None if row.mu_low is None or row.mu_high is None else (row.mu_low, row.mu_high)
+
+    def interval(low: float | None, high: float | None, shown: Callable[[float], str], without: str) -> Cell:
+        if low is None or high is None:
+            return notes.number(None, str, without)
+        return Cell(f"{shown(low)} to {shown(high)}")
+
+    short = row.why or "too few readings for an interval"
     return (
         Cell(str(row.trial)),
         Cell(str(row.index)),
         notes.number(given, places(1), f"no score: {row.outcome}"),
         notes.number(row.mu, places(3), why),
-        notes.number(None, str, why) if interval is None else Cell(" to ".join(digits(end, 3) for end in interval)),
+        interval(row.mu_low, row.mu_high, places(3), short),
         notes.number(row.tau_max, tau, why),
+        interval(row.tau_max_low, row.tau_max_high, tau, short),
         notes.number(row.normal_force, places(2), why),
         notes.number(row.speed, places(1), why),
+        interval(row.speed_low, row.speed_high, places(1), short),
         notes.number(row.sed, sed, why),
+        interval(row.sed_low, row.sed_high, sed, row.why or row.sed_interval or why),
         notes.number(row.error_estimate, lambda v: significant(100 * v, 2), why),
         Cell(", ".join(flaw.replace("_", " ") for flaw in row.flaws) or "none"),
     )

@@ -19,8 +19,12 @@ from sessions.recording.manifest import file_sha256
 from sessions.recording.schema import LIVE_FILE
 from sessions.report.predictions import modelled
 from sessions.sealing import NUMBERS, sealed_sentence
+from sessions.uncertainty import with_intervals
 
-FORM = 6  # raised when a row holds something else: what was stored before is then computed anew
+FORM = 7  # raised when a row holds something else: what was stored before is then computed anew
+
+
+NO_INTERVAL = "intervals of the SED were not asked for"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,14 +54,21 @@ class TrialRow:
     estimate: float | None = None  # on a scale of the subject's own
     rule: str = ""  # which mu the model got
     mu: float | None = None
-    mu_low: float | None = None  # bootstrap interval of mu, see `BootstrapSettings.kind`
+    mu_low: float | None = None  # 95 % bootstrap interval of mu, as of tau_max and speed: `BootstrapSettings.kind`
     mu_high: float | None = None
     mu_dynamic: float | None = None
     mu_static: float | None = None
     tau_max: float | None = None  # [MPa]
+    tau_max_low: float | None = None
+    tau_max_high: float | None = None
     speed: float | None = None  # [mm/s]
+    speed_low: float | None = None
+    speed_high: float | None = None
     normal_force: float | None = None  # [N]
     sed: float | None = None  # [MPa]
+    sed_low: float | None = None  # 95 % interval that friction alone makes, see `sessions.uncertainty`
+    sed_high: float | None = None
+    sed_interval: str = ""  # how it was found, or why there is none
     error_estimate: float | None = None  # relative, of sed
     model_normal_force: float | None = None  # [N]
     matching_depth: float | None = None  # [mm]
@@ -101,7 +112,9 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
     """
     known = revealed(recording)
     analysis = analyse(known, AnalysisSettings(area=options.area))
-    prediction = predict(analysis, known.plan, options.prediction) if known.plan.forces else None
+    prediction = None
+    if known.plan.forces:
+        prediction = with_intervals(analysis, predict(analysis, known.plan, options.prediction))
     along: Mapping[int, Seds] = {}
     if options.paths != "none" and known.plan.forces:
         along = trial_paths(known, options.prediction, finite=options.paths == "finite")
@@ -161,25 +174,35 @@ def _row(
         return replace(row, flaws=flaws, why=missing)
     stroke = analysis.strokes[friction.stroke]
     intervals = stroke_intervals(stroke, friction.stroke)
-    low, high = (intervals.mu_max if friction.rule == "maximum" else intervals.mu_dynamic) or (None, None)
+    mu_low, mu_high = (intervals.mu_max if friction.rule == "maximum" else intervals.mu_dynamic) or (None, None)
+    tau_max_low, tau_max_high = intervals.tau_max or (None, None)
+    speed_low, speed_high = intervals.speed or (None, None)
     row = replace(
         row,
         rule=friction.rule,
         mu=friction.mu,
-        mu_low=low,
-        mu_high=high,
+        mu_low=mu_low,
+        mu_high=mu_high,
         mu_dynamic=stroke.mu_dynamic,
         mu_static=stroke.mu_static,
         tau_max=friction.tau_max,
+        tau_max_low=None if friction.tau_max is None else tau_max_low,
+        tau_max_high=None if friction.tau_max is None else tau_max_high,
         speed=friction.speed,
+        speed_low=None if friction.speed is None else speed_low,
+        speed_high=None if friction.speed is None else speed_high,
         normal_force=stroke.normal_force,
         flaws=flaws,
     )
     if answer is None:
         return row
+    interval = next((one for one in prediction.intervals if one.trial == trial.number), None) if prediction else None
     return replace(
         row,
         sed=answer.sed,
+        sed_low=None if interval is None else interval.low,
+        sed_high=None if interval is None else interval.high,
+        sed_interval=NO_INTERVAL if interval is None else interval.reason or f"by {interval.method}",
         error_estimate=answer.error_estimate,
         model_normal_force=answer.normal_force,
         matching_depth=answer.matching_depth,

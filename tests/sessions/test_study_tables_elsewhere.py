@@ -1,12 +1,15 @@
 """The study's table opened by other programs: R and pandas read the same numbers, and R comes to the same result."""
 
+import csv
 import shutil
 import subprocess
+from dataclasses import fields
 
 import pytest
 from study_example import study
 
-from sessions.exports.study_csv import paths_csv, trials_csv
+from sessions.exports.study_csv import _MEANING, columns_csv, paths_csv, trials_csv
+from sessions.pooling.visit import TrialRow
 
 RSCRIPT = shutil.which("Rscript")
 
@@ -14,6 +17,13 @@ R = """
 t <- read.csv("trials.csv")
 stopifnot(is.numeric(t$score), is.numeric(t$sed_MPa), is.numeric(t$mu), is.character(t$excluded))
 stopifnot(all(is.na(t$mu_static)))
+for (name in c("mu", "tau_max_MPa", "speed_mm_per_s", "sed_MPa")) {
+  part <- strsplit(name, "_(?=MPa|mm)", perl = TRUE)[[1]]
+  end <- function(which) t[[paste(c(part[1], which, part[-1]), collapse = "_")]]
+  stopifnot(all(end("low") < t[[name]]), all(t[[name]] < end("high")))
+}
+told <- read.csv("trials-columns.csv")
+stopifnot(identical(told$column, names(t)), all(told$meaning != ""))
 kept <- t[t$excluded == "", ]
 fit <- anova(lm(score ~ factor(subject) + sed_MPa, kept))
 ss <- fit[["Sum Sq"]]
@@ -31,8 +41,15 @@ def found():
 @pytest.fixture
 def folder(found, tmp_path):
     (tmp_path / "trials.csv").write_text(trials_csv(found), encoding="utf-8")
+    (tmp_path / "trials-columns.csv").write_text(columns_csv(found), encoding="utf-8")
     (tmp_path / "paths.csv").write_text(paths_csv(found), encoding="utf-8")
     return tmp_path
+
+
+def test_every_field_of_a_trial_has_a_column_with_its_meaning(found):
+    heads = trials_csv(found).splitlines()[0].split(",")
+    assert heads == [row[0] for row in list(csv.reader(columns_csv(found).splitlines()))[1:]]
+    assert {field.name for field in fields(TrialRow)} - {"paths"} == set(_MEANING)
 
 
 @pytest.mark.skipif(RSCRIPT is None, reason="no R to open the table in")
@@ -55,4 +72,7 @@ def test_pandas_opens_the_table_with_every_number(found, folder):
     assert table["sed_MPa"].tolist() == pytest.approx([row.sed for row in rows], rel=1e-14)
     assert table["score"].tolist() == pytest.approx([row.score for row in rows], rel=1e-14)
     assert table.dtypes["index"] == "int64"
+    assert table["sed_low_MPa"].tolist() == pytest.approx([row.sed_low for row in rows], rel=1e-14)
+    told = pandas.read_csv(folder / "trials-columns.csv", keep_default_na=False)
+    assert told["column"].tolist() == table.columns.tolist()
     assert table["excluded"].notna().sum() == 5  # the five trials of the one subject left out
