@@ -18,7 +18,7 @@ from daq_app.cli import WrongValue
 from daq_app.console import Console
 from daq_app.pooling import Shelf, visits
 from sessions.pooling.exclusions import exclusions_in
-from sessions.pooling.pooled import StudyFindings, pooled
+from sessions.pooling.pooled import UNITS, StudyFindings, pooled
 from sessions.pooling.visit import VisitOptions
 from sessions.prediction import PredictionOptions
 from sessions.recording import RecordingError
@@ -139,7 +139,7 @@ def _print(study: StudyFindings, files: dict[str, str], console: Console) -> Non
     for one in study.effects:
         inside = "inside" if one.covered else "OUTSIDE"
         console.say(
-            f"planted {one.descriptor}, {one.effect}: {one.planted:g}, found {one.found:.3g} "
+            f"planted {one.descriptor}, {one.effect} [{UNITS[one.effect]}]: {one.planted:.3g}, found {one.found:.3g} "
             f"({one.low:.3g} to {one.high:.3g}): {inside}"
         )
     for what, path in files.items():

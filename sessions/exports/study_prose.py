@@ -17,27 +17,35 @@ _FEW = 12  # trials named one by one
 def summary(study: StudyFindings) -> list[str]:
     """Return the findings in short, a sentence each."""
     subjects = {visit.subject for visit in study.visits}
-    said = [f"{plural(len(study.visits), 'session')} of {plural(len(subjects), 'subject')} were read."]
+    read = "was" if len(study.visits) == 1 else "were"
+    said = [f"{plural(len(study.visits), 'session')} of {plural(len(subjects), 'subject')} {read} read."]
+    strain = study.options.prediction.kinematics
     for one in study.descriptors:
-        said += _related(one)
+        said += _related(one, strain)
         said += [paths_sentence(one.descriptor, one.paths)] if one.paths else []
+    if strain == "small" and any(one.repeated is not None for one in study.descriptors):
+        said.append("At finite strain, which is not computed here, the sign may be another: --kinematics finite tells.")
     if study.friction is not None:
         f = study.friction
         said.append(
             f"Of {f.strokes} strokes the planted µ came back with a median error of "
             f"{digits(100 * f.median_error, 2)} %, {digits(100 * f.worst_error, 2)} % at worst; "
-            f"{f.covered} of {f.intervals} intervals of µ hold it."
+            f"{f.covered} of {f.intervals} intervals of µ hold it, and those of one subject hold or miss together, for "
+            "the error of a transducer's calibration is one for all its strokes."
         )
     return said
 
 
-def _related(one: DescriptorFindings) -> list[str]:
+def _related(one: DescriptorFindings, strain: str) -> list[str]:
     name = one.descriptor[:1].upper() + one.descriptor[1:]
     if one.repeated is None:
         return [f"{name}: too few subjects with scores and strokes of their own for a correlation within subjects."]
     r = one.repeated
     interval = f"95 % interval {correlation(r.low)} to {correlation(r.high)}"
-    return [f"{name}: within subjects, score and predicted SED go together by r = {correlation(r.r)}, {interval}."]
+    return [
+        f"{name}: within subjects, score and the SED predicted at {strain} strain go together by "
+        f"r = {correlation(r.r)}, {interval}."
+    ]
 
 
 def who(study: StudyFindings) -> list[Fact]:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Sequence
 
-from sessions.analysis.scores import Relation
+from sessions.analysis.scores import MeanScore, Relation
 from sessions.analysis.within import RepeatedCorrelation
 from sessions.exports.report_tables.cells import Cell, Column, Notes, Table
 from sessions.exports.report_tables.paths import paths_table
@@ -14,6 +14,8 @@ from sessions.exports.wording import NONE, correlation, digits, significant
 from sessions.pooling.averages import Average
 from sessions.pooling.pooled import DescriptorFindings, StudyFindings
 from sessions.pooling.visit import Visit
+
+POINTS = "0–100"  # unit of scores
 
 
 def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
@@ -65,11 +67,18 @@ def _scores(study: StudyFindings) -> Table:
                 Cell(str(mean.n)),
                 Cell(digits(mean.mean, 1)),
                 notes.number(mean.sd, lambda v: digits(v, 1), mean.reason),
-                interval(mean.low, mean.high, 1),
+                _of_scores(mean, notes),
                 interval(None, None, 1) if inner is None else interval(inner.low, inner.high, 1),
             )
 
-    columns = ("index", "subjects", "mean score", "standard deviation", "95 % interval of the mean", "within subjects")
+    columns = (
+        Column("index"),
+        Column("subjects"),
+        Column("mean score", POINTS),
+        Column("standard deviation", POINTS),
+        Column("95 % interval of the mean", POINTS),
+        Column("within subjects", POINTS),
+    )
     complete = ", ".join(f"{one.within[0].n} for {one.descriptor}" for one in study.descriptors if one.within)
     caption = (
         "Scores: t interval of the mean over subjects; and interval within subjects (Cousineau 2005, Morey 2008), for "
@@ -77,6 +86,16 @@ def _scores(study: StudyFindings) -> Table:
     )
     groups = _by_descriptor(study, rows)
     return study_table("table-scores", caption, columns, groups, notes)
+
+
+def _of_scores(mean: MeanScore, notes: Notes) -> Cell:
+    """Return the t interval of a mean score; where that leaves the scale, with what cannot."""
+    told = interval(mean.low, mean.high, 1)
+    if mean.bootstrap is None:
+        return told
+    low, high = (digits(end, 1) for end in mean.bootstrap)
+    where = f"{mean.descriptor} {mean.index}: the t interval leaves the scale; resampling the subjects {low} to {high}"
+    return Cell(told.text, notes.mark(where))
 
 
 def _agreement(study: StudyFindings) -> Table:
@@ -113,7 +132,15 @@ def _normalised(study: StudyFindings) -> Table:
                 interval(mean.low, mean.high, 2),
             )
 
-    columns = ("index", "subjects", "as given", "95 % interval", "subjects", "standardised", "95 % interval")
+    columns = (
+        Column("index"),
+        Column("subjects"),
+        Column("as given", POINTS),
+        Column("95 % interval", POINTS),
+        Column("subjects"),
+        Column("standardised", "1"),
+        Column("95 % interval", "1"),
+    )
     caption = (
         "Scores as they were given and standardised: each subject's own mean taken away and the rest divided by its "
         "own standard deviation over the surfaces it scored, which takes away what part of the scale a subject uses. "
@@ -134,7 +161,14 @@ def _differences(study: StudyFindings) -> Table:
                 Cell(p_value(pair.p_holm)),
             )
 
-    columns = ("index", "subjects", "difference of scores", "95 % interval", "p", "p, Holm")
+    columns = (
+        Column("index"),
+        Column("subjects"),
+        Column("difference of scores", POINTS),
+        Column("95 % interval", POINTS),
+        Column("p"),
+        Column("p, Holm"),
+    )
     caption = (
         "How much higher one surface was scored than another, within subjects: mean and t interval of the differences, "
         "paired t test, and its p corrected for all pairs of the descriptor (Holm 1979)."
@@ -226,7 +260,7 @@ def _forces(study: StudyFindings) -> Table:
     caption = (
         "Model against measurement: normal force over the steady window, the force of the model pressed to the depth "
         "of its block (times the finger's width, assumed unless it was measured), and the depth at which the model "
-        "would press as hard as the subject did. Means over subjects with t intervals."
+        f"would press as hard as the subject did. Means over subjects with t intervals. Model: {model_in_short(study)}."
     )
     return study_table(
         "table-forces", caption, columns, [(one.descriptor, tuple(row(one))) for one in study.descriptors], notes
@@ -251,6 +285,11 @@ def _mean(mean: Average | None, decimals: int, notes: Notes) -> tuple[Cell, Cell
 
 
 def _relation(study: StudyFindings) -> Table:
+    notes = Notes()
+
+    def or_why(cell: Cell, why: str | None) -> Cell:
+        return notes.number(None, str, why) if cell.text == NONE else cell
+
     def means(name: str, related: Relation | None) -> Iterable[tuple[Cell, ...]]:
         if related is not None and related.pearson is not None:
             rho = NONE if related.spearman is None else correlation(related.spearman)
@@ -258,9 +297,9 @@ def _relation(study: StudyFindings) -> Table:
                 Cell(name),
                 Cell(f"{related.n} surfaces"),
                 Cell(correlation(related.pearson)),
-                correlations(related.low, related.high),
+                or_why(correlations(related.low, related.high), related.reason),
                 Cell(rho),
-                correlations(related.spearman_low, related.spearman_high),
+                or_why(correlations(related.spearman_low, related.spearman_high), _no_rank_interval(related)),
                 Cell(NONE if related.spearman_p is None else p_value(related.spearman_p)),
                 Cell(NONE),
                 _without([(f"index {label}", r) for label, r in related.without if r is not None]),
@@ -310,7 +349,12 @@ def _relation(study: StudyFindings) -> Table:
         "(Bakdash and Marusich 2017), and its p corrected for the descriptors that have one (Holm 1979). Last column: "
         "least and greatest r when one surface, or one subject, is left out, and which."
     )
-    return study_table("table-relation", caption, columns, [(one.descriptor, rows(one)) for one in study.descriptors])
+    groups = [(one.descriptor, rows(one)) for one in study.descriptors]
+    return study_table("table-relation", caption, columns, groups, notes)
+
+
+def _no_rank_interval(related: Relation) -> str:
+    return "no interval of a perfect rho" if related.n > 3 else f"no interval of rho from {related.n} points"
 
 
 def _without(left_out: Sequence[tuple[str, float]]) -> Cell:

@@ -18,6 +18,7 @@ from sessions.pooling.visit import Visit, VisitOptions
 from sessions.prediction import PredictionOptions
 
 STEADY = VisitOptions()
+QUICK = VisitOptions(PredictionOptions(course="steady"))
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +62,9 @@ def test_friction_comes_back_as_planted_but_for_the_calibration(pool, study):
         for row in visit["rows"]:
             if row["mu"] is not None:  # each axis' gain is planted with a standard deviation of 1 %
                 assert row["mu"] == pytest.approx(truth[visit["subject"], row["trial"]], rel=0.05)
-                assert row["mu_low"] < row["mu"] < row["mu_high"]
+                for name in ("mu", "tau_max", "speed", "sed"):
+                    assert row[f"{name}_low"] < row[name] < row[f"{name}_high"]
+                assert row["sed_interval"] in ("by derivatives", "by sampling")
 
 
 def test_what_was_computed_once_is_not_computed_again(pool, study, monkeypatch):
@@ -85,10 +88,9 @@ def test_another_recording_or_other_options_are_another_key(study):
 
 
 def test_a_session_whose_files_are_sent_gives_the_same_bits_as_one_on_the_disk(pool, study):
-    name, here = computed(study / "S01", STEADY)
-    assert computed_from(name, content_of(study / "S01"), STEADY) == (name, here)
-    stored = next(visit for visit in pool["visits"] if visit["session"] == "S01")
-    assert json.loads(json.dumps(here)) == stored  # and the same in this process as in another
+    name, sent = computed_from("S01", content_of(study / "S01"), STEADY)
+    stored = next(visit for visit in pool["visits"] if visit["session"] == "S01")  # from the disk, by another process
+    assert (name, json.loads(json.dumps(sent))) == ("S01", stored)
 
 
 def test_a_worker_that_dies_costs_its_own_session_alone(study, tmp_path, monkeypatch):
@@ -96,10 +98,10 @@ def test_a_worker_that_dies_costs_its_own_session_alone(study, tmp_path, monkeyp
         for folder in folders:
             if folder.name == "S02":
                 raise pooling.BrokenProcessPool
-            yield computed(folder, STEADY)
+            yield computed(folder, QUICK)
 
     monkeypatch.setattr(pooling, "_in_pool", dying)
-    done, failed = visits([study / "S02", study / "S01"], STEADY, Shelf(tmp_path, STEADY), Console(as_json=True))
+    done, failed = visits([study / "S02", study / "S01"], QUICK, Shelf(tmp_path, QUICK), Console(as_json=True))
     assert [visit.session for visit in done] == ["S01"]
     assert [name for name, _ in failed] == ["S02"]
 
