@@ -27,6 +27,7 @@ from solver.scene import Scene
 FINENESS = {"small": (5, 6, 8, 10, 12, 16, 20, 24), "finite": (7, 10, 14, 20, 24)}  # meshes that can be asked for
 DEFAULT = {"small": 8, "finite": 10}
 FROM_MESHES = {"small": 0.15, "finite": 0.35}
+FROM_NAIL = {"small": 2.0, "finite": 3.5}  # the same where a nail ends: errors fall with the element, or its root
 FROM_FINENESS = {"small": ((0.07, 2.0),), "finite": ((0.15, 2.0), (0.06, 1.5))}  # the largest, by the power given
 FROM_COARSE = 1.0  # of both forces at small strain, by fineness to the fourth power
 FROM_LIMIT, CALM = 1.5, 2.0  # of the mesh's own part, for every relative change by friction's beyond that many
@@ -108,7 +109,8 @@ def _off(scene: Scene, fineness: float, numbers: Array, others: Array, felt: Arr
         part += FROM_LIMIT * _least(scene, fineness) * np.maximum(np.abs(felt) - CALM, 0.0)
     elif not marched and np.any(felt):
         part += FROM_EDGE * scene.friction.cap * _element(scene, fineness) / size[2] * np.abs(felt)
-    return FROM_MESHES[kind] * largest + part * size
+    from_meshes = (FROM_NAIL if scene.finger.nail_length > 0.0 else FROM_MESHES)[kind]
+    return from_meshes * largest + part * size
 
 
 def coarsest_for(scene: Scene, tolerance: float) -> float:

@@ -206,7 +206,7 @@ DECEIVING = (
 )
 
 
-@pytest.mark.parametrize("tolerance", [0.01, None])
+@pytest.mark.parametrize("tolerance", [pytest.param(0.01, marks=pytest.mark.slow), None])
 @pytest.mark.parametrize("drawn", DECEIVING, ids=["layers", "bound"])
 def test_at_finite_strain_estimates_see_layers_in_the_fat_and_the_bound_at_the_edges_of_contact(drawn, tolerance):
     depth, mu, bound, slide, angle, moduli, truth = drawn
