@@ -7,6 +7,7 @@ loops are some ten times as fast; to load them takes longer than a solve, so who
 from collections.abc import Sequence
 from copy import copy
 from functools import lru_cache
+from threading import Lock
 from typing import Self
 
 import numpy as np
@@ -14,12 +15,13 @@ from numpy.linalg import LinAlgError
 
 from solver.elements import Q2P1
 from solver.elimination import Plan
-from solver.kernels import condense, hooke
+from solver.kernels import condense, eliminate, hooke
 from solver.mesh import Array, Indices, Mesh
 from solver.stiffness import Elastic, Isotropic
 
 _VALUES, _SLOPES = Q2P1.shape(Q2P1.points)
 _ALONG, _UP = np.ascontiguousarray(_SLOPES[..., 0]), np.ascontiguousarray(_SLOPES[..., 1])
+_ALONE = Lock()  # held while the memory of `_room` is in use
 
 
 class ReducedInLoops:
@@ -36,17 +38,20 @@ class ReducedInLoops:
         lame = np.array([m.lame for m in materials])[mesh.region]
         stiffness, dilatation, centre = np.empty((count, 18, 18)), np.empty((count, 3, 18)), np.empty((count, 2))
         self._fold, self._factors, skin = np.empty((count, 2, 16)), np.empty(plan.factors), np.empty((width, width))
-        ended = hooke.reduce(
-            mesh.nodes, mesh.elements, shear, lame, _VALUES, _ALONG, _UP, Q2P1.weights, plan.start, plan.inner,
-            plan.border, plan.children, plan.border_at, plan.place, plan.run, plan.factor_at, plan.wait_at, plan.leaf,
-            plan.order, plan.at, _room(256 * count + plan.waiting), stiffness, dilatation, centre, self._fold,
-            self._factors, skin,
-        )  # fmt: skip
-        if ended != hooke.SOUND:
-            folded = ended == hooke.FOLDED
-            raise LinAlgError(
-                "an element is folded" if folded else "the stiffness inside the body is not positive definite"
-            )
+        with _ALONE:
+            room = _room(256 * count + plan.waiting)
+            outer, waiting = room[: 256 * count].reshape(count, 16, 16), room[256 * count :]
+            if not hooke.stiffen(
+                mesh.nodes, mesh.elements, shear, lame, _VALUES, _ALONG, _UP, Q2P1.weights, stiffness, dilatation,
+                centre, outer, self._fold,
+            ):  # fmt: skip
+                raise LinAlgError("an element is folded")
+            sound = eliminate(
+                outer, plan.start, plan.inner, plan.border, plan.children, plan.border_at, plan.place, plan.run,
+                plan.factor_at, plan.wait_at, plan.leaf, plan.order, plan.at, self._factors, waiting, skin,
+            )  # fmt: skip
+        if not sound or not hooke.definite(plan.start, plan.inner, plan.border, plan.factor_at, self._factors):
+            raise LinAlgError("the stiffness inside the body is not positive definite")
         self._mesh, self._plan = mesh, plan
         self.elastic = Elastic(stiffness, dilatation, centre, shear, lame)
         nodes = np.arange(width // 2)
@@ -117,8 +122,5 @@ class ReducedInLoops:
 
 @lru_cache(maxsize=1)
 def _room(size: int) -> Array:
-    """Return memory that one compiled call uses and forgets, always the same: new memory takes as long as the work.
-
-    No other thread runs within a compiled call.
-    """
+    """Return memory for what is forgotten at once, always the same: to be given new memory takes as long as the work."""
     return np.empty(size)

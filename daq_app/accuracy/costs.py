@@ -1,7 +1,8 @@
 """Where the time of one solve goes: mesh, assembly, factorisation, contact, estimate.
 
 A solve through the front door is run once to load what must be loaded, timed, and run again under a profiler whose
-shares are then of the time without it. What a function outside the solver takes is its caller's.
+shares are then of the time without it. What a function outside the solver takes is its caller's; all that is done for
+the error estimate is the estimate's, on whatever mesh.
 """
 
 import cProfile
@@ -10,9 +11,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from time import perf_counter
 from typing import cast
 
-from daq_app.accuracy.asked import Asked, Found, LeftOut, timed, within
+from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, timed, within
 from daq_app.accuracy.methods import Kinematics
 from daq_app.accuracy.truth import KINEMATICS, cases
 from solver.scene import Solve
@@ -26,13 +28,11 @@ FILES = {
     "contact": "contact", "friction": "contact", "skin": "contact", "receptor": "receptor", "newton": "iteration",
     "sliding": "iteration", "existence": "proof of existence", "crossing": "proof of existence",
     "limit": "proof of existence", "audits": "audits and evidence", "evidence": "audits and evidence",
-    "kernels_numpy": "audits and evidence",
+    "kernels_numpy": "audits and evidence", "hooke": "assembly", "in_loops": "factorisation", "rubbing": "contact",
+    "contact_in_loops": "contact", "small_states": "contact",
 }  # fmt: skip
-LOOPS = {
-    "assemble": "assembly", "advance": "assembly", "factorise": "factorisation", "substitute": "factorisation",
-    "impose": "contact", "reactions": "contact", "tributary": "contact", "restate": "contact", "energies": "receptor",
-}  # fmt: skip
-OTHER = "the rest"
+LOOPS = {"energies": "receptor", "displace": "factorisation"}
+ESTIMATE, OTHER = "error estimate", "the rest"
 Function = tuple[str, int, str]  # file, line, name
 Spent = tuple[
     int, int, float, float, dict["Function", tuple[int, int, float, float]]
@@ -47,7 +47,7 @@ class Cost:
     tolerance: float
     dofs: int
     took_s: float  # from scene to answer: median
-    setup_s: float  # as the answer itself tells
+    setup_s: float  # as the answer itself tells, of the mesh it is from
     wall_s: float
     estimate_s: float
     parts: dict[str, float]  # shares of `took_s`
@@ -65,15 +65,18 @@ def measure(asked: Asked, found: Found) -> Iterator[Cost | LeftOut]:
             return
         kinematics, tolerance = work
         scene = replace(cases(kinematics)[-1], solve=Solve(kinematics, tolerance=tolerance))
-        answer = solve(scene)
-        span = timed(partial(solve, scene), 5, 1.5)
+        solve(scene, in_loops=True)
+        begun, before = clock(), perf_counter()
+        answer = solve(scene, in_loops=True)
+        own = (clock() - begun) / (perf_counter() - before)  # of the time that passed, by which answers tell theirs
+        span = timed(partial(solve, scene, in_loops=True), 5, 1.5)
         profile = cProfile.Profile(builtins=False)
         profile.enable()
-        solve(scene)
+        solve(scene, in_loops=True)
         profile.disable()
         yield Cost(
-                kinematics, tolerance, answer.dofs, span, answer.setup_s, answer.wall_s, answer.estimate_s,
-                shares(pstats.Stats(profile)),
+                kinematics, tolerance, answer.dofs, span, own * answer.setup_s, own * answer.wall_s,
+                own * answer.estimate_s, shares(pstats.Stats(profile)),
             )  # fmt: skip
 
 
@@ -99,11 +102,34 @@ def shares(profile: pstats.Stats) -> dict[str, float]:
         return part_of[function]
 
     spent: dict[str, float] = {}
+    estimating = _estimating(raw)
     for function, row in raw.items():
+        its = estimating[function]
+        spent[ESTIMATE] = spent.get(ESTIMATE, 0.0) + its * row[2]
         for name, share in parts(function, frozenset()).items():
-            spent[name] = spent.get(name, 0.0) + share * row[2]
+            spent[name] = spent.get(name, 0.0) + (1.0 - its) * share * row[2]
+    spent = {name: value for name, value in spent.items() if value > 0.0}
     total = sum(spent.values())
     return {name: value / total for name, value in sorted(spent.items(), key=lambda item: -item[1])}
+
+
+def _estimating(raw: dict[Function, Spent]) -> dict[Function, float]:
+    """Return which part of each function's time is spent for the error estimate: on coarser meshes, and in judging."""
+    known: dict[Function, float] = {}
+
+    def its(function: Function, above: frozenset[Function]) -> float:
+        path, _, name = function
+        file = Path(path).stem
+        if file.endswith("_errors") or name.endswith("error_estimates") or name == "_coarser":
+            return 1.0
+        if function not in known:
+            callers = {c: spent[3] for c, spent in raw[function][4].items() if c not in above}
+            total = sum(callers.values())
+            theirs = sum(spent * its(c, above | {function}) for c, spent in callers.items())
+            known[function] = theirs / total if total > 0.0 else 0.0
+        return known[function]
+
+    return {function: its(function, frozenset()) for function in raw}
 
 
 def _part(function: Function) -> str | None:

@@ -17,7 +17,20 @@ from daq_app.accuracy.methods import PLAIN
 from daq_app.accuracy.orders import Order
 from daq_app.accuracy.speed import Speed
 from daq_app.accuracy.truth import JUDGED, NUMBERS, Truth
-from sessions.exports.figures.style import GREEN, GREY, PALE, PURPLE, SKY, VERMILLION, Panel, Plate, look, sheet, svg
+from sessions.exports.figures.style import (
+    GREEN,
+    GREY,
+    INK,
+    PALE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    Panel,
+    Plate,
+    look,
+    sheet,
+    svg,
+)
 
 COLOURS = {"small": GREEN, "finite": VERMILLION}
 MARKS = {"small": "o", "finite": "s"}
@@ -89,7 +102,7 @@ def benchmark_plate(found: Measured) -> Plate:
     panel = _order_panel(found.of(Order), "benchmarks", "time of a solve [s]", lambda row: row.took_s)
     caption = (
         "Time against true error on problems with a known answer, mesh included: thick cylinder, Cook's membrane, "
-        "half-plane under a round body, and the finger at its ending. Hovering names a curve."
+        "half-plane under a round body, and the finger at its ending. The table of orders names every point."
     )
     return Plate("benchmarks", caption, () if panel is None else (panel,))
 
@@ -119,15 +132,19 @@ def _order_panel(
         words = f"{row.problem}, {row.quantity}: order {row.order:.2f}"
         style = "--" if row.kinematics == "finite" else "-"
         axes.plot(
-            across, up, style, marker="o", color=shown.get(row.quantity, GREEN), markersize=3.5, linewidth=0.9,
-            gid=drawn.note(words),
+            across, up, style, marker=_mark(row.problem), color=shown.get(row.quantity, GREEN), markersize=3.5,
+            linewidth=0.9, gid=drawn.note(words),
         )  # fmt: skip
         table += [
             (row.problem, row.quantity, row.kinematics, size, error, took)
             for size, error, took in zip(row.sizes, row.errors, row.took_s, strict=True)
         ]
     for quantity in dict.fromkeys(row.quantity for row in rows):
-        axes.plot([], [], "-", marker="o", color=shown.get(quantity, GREEN), markersize=3.5, label=quantity)
+        axes.plot([], [], "-", color=shown.get(quantity, GREEN), label=quantity)
+    for kind in dict.fromkeys(row.problem.split(",")[0] for row in rows):
+        axes.plot([], [], " ", marker=_mark(kind), color=GREY, markersize=3.5, label=kind)
+    if any(row.kinematics == "finite" for row in rows):
+        axes.plot([], [], "--", color=GREY, label="finite strain")
     axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     _logarithmic(axes)
     axes.set_xlabel("error [–]" if time is not None else "element size, by the unit of each problem [–]")
@@ -135,6 +152,12 @@ def _order_panel(
     header = ("problem", "quantity", "kinematics", "element size", "error [-]", "time of a solve [s]")
     title = "Time against true error on published problems" if time is not None else "Error against element size"
     return Panel(name, title, svg(drawn, name, title, simulated=False), header, tuple(table))
+
+
+def _mark(problem: str) -> str:
+    """Return the mark of a problem, whatever its parameters."""
+    marks = {"thick cylinder": "o", "Cook's membrane": "s", "finger": "D", "half-plane under a round body": "^"}
+    return marks.get(problem.split(",")[0], "x")
 
 
 def estimate_plate(found: Measured) -> Plate:
@@ -213,7 +236,7 @@ def cost_plate(found: Measured) -> Plate:
 
 
 def _distinct(count: int) -> list[str]:
-    base = [GREEN, VERMILLION, SKY, PURPLE, "#E69F00", "#0072B2", "#F0E442", GREY, PALE]
+    base = [GREEN, VERMILLION, SKY, PURPLE, "#E69F00", "#0072B2", "#F0E442", GREY, PALE, "#8C564B", INK]
     return [base[n % len(base)] for n in range(count)]
 
 

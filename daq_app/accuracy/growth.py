@@ -32,7 +32,7 @@ def measure(asked: Asked, found: Found) -> Iterator[Growth | LeftOut]:
         scene = cases(method.kinematics)[0]
         last: Growth | None = None
         for fineness in asked.pick(MESHES, QUICK):
-            if last is not None:
+            if last is not None and not asked.quick:
                 larger = last.dofs * (fineness / last.fineness) ** 1.6
                 awaited = (last.setup_s + 2.0 * last.floor_s) * (larger / last.dofs) ** 2.2
                 if awaited > SHARE * asked.left:

@@ -94,7 +94,8 @@ def _commands(folder: Path) -> list[tuple[str, list[str]]]:
         ("Python alone", [python, "-c", "pass"]),
         ("Python and its arrays", [python, "-c", "import numpy, scipy.linalg"]),
     ]
-    for kinematics in ("small", "finite"):
+    for kinematics, loaded in (("small", "solver.solution"), ("finite", "solver.finite_solution")):
+        out.append((f"the solver loaded, {kinematics} strain", [python, "-c", f"import {loaded}"]))
         scene = folder / f"{kinematics}.toml"
         scene.write_text(SCENE.format(kinematics=kinematics), encoding="utf-8")
         out.append((f"daq-app solve, {kinematics} strain", [python, "-m", "daq_app", "solve", str(scene), "--json"]))

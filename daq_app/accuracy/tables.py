@@ -98,21 +98,26 @@ def truths(found: Measured) -> Table:
 
 
 def speeds(found: Measured) -> Table:
-    """Return time against error."""
-    rows: list[Speed] = found.of(Speed)
+    """Return time against error, way by way."""
+    rows: list[Speed] = sorted(found.of(Speed), key=lambda row: (row.kinematics == "finite", row.method, row.dofs))
     cells = [
         (
-            row.method, row.element, row.linear_solver, f"{row.dofs:,}", _ms(row.setup_s), _ms(row.floor_s),
-            _ms(row.first_s), _ms(row.next_s), "–" if row.judged_error is None else percent(row.judged_error),
+            row.method, row.element, str(row.order), row.linear_solver, f"{row.dofs:,}", _ms(row.setup_s),
+            _ms(row.floor_s), _ms(row.first_s), _ms(row.next_s), "–" if row.judged_error is None else percent(row.judged_error),
             ", ".join(row.failed) or "–",
         )
         for row in rows
     ]  # fmt: skip
     header = (
-        "way", "element", "linear solver", "unknowns", "set-up [ms]", "floor [ms]", "first [ms]", "next [ms]",
+        "way", "element", "order", "linear solver", "unknowns", "set-up [ms]", "floor [ms]", "first [ms]", "next [ms]",
         "largest error", "no answer",
     )  # fmt: skip
-    return Table("speeds", "Time against true error, mesh by mesh.", header, tuple(cells))
+    caption = (
+        "Time against true error, mesh by mesh. Order: of the element's displacements. Floor: one assembly, "
+        "factorisation and solve. First, next: a surface from undeformed, a further one. What lost to these is told in "
+        "the decision on what the solver is made of, docs/decisions."
+    )
+    return Table("speeds", caption, header, tuple(cells))
 
 
 def estimates(found: Measured) -> Table:
@@ -182,7 +187,11 @@ def costs(found: Measured) -> Table:
         for row in rows
     ]  # fmt: skip
     header = ("", "tolerance", "unknowns", "in all [ms]", "set-up [ms]", "solve [ms]", "estimate [ms]", "by part")
-    return Table("costs", "Where the time of one surface goes, with a guaranteed tolerance.", header, tuple(cells))
+    caption = (
+        "Where the time of one surface goes, asked for with a tolerance: in all, from scene to answer. Set-up, solve "
+        "and estimate are of the mesh that the answer is from, as it tells itself; parts are shares of all, by a profiler."
+    )
+    return Table("costs", caption, header, tuple(cells))
 
 
 def starts(found: Measured) -> Table:
@@ -190,7 +199,10 @@ def starts(found: Measured) -> Table:
     rows: list[Cold] = found.of(Cold)
     cells = [(row.what, str(row.runs), _ms(row.took_s), _ms(row.passed_s)) for row in rows]
     header = ("process", "runs", "processor time [ms]", "time that passed [ms]")
-    return Table("starts", "Processes from start to end, medians.", header, tuple(cells))
+    caption = (
+        "Start-up: processes from start to end, medians. What Python and the solver take to load is in the last ones."
+    )
+    return Table("starts", caption, header, tuple(cells))
 
 
 def orders(found: Measured) -> Table:
@@ -199,12 +211,13 @@ def orders(found: Measured) -> Table:
     cells = [
         (
             row.problem, row.quantity, row.kinematics, " / ".join(f"{error:.1e}" for error in row.errors),
-            f"{row.order:.2f}", f"{row.least:g}",
+            " / ".join(short(1e3 * took) for took in row.took_s), f"{row.order:.2f}", f"{row.least:g}",
         )
         for row in rows
     ]  # fmt: skip
-    header = ("problem", "quantity", "strain", "errors, coarse to fine", "order", "at least")
-    return Table("orders", "Observed orders of convergence.", header, tuple(cells))
+    header = ("problem", "quantity", "strain", "errors, coarse to fine", "time [ms]", "order", "at least")
+    caption = "Observed orders of convergence. Time: of a solve on each mesh, the mesh included."
+    return Table("orders", caption, header, tuple(cells))
 
 
 def problems(found: Measured) -> Table:

@@ -7,9 +7,6 @@
 import numpy as np
 
 from solver.kernels.compiling import Array, Flags, Narrow, Wide, compiled
-from solver.kernels.fronts import eliminate
-
-SOUND, FOLDED, UNSTABLE = 0, 1, 2  # what `reduce` returns
 
 
 @compiled
@@ -205,51 +202,10 @@ def displace(
 
 
 @compiled
-def reduce(
-    place: Array,
-    nodes: Wide,
-    shear: Array,
-    lame: Array,
-    values: Array,
-    along: Array,
-    up: Array,
-    weights: Array,
-    start: Narrow,
-    inner: Narrow,
-    border: Narrow,
-    children: Narrow,
-    border_at: Narrow,
-    spot: Narrow,
-    run: Narrow,
-    factor_at: Wide,
-    wait_at: Wide,
-    leaf: Narrow,
-    order: Narrow,
-    at: Narrow,
-    room: Array,
-    stiffness: Array,
-    dilatation: Array,
-    centre: Array,
-    fold: Array,
-    factors: Array,
-    skin: Array,
-) -> int:
-    """Assemble a body and eliminate all but its skin, filling what `stiffen` and `eliminate` fill.
-
-    `room` is memory for what is forgotten again: 256 numbers an element, and those that wait. Returns SOUND, FOLDED
-    where an element is, or UNSTABLE where a pivot is not positive.
-    """
-    count = nodes.shape[0]
-    outer = room[: 256 * count].reshape(count, 16, 16)
-    if not stiffen(place, nodes, shear, lame, values, along, up, weights, stiffness, dilatation, centre, outer, fold):
-        return FOLDED
-    if not eliminate(
-        outer, start, inner, border, children, border_at, spot, run, factor_at, wait_at, leaf, order, at, factors,
-        room[256 * count :], skin,
-    ):  # fmt: skip
-        return UNSTABLE
+def definite(start: Narrow, inner: Narrow, border: Narrow, factor_at: Wide, factors: Array) -> bool:
+    """Return whether every pivot of an elimination is positive, as those of a stable body are."""
     for p in range(start.shape[0]):
         for i in range(inner[p]):
             if not factors[factor_at[p] + i * (inner[p] + border[p] + 1)] > 0.0:
-                return UNSTABLE
-    return SOUND
+                return False
+    return True
