@@ -122,5 +122,5 @@ class ReducedInLoops:
 
 @lru_cache(maxsize=1)
 def _room(size: int) -> Array:
-    """Return memory for what is forgotten at once, always the same: to be given new memory takes as long as the work."""
+    """Return memory for what is forgotten at once, always the same: to be given new takes as long as the work."""
     return np.empty(size)

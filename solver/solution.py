@@ -215,9 +215,7 @@ def _solve_on(
         fine = _meshed(scenes[0], Sizing(fineness, depth, margin=margin), in_loops)
         setup = perf_counter() - begun - fine.solve_s
         begun = perf_counter()
-        coarse = tuple(
-            _meshed(scenes[0], Sizing(fineness / 2.0, depth, shift, margin=margin), in_loops) for shift in (False, True)
-        )
+        coarse = _coarser(scenes[0], Sizing(fineness, depth, margin=margin), in_loops)
         estimate = (perf_counter() - begun) / len(scenes)
         shared = _Shared(fineness, fine, coarse, setup, fine.solve_s / len(scenes), estimate, widest=margin == WIDE)
         done = []
@@ -231,6 +229,12 @@ def _solve_on(
             break
     lost = NotConverged("The skin touched the surface beyond every part of it where contact was looked for.")
     return [lost if answer is None else answer for answer in done]
+
+
+def _coarser(scene: Scene, sizing: Sizing, in_loops: bool) -> tuple[FingerModel, FingerModel]:
+    """Return the two fingers of the estimate: elements twice as long, and those moved along the skin by half of one."""
+    twice = replace(sizing, fineness=sizing.fineness / 2.0)
+    return _meshed(scene, twice, in_loops), _meshed(scene, replace(twice, shift=True), in_loops)
 
 
 def _of_all(progress: Progress | None, number: int, count: int) -> Progress | None:

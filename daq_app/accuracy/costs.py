@@ -29,7 +29,7 @@ FILES = {
     "sliding": "iteration", "existence": "proof of existence", "crossing": "proof of existence",
     "limit": "proof of existence", "audits": "audits and evidence", "evidence": "audits and evidence",
     "kernels_numpy": "audits and evidence", "hooke": "assembly", "in_loops": "factorisation", "rubbing": "contact",
-    "contact_in_loops": "contact", "small_states": "contact",
+    "contact_in_loops": "contact", "small_states": "contact", "holding": "audits and evidence",
 }  # fmt: skip
 LOOPS = {"energies": "receptor", "displace": "factorisation"}
 ESTIMATE, OTHER = "error estimate", "the rest"

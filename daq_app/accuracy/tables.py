@@ -103,8 +103,8 @@ def speeds(found: Measured) -> Table:
     cells = [
         (
             row.method, row.element, str(row.order), row.linear_solver, f"{row.dofs:,}", _ms(row.setup_s),
-            _ms(row.floor_s), _ms(row.first_s), _ms(row.next_s), "–" if row.judged_error is None else percent(row.judged_error),
-            ", ".join(row.failed) or "–",
+            _ms(row.floor_s), _ms(row.first_s), _ms(row.next_s),
+            "–" if row.judged_error is None else percent(row.judged_error), ", ".join(row.failed) or "–",
         )
         for row in rows
     ]  # fmt: skip
@@ -189,7 +189,7 @@ def costs(found: Measured) -> Table:
     header = ("", "tolerance", "unknowns", "in all [ms]", "set-up [ms]", "solve [ms]", "estimate [ms]", "by part")
     caption = (
         "Where the time of one surface goes, asked for with a tolerance: in all, from scene to answer. Set-up, solve "
-        "and estimate are of the mesh that the answer is from, as it tells itself; parts are shares of all, by a profiler."
+        "and estimate are of the mesh that the answer is from, as it tells itself; parts: shares of all, by a profiler."
     )
     return Table("costs", caption, header, tuple(cells))
 
