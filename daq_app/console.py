@@ -2,9 +2,13 @@
 
 import json
 import sys
+import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
 from typing import Any, TextIO
+
+PATIENCE = 1.0  # of people, before they want to see that something is going on [s]
 
 
 class Console:
@@ -45,6 +49,33 @@ class Console:
         line = f"{100 * done:3.0f} %  {text}"
         print(f"\r\x1b[K{line}" if terminal else line, end="" if terminal else "\n", file=self._err, flush=True)
         self._line_open = terminal
+
+    @contextmanager
+    def working(self, text: str) -> Generator[Callable[[float], bool]]:
+        """Show from the second second on how long work has taken whose end nobody knows, whatever it is busy with.
+
+        Yields what the work may tell the part done (0 to 1), where it knows it; the answer is always to go on.
+        """
+        begun, over = time.monotonic(), threading.Event()
+        part = [0.0]
+
+        def told(done: float) -> bool:
+            part[0] = done
+            return True
+
+        def show() -> None:
+            pause = PATIENCE
+            while not over.wait(pause):
+                self.progress(part[0], f"{text}, {time.monotonic() - begun:.0f} s so far; Ctrl-C stops")
+                pause = 0.2
+
+        shower = threading.Thread(target=show, name="progress", daemon=True)
+        shower.start()
+        try:
+            yield told
+        finally:
+            over.set()
+            shower.join()
 
     def _end_progress(self) -> None:
         if self._line_open:

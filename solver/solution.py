@@ -46,29 +46,36 @@ LOW = 1e-8  # part of the indentation by which skin may lie too low before it is
 
 _Answer = Prediction | SolveFailure
 Watch = Callable[[int, _Answer, FingerModel, March | None], None]  # told each answer as it is found, and how
+Rough = Callable[[Prediction], None]  # told an answer before more is made of it: what there is, should work be stopped
 Progress = Callable[[float], bool]  # told the part done, 0 to 1; returns False to stop the work (Cancelled is raised)
 
 
-def solve(scene: Scene, progress: Progress | None = None, *, in_loops: bool = False) -> Prediction:
-    """Return the prediction of one scene; `in_loops` as in `answers`.
+def solve(
+    scene: Scene, progress: Progress | None = None, *, rough: Rough | None = None, in_loops: bool = False
+) -> Prediction:
+    """Return the prediction of one scene; `rough` and `in_loops` as in `answers`.
 
     Raises NoSteadyState where the scene has no settled sliding, NotConverged where none was found, SceneError where
     its finger cannot be meshed, Cancelled where `progress` says so.
     """
-    return solve_together((scene,), progress, in_loops=in_loops)[0]
+    return solve_together((scene,), progress, rough=rough, in_loops=in_loops)[0]
 
 
 def solve_together(
-    scenes: Sequence[Scene], progress: Progress | None = None, *, in_loops: bool = False
+    scenes: Sequence[Scene],
+    progress: Progress | None = None,
+    *,
+    rough: Rough | None = None,
+    in_loops: bool = False,
 ) -> tuple[Prediction, ...]:
-    """Return the predictions of several scenes, in their order; `in_loops` as in `answers`.
+    """Return the predictions of several scenes, in their order; `rough` and `in_loops` as in `answers`.
 
     Scenes with the same finger, materials and receptor share one mesh, fine enough for the strictest tolerance among
     them, so that differences between them are more accurate than each of them; at finite strain those do that are
     pressed alike, its lines moved to the edges of contact of each. Raises as `solve` does.
     """
     done: list[Prediction] = []
-    for answer in answers(scenes, progress, in_loops=in_loops):
+    for answer in answers(scenes, progress, rough=rough, in_loops=in_loops):
         if isinstance(answer, SolveFailure):
             raise answer
         done.append(answer)
@@ -76,7 +83,12 @@ def solve_together(
 
 
 def answers(
-    scenes: Sequence[Scene], progress: Progress | None = None, watch: Watch | None = None, *, in_loops: bool = False
+    scenes: Sequence[Scene],
+    progress: Progress | None = None,
+    watch: Watch | None = None,
+    *,
+    rough: Rough | None = None,
+    in_loops: bool = False,
 ) -> tuple[Prediction | SolveFailure, ...]:
     """Return the prediction of each scene or why it has none, as `solve_together` does.
 
@@ -84,13 +96,16 @@ def answers(
     what a process should ask for that solves again and again. To load them takes longer than one solve without them.
 
     At small strain `watch` is told each answer, by the position of its scene, as soon as it is found, with the finger
-    and the way that led to it; where another mesh is needed it is told once more. Raises SceneError where a finger
-    cannot be meshed, Cancelled where `progress` says so.
+    and the way that led to it; where another mesh is needed it is told once more. `rough` is told the answers that a
+    tolerance sends to a finer mesh, or that await their evidence. Raises SceneError where a finger cannot be meshed,
+    Cancelled where `progress` says so.
     """
     known: dict[int, tuple[_Answer, _Answer]] = {}  # what was told is not looked into again
 
     def evident(answer: _Answer) -> _Answer:
         if id(answer) not in known:
+            if rough is not None and isinstance(answer, Prediction):
+                rough(answer)
             known[id(answer)] = answer, _with_evidence(answer, progress, in_loops)
         return known[id(answer)][1]
 
@@ -98,16 +113,22 @@ def answers(
         assert watch is not None
         watch(number, evident(answer), finger, way)
 
-    return tuple(evident(answer) for answer in _answers(scenes, progress, seen if watch else None, in_loops=in_loops))
+    found = _answers(scenes, progress, seen if watch else None, rough, in_loops=in_loops)
+    return tuple(evident(answer) for answer in found)
 
 
 def _answers(
-    scenes: Sequence[Scene], progress: Progress | None = None, watch: Watch | None = None, *, in_loops: bool
+    scenes: Sequence[Scene],
+    progress: Progress | None = None,
+    watch: Watch | None = None,
+    rough: Rough | None = None,
+    *,
+    in_loops: bool,
 ) -> tuple[_Answer, ...]:
     """Do the same, evidence as far as it comes with the answers."""
     out: dict[int, _Answer] = {}
     for group in _groups(scenes):
-        found = _solve_group([scenes[i] for i in group], progress, _within(watch, group), in_loops)
+        found = _solve_group([scenes[i] for i in group], progress, _within(watch, group), rough, in_loops)
         out |= dict(zip(group, found, strict=True))
     told = {i: answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer for i, answer in out.items()}
     return tuple(told[i] for i in range(len(scenes)))
@@ -137,7 +158,9 @@ def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
     return lambda number, answer, finger, way: watch(group[number], answer, finger, way)
 
 
-def _solve_group(scenes: list[Scene], progress: Progress | None, watch: Watch | None, in_loops: bool) -> list[_Answer]:
+def _solve_group(
+    scenes: list[Scene], progress: Progress | None, watch: Watch | None, rough: Rough | None, in_loops: bool
+) -> list[_Answer]:
     """Refine until every scene's estimate meets its tolerance, or the finest mesh is reached.
 
     Scenes that share a mesh are solved again together on the finer one.
@@ -155,6 +178,9 @@ def _solve_group(scenes: list[Scene], progress: Progress | None, watch: Watch | 
         finer = [n for n in FINENESS[kind] if n > fineness]
         if not finer or not any(missed):
             break
+        for answer in found.values():
+            if rough is not None and isinstance(answer, Prediction):
+                rough(answer)
         fineness = finer[0]
         if kind == "finite":
             again = {scenes[i].pressed for i in todo if missed[i]}

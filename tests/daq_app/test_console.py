@@ -1,5 +1,6 @@
 import io
 import json
+import threading
 
 import pytest
 
@@ -32,3 +33,20 @@ def test_a_number_that_is_none_never_becomes_json():
     speaker, _, _ = console(as_json=True)
     with pytest.raises(ValueError, match="not JSON compliant"):
         speaker.result({"a": float("nan")})
+
+
+def test_work_whose_end_nobody_knows_shows_how_long_it_has_taken_and_can_still_be_left(monkeypatch):
+    monkeypatch.setattr("daq_app.console.PATIENCE", 0.0)
+    speaker, _, err = console(as_json=False)
+
+    def work():
+        with speaker.working("solving") as told:
+            assert told(0.4)
+            while "solving" not in err.getvalue():
+                pass
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert "s so far; Ctrl-C stops" in err.getvalue()
+    assert all(thread.name != "progress" for thread in threading.enumerate())
