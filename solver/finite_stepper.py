@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.crossing import least_stretch
 from solver.finite_finger import FiniteFinger
 from solver.finite_forced import Given, corrected
 from solver.kernels import OPEN, SLIP, STICK
@@ -17,6 +18,10 @@ from solver.newton import Pull, Shape
 
 SLIDING = 0.995  # part of the friction limit beyond which the tangential force means sliding
 LIGHT = 1e-7  # N/mm: less than this is no touch
+MET = 0.02  # part of the normal force by which a state may miss the forces and still be told of
+EASED = 0.7  # of the normal force at which the state was lost: from there it is sought again [-]
+STAIRS, LEADING = 12, 3  # that lead a finger from nothing to forces it bears already, and iterations on each
+FOLDING = 0.65  # least stretch of the skin that is told of: it folds from 0.544 on, and a coarse mesh squeezes it less
 FURTHEST = 5.0  # displacement in one iteration beyond which the state is lost [mm]
 
 
@@ -29,6 +34,7 @@ class FiniteStepper:
         self._finger, self._newton = finger, newton
         self.mu, self.tau = mu, tau
         self.shape = Shape.undeformed(newton.body)
+        self._lost_at: float | None = None  # normal force [N/mm]
 
     @property
     def depth(self) -> float:
@@ -43,17 +49,43 @@ class FiniteStepper:
     def forget(self) -> None:
         """Start afresh from the untouched finger."""
         self.shape = Shape.undeformed(self._newton.body)
+        self._lost_at = None
 
     def step(self, normal: float, tangential: float, iterations: int = 1) -> float:
-        """Take one reading and return the SED averaged over the ending [MPa]; nan where the state was lost.
+        """Take one reading and return the SED averaged over the ending [MPa]; nan where no state can be told of.
 
-        `normal` [N/mm] presses the finger, `tangential` [N/mm] is the surface's pull on it along +x. After nan the next
-        reading starts afresh from the untouched finger.
+        `normal` [N/mm] presses the finger, `tangential` [N/mm] is the surface's pull on it along +x. A state is lost
+        where contact leaves the skin that may touch, and where skin is squeezed so far that it may have folded: it is
+        sought again once the normal force has eased. One that has not caught up with the forces is not told of.
         """
-        newton = self._newton
         if normal < LIGHT:
             self.forget()
             return 0.0
+        if self._lost_at is None:
+            return self._followed(normal, tangential, iterations)
+        if normal >= EASED * self._lost_at:
+            return float("nan")
+        return self._led(normal, tangential, max(iterations, LEADING))
+
+    def _led(self, normal: float, tangential: float, iterations: int) -> float:
+        """Return what `step` does of a finger led from nothing to these forces."""
+        self.forget()
+        sed = float("nan")
+        for part in np.linspace(1.0 / STAIRS, 1.0, STAIRS).tolist():
+            sed = self._followed(part * normal, part * tangential, iterations)
+            if self.lost:
+                self._lost_at = normal
+                break
+        return sed
+
+    @property
+    def lost(self) -> bool:
+        """Whether there is no state until the normal force eases."""
+        return self._lost_at is not None
+
+    def _followed(self, normal: float, tangential: float, iterations: int) -> float:
+        """Return what `step` does of a state that is not lost, or of the untouched finger."""
+        newton = self._newton
         most = self.mu * normal
         pull_back = float(np.clip(tangential, -most, most))
         shape = self._ready(normal, pull_back)
@@ -61,11 +93,20 @@ class FiniteStepper:
         for _ in range(iterations):
             done = corrected(newton, shape, Given(normal, pull_back), origin, before)
             if done is None or done[1] > FURTHEST or done[0].state[0] != OPEN or done[0].state[-1] != OPEN:
-                self.forget()
-                return float("nan")
+                return self._lose(normal)
             shape = done[0]
+        outline = newton.body.mesh.nodes[self._finger.geometry.whole]
+        if least_stretch(outline, outline + shape.u[self._finger.geometry.whole]) < FOLDING:
+            return self._lose(normal)
         self.shape = shape
-        return self._finger.sed_ending(shape)
+        x, y = shape.force
+        behind = max(abs(y - normal), abs(x - pull_back) if (shape.state == STICK).any() else 0.0)
+        return self._finger.sed_ending(shape) if behind <= MET * normal else float("nan")
+
+    def _lose(self, normal: float) -> float:
+        self.forget()
+        self._lost_at = normal
+        return float("nan")
 
     def row(self) -> Array:
         """Return the SED of the row of endings as it is now (r,) [MPa]; nan where the finger ends before one."""

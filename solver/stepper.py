@@ -8,7 +8,7 @@ from solver.mesher import Sizing
 from solver.scene import Scene
 
 FINENESS = {"small": 4.0, "finite": 2.7}  # meshes on which the response is good to about 1 % of its peak
-MARGIN = {"small": 4.0, "finite": 3.0}  # how far above the indentation undeformed skin is looked at for contact
+MARGIN = {"small": 4.0, "finite": 6.0}  # how far above the indentation undeformed skin is looked at for contact
 
 
 class Stepper(Protocol):
@@ -35,10 +35,10 @@ class Stepper(Protocol):
         ...
 
     def step(self, normal: float, tangential: float) -> float:
-        """Take one reading and return the SED averaged over the ending [MPa]; nan where the state was lost.
+        """Take one reading and return the SED averaged over the ending [MPa]; nan where no state can be told of.
 
-        `normal` [N/mm] presses the finger, `tangential` [N/mm] is the surface's pull on it along +x. After nan the next
-        reading starts afresh from the untouched finger.
+        `normal` [N/mm] presses the finger, `tangential` [N/mm] is the surface's pull on it along +x. At small strain
+        the next reading starts afresh from the untouched finger, at finite strain the first after the force has eased.
         """
         ...
 

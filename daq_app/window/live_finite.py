@@ -1,7 +1,5 @@
 """The live model at finite strain: as far as its warm stepper reaches, and back again once the forces have eased."""
 
-import numpy as np
-
 from solver.finite_finger import FiniteFinger
 from solver.finite_picture import FinitePicture
 from solver.finite_stepper import FiniteStepper
@@ -10,8 +8,6 @@ from solver.mesher import Sizing
 from solver.scene import Scene
 from solver.stepper import FINENESS, MARGIN
 
-EASED = 0.7  # of the normal force at which it was lost: from there it is tried again [-]
-STAIRS, ITERATIONS = 12, 3  # that lead a finger from nothing to a force it bears already
 WARMING = 1e-3  # [N/mm]
 
 
@@ -23,7 +19,6 @@ class LiveFinite:
         finger = FiniteFinger.of(scene, Sizing(FINENESS["finite"], scene.loading.depth, margin=MARGIN["finite"]))
         self._stepper = FiniteStepper(finger, mu)
         self._drawn = FinitePicture.of(finger, scene)
-        self._lost_at: float | None = None  # normal force [N/mm]
         self._stepper.step(WARMING, 0.0)  # compiles, or loads what was compiled
         self._drawn.sed(self._stepper.shape)
         self._stepper.forget()
@@ -40,20 +35,11 @@ class LiveFinite:
 
     def step(self, normal: float, pull: float, mu: float, tau: float) -> float:
         """Return the SED at the ending [MPa] under forces [N/mm]; nan where they are beyond its reach."""
-        follows = self._stepper
-        follows.mu, follows.tau = mu, tau
-        if self._lost_at is None:
-            sed = follows.step(normal, pull)
-        elif normal < EASED * self._lost_at:
-            sed = self._led_to(normal, pull)
-        else:
-            return float("nan")
-        self._lost_at = normal if np.isnan(sed) else None
-        return sed
+        self._stepper.mu, self._stepper.tau = mu, tau
+        return self._stepper.step(normal, pull)
 
     def forget(self) -> None:
         """Start afresh from the untouched finger."""
-        self._lost_at = None
         self._stepper.forget()
 
     def row(self) -> Array:
@@ -68,13 +54,3 @@ class LiveFinite:
         """Return nodes (n, 2) [mm], faces (f, 4) and their SED (f,) [MPa] as they are now."""
         shape = self._stepper.shape
         return self._drawn.nodes(shape), self._drawn.faces, self._drawn.sed(shape)
-
-    def _led_to(self, normal: float, pull: float) -> float:
-        """Return the SED of a finger led from nothing to these forces; nan where that is not possible."""
-        self._stepper.forget()
-        sed = float("nan")
-        for part in np.linspace(1.0 / STAIRS, 1.0, STAIRS).tolist():
-            sed = self._stepper.step(part * normal, part * pull, ITERATIONS)
-            if np.isnan(sed):
-                break
-        return sed

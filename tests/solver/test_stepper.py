@@ -17,6 +17,7 @@ from solver.mesher import Sizing
 from solver.receptor import ROW
 from solver.scene import Friction, Loading, Scene, Solve
 from solver.small_stepper import Condensed, SmallStepper
+from solver.solution import solve
 from solver.stepper import stepper
 
 KINEMATICS = ("small", "finite")
@@ -82,6 +83,45 @@ def test_a_lifted_finger_has_no_response_and_starts_afresh(kinematics):
     assert follows.depth == 0.0
     undeformed = made(kinematics, 0.4)
     np.testing.assert_array_equal(follows.outline(), undeformed.outline())
+
+
+def pressed_then_dragged(normal, drag):
+    """Yield forces [N/mm]: 100 readings of pressing, 200 of a drag that grows, 5 held."""
+    yield from ((normal * n / 100, 0.0) for n in range(1, 101))
+    yield from ((normal, drag * min(n, 200) / 200) for n in range(1, 206))
+
+
+def test_pressed_much_deeper_than_its_mesh_was_made_for_it_ends_in_the_full_solves_state():
+    asked = Scene(
+        friction=Friction(1.0),
+        loading=Loading(None, "-x", normal_force=2.0, force_unit="N"),
+        solve=Solve("finite", tolerance=0.05),
+    )
+    follows = stepper(replace(asked, loading=Loading(1.5, "-x")))
+    told = [follows.step(*forces) for forces in pressed_then_dragged(2.0 / asked.width, 2.0 / asked.width)]
+    found = solve(asked)
+    assert not np.isnan(told).any()
+    assert abs(told[-1] - found.sed_ending) < 0.02 * max(told)
+    assert follows.depth == pytest.approx(found.indentation, rel=0.02)
+    assert follows.depth > 2.2
+
+
+def test_at_finite_strain_no_number_is_told_of_skin_that_folds_until_the_force_has_eased():
+    follows = stepper(Scene(friction=Friction(1.0), loading=Loading(1.5, "+x"), solve=Solve("finite")))
+    told = [follows.step(*forces) for forces in pressed_then_dragged(2.0 / 15.0, -2.0 / 15.0)]
+    first = int(np.flatnonzero(np.isnan(told))[0])  # the full solve has no settled state there
+    assert first > 100
+    assert np.isnan(told[first:]).all()
+    assert 0.0 < follows.step(1.0 / 15.0, -0.2 / 15.0) < told[100]
+
+
+def test_a_state_that_has_not_caught_up_with_its_forces_is_not_told_of():
+    follows = stepper(Scene(friction=Friction(0.3), loading=Loading(1.5), solve=Solve("finite")))
+    told = [follows.step(0.1, 0.0) for _ in range(20)]
+    assert np.isnan(told[0])
+    assert np.isfinite(told[-1])
+    for sed in told:
+        assert np.isnan(sed) or sed == pytest.approx(told[-1], rel=0.05)
 
 
 def test_forces_held_still_are_met_exactly_at_finite_strain():
