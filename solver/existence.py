@@ -9,6 +9,7 @@ from solver.mesh import Indices
 from solver.newton import Newton, Pull, Shape
 from solver.sliding import settled
 
+SQUEEZED = " It folds before its limit point, at one place, and on finer meshes with up to a tenth less friction."
 SOUND = 0.6  # least stretch of the skin that needs no proof: neo-Hookean surfaces fold from 0.544 on (Biot 1963)
 
 
@@ -50,9 +51,21 @@ def steady(
     raise NoSteadyState(
         f"At {pull.depth:.3g} mm of indentation there is settled sliding up to mu = {branch.value:.3g}{beyond}, but "
         f"not at mu = {pull.mu:.3g}: the skin behind the contact folds; ask for less depth, less friction or small "
-        "strain.",
+        f"strain.{SQUEEZED if branch.squeezed else ''}",
         limit_mu=branch.value,
         limit_indentation=depth,
+    )
+
+
+def doubts(newton: Newton, shape: Shape, outline: Indices) -> tuple[str, ...]:
+    """Return the sentence that a state needs whose skin is squeezed nearly as far as surfaces fold, or none."""
+    nodes = newton.body.mesh.nodes[outline]
+    least = least_stretch(nodes, nodes + shape.u[outline])
+    if least >= SOUND:
+        return ()
+    return (
+        f"The skin is squeezed to {100 * least:.0f} % of its length at one place, where neo-Hookean surfaces fold from "
+        "54 % on: whether there is settled sliding here depends on the mesh, within a tenth of the friction.",
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from solver import evidence, kernels_numpy
 from solver.climbing import Ascent, Climbed, foot, risen, sized_together
+from solver.existence import doubts
 from solver.failures import Cancelled, SolveFailure
 from solver.finite_errors import error_estimates
 from solver.finite_finger import FiniteFinger
@@ -153,7 +154,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         mesh=finger.geometry.mesh,
         displacement=shape.u,
         history=_history(scene, finger, way, relaxing, times) if way else None,
-        warnings=evidence.warnings(driven, model["left_out"]),
+        warnings=(*evidence.warnings(driven, model["left_out"]), *doubts(newton, shape, finger.geometry.whole)),
     )
 
 

@@ -20,6 +20,7 @@ LARGEST_MU = 2.0  # beyond this a coefficient of friction is not looked for
 TOLERANCE = 1e-6  # of a point on the branch [mm]
 TURN = 0.7  # least cosine between the directions of the branch and of a step along it
 SQUEEZE = 0.85  # least ratio of the skin's least stretches at neighbouring points: a leap to a folded branch has less
+STEEP = 0.1  # least part of the value in the branch's direction, at an end that is no limit point
 FOLDED = 0.5  # and least stretch there may be: surfaces fold at 0.544 (Biot 1963); beyond, the mesh decides
 
 
@@ -30,6 +31,7 @@ class Branch:
     last: Shape  # the state at the value asked for, or the last one before the limit
     value: float  # of the coefficient or the depth [mm] there: the largest one met
     limited: bool  # whether the branch ends there, short of what was asked for
+    squeezed: bool = False  # whether it ends for the skin's squeeze alone, far from a limit point: as the mesh has it
 
 
 def follow(
@@ -64,7 +66,7 @@ def follow(
                 break
             length /= 2.0
             if length < 1e-4 * reach:
-                return Branch(best, largest, limited=True)
+                return Branch(best, largest, limited=True, squeezed=rate > STEEP)
         easy = found.iterations - shape.iterations <= 5
         previous, shape = (direction, rate), found
         value = _value(shape.pull, by)

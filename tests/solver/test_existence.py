@@ -1,12 +1,16 @@
 """A settled sliding state is given only where there is one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from solver.existence import steady
 from solver.failures import NoSteadyState
 from solver.newton import Pull
+from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
 from solver.sliding import settled
+from solver.solution import solve
 from tests.solver.finite_examples import finger
 
 TOWARDS_TIP = -1
@@ -29,6 +33,7 @@ def test_four_surfaces_have_no_settled_sliding_at_two_millimetres_and_the_refusa
     with pytest.raises(NoSteadyState, match="folds") as refusal:
         steady(newton, Pull(2.0, mu, tau, TOWARDS_TIP), outline)
     assert refusal.value.limit_mu == pytest.approx(0.375, rel=0.04)
+    assert "finer meshes" not in str(refusal.value)
     assert 1.4 < refusal.value.limit_indentation < 1.9
 
 
@@ -51,3 +56,19 @@ def test_a_finger_that_barely_touches_has_an_answer(depth):
     shape = steady(newton, Pull(depth, 0.5, 0.01, 1), outline)
     assert shape.touching.any()
     assert shape.force[1] > 0.0
+
+
+@pytest.mark.slow
+def test_where_skin_folds_at_one_place_before_its_limit_point_answers_and_refusals_say_that_the_mesh_has_a_part_in_it():
+    tissues = Materials(*(Material(modulus, 0.48) for modulus in (0.1525, 0.0775, 0.0303)))
+    asked = Scene(
+        finger=Finger(contact_angle=69.4),
+        materials=tissues,
+        friction=Friction(0.8),
+        loading=Loading(1.8, "+x"),
+        solve=Solve("finite"),
+    )
+    assert any("squeezed" in told for told in solve(asked).warnings)
+    assert not any("squeezed" in told for told in solve(replace(asked, friction=Friction(0.6))).warnings)
+    with pytest.raises(NoSteadyState, match="finer meshes"):
+        solve(replace(asked, friction=Friction(0.95)))
