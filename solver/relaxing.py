@@ -17,7 +17,7 @@ from math import ceil
 
 import numpy as np
 
-from solver.body import Body, elimination
+from solver.body import Body, planned
 from solver.contact import Contact, Course, Touchable, forced
 from solver.friction import FrictionLaw
 from solver.materials import Moduli, Prony, kept
@@ -42,9 +42,10 @@ class _Ready:
 class RelaxingBody:
     """A held body and its past; e elements, m terms at most in any of its materials."""
 
-    def __init__(self, mesh: Mesh, laws: Sequence[Prony]) -> None:
-        """Start at rest; `laws` by region."""
-        self.mesh, self._laws, self._tree = mesh, laws, elimination(mesh)
+    def __init__(self, mesh: Mesh, laws: Sequence[Prony], *, in_loops: bool = False) -> None:
+        """Start at rest; `laws` by region, `in_loops` as in `Body.of`."""
+        self.mesh, self._laws, self._in_loops = mesh, laws, in_loops
+        self._tree = planned(mesh, in_loops=in_loops)
         count, most = len(mesh.elements), max(len(law.terms) for law in laws)
         self._g, self._tau = np.zeros((count, most)), np.ones((count, most))
         for number, law in enumerate(laws):
@@ -154,7 +155,9 @@ class RelaxingBody:
     def _form(self, step: float) -> _Ready:
         key = f"{step:.9e}"
         if key not in self._steps:
-            body = Body.of(self.mesh, [law.within(step) for law in self._laws], tree=self._tree)
+            body = Body.of(
+                self.mesh, [law.within(step) for law in self._laws], tree=self._tree, in_loops=self._in_loops
+            )
             t = body.touchable
             across = t.normal_by_tangential
             whole = np.block([[t.normal_by_normal, across], [across.T, t.tangential_by_tangential]])

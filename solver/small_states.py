@@ -71,7 +71,8 @@ def marched(
     law, loading = law_of(scene), scene.loading_per_mm
     if not scene.materials.relax:
         return march(finger.body.touchable, law, loading, progress, times), None
-    body = RelaxingBody(finger.geometry.mesh, relaxing_laws(scene.materials))
+    laws, in_loops = relaxing_laws(scene.materials), finger.body.touchable.in_loops
+    body = RelaxingBody(finger.geometry.mesh, laws, in_loops=in_loops)
     first = PRESSING_TIME / round(PRESSING_STEPS * times)
     way = RelaxingWay(body, law, loading, finger.ending, finger.point, first)
     march_relaxing(way, loading, scene.materials.longest_relaxation, progress, times)

@@ -138,7 +138,7 @@ def _with_evidence(found: _Answer, progress: Progress | None, in_loops: bool) ->
     """Return the answer with its evidence marched, and measured where its scene asks for that."""
     if not isinstance(found, Prediction):
         return found
-    found = with_held(found, lambda: progress is not None and not progress(1.0))
+    found = with_held(found, lambda: progress is not None and not progress(1.0), in_loops=in_loops)
     if found.scene.solve.evidence == "estimated":
         return found
     return measured(found, lambda scenes: _answers(scenes, progress, in_loops=in_loops))
