@@ -19,6 +19,8 @@ from solver.receptor import ROW, endings, middle
 from solver.scene import Receptor, Scene, SceneError
 from solver.tissues import finite_laws
 
+RUBS = 1e-3  # drag by normal force from which a traction bound matters
+
 
 @dataclass(frozen=True, eq=False)  # without slots: what few ask for is made when they ask
 class FiniteFinger:
@@ -102,7 +104,12 @@ class FiniteFinger:
         return width(self.geometry, shape.place(self.newton.body)[:, 0], shape.reaction[:, 1], shape.touching)
 
     def bounded_at_an_edge(self, shape: Shape) -> bool:
-        """Return whether skin slips at the traction bound at the last two nodes of an edge of contact that is known."""
+        """Return whether skin slips at the traction bound at the last two nodes of an edge of contact that is known.
+
+        A drag too small to matter does not count.
+        """
+        if not abs(shape.force[0]) > RUBS * shape.force[1]:
+            return False
         on = np.flatnonzero(shape.touching)
         last = np.concatenate([on[:2], on[-2:]])
         return bool((shape.state[last] == CAP).any()) and self.edges(shape) is not None
