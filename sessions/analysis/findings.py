@@ -8,7 +8,7 @@ from sessions.analysis.flaws import Flaw, FlawName, Grade
 
 COEFFICIENTS = ("mu_static", "mu_dynamic", "mu_dynamic_sd", "mu_dynamic_interval", "mu_max", "tau_max", "contact_area")
 LOADS = ("normal_force", "tangential_force", "peak_normal", "peak_tangential")
-PEAKS = ("mu_max", "tau_max", "contact_area", "peak_normal", "peak_tangential")
+PEAKS = ("mu_static", "mu_max", "tau_max", "contact_area", "peak_normal", "peak_tangential")
 SPEED = ("speed", "speed_error")
 DIRECTION = ("direction", "direction_from", "heading")
 EVERYTHING = (*COEFFICIENTS, *LOADS, *SPEED, *DIRECTION, "steady", "readings", "break_away", "slide_onset")

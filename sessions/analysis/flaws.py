@@ -14,6 +14,7 @@ class FlawName(StrEnum):
     SATURATED = "saturated"
     FROZEN = "frozen_sensor"
     DEAD = "dead_sensor"
+    WILD = "wild_reading"
     IRREGULAR_TIME = "irregular_time"
     UNKNOWN_RATE = "unknown_rate"
     RECORDING = "recording"  # what the recording itself says it lost
@@ -32,6 +33,7 @@ class FlawName(StrEnum):
     SLOW_ONSET = "slow_onset"
     TOO_LITTLE_FORCE = "too_little_force"
     RATIO_ABOVE_ONE = "ratio_above_one_at_low_force"
+    RATIO_ABOVE_ONE_THROUGHOUT = "ratio_above_one"
     SIDE_LOAD = "side_load"
     NO_STEADY_SLIDING = "no_steady_sliding"
     SPEED_NOT_MEASURABLE = "speed_not_measurable"

@@ -126,6 +126,12 @@ def _judge_gaps(found: Findings, span: Span, contact: Contact, settings: Analysi
             "may hide its peaks."
         )
         found.flaw(widest.cause, sentence, "doubtful", PEAKS)
+    wild = [gap for gap in inside if gap.cause is FlawName.WILD]
+    if wild:
+        sentence = (
+            f"A wild reading at {wild[0].start:.2f} s of this stroke was left out: hold its numbers against its curve."
+        )
+        found.flaw(FlawName.WILD, sentence, "doubtful")
 
 
 def _judge_loads(found: Findings, track: Track, contact_area: float, settings: AnalysisSettings) -> None:
@@ -198,6 +204,12 @@ def _friction(found: Findings, track: Track, window: slice, zero: ZeroInForce, s
     lightness = float(np.nanmean(1.0 / track.normal[window]))
     from_zero = float(np.hypot(sideways, ratio * zero.error[2])) * lightness
     mean = mean_of(track.ratio[window], track.rate, from_zero, settings)
+    if mean.value > 1.0:
+        sentence = (
+            f"T/N is {mean.value:.2f} in the steady window: a surface that sticks can make it so, but so do a clipped "
+            "axis, a wrong gain or zero, or a face that leans."
+        )
+        found.flaw(FlawName.RATIO_ABOVE_ONE_THROUGHOUT, sentence, "doubtful")
     found.numbers |= {
         "mu_dynamic": mean.value,
         "mu_dynamic_sd": mean.sd,

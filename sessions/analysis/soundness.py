@@ -10,6 +10,8 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.analysis.flaws import FlawName, Grade
 from sessions.analysis.settings import AnalysisSettings
+from sessions.analysis.stuck import Stuck, at_the_same_value, stuck_axes
+from sessions.analysis.wild import wild_readings
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -37,7 +39,6 @@ class Soundness:
     gaps: tuple[Gap, ...]
     segments: tuple[slice, ...]  # stretches of good readings without a gap
     dead: tuple[str, ...]  # axes that never moved
-    frozen_share: float
     flaws: tuple[tuple[FlawName, str, Grade], ...]
 
     @property
@@ -51,10 +52,16 @@ def soundness(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSetti
     steps = np.diff(block.time)
     forward = steps[steps > 0.0]
     step = float(np.median(forward)) if len(forward) else np.nan
-    frozen = _frozen(block, settings)
-    saturated = _saturated(block, info)
+    beyond = _saturated(block, info)
+    wild_axes = wild_readings(block.raw, settings) & ~beyond[:, None]
+    wild = wild_axes.any(axis=1)
+    repeated = _frozen(block, settings)
+    stuck = stuck_axes(block.time, block.raw, wild | beyond, settings)
+    frozen = repeated | at_the_same_value(block.raw, stuck, clipped=False)
+    clipped = at_the_same_value(block.raw, stuck, clipped=True)
+    saturated = beyond | clipped
     stalled = np.concatenate([[False], steps <= 0.0])
-    good = ~(frozen | saturated | stalled)
+    good = ~(frozen | saturated | wild | stalled)
     broken = (np.diff(block.sequence) != 1) | (steps > 1.8 * step) | (steps <= 0.0)
     neighbours = steps[~broken]
     even = bool(len(neighbours) and np.ptp(np.percentile(neighbours, [2, 98])) <= settings.uneven * step)
@@ -68,8 +75,10 @@ def soundness(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSetti
     lost = int(missing[missing > 0].sum())
     flaws = [
         *_loss_flaws(lost, len(block)),
-        *_frozen_flaws(frozen, block.time, settings),
-        *_saturation_flaws(saturated, block.time),
+        *_frozen_flaws(repeated, frozen, block.time, settings),
+        *_saturation_flaws(beyond, block.time),
+        *_stuck_flaws(stuck, block.time),
+        *_wild_flaws(wild_axes, block.time),
         *_dead_flaws(dead),
         *_time_flaws(step, even, int(stalled.sum())),
     ]
@@ -78,10 +87,9 @@ def soundness(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSetti
         even,
         good,
         saturated,
-        tuple(_gap(a, b, block.time, frozen, saturated) for a, b in pairwise(segments)),
+        tuple(_gap(a, b, block.time, frozen, saturated, wild) for a, b in pairwise(segments)),
         segments,
         dead,
-        float(frozen.mean()),
         tuple(flaws),
     )
 
@@ -119,13 +127,15 @@ def _segments(good: Mask, broken: Mask) -> tuple[slice, ...]:
     )
 
 
-def _gap(before: slice, after: slice, time: Array, frozen: Mask, saturated: Mask) -> Gap:
+def _gap(before: slice, after: slice, time: Array, frozen: Mask, saturated: Mask, wild: Mask) -> Gap:
     hole = slice(before.stop, after.start)
     cause = FlawName.LOST_READINGS
     if frozen[hole].any():
         cause = FlawName.FROZEN
     elif saturated[hole].any():
         cause = FlawName.SATURATED
+    elif wild[hole].any():
+        cause = FlawName.WILD
     return Gap(float(time[before.stop - 1]), float(time[after.start]), cause)
 
 
@@ -140,14 +150,57 @@ def _loss_flaws(lost: int, arrived: int) -> _Found:
     return [(FlawName.LOST_READINGS, sentence, "note")]
 
 
-def _frozen_flaws(frozen: Mask, time: Array, settings: AnalysisSettings) -> _Found:
-    if not frozen.any():
+def _frozen_flaws(repeated: Mask, frozen: Mask, time: Array, settings: AnalysisSettings) -> _Found:
+    """Name readings that repeat all six numbers; from a share of frozen ones on, of any axis, refuse the rest too."""
+    refused = float(frozen.mean()) >= settings.frozen_refused
+    found: _Found = []
+    if repeated.any():
+        sentence = (
+            f"{100 * float(repeated.mean()):.0f} % of the readings repeat the six numbers before them, first at "
+            f"{time[repeated][0]:.2f} s: the sensor was frozen"
+        )
+        rest = ", and nothing is analysed." if refused else " there, and these readings are left out."
+        found.append((FlawName.FROZEN, sentence + rest, "refused" if refused else "doubtful"))
+    elif refused:
+        share = 100 * float(frozen.mean())
+        sentence = f"One axis or another was frozen in {share:.0f} % of the readings: nothing is analysed."
+        found.append((FlawName.FROZEN, sentence, "refused"))
+    return found
+
+
+def _stuck_flaws(stuck: tuple[Stuck, ...], time: Array) -> _Found:
+    """Name each axis that was clipped or frozen by the first run that shows it."""
+    found: _Found = []
+    for axis, clipped in dict.fromkeys((one.axis, one.clipped) for one in stuck):
+        runs = [one for one in stuck if (one.axis, one.clipped) == (axis, clipped)]
+        lasting = sum(float(time[one.last] - time[one.first]) for one in runs)
+        sentence = (
+            f"{_AXIS_NAMES[axis]} keeps one value bit for bit while other axes move, for {lasting:.2g} s in all, first "
+            f"at {time[runs[0].first]:.2f} s, "
+        )
+        if clipped:
+            sentence += (
+                "and never goes beyond it: clipped. These readings are left out, and no peak that they hide is told."
+            )
+            found.append((FlawName.SATURATED, sentence, "doubtful"))
+        else:
+            sentence += "and moves before or after: frozen there. These readings are left out."
+            found.append((FlawName.FROZEN, sentence, "doubtful"))
+    return found
+
+
+def _wild_flaws(wild: Mask, time: Array) -> _Found:
+    """Name the readings (n, 6) that stand far beyond all around them."""
+    if not wild.any():
         return []
-    share = float(frozen.mean())
-    where = f"{100 * share:.0f} % of the readings repeat the six numbers before them, first at {time[frozen][0]:.2f} s"
-    if share >= settings.frozen_refused:
-        return [(FlawName.FROZEN, f"{where}: the sensor was frozen, and nothing is analysed.", "refused")]
-    return [(FlawName.FROZEN, f"{where}: the sensor was frozen there, and these readings are left out.", "doubtful")]
+    at = wild.any(axis=1)
+    axes = ", ".join(name for name, marked in zip(_AXIS_NAMES, wild.any(axis=0), strict=True) if marked)
+    count = int(at.sum())
+    sentence = (
+        f"{count} {'reading stands' if count == 1 else 'readings stand'} far beyond everything around on {axes}, first "
+        f"at {time[at][0]:.3f} s: wild, and left out before anything is filtered."
+    )
+    return [(FlawName.WILD, sentence, "doubtful")]
 
 
 def _saturation_flaws(saturated: Mask, time: Array) -> _Found:

@@ -92,6 +92,7 @@ CASES = {
     ),
     "frozen_sensor": Case(changed(slice(420, 460), 419), ("tau_max",)),
     "dead_sensor": Case(moved(ty=lambda t: 0 * t), ("speed", *FRICTION), (), frozenset({"no_steady_sliding"})),
+    "wild_reading": Case(changed(slice(420, 421), np.array([20.0, 0, 0, 0, 0, 0])), kept=FRICTION),
     "irregular_time": Case(block(T + np.random.default_rng(3).uniform(0, 0.002, len(T)), felt(PLAIN))),
     "unknown_rate": Case(block(0 * T, felt(PLAIN)), (), ()),
     "recording": Case(block(T, felt(PLAIN)), extra={"told": [Flaw(FlawName.RECORDING, "Lost.", "doubtful")]}),
@@ -132,6 +133,7 @@ CASES = {
     "ratio_above_one_at_low_force": Case(
         block(T, felt(made(T, trapezium(T, 1.0, 3.0, 0.4, 3.0), np.where(T < 1.12, 1.6, 0.5), ALONG))), ("mu_static",)
     ),
+    "ratio_above_one": Case(block(T, felt(stroke(T, mu=1.4))), kept=("mu_max", "mu_dynamic")),
     "side_load": Case(block(T, felt(sideways(0.3)))),
     "no_steady_sliding": Case(block(T, felt(made(T, N, 0.3 + 0 * T, 0 * T))), (*FRICTION, "speed", "direction"), ()),
     "speed_not_measurable": Case(

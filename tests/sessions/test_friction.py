@@ -320,8 +320,10 @@ def test_a_side_load_at_low_force_is_named_and_does_not_make_the_maximum():
     assert found.strokes[0].mu_max == pytest.approx(0.5, rel=0.02)
 
 
-def test_a_sticky_surface_with_a_ratio_above_one_throughout_is_no_flaw():
-    assert names(analysed(block(T, felt(stroke(T, mu=1.4))))) == set()
+def test_a_ratio_above_one_throughout_is_doubted_and_given():
+    found = analysed(block(T, felt(stroke(T, mu=1.4))))
+    assert names(found) == names(found, "doubtful") == {"ratio_above_one"}
+    assert found.strokes[0].mu_dynamic == pytest.approx(1.4, rel=0.01)
 
 
 def test_coarse_torques_give_no_speed():

@@ -1,0 +1,103 @@
+"""An axis that clips or freezes alone, and a wild reading, are named without a rated range; coarse steps are neither.
+
+Three strokes of 4 N with a ratio of 0.68 are planted in closed form; the calibration states no rated range.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_strokes import CALIBRATION, INFO, SETTINGS, analysed, block, felt, names, times, trapezium, wrench
+
+from sessions.analysis.stuck import stuck_axes
+from sessions.analysis.wild import wild_readings
+
+T = times(10.0)
+BEGINS = (1.0, 4.0, 7.0)
+MU = 0.68
+UNRATED = replace(INFO, calibration=replace(CALIBRATION, rated=np.full(6, np.nan)))
+PRESS = sum(trapezium(T, at, at + 2.0, 0.3, 4.0) for at in BEGINS) * (1.0 + 0.05 * np.sin(2 * np.pi * 0.7 * T))
+ALONG = sum(25.0 * (np.clip(T, at, at + 2.0) - at - 1.0) * ((at - 0.5 < T) & (at + 2.5 > T)) for at in BEGINS)
+CLEAN = felt(wrench(T, PRESS, np.full_like(T, MU), ALONG))
+FX, FZ = 0, 2
+
+
+def with_axis(axis, change):
+    raw = CLEAN.copy()
+    raw[:, axis] = change(raw[:, axis].copy())
+    return raw
+
+
+def of(raw):
+    return analysed(block(T, raw), info=UNRATED)
+
+
+def frozen(column):
+    column[(T > 1.8) & (T < 2.8)] = column[T > 1.8][0]
+    return column
+
+
+def told(analysis, name):
+    return [flaw for flaw in analysis.flaws if flaw.name == name and flaw.stroke is None]
+
+
+def test_the_strokes_are_sound_before_they_are_spoilt():
+    found = of(CLEAN)
+    assert names(found) == set()
+    assert [stroke.mu_dynamic for stroke in found.strokes] == pytest.approx([MU] * 3, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("axis", "low", "high", "name"), [(FZ, -3.0, np.inf, "Fz"), (FX, -2.0, 2.0, "Fx"), (FX, -np.inf, 2.5, "Fx")]
+)
+def test_a_flat_top_is_named_as_saturation_and_no_peak_of_it_is_given(axis, low, high, name):
+    found = of(with_axis(axis, lambda column: np.clip(column, low, high)))
+    assert told(found, "saturated")[0].sentence.startswith(name)
+    for stroke in found.strokes:
+        assert stroke.mu_max is stroke.mu_static is stroke.tau_max is stroke.peak_normal is None
+        assert stroke.mu_dynamic is None or stroke.mu_dynamic == pytest.approx(MU, rel=0.01)
+
+
+def test_one_axis_frozen_while_the_others_move_is_named_and_left_out():
+    found = of(with_axis(FZ, frozen))
+    assert told(found, "frozen_sensor")[0].sentence.startswith("Fz")
+    first, *rest = found.strokes
+    assert first.mu_max is first.mu_static is first.tau_max is None
+    assert first.mu_dynamic is None or first.mu_dynamic == pytest.approx(MU, rel=0.01)
+    assert [stroke.mu_dynamic for stroke in rest] == pytest.approx([MU] * 2, rel=0.01)
+    assert all(stroke.flaws == () for stroke in rest)
+
+
+@pytest.mark.parametrize("readings", [slice(380, 381), slice(380, 382)])
+def test_a_wild_reading_is_named_before_it_is_filtered_and_stays_raw(readings):
+    def struck(column):
+        column[readings] = 40.0
+        return column
+
+    given = block(T, with_axis(FX, struck))
+    found = analysed(given, info=UNRATED)
+    assert "Fx" in told(found, "wild_reading")[0].sentence
+    assert (given.raw[readings, FX] == 40.0).all()
+    first, *rest = found.strokes
+    assert "wild_reading" in first.flaws
+    assert first.mu_max == pytest.approx(MU, rel=0.01)
+    assert first.mu_static is None
+    assert first.peak_tangential == pytest.approx(MU * PRESS.max(), rel=0.02)
+    assert all(stroke.flaws == () for stroke in rest)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.2, 1.0])
+@pytest.mark.parametrize("step", [0.01, 0.1])
+def test_coarse_steps_are_neither_clipped_nor_frozen_nor_wild(step, noise):
+    """Steps of hundredths or tenths of a newton, a hundred times as large for torques, with little or much noise."""
+    clean = wrench(T, PRESS, np.full_like(T, MU), ALONG)
+    steps = step * np.array([1.0] * 3 + [100.0] * 3)
+    rough = clean + noise * steps * np.random.default_rng(1).standard_normal(clean.shape)
+    raw = np.round(rough / steps) * steps
+    assert stuck_axes(T, raw, np.zeros(len(T), bool), SETTINGS) == ()
+    assert not wild_readings(raw, SETTINGS).any()
+
+
+def test_a_sensor_that_never_reads_below_zero_is_not_clipped_where_nothing_presses():
+    found = of(with_axis(FZ, lambda column: np.minimum(np.round(column, 2), 0.0)))
+    assert not names(found) & {"saturated", "frozen_sensor"}
