@@ -18,6 +18,7 @@ from sessions.analysis.soundness import soundness
 from sessions.analysis.span import Span, ZeroInForce, recorded_zero, span_of, zero_for
 from sessions.analysis.stroke import Stroke
 from sessions.analysis.tilt import Press, Tilt, press_of, tilt_of
+from sessions.analysis.turns import split_at_turns
 from sessions.decisions import OF_SESSION, Decided, Decision, Decisions, read
 from sessions.plan import SessionPlan, Trial
 
@@ -220,6 +221,11 @@ def _strokes(
     idle = np.ones(len(span.time), np.bool_)
     for contact in touching:
         idle[contact.start : contact.stop] = False
+    pieces = [
+        one
+        for piece in pieces
+        for one in _ways(piece, span, general if stated else zero_for(span, piece, idle, settings), settings)
+    ]
     kept, flaws = _worth_measuring(pieces, span, smooth, settings)
     number = None if trial is None else trial.number
     decided = [decisions.of_stroke(number, at) for at in range(1, len(kept) + 1)]
@@ -239,6 +245,13 @@ def _strokes(
             presses += [] if press is None else [press]
     flaws += _counted(tuple(strokes), trial, plan, decisions)
     return tuple(strokes), flaws, tuple(presses)
+
+
+def _ways(piece: Contact, span: Span, zero: ZeroInForce | None, settings: AnalysisSettings) -> tuple[Contact, ...]:
+    """Cut a contact where the finger turns, as far as its zero tells that."""
+    if zero is None:
+        return (piece,)
+    return split_at_turns(piece, span.time, span.smooth - zero.level, zero.unsure[0], settings)
 
 
 def _general_zero(span: Span, info: TransducerInfo, settings: AnalysisSettings, *, stated: bool) -> ZeroInForce | None:

@@ -21,6 +21,7 @@ class Contact:
     onset: float | None  # [s, device time]; None where the recording begins in contact
     lift: float | None  # [s, device time]; None where it ends in contact
     valleys: tuple[int, ...] = ()  # readings of least force that tell it from neighbours it was not lifted from
+    turns: tuple[int, ...] = ()  # readings at which the finger turned, where that is its beginning or end
 
 
 def contacts(time: Array, normal: Array, baseline: Baseline, settings: AnalysisSettings) -> tuple[Contact, ...]:

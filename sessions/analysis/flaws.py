@@ -28,6 +28,7 @@ class FlawName(StrEnum):
     LIGHT_TOUCH = "light_touch"
     TAP = "tap"
     NOT_LIFTED = "not_lifted_between"
+    TURNED = "turned_without_lift"
     BEGINS_IN_CONTACT = "begins_in_contact"
     ENDS_IN_CONTACT = "ends_in_contact"
     SLOW_ONSET = "slow_onset"

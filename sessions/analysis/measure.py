@@ -43,7 +43,7 @@ def measured(
     decided = decided or Decided({})
     track = track_of(span, contact, zero, frame.height, settings)
     _judge_ends(found, contact, track, settings)
-    _judge_zero(found, zero)
+    _judge_zero(found, zero, track)
     if zero.flaw is not FlawName.NO_UNLOADED_STRETCH:
         _judge_gaps(found, span, contact, settings)
         _judge_loads(found, track, contact_area, settings)
@@ -61,8 +61,8 @@ def measured(
     numbers = dict(found.allowed(EVERYTHING))
     stroke = Stroke(
         trial=None if trial is None else trial.number,
-        onset=contact.onset,
-        lift=contact.lift,
+        onset=contact.onset if "onset" not in found.reasons else decided.instant("onset"),
+        lift=contact.lift if "lift" not in found.reasons else decided.instant("lift"),
         readings=numbers.pop("readings") or 0,
         zero=zero.origin,
         zero_drift=None if zero.drift is None else float(np.linalg.norm(zero.drift[:3])),
@@ -84,12 +84,18 @@ def _judge_ends(found: Findings, contact: Contact, track: Track, settings: Analy
         found.flaw(FlawName.BEGINS_IN_CONTACT, sentence, "doubtful")
     if contact.lift is None:
         found.flaw(FlawName.ENDS_IN_CONTACT, "The recording ends in contact: no lift.", "doubtful")
-    if contact.valleys:
+    if contact.valleys and len(contact.turns) < 2:
         sentence = (
             "The force did not return to zero between this stroke and its neighbour: there it begins or ends where a "
             "fifth of its peak is left."
         )
         found.flaw(FlawName.NOT_LIFTED, sentence, "doubtful")
+    if contact.turns:
+        sentence = (
+            "The finger turned without lifting: this stroke begins or ends at the turn, where the drag changes its "
+            "sign, and its neighbour goes the other way."
+        )
+        found.flaw(FlawName.TURNED, sentence, "note")
     peak = float(np.nanmax(track.normal, initial=0.0))
     risen = np.flatnonzero(track.normal >= settings.force_floor_share * peak)
     if contact.onset is not None and len(risen) and track.time[risen[0]] - contact.onset > settings.slow_onset:
@@ -100,13 +106,14 @@ def _judge_ends(found: Findings, contact: Contact, track: Track, settings: Analy
         found.flaw(FlawName.SLOW_ONSET, sentence, "doubtful")
 
 
-def _judge_zero(found: Findings, zero: ZeroInForce) -> None:
+def _judge_zero(found: Findings, zero: ZeroInForce, track: Track) -> None:
     if zero.flaw is FlawName.NO_UNLOADED_STRETCH:
         sentence = (
-            "No stretch around this contact is unloaded, so the zero is unknown: no friction, force or speed is given; "
-            "onset and lift are where the recorded force passes a fifth of its peak."
+            f"From {track.time[0]:.2f} to {track.time[-1]:.2f} s the recorded force lies beyond a fifth of its peak, "
+            "but no stretch around is unloaded, so the zero is unknown: perhaps there is no contact at all, and no "
+            "onset, lift, friction, force or speed is given."
         )
-        found.flaw(zero.flaw, sentence, "refused", EVERYTHING)
+        found.flaw(zero.flaw, sentence, "refused", (*EVERYTHING, "onset", "lift"))
     elif zero.flaw is FlawName.ZERO_AFTER_CONTACT:
         sentence = "No stretch before this contact is unloaded: the zero was taken after it, and drift is not known."
         found.flaw(zero.flaw, sentence, "doubtful")

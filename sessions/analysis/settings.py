@@ -20,6 +20,8 @@ class AnalysisSettings:
     near: float = 1.0  # unloaded forces so near a stroke tell how far its zero can be trusted [s]
     unloaded_share: float = 0.3  # a quiet stretch higher than this share of the range of N is a steady press [-]
     valley: float = 0.2  # two strokes are told apart where N falls below this share of the lower peak [-]
+    turn_share: float = 0.5  # to and fro: the drag counts beyond this share of the median T/N each way [-] ...
+    turn_shortest: float = 0.1  # ... and each way lasts so long beside the longest [-]
     light_share: float = 0.2  # a contact whose peak is below this share of the greatest is a light touch [-]
     shortest_stroke: float = 0.2  # a shorter contact is a tap [s]
     sliding_share: float = 0.5  # sliding: the centre of pressure is faster than this share of its greatest speed [-]

@@ -36,8 +36,8 @@ class Stroke:
     """One stroke. None stands where the recording allows no honest number; `flaws` says why."""
 
     trial: int | None  # None where the recording has no trials
-    onset: float | None  # [s, device time]; None where the recording begins in contact
-    lift: float | None  # [s, device time]; None where it ends in contact
+    onset: float | None  # [s, device time]; None where the recording begins in contact, or no zero is known
+    lift: float | None  # [s, device time]; None where it ends in contact, or no zero is known
     steady: Interval | None  # steady window [s, device time]
     break_away: float | None  # where T/N stops climbing, by a change point [s, device time]; None: no stick phase
     slide_onset: float | None  # from here on the centre of pressure slides [s, device time], where that is seen

@@ -27,23 +27,17 @@ def wild_readings(raw: Array, settings: AnalysisSettings) -> Mask:
             continue
         floor = max(settings.wild_noise * _NORMAL_STEP * float(np.median(steps)), _LEAST_STEPS * float(moving.min()))
         for width in range(1, _WIDEST + 1):
-            for at in _standing_out(column, width, floor).tolist():
+            for at in _candidates(np.diff(column), width, floor).tolist():
                 if not marked[at : at + width, axis].any() and _wild(column, steps, at, width, settings):
                     marked[at : at + width, axis] = True
     return marked
 
 
-def _standing_out(column: Array, width: int, floor: float) -> NDArray[np.int64]:
-    """Return where `width` readings begin that lie beyond the nearest ones on both sides by more than `floor`."""
-    whole = width + 2 * _BESIDE
-    if len(column) < whole:
-        return np.empty(0, np.int64)
-    windows = np.lib.stride_tricks.sliding_window_view(column, whole)
-    inside = windows[:, _BESIDE : _BESIDE + width]
-    beside = np.concatenate([windows[:, :_BESIDE], windows[:, -_BESIDE:]], axis=1)
-    above = inside.min(axis=1) - beside.max(axis=1)
-    below = beside.min(axis=1) - inside.max(axis=1)
-    return np.flatnonzero(np.maximum(above, below) > floor) + _BESIDE
+def _candidates(steps: Array, width: int, floor: float) -> NDArray[np.int64]:
+    """Return where `width` readings begin that more than `floor` leads to and back from, with neighbours beside."""
+    there, back = steps[:-width], steps[width:]
+    found = np.flatnonzero((np.minimum(np.abs(there), np.abs(back)) > floor) & (there * back < 0.0)) + 1
+    return found[(found >= _BESIDE) & (found + width + _BESIDE <= len(steps) + 1)]
 
 
 def _wild(column: Array, steps: Array, at: int, width: int, settings: AnalysisSettings) -> bool:

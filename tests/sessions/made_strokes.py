@@ -41,6 +41,21 @@ def stroke(t, *, mu=0.5, newtons=2.0, speed=25.0, direction=1, begin=1.0, end=3.
     return wrench(t, trapezium(t, begin, end, 0.1, newtons), mu * np.ones_like(t), along, direction=direction)
 
 
+def to_and_fro(t, *, mu=0.5, newtons=2.0, speed=25.0, begin=1.0, end=7.0, ways=4):
+    """Return the wrench of a finger that goes `ways` times along x, first from the hand, and never lifts between.
+
+    Each way takes equally long; at each turn the skin is pulled over within 0.1 s, mu changing straight from one sign
+    to the other.
+    """
+    each = (end - begin) / ways
+    phase = (np.clip(t, begin, end - 1e-9) - begin) / each
+    way = np.where(np.floor(phase) % 2 == 0, 1.0, -1.0)
+    along = speed * each * (way * (phase - np.floor(phase) - 0.5))
+    since = (phase - np.floor(phase)) * each
+    ratio = mu * np.where(phase >= 1.0, way * np.clip(since / 0.05 - 1.0, -1.0, 1.0), 1.0)
+    return wrench(t, trapezium(t, begin, end, 0.1, newtons), ratio, along)
+
+
 def felt(clean, seed=0, offset=None):
     """Return a wrench with white noise of the usual size, and an offset (6,)."""
     noisy = clean + np.random.default_rng(seed).standard_normal(clean.shape) * NOISE

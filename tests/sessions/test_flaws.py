@@ -4,7 +4,21 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from made_strokes import CALIBRATION, COUNTS, HEIGHT, INFO, SETTINGS, block, felt, plan, stroke, times, trapezium, trial
+from made_strokes import (
+    CALIBRATION,
+    COUNTS,
+    HEIGHT,
+    INFO,
+    SETTINGS,
+    block,
+    felt,
+    plan,
+    stroke,
+    times,
+    to_and_fro,
+    trapezium,
+    trial,
+)
 from made_strokes import wrench as made
 
 from drivers.readings import ReadingBlock
@@ -98,7 +112,7 @@ CASES = {
     "recording": Case(block(T, felt(PLAIN)), extra={"told": [Flaw(FlawName.RECORDING, "Lost.", "doubtful")]}),
     "no_unloaded_stretch": Case(
         block(T[INSIDE], felt(made(T, SWAYING, HALF, ALONG))[INSIDE]),
-        (*FRICTION, "speed", "direction"),
+        (*FRICTION, "speed", "direction", "onset", "lift"),
         (),
         frozenset({"begins_in_contact", "ends_in_contact"}),
     ),
@@ -123,6 +137,11 @@ CASES = {
         block(LONG, felt(made(LONG, DIP, 0.5 + 0 * LONG, 10.0 * (LONG - 4.0)))),
         kept=("lift",),
         also=frozenset({"second_stroke", "drift"}),  # 0.2 N are left in the valley
+    ),
+    "turned_without_lift": Case(
+        block(LONG, felt(to_and_fro(LONG))),
+        kept=("mu_dynamic", "speed", "direction"),
+        also=frozenset({"second_stroke", "wrong_direction"}),
     ),
     "begins_in_contact": Case(cut(T >= 1.5), ("onset",), also=frozenset({"zero_after_contact"})),
     "ends_in_contact": Case(cut(T <= 2.5), ("lift",)),
