@@ -54,7 +54,7 @@ def soundness(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSetti
     step = float(np.median(forward)) if len(forward) else np.nan
     beyond = _saturated(block, info)
     wild_axes = wild_readings(block.raw, settings) & ~beyond[:, None]
-    wild = wild_axes.any(axis=1)
+    wild: Mask = np.asarray(wild_axes.any(axis=1), np.bool_)
     repeated = _frozen(block, settings)
     stuck = stuck_axes(block.time, block.raw, wild | beyond, settings)
     frozen = repeated | at_the_same_value(block.raw, stuck, clipped=False)
@@ -193,8 +193,8 @@ def _wild_flaws(wild: Mask, time: Array) -> _Found:
     """Name the readings (n, 6) that stand far beyond all around them."""
     if not wild.any():
         return []
-    at = wild.any(axis=1)
-    axes = ", ".join(name for name, marked in zip(_AXIS_NAMES, wild.any(axis=0), strict=True) if marked)
+    at: Mask = np.asarray(wild.any(axis=1), np.bool_)
+    axes = ", ".join(name for name, marked in zip(_AXIS_NAMES, wild.T, strict=True) if marked.any())
     count = int(at.sum())
     sentence = (
         f"{count} {'reading stands' if count == 1 else 'readings stand'} far beyond everything around on {axes}, first "
