@@ -97,6 +97,7 @@ def test_terms_that_relax_nothing_leave_the_elastic_course_as_it_was():
     assert same.sed_ending == pytest.approx(elastic.sed_ending, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_terms_that_take_for_ever_leave_the_pressing_as_it_was():
     elastic = solve(published(Materials(), slide="none")).history
     slow = solve(published(of_layers(Relaxation(0.3, 1e6)), slide="none")).history
