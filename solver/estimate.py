@@ -33,7 +33,11 @@ FROM_COARSE = 1.0  # of both forces at small strain, by fineness to the fourth p
 FROM_LIMIT, CALM = 1.5, 2.0  # of the mesh's own part, for every relative change by friction's beyond that many
 FROM_BOUND = {"small": 0.2, "finite": 0.08}  # of an element that touches, in the drag under a bound
 FROM_EDGE = 0.06  # the same in all numbers, at finite strain where skin slips at the bound up to an edge of contact
-FROM_WIDTH = 0.12  # of an element at the edge of contact, by which either edge may lie elsewhere
+OF_DEPTH = 0.5  # of what the mesh alone decides, in a depth that is found at finite strain
+FROM_WIDTH = {
+    "small": 0.12,
+    "finite": 0.08,
+}  # of an element at the edge of contact, by which either edge may lie elsewhere
 
 
 class Errors(NamedTuple):
@@ -47,6 +51,7 @@ class Errors(NamedTuple):
     width: float | None  # of the contact
 
 
+DEPTH = slice(3, 4)  # place of the indentation among the numbers
 UNKNOWN = Errors(1.0, 1.0, 1.0, 1.0, None, 1.0)
 
 
@@ -60,7 +65,7 @@ def errors(scene: Scene, fineness: float, numbers: Array, others: Array, felt: A
         return _given_none(scene, UNKNOWN)
     driven = scene.driven(float(numbers[3]))
     off = _off(driven, fineness, numbers, others, felt, marched=steps is not None)
-    off[5] += 2.0 * FROM_WIDTH * _element(driven, fineness)
+    off[5] += 2.0 * FROM_WIDTH[scene.solve.kinematics] * _element(driven, fineness)
     if steps is not None:
         off += steps.error(numbers)
     relative = np.minimum(off / np.maximum(np.abs(numbers), np.finfo(float).tiny), 1.0)
@@ -98,6 +103,8 @@ def _off(scene: Scene, fineness: float, numbers: Array, others: Array, felt: Arr
     kind = scene.solve.kinematics
     size, largest = np.abs(numbers), np.abs(others - numbers).max(axis=0)
     part = np.full(len(numbers), _least(scene, fineness))
+    if kind == "finite":
+        part[DEPTH] *= OF_DEPTH
     if kind == "small":
         part[1:] += FROM_COARSE / _resolved(scene, fineness) ** 4
     if marched:

@@ -41,6 +41,18 @@ def steps_asked(scene: Scene, finger: FiniteFinger, shape: Shape, stop: Callable
     return Steps.of(finger.all_numbers(whole), finger.all_numbers(half), scene.solve.tolerance)
 
 
+def times_on_way(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool]) -> int:
+    """Return how many times the usual load steps a history takes whose end does not depend on them.
+
+    Those that a tolerance asks for at the end of its press, judged on a mesh. Raises NotConverged, Cancelled.
+    """
+    if scene.solve.course == "steady" or scene.solve.tolerance is None or scene.friction.mu == 0.0:
+        return 1
+    press = scene.pressed_only()
+    steps = steps_asked(press, finger, end(finger, press, stop), stop)
+    return 1 if steps is None else steps.times
+
+
 def felt_of_bound(scene: Scene, finger: FiniteFinger, shape: Shape, stop: Callable[[], bool]) -> Array:
     """Return how the numbers (6,) at the end of a course answer to the traction bound: relative change by its own.
 

@@ -14,6 +14,7 @@ from solver import evidence, kernels_numpy
 from solver.climbing import Ascent, Climbed, foot, risen, sized_together
 from solver.existence import doubts
 from solver.failures import Cancelled, SolveFailure
+from solver.finite_ends import times_on_way
 from solver.finite_errors import error_estimates
 from solver.finite_finger import FiniteFinger
 from solver.finite_relaxing import RelaxingCourse, RelaxingNewton
@@ -104,7 +105,8 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
     at = way_up.top
     finger, shape = at.finger, at.shape
     setup = sum(state.setup_s for state in (way_up.foot, way_up.first, at) if state is not None)
-    times = 1 if way_up.steps is None else way_up.steps.times
+    steps = way_up.steps
+    times = times_on_way(scene, way_up.foot.finger, stop) if steps is None else steps.times
     way: list[Shape] = []
     relaxing: RelaxingCourse | None = None
     if scene.solve.course == "history":

@@ -1,15 +1,17 @@
 """The depth at which the model presses as hard as a measured finger did."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-from solver.contact import ContactLost
+from solver.contact import Contact, ContactLost
 from solver.finger import FingerModel
 from solver.friction import FrictionLaw
 from solver.mesher import Sizing
 from solver.pressing import depth_of, sliding_under
-from solver.scene import Scene
+from solver.scene import Friction, Scene
 
 FINENESS = 6.0  # good to some tenths of a per cent of the depth
+NEARLY = 0.98  # of what makes it slide, from which a finger that is dragged is as deep as one that slides
 DEEPEST = 0.85  # of the tissue between first touch and bone: beyond, a small-strain depth means nothing
 
 
@@ -26,22 +28,33 @@ def matching_depths(
         return ()
     deepest = DEEPEST * scenes[0].finger.pulp_thickness()
     finger = FingerModel.of(scenes[0], Sizing(FINENESS, deepest), in_loops=in_loops)
-    return tuple(_depth(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True))
+    pressed = [_pressed(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True)]
+    return tuple(None if found is None else depth_of(found) for found in pressed)
 
 
 def expected_depth(scene: Scene, *, in_loops: bool = False) -> float:
     """Return the indentation [mm], or about what a given force will lead to, for which meshes are made."""
-    if scene.normal_force is None:
+    force = scene.normal_force
+    if force is None:
         return scene.loading.depth
-    depth = matching_depths((scene,), (scene.normal_force,), in_loops=in_loops)[0]
-    return DEEPEST * scene.finger.pulp_thickness() if depth is None else depth
+    deepest = DEEPEST * scene.finger.pulp_thickness()
+    finger = FingerModel.of(scene, Sizing(FINENESS, deepest), in_loops=in_loops)
+    found = _pressed(finger, scene, force, deepest)
+    drag = scene.tangential_force or 0.0
+    held = scene.loading.direction == 0 or scene.loading.dragged
+    if held and (found is None or drag < NEARLY * abs(found.tangential.sum())):
+        # Then it goes about as deep as one that slides with so much drag and no more.
+        friction = Friction(min(drag / force, float(scene.friction.mu)), scene.friction.tau_max)
+        found = _pressed(finger, replace(scene, friction=friction), force, deepest)
+    return deepest if found is None else depth_of(found)
 
 
-def _depth(finger: FingerModel, scene: Scene, normal_force: float, deepest: float) -> float | None:
+def _pressed(finger: FingerModel, scene: Scene, normal_force: float, deepest: float) -> Contact | None:
+    """Return the settled slide under a normal force [N/mm], None where none is less deep than `deepest` [mm]."""
     law = FrictionLaw(float(scene.friction.mu), scene.friction.cap)
     try:
         found = sliding_under(finger.body.touchable, law, normal_force, scene.loading.direction or 1, deepest)
     except ContactLost:
         return None
     inside = not (found.touching[0] or found.touching[-1])
-    return depth_of(found) if inside and depth_of(found) <= deepest else None
+    return found if inside and depth_of(found) <= deepest else None

@@ -363,6 +363,11 @@ class Scene:
         """Return the scene that slides on, where a drag was asked for."""
         return replace(self, loading=replace(self.loading, tangential_force=None))
 
+    def pressed_only(self) -> "Scene":
+        """Return the scene up to the end of its pre-indentation, as a scene of its own."""
+        loading = replace(self.loading, slide="none", tangential_force=None)
+        return replace(self, loading=loading, solve=replace(self.solve, course="steady"))
+
     def driven(self, depth: float) -> "Scene":
         """Return the scene with its bone driven to `depth` [mm], where a normal force was asked for."""
         loading = self.loading

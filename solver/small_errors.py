@@ -16,6 +16,7 @@ from solver.small_states import (
     all_numbers,
     end,
     felt_of_bound,
+    law_of,
     nearest,
     numbers_on,
     rubbed_more,
@@ -29,8 +30,18 @@ def steps_asked(scene: Scene, finger: FingerModel) -> Steps:
     try:
         whole, half = (all_numbers(scene, finger, end(scene, finger, times)) for times in (1.0, HALF))
     except LOST:
-        return Steps(1, np.zeros(6))  # nor will there be an estimate
+        return Steps(1, np.full(6, np.nan), np.zeros(6))  # nor will there be an estimate
     return Steps.of(whole, half, scene.solve.tolerance)
+
+
+def times_on_way(scene: Scene, finger: FingerModel) -> int:
+    """Return how many times the usual load steps a history takes whose end does not depend on them.
+
+    Those that a tolerance asks for at the end of its press, judged on a coarse mesh.
+    """
+    if scene.solve.course == "steady" or scene.solve.tolerance is None or law_of(scene).frictionless:
+        return 1
+    return steps_asked(scene.pressed_only(), finger).times
 
 
 def error_estimates(
@@ -60,8 +71,13 @@ def _settled(scene: Scene, fineness: float, coarse: Sequence[FingerModel], numbe
 
 
 def _on_way(scene: Scene, fineness: float, coarse: Sequence[FingerModel], numbers: Array, steps: Steps) -> Errors:
-    others = np.array([steps.taken(all_numbers(scene, finger, _near(scene, finger))) for finger in coarse])
-    felt = felt_of_bound(scene, coarse[0], end(scene, coarse[0], HALF))
+    first, *more = coarse  # of which the first has told the steps
+    whole = [steps.whole if np.isfinite(steps.whole).all() else all_numbers(scene, first, nearest(scene, first))]
+    whole += [all_numbers(scene, finger, _near(scene, finger)) for finger in more]
+    others = np.array([steps.taken(numbers) for numbers in whole])
+    felt = np.zeros(6)
+    if scene.friction.tau_max is not None:
+        felt = felt_of_bound(scene, first, end(scene, first, HALF))
     return errors(scene, fineness, numbers, others, felt, steps)
 
 

@@ -23,7 +23,7 @@ from solver.mesher import Sizing
 from solver.prediction import History, Prediction, Row, Skin
 from solver.receptor import ROW
 from solver.scene import Scene, SceneError
-from solver.small_errors import error_estimates, steps_asked
+from solver.small_errors import error_estimates, steps_asked, times_on_way
 from solver.small_states import (
     all_numbers,
     depends_on_way,
@@ -340,7 +340,7 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
     contact, steps = _in_steps(scene, shared)
     if contact is None:
         return None
-    times = 1 if steps is None else steps.times
+    times = times_on_way(scene, shared.coarse[0]) if steps is None else steps.times
     way: March | None = None
     over_time: Array | None = None
     direct = contact
