@@ -60,9 +60,13 @@ def _print(found: "Prediction", title: str, console: Console) -> None:
         ["SED at the point", number(found.sed_point * 1e3, 5), "kPa", ""],
         ["normal force", number(found.normal_force, 5), "N/mm", _percent(found.normal_force_error)],
         ["tangential force", number(found.tangential_force, 5), "N/mm", _percent(found.tangential_force_error)],
-        ["contact width", number(found.contact_width, 3), "mm", ""],
-        ["indentation", number(found.indentation, 4), "mm", ""],
-        *([] if found.shift is None else [["sideways shift", number(found.shift, 4), "mm", ""]]),
+        ["contact width", number(found.contact_width, 3), "mm", _percent(found.contact_width_error)],
+        ["indentation", number(found.indentation, 4), "mm", _percent(found.indentation_error)],
+        *(
+            []
+            if found.shift is None
+            else [["sideways shift", number(found.shift, 4), "mm", _length(found.shift_error)]]
+        ),
         ["unknowns", str(found.dofs), "", ""],
         ["solving took", number(found.wall_s * 1e3, 3), "ms", ""],
         ["setting up took", number(found.setup_s * 1e3, 3), "ms", ""],
@@ -79,6 +83,10 @@ def _print(found: "Prediction", title: str, console: Console) -> None:
     console.say(table(shown, head=["", ""]).lstrip("\n"))
     for warning in found.warnings:
         console.note(f"note: {warning}")
+
+
+def _length(error: float | None) -> str:
+    return "–" if error is None else f"{number(error, 2)} mm"
 
 
 def _percent(part: float | None) -> str:
