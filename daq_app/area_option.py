@@ -10,9 +10,9 @@ def add_area(parser: argparse.ArgumentParser) -> None:
     """Declare --area and --area-force."""
     parser.add_argument(
         "--area",
-        default="fixed",
         metavar="LAW",
-        help="contact area by which tau_max is told: fixed (the plan's), hertz (grows as N^(2/3)), or an exponent of N",
+        help="contact area by which tau_max is told: fixed (the plan's), hertz (grows as N^(2/3)), or an exponent of "
+        "N; where none is given as the session was analysed before, or else fixed",
     )
     parser.add_argument(
         "--area-force",
@@ -22,12 +22,14 @@ def add_area(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def area_law(options: argparse.Namespace) -> AreaLaw:
-    """Return the law asked for. Raises WrongValue."""
+def area_law(options: argparse.Namespace) -> AreaLaw | None:
+    """Return the law asked for, None where none was. Raises WrongValue."""
+    if options.area is None and options.area_force is None:
+        return None
     force = PLANNED_AT if options.area_force is None else options.area_force
     if not 0.01 <= force <= 100.0:
         raise WrongValue(f"--area-force {force:g} is not allowed: 0.01 to 100 (N)")
-    if options.area == "fixed":
+    if options.area in ("fixed", None):
         if options.area_force is not None:
             raise WrongValue("--area-force says nothing of a fixed area: give --area hertz or an exponent too")
         return FIXED

@@ -8,17 +8,17 @@ from typing import Any
 from daq_app.cli import WrongValue
 from daq_app.console import Console
 from sessions.analysis import Analysis, AnalysisSettings, analyse
-from sessions.analysis.area import FIXED, AreaLaw
+from sessions.analysis.area import AreaLaw
 from sessions.analysis.bootstrap import BootstrapSettings, intervals_of
 from sessions.blinding import revealed
 from sessions.decisions import Decisions
 from sessions.plan import SessionPlan
 from sessions.prediction import PredictionOptions, Progress, SessionPrediction, predict
 from sessions.recording import Recording, RecordingError
-from sessions.recording.derived import store_derived
+from sessions.recording.derived import load_derived, store_derived
 from sessions.side_by_side import with_alternatives
 from sessions.study_file import is_study
-from sessions.toml_file import from_table
+from sessions.toml_file import SettingsError, from_table
 from sessions.uncertainty import with_intervals
 from sessions.visits import force_visit
 
@@ -27,15 +27,35 @@ PREDICTION = "prediction.json"
 
 
 def analysed(
-    recording: Recording, console: Console, area: AreaLaw = FIXED, bootstrap: BootstrapSettings | None = None
+    recording: Recording, console: Console, area: AreaLaw | None = None, bootstrap: BootstrapSettings | None = None
 ) -> Analysis:
     """Return the analysis of a session, tau_max told by a law of the area, and keep it in the session's folder.
 
-    `bootstrap` says what the intervals kept with it are drawn from.
+    `bootstrap` says what the intervals kept with it are drawn from. Where nobody says, both are as in the analysis that
+    was kept before: what somebody set is not lost by a verb that says nothing of it.
     """
-    analysis = analyse(recording, AnalysisSettings(area=area))
-    _keep(recording, ANALYSIS, analysis_document(analysis, bootstrap), console)
+    before = _kept(recording, ANALYSIS)
+    analysis = analyse(recording, settings_of(before) if area is None else AnalysisSettings(area=area))
+    _keep(recording, ANALYSIS, analysis_document(analysis, bootstrap or bootstrap_of(before)), console)
     return analysis
+
+
+def asked_before(recording: Recording) -> PredictionOptions | None:
+    """Return the options of the prediction that was kept before; None where there is none that can be read."""
+    before = _kept(recording, PREDICTION)
+    return from_table(before["options"], PredictionOptions, PREDICTION) if "options" in before else None
+
+
+def _kept(recording: Recording, name: str) -> Mapping[str, Any]:
+    """Return a document as it was kept before; empty where there is none, or one that is damaged and made anew."""
+    try:
+        document = load_derived(recording.folder, name) or {}
+        settings_of(document)
+        bootstrap_of(document)
+        from_table(document.get("options", {}), PredictionOptions, name)
+    except (RecordingError, SettingsError):
+        return {}
+    return document
 
 
 def predicted(

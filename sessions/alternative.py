@@ -4,6 +4,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from sessions.sed_interval import SedInterval
+
 Driven = Literal["depth", "force", "other way"]
 
 
@@ -52,6 +54,8 @@ class Alternative:
     normal_force: float | None  # of the whole finger [N]
     tangential_force: float | None  # [N]
     reason: str = ""
+    traction: float | None = None  # the greatest friction traction on the skin: below tau_max that bounds nothing [MPa]
+    interval: SedInterval | None = None  # of the SED, where it was asked for
 
 
 def variants(beside: Literal["none", "small", "both"]) -> Iterator[Variant]:

@@ -30,7 +30,8 @@ DEFAULT_SPEED = 20.0  # where none was measured [mm/s]; rescales the time of a c
 
 Progress = Callable[[float], bool]
 
-_LEFT_OUT = ("prediction", "stimulus", "alternatives")  # of a row as plain data: told in words of their own
+_NOT_TOLD = ("prediction", "opposite")  # of a row as plain data: all that the solver found
+_TOLD_OTHERWISE = ("stimulus", "alternatives", "interval", "opposite_interval")
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +77,10 @@ class TrialPrediction:
     wall_s: float | None  # the solve [s]
     prediction: Prediction | None  # all that the solver found
     reasons: Mapping[str, str]
+    opposite: Prediction | None = None  # that slid the other way
     alternatives: tuple[Alternative, ...] = ()  # the same trial predicted otherwise, where that was asked for
+    interval: SedInterval | None = None  # of `sed`, where it was asked for
+    opposite_interval: SedInterval | None = None  # of `opposite_sed`
 
     @property
     def history(self) -> History | None:
@@ -89,10 +93,12 @@ class TrialPrediction:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        row = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _LEFT_OUT}
+        row = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in (*_NOT_TOLD, *_TOLD_OTHERWISE)}
         row["stimulus"] = None if self.stimulus is None else asdict(self.stimulus)
         row["reasons"] = dict(self.reasons)
         row["alternatives"] = [asdict(one) for one in self.alternatives]
+        told = {"interval": self.interval, "opposite_interval": self.opposite_interval}
+        row |= {name: asdict(one) for name, one in told.items() if one is not None}
         row["solver"] = None if self.prediction is None else self.prediction.to_dict()
         return row
 
@@ -108,7 +114,6 @@ class SessionPrediction:
     options: PredictionOptions
     decisions: tuple[Decision, ...] = ()  # of people about the strokes, in force
     area: AreaLaw = FIXED  # by which tau_max was told
-    intervals: tuple[SedInterval, ...] = ()  # of each trial's SED, where they were asked for
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, None where honesty allows no number."""
@@ -117,7 +122,6 @@ class SessionPrediction:
             "trials": [trial.to_dict() for trial in self.trials],
             "decisions": [decision.to_dict() for decision in self.decisions],
             "area": asdict(self.area),
-            **({"sed_intervals": [one.to_dict() for one in self.intervals]} if self.options.intervals else {}),
             "width": self.width,
             "width_origin": self.width_origin,
             "options": asdict(self.options),
@@ -179,13 +183,13 @@ def predict(
 
     def seen(number: int, answer: Prediction | SolveFailure, finger: FingerModel, march: March | None) -> None:
         found[number] = answer
-        at, opposite = divmod(number, 2)
-        if not opposite:
+        at, back = divmod(number, 2)
+        if not back:
             ways[at] = Way(scenes[at], finger, march)
         elif 2 * at in found:
             told(solved[at], known(at), ways.get(at))
 
-    both = [one for scene in scenes for one in (scene, _opposite(scene))]
+    both = [one for scene in scenes for one in (scene, opposite(scene))]
     found |= dict(enumerate(answers(both, progress, seen if watch else None, in_loops=True)))
     for at, number in enumerate(solved):
         rows[number] = known(at)
@@ -205,24 +209,29 @@ def _unseen(_number: int, _row: TrialPrediction, _way: Way | None) -> None:
     """Tell nobody."""
 
 
-def seds_with(
-    changed: Sequence[tuple[TrialPrediction, float, float]], progress: Progress | None = None
-) -> tuple[float | None, ...]:
-    """Return the settled SED [MPa] of predicted trials with another mu [-] and tau_max [MPa] as the model gets it.
+def with_loads(scene: Scene, loads: Mapping[str, float]) -> Scene:
+    """Return a scene with another "mu" [-], "tau_max" [MPa] as the model gets it, or driving "force" [N]."""
+    friction, loading = scene.friction, scene.loading
+    mu, tau_max = loads.get("mu", friction.mu), loads.get("tau_max", friction.tau_max)
+    force = loads.get("force", loading.normal_force)
+    return replace(
+        scene,
+        friction=replace(friction, mu=mu, tau_max=tau_max),
+        loading=loading if force == loading.normal_force else replace(loading, normal_force=force),
+    )
 
-    All are solved together on one mesh, so that differences are those of friction. None where there is no settled
-    state. Raises Cancelled.
+
+def seds_of(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[float | None, ...]:
+    """Return the settled SED [MPa] of scenes, solved together on one mesh, so that differences are those of the loads.
+
+    None where there is no settled state. Raises Cancelled.
     """
-    scenes = [
-        replace(
-            row.prediction.scene,
-            friction=replace(row.prediction.scene.friction, mu=max(mu, 0.0), tau_max=tau_max),
-            solve=replace(row.prediction.scene.solve, course="steady"),
-        )
-        for row, mu, tau_max in changed
-        if row.prediction is not None
-    ]
     return tuple(None if one is None else one.sed_ending for one in settled(scenes, progress))
+
+
+def traction_reached(found: Prediction) -> float:
+    """Return the greatest friction traction on the skin [MPa]: any tau_max beyond it has the same solution."""
+    return float(abs(found.skin.traction).max())
 
 
 def settled(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | None, ...]:
@@ -248,7 +257,7 @@ def scene_along(row: TrialPrediction, variant: Variant, options: PredictionOptio
     tau_max = row.tau_max / SCALE[options.tau_reading] * SCALE[variant.tau_reading]
     scene = replace(scene, friction=replace(scene.friction, tau_max=tau_max))
     if variant.driven == "other way":
-        return _opposite(scene)
+        return opposite(scene)
     if variant.driven == "force":
         slide, speed = scene.loading.slide, scene.loading.speed
         force = Loading(slide=slide, speed=speed, normal_force=row.measured_normal, force_unit="N")
@@ -400,7 +409,7 @@ def _scene(row: TrialPrediction, options: PredictionOptions) -> Scene:
     )
 
 
-def _opposite(scene: Scene) -> Scene:
+def opposite(scene: Scene) -> Scene:
     """Return the same press, slid the other way, its settled state alone."""
     slide = SLIDES[-scene.loading.direction]
     return replace(scene, loading=replace(scene.loading, slide=slide), solve=replace(scene.solve, course="steady"))
@@ -414,7 +423,7 @@ def _force_per_mm(prepared: _Prepared) -> float | None:
 def _filled(
     prepared: _Prepared,
     found: Prediction | SolveFailure,
-    opposite: Prediction | SolveFailure,
+    back: Prediction | SolveFailure,
     depth: float | None,
 ) -> TrialPrediction:
     """Return the row with what the solver found, or with the reason for what it did not."""
@@ -430,10 +439,10 @@ def _filled(
             reasons["matching_depth"] = (
                 "The model would have to be pressed nearly to its bone, or has no settled state there."
             )
-    if isinstance(opposite, SolveFailure):
-        reasons["opposite_sed"] = str(opposite)
+    if isinstance(back, SolveFailure):
+        reasons["opposite_sed"] = str(back)
     else:
-        row = replace(row, opposite_sed=opposite.sed_ending)
+        row = replace(row, opposite_sed=back.sed_ending, opposite=back)
     row = replace(row, matching_depth=depth)
     if isinstance(found, SolveFailure):
         reasons |= dict.fromkeys(("sed", "normal_force", "tangential_force"), str(found))

@@ -1,24 +1,19 @@
 """The interval of a predicted SED that the uncertainty of its friction makes; `sessions.uncertainty` finds it."""
 
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 Method = Literal["derivatives", "sampling"]
 
 
 @dataclass(frozen=True, slots=True)
 class SedInterval:
-    """The 95 % interval of one SED that friction alone makes: not the model's own error."""
+    """The 95 % interval of one SED that friction makes, and the force where that drives: not the model's error."""
 
-    trial: int | None
-    stroke: int | None
     low: float | None  # [MPa]; None where `reason` says why
     high: float | None
     method: Method | None
-    by_mu: float | None  # derivative of the SED by mu [MPa]
-    by_tau_max: float | None  # derivative of the SED by tau_max as the model gets it [-]
-    reason: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data."""
-        return asdict(self)
+    by_mu: float | None = None  # derivative of the SED by mu [MPa]
+    by_tau_max: float | None = None  # derivative of the SED by tau_max as the model gets it [-]
+    by_force: float | None = None  # derivative of the SED by the normal force, where that drives the model [MPa/N]
+    reason: str = ""

@@ -7,7 +7,15 @@ accurate; between two they are as good as each one's error estimate.
 from dataclasses import replace
 
 from sessions.alternative import Alternative, Variant, variants
-from sessions.prediction import Prediction, Progress, SessionPrediction, TrialPrediction, scene_along, solved
+from sessions.prediction import (
+    Prediction,
+    Progress,
+    SessionPrediction,
+    TrialPrediction,
+    scene_along,
+    solved,
+    traction_reached,
+)
 
 
 def with_alternatives(prediction: SessionPrediction, progress: Progress | None = None) -> SessionPrediction:
@@ -60,6 +68,7 @@ def _alternative(row: TrialPrediction, variant: Variant, tau_max: float | None, 
         found.error_estimate,
         found.normal_force * width,
         found.tangential_force * width,
+        traction=traction_reached(found),
     )
 
 

@@ -21,9 +21,9 @@ from sessions.plan import Blinded
 from sessions.prediction import TrialPrediction, Way, predict
 from sessions.recording import Recording, RecordingError
 from sessions.recording.provenance import software_versions
-from sessions.report import Field, Further, Report, findings
+from sessions.report import Field, Report, findings
 from sessions.report.predictions import field_of, finding_of
-from sessions.uncertainty import sed_intervals
+from sessions.uncertainty import with_intervals
 from solver.failures import Cancelled
 from solver.fields import Sketch
 from solver.scene import SceneError
@@ -260,8 +260,9 @@ class Work:
             from sessions.exports import html
 
             told = self.timed("carrying the uncertainty of friction through")
-            further = Further(sed_intervals(self._analysis, self._prediction, progress=told))
-            html.write_report(findings(self._recording, self._analysis, self._prediction, further=further), path)
+            asked = replace(self._prediction, options=replace(self._prediction.options, intervals=True))
+            self._prediction = with_intervals(self._analysis, asked, progress=told)
+            html.write_report(findings(self._recording, self._analysis, self._prediction), path)
             return str(path)
         made_by = {"made_by": software_versions()}
         source = ExportSource(

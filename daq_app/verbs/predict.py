@@ -24,7 +24,7 @@ from solver.scene import Scene
 EXAMPLE = "daq-app predict recordings/P07 --tau as-printed"
 HEAD = ["trial", "surface", "mu", "tau_max [kPa]", "SED [kPa]", "error", "model N [N]", "measured [N]", "match [mm]"]
 
-INTERVALS = ["trial", "SED [kPa]", "by", "per 0.01 of mu [Pa]", "per kPa of tau_max [Pa]"]
+INTERVALS = ["trial", "SED [kPa]", "by", "per 0.01 of mu [Pa]", "per kPa of tau_max [Pa]", "slid the other way", "by"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -92,7 +92,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
     recording = visit(options.session, options.subject)
     analysis = analysed(recording, console, area_law(options))
     prediction = predicted(recording, analysis, console, asked)
-    intervals = prediction.intervals
     seal = {"sealed_sha256": seal_prediction(recording, prediction.to_dict())} if options.seal else {}
     firing = _firing(prediction, options) if options.afferent else {}
     console.result({**prediction.to_dict(), **seal, **firing})
@@ -114,9 +113,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     ]
     console.say(table(rows, head=HEAD) if rows else "nothing to predict: no forces were recorded")
     _print_beside(prediction, console)
-    if intervals:
+    if asked.intervals:
         console.say("\n95 % interval of SED from the uncertainty of friction alone, not the model's own error:")
-        console.say(table([_row(one) for one in intervals], head=INTERVALS))
+        console.say(table([_row(row) for row in prediction.trials], head=INTERVALS))
+        _print_beside_intervals(prediction, console)
     if firing:
         _print_firing(firing["afferent"], console)
     if seal:
@@ -158,15 +158,43 @@ def _cell(one: Alternative) -> str:
     return f"{number(one.sed * 1e3, 4)} ({number(beside)})"
 
 
-def _row(one: SedInterval) -> list[str]:
-    known = None if one.low is None or one.high is None else (1e3 * one.low, 1e3 * one.high)
+def _print_beside_intervals(prediction: SessionPrediction, console: Console) -> None:
+    """Print the interval of each SED in every variant: by derivatives, or marked * by solving draws."""
+    rows = [row for row in prediction.trials if row.alternatives]
+    if not rows:
+        return
+    console.say("\nof the same trials side by side [kPa], by derivatives, or where marked * by solving draws:")
+    head = ["trial", *(f"({n})" for n, _ in enumerate(rows[0].alternatives, 1))]
+    cells = [[_called(row), *(_ends(one.interval, mark=True) for one in row.alternatives)] for row in rows]
+    console.say(table(cells, head=head))
+    missing: defaultdict[str, list[str]] = defaultdict(list)
+    for row in rows:
+        for n, one in enumerate(row.alternatives, 1):
+            if one.sed is not None and one.interval is not None and one.interval.low is None:
+                missing[one.interval.reason].append(f"{_called(row)} ({n})")
+    for reason, which in missing.items():
+        console.say(f"{', '.join(which)}: no interval: {reason}")
+
+
+def _row(row: TrialPrediction) -> list[str]:
+    one = row.interval or SedInterval(None, None, None)
+    other = row.opposite_interval
     return [
-        str(one.trial or (one.stroke or 0) + 1),
-        one.reason if known is None else f"{number(known[0], 4)} to {number(known[1], 4)}",
+        _called(row),
+        one.reason or _ends(one),
         one.method or "–",
         number(None if one.by_mu is None else 1e4 * one.by_mu),
         number(None if one.by_tau_max is None else 1e3 * one.by_tau_max),
+        _ends(other),
+        "–" if other is None else other.method or "–",
     ]
+
+
+def _ends(one: SedInterval | None, *, mark: bool = False) -> str:
+    if one is None or one.low is None or one.high is None:
+        return "–"
+    star = "*" if mark and one.method == "sampling" else ""
+    return f"{number(1e3 * one.low, 4)} to {number(1e3 * one.high, 4)}{star}"
 
 
 def _firing(prediction: SessionPrediction, options: argparse.Namespace) -> dict[str, Any]:

@@ -4,11 +4,12 @@ Scores of further visits (other subjects, or this one without a transducer) are 
 """
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 from daq_app.area_option import add_area, area_law
 from daq_app.console import Console
-from daq_app.derived import analysed, predicted, visit
+from daq_app.derived import analysed, asked_before, predicted, visit
 from sessions.afferent import AfferentSettings, session_firing
 from sessions.blinding import revealed
 from sessions.paths import trial_paths
@@ -42,9 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--beside",
         choices=["none", "small", "both"],
-        default="small",
         help="also otherwise, as for 'daq-app predict': both readings of tau_max, by depth and by force, both ways; "
-        "with 'both' at finite strain too (about a minute)",
+        "with 'both' at finite strain too (about a minute); small, or all that was predicted before",
     )
     parser.add_argument(
         "--afferent", action="store_true", help="also firing rates of an SA-II afferent: an illustration"
@@ -64,7 +64,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         if one.plan.blinded:
             raise Blinded(f"{one.folder} is blinded: a report tells scores by index; 'daq-app unblind' opens the key")
     analysis = analysed(recording, console, area_law(options))
-    prediction = predicted(recording, analysis, console, PredictionOptions(intervals=True, beside=options.beside))
+    prediction = predicted(recording, analysis, console, _asked(recording, options))
     from sessions.exports import html
     from sessions.report import findings, score_table
 
@@ -80,6 +80,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.result({"page": str(page), "pictures": [str(path) for path in pictures], "flaws": len(report.flaws)})
     console.say(f"{page}{' (SIMULATED)' if report.simulated else ''}")
     return 3 if analysis.flaws else 0
+
+
+def _asked(recording: Recording, options: argparse.Namespace) -> PredictionOptions:
+    """Return what to ask of the model: what was asked before, so that nothing kept is lost, and what a page shows."""
+    before = asked_before(recording) or PredictionOptions()
+    beside = max(before.beside, options.beside or "small", key=("none", "small", "both").index)
+    return replace(before, intervals=True, beside=beside, course="history")
 
 
 def _further(
@@ -102,4 +109,4 @@ def _further(
     if options.paths is not None and recording.plan.forces:
         finite = options.paths == "finite"
         paths = trial_paths(recording, progress=shown("many paths of the analysis"), finite=finite)
-    return Further(prediction.intervals, firing, afferent_facts(AfferentSettings(), reference), paths)
+    return Further(firing, afferent_facts(AfferentSettings(), reference), paths)

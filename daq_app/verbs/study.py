@@ -17,6 +17,7 @@ from daq_app.area_option import add_area, area_law
 from daq_app.cli import WrongValue
 from daq_app.console import Console
 from daq_app.pooling import Shelf, visits
+from sessions.analysis.area import FIXED
 from sessions.pooling.exclusions import exclusions_in
 from sessions.pooling.pooled import UNITS, StudyFindings, pooled
 from sessions.pooling.visit import VisitOptions
@@ -78,7 +79,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         raise RecordingError(f"{folder} holds no session: give the folder that holds a folder for each of them")
     intervals = options.kinematics == "small" if options.intervals is None else options.intervals
     model = PredictionOptions(options.tau, course="steady", kinematics=options.kinematics, intervals=intervals)
-    asked = VisitOptions(model, area_law(options), options.paths)
+    asked = VisitOptions(model, area_law(options) or FIXED, options.paths)
     shelf = Shelf(out / "results", asked)
     done, failed = visits(sessions, asked, shelf, console, scheduler=options.scheduler, workers=options.workers)
     planted = folder / PLANTED

@@ -7,7 +7,7 @@ and ended; the interval lies between two quantiles of what the repeats give.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,10 +132,18 @@ def intervals_of(strokes: Sequence[Stroke], settings: BootstrapSettings | None =
     return {"kind": chosen.kind, "kinds": dict(chosen.kinds), "settings": asdict(chosen), "strokes": found}
 
 
+class FrictionDraws(NamedTuple):
+    """What the friction of a stroke may have been: (repeats,) of each, together as they were drawn."""
+
+    mu: Array  # [-]
+    tau_max: Array  # [MPa]
+    normal_force: Array | None  # mean over the steady window [N]; None where there is none
+
+
 def friction_draws(
     stroke: Stroke, number: int, rule: Rule, settings: BootstrapSettings | None = None
-) -> tuple[Array, Array] | None:
-    """Return mu [-] and tau_max [MPa] (repeats,) of each repeat, together as they were drawn; None without either.
+) -> FrictionDraws | None:
+    """Return mu, tau_max and normal force of each repeat; None without mu or tau_max.
 
     They are the draws that `stroke_intervals` takes its quantiles from; an error of calibration moves both alike.
     """
@@ -144,7 +152,9 @@ def friction_draws(
         return None
     found = _Repeats(stroke, stroke.curve, chosen, np.random.default_rng([chosen.seed, number])).all()
     name = "mu_max" if rule == "maximum" else "mu_dynamic"
-    return None if name not in found or "tau_max" not in found else (found[name], found["tau_max"])
+    if name not in found or "tau_max" not in found:
+        return None
+    return FrictionDraws(found[name], found["tau_max"], found.get("normal_force"))
 
 
 class _Repeats:

@@ -14,10 +14,12 @@ Cell = str | int | float | None
 
 AXES = (("Fx", "N"), ("Fy", "N"), ("Fz", "N"), ("Tx", "N mm"), ("Ty", "N mm"), ("Tz", "N mm"))
 _SUFFIXES = {"mm/s": "mm_per_s", "N/mm": "N_per_mm", "N mm": "Nmm", "mm2": "mm2"}
+_OTHERWISE_TOLD = ("solver", "alternatives", "interval", "opposite_interval")
 _PAIRS = {
     "steady": ("start", "stop"),
     "mu_interval": ("low", "high"),
     "sed_interval": ("low", "high"),
+    "opposite_sed_interval": ("low", "high"),
     "mu_dynamic_interval": ("low", "high"),
 } | {f"{name}_bootstrap": ("low", "high") for name in NUMBERS}
 
@@ -72,13 +74,17 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
         made = (*made, _of("decisions", "what people decided, in force", analysis["decisions"], _DECISION))
     if prediction is None:
         return made
-    rows = [{k: v for k, v in row.items() if k not in ("solver", "alternatives")} for row in prediction["trials"]]
-    ends: Sequence[Mapping[str, Any]] = prediction.get("sed_intervals") or ()
-    for row, one in zip(rows, ends, strict=False):  # one for each trial, where they were asked for
-        row["sed_interval"] = None if one["low"] is None else (one["low"], one["high"])
+    rows = [{k: v for k, v in row.items() if k not in _OTHERWISE_TOLD} for row in prediction["trials"]]
+    for row, told in zip(rows, prediction["trials"], strict=True):
+        row |= _sed_interval("sed", told.get("interval")) | _sed_interval("opposite_sed", told.get("opposite_interval"))
     predicted = _of("predictions", "what the finite-element finger predicts for each trial", rows, _PREDICTION)
     otherwise = [
-        {"trial": row["trial"], **one["variant"], **{k: v for k, v in one.items() if k != "variant"}}
+        {
+            "trial": row["trial"],
+            **one["variant"],
+            **{k: v for k, v in one.items() if k not in ("variant", "interval")},
+            **_sed_interval("sed", one.get("interval")),
+        }
         for row in prediction["trials"]
         for one in row.get("alternatives", ())
     ]
@@ -86,6 +92,14 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
         return (*made, predicted)
     meaning = "the same trials predicted otherwise: another reading of tau_max, another strain, by the measured force"
     return (*made, predicted, _of("alternatives", meaning, otherwise, _ALTERNATIVE))
+
+
+def _sed_interval(name: str, told: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return the columns of an interval, where one was asked for: its ends, how it was found, or why it is none."""
+    if told is None:
+        return {}
+    ends = None if told["low"] is None else (told["low"], told["high"])
+    return {f"{name}_interval": ends, f"{name}_interval_by": told["method"] or told["reason"]}
 
 
 def trials(recording: Recording) -> Table:
@@ -326,6 +340,9 @@ _ALTERNATIVE = {
     "normal_force": ("N", "the model's, times the finger's width"),
     "tangential_force": ("N", "likewise"),
     "reason": ("", "why there is no number"),
+    "traction": ("MPa", "greatest friction traction on the skin; a tau_max above it bounds nothing"),
+    "sed_interval": ("MPa", "95 % interval of sed that the uncertainty of friction, and of a driving force, makes"),
+    "sed_interval_by": ("", "derivatives or sampling, or why there is no interval"),
 }
 _PREDICTION = {
     "trial": ("", "number of the trial"),
@@ -342,6 +359,9 @@ _PREDICTION = {
     "speed": ("mm/s", "of the slide"),
     "sed": ("MPa", "strain-energy density averaged over the ending (mJ/mm3)"),
     "sed_interval": ("MPa", "95 % interval of sed that the uncertainty of friction makes, where it was asked for"),
+    "sed_interval_by": ("", "derivatives or sampling, or why there is no interval"),
+    "opposite_sed_interval": ("MPa", "likewise of opposite_sed"),
+    "opposite_sed_interval_by": ("", "likewise"),
     "error_estimate": ("", "relative, of sed"),
     "normal_per_mm": ("N/mm", "the model's normal force"),
     "tangential_per_mm": ("N/mm", "the model's tangential force"),

@@ -114,7 +114,7 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
     analysis = analyse(known, AnalysisSettings(area=options.area))
     prediction = None
     if known.plan.forces:
-        prediction = with_intervals(analysis, predict(analysis, known.plan, options.prediction))
+        prediction = with_intervals(analysis, predict(analysis, known.plan, options.prediction), both_ways=False)
     along: Mapping[int, Seds] = {}
     if options.paths != "none" and known.plan.forces:
         along = trial_paths(known, options.prediction, finite=options.paths == "finite")
@@ -196,7 +196,7 @@ def _row(
     )
     if answer is None:
         return row
-    interval = next((one for one in prediction.intervals if one.trial == trial.number), None) if prediction else None
+    interval = answer.interval
     return replace(
         row,
         sed=answer.sed,

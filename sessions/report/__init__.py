@@ -29,7 +29,6 @@ from sessions.report.experiments import experiments
 from sessions.report.predictions import fields, left_out, modelled, predicted_seds, predictions
 from sessions.report.strokes import course, flaws, strokes
 from sessions.sealing import NUMBERS, sealed_sentence
-from sessions.sed_interval import SedInterval
 
 __all__ = [
     "Answers",
@@ -55,7 +54,6 @@ __all__ = [
 class Further:
     """What a report can hold beside the prediction itself."""
 
-    intervals: Sequence[SedInterval] = ()  # of each predicted trial, in order
     firing: Sequence[Firing] = ()  # of each trial with a course
     afferent: tuple[Fact, ...] = ()  # the parameters that `firing` was told with
     paths: Mapping[int, Seds] | None = None  # trial -> SED along many paths of the analysis
@@ -78,7 +76,7 @@ def findings(
     tables = joined((score_table(recording), *(scores or ())))
     found = strokes(recording, analysis)
     more = further or Further()
-    predicted = predictions(prediction, more.intervals, more.firing)
+    predicted = predictions(prediction, more.firing)
     head = _head(recording, tables)
     return Report(
         title=_title(recording),

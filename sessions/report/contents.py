@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, field
 from sessions.alternative import Alternative
 from sessions.analysis.scores import MeanScore, Relation
 from sessions.paths import PathFinding
+from sessions.sed_interval import SedInterval
 
 Numbers = tuple[float, ...]
 
@@ -127,6 +128,7 @@ class PredictionFinding:
     reasons: dict[str, str]
     sed_interval: tuple[float, float] | None = None  # that the uncertainty of friction alone makes [MPa]
     interval_by: str = ""  # "derivatives" or "sampling"
+    opposite_interval: SedInterval | None = None  # of opposite_sed, likewise
     peak_rate: float | None = None  # of an SA-II afferent, an illustration [imp/s]
     settled_rate: float | None = None  # likewise
     alternatives: tuple[Alternative, ...] = ()  # the trial in each variant, where they were asked for

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from sessions.afferent import AfferentSettings, Firing, parameters
 from sessions.prediction import SessionPrediction, TrialPrediction
 from sessions.report.contents import Fact, Field, History, PredictionFinding
-from sessions.sed_interval import SedInterval
 
 _SCENE = {"finger": "mm, degrees", "materials": "E in MPa", "receptor": "mm"}  # what all trials share, with its units
 _READINGS = {
@@ -22,18 +21,12 @@ _READINGS = {
 _FROM_ROW = {"tau_max": "mu", "error_estimate": "sed", "normal_per_mm": "normal_force", "wall_s": "sed"}
 
 
-def predictions(
-    found: SessionPrediction | None, intervals: Sequence[SedInterval] = (), firing: Sequence[Firing] = ()
-) -> tuple[PredictionFinding, ...]:
+def predictions(found: SessionPrediction | None, firing: Sequence[Firing] = ()) -> tuple[PredictionFinding, ...]:
     """Return a finding for each trial, or for each stroke of a recording without trials."""
     if found is None:
         return ()
     rates = {one.trial: one for one in firing}
-    told = list(intervals) or [None] * len(found.trials)
-    return tuple(
-        _with_more(finding_of(row), interval, rates.get(row.trial))
-        for row, interval in zip(found.trials, told, strict=True)
-    )
+    return tuple(_with_more(finding_of(row), row, rates.get(row.trial)) for row in found.trials)
 
 
 def afferent_facts(settings: AfferentSettings, reference: float | None) -> tuple[Fact, ...]:
@@ -148,12 +141,14 @@ def finding_of(row: TrialPrediction) -> PredictionFinding:
     )
 
 
-def _with_more(finding: PredictionFinding, interval: SedInterval | None, firing: Firing | None) -> PredictionFinding:
-    """Return the finding with the interval of its SED, and with an afferent's rates."""
+def _with_more(finding: PredictionFinding, row: TrialPrediction, firing: Firing | None) -> PredictionFinding:
+    """Return the finding with the intervals of its SED, and with an afferent's rates."""
+    interval = row.interval
     if interval is not None and interval.low is not None and interval.high is not None:
         finding = replace(finding, sed_interval=(interval.low, interval.high), interval_by=interval.method or "")
     elif interval is not None:
         finding = replace(finding, reasons={**finding.reasons, "sed_interval": interval.reason})
+    finding = replace(finding, opposite_interval=row.opposite_interval)
     if firing is not None:
         finding = replace(finding, peak_rate=float(firing.rate.max()), settled_rate=firing.settled_rate)
     return finding

@@ -87,7 +87,7 @@ def test_every_file_of_a_simulated_session_says_simulated(session, capsys):
 def test_predict_gives_a_row_a_trial_and_every_number_comes_out_again_in_another_process_to_the_last_bit(small, capsys):
     assert run(["predict", str(small), "--intervals", "--json"]) == 0
     document = printed(capsys)
-    assert len(document["trials"]) == len(document["sed_intervals"]) == 2
+    assert [row["interval"]["method"] for row in document["trials"]] == ["derivatives"] * 2
     for row in document["trials"]:
         assert row["sed"] > 0
         assert row["error_estimate"] > 0
@@ -239,8 +239,16 @@ def test_a_session_is_never_written_over(recorded, capsys):
     assert {path.name: path.read_bytes() for path in recorded.iterdir()} == before
 
 
-def test_a_report_is_one_page_that_says_simulated_listed_in_the_sessions_manifest_and_verified(session, capsys):
+def test_a_report_is_one_page_that_says_simulated_listed_in_the_manifest_and_keeps_what_was_asked_before(small, capsys):
+    session = small
+    run(["analyse", str(session), "--area", "hertz", "--calibration-error", "2"])
+    run(["predict", str(session), "--beside", "none", "--indentation", "1.2"])
+    capsys.readouterr()
     assert run(["report", str(session), "--json"]) == 0
+    stored = {name: json.loads((session / f"{name}.json").read_text()) for name in ("analysis", "prediction")}
+    assert stored["analysis"]["settings"]["area"]["law"] == stored["prediction"]["area"]["law"] == "hertz"
+    assert stored["analysis"]["bootstrap"]["settings"]["gain_error"] == 0.02
+    assert [row["indentation"] for row in stored["prediction"]["trials"]] == [1.2, 1.2]
     page = session / "report.html"
     assert printed(capsys)["page"] == str(page)
     text = page.read_text()

@@ -4,6 +4,7 @@ from sessions.exports.report_tables.cells import Cell, Column, Group, Table
 from sessions.exports.report_tables.paths import paths_table
 from sessions.exports.report_tables.predictions import (
     afferent_table,
+    beside_interval_table,
     beside_table,
     direction_table,
     force_table,
@@ -21,7 +22,13 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
     sections = {
         "scores": (score_table(report), *answer_tables(report)),
         "strokes": (stroke_table(report), interval_table(report), course_table(report)),
-        "predictions": (prediction_table(report), force_table(report), direction_table(report), beside_table(report)),
+        "predictions": (
+            prediction_table(report),
+            force_table(report),
+            direction_table(report),
+            beside_table(report),
+            beside_interval_table(report),
+        ),
         "afferent": (afferent_table(report),),
         "relation": (relation_table(report),),
         "paths": (paths_table((e.name, e.paths) for e in report.experiments),),

@@ -4,6 +4,7 @@ from sessions.alternative import Alternative
 from sessions.exports.report_tables.cells import Cell, Column, Notes, Table, grouped
 from sessions.exports.wording import digits, direction, places, sed, significant, tau
 from sessions.report import PredictionFinding, Report
+from sessions.sed_interval import SedInterval
 
 
 def prediction_table(report: Report) -> Table | None:
@@ -99,6 +100,32 @@ def beside_table(report: Report) -> Table | None:
     return Table("table-beside", caption, columns, groups, notes.listed())
 
 
+def beside_interval_table(report: Report) -> Table | None:
+    """Return the interval of each SED in every variant, where they were asked for."""
+    first = next((p.alternatives for p in report.predictions if p.alternatives), ())
+    if all(one.interval is None for one in first):
+        return None
+    notes = Notes()
+
+    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+        return (*_named(p), *(_ends(one.interval, notes, one.reason) for one in p.alternatives))
+
+    caption = (
+        "95 % intervals of the SEDs of the table before, column by column, that the uncertainty of friction makes, and "
+        "of the force where that drives the model: by derivatives, or where marked * by solving draws."
+    )
+    columns = (*_who(report), *(Column(f"({n})", "kPa") for n in range(1, len(first) + 1)))
+    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
+    return Table("table-beside-intervals", caption, columns, groups, notes.listed())
+
+
+def _ends(interval: SedInterval | None, notes: Notes, why: str | None) -> Cell:
+    if interval is None or interval.low is None or interval.high is None:
+        told = "" if interval is None else interval.reason
+        return notes.number(None, sed, told or why or "not computed")
+    return Cell(f"{sed(interval.low)} to {sed(interval.high)}{'*' if interval.method == 'sampling' else ''}")
+
+
 def force_table(report: Report) -> Table | None:
     """Return the model's forces beside the measured ones."""
     if not report.predictions:
@@ -149,7 +176,9 @@ def direction_table(report: Report) -> Table | None:
         Column("depth", "mm"),
         Column("stroked"),
         Column("SED as stroked", "kPa"),
+        Column("95 % interval", "kPa"),
         Column("SED the other way", "kPa"),
+        Column("95 % interval", "kPa"),
         Column("d → p over p → d"),
     )
 
@@ -164,12 +193,15 @@ def direction_table(report: Report) -> Table | None:
             _depth(p, notes),
             Cell(direction(p.direction)),
             notes.number(p.sed, sed, p.reasons.get("sed")),
+            _interval(p, notes),
             notes.number(p.opposite_sed, sed, why),
+            _ends(p.opposite_interval, notes, why),
             notes.number(ratio, places(3), why),
         )
 
     caption = (
-        "Both directions at equal depth, each with its trial's friction. Last column: SED while sliding from distal "
+        "Both directions at equal depth, each with its trial's friction. Intervals: what the uncertainty of friction "
+        "makes of each, by derivatives, or where marked * by solving draws. Last column: SED while sliding from distal "
         "to proximal over SED while sliding from proximal to distal."
     )
     groups = grouped(report, report.predictions, lambda p: p.experiment, row)
