@@ -4,7 +4,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, cast
 
 MADE_BY = "made_by"  # versions of what made a stored document
-TIMINGS = frozenset({"wall_s", "setup_s", "estimate_s", MADE_BY, "SIMULATED"})  # not numbers of the session
+TIMINGS = frozenset(
+    {"wall_s", "setup_s", "estimate_s", "evidence_s", MADE_BY, "SIMULATED"}
+)  # not numbers of the session
 _MOST = 20  # differences told one by one
 
 

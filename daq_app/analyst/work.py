@@ -260,8 +260,8 @@ class Work:
             from sessions.exports import html
 
             told = self.timed("carrying the uncertainty of friction through")
-            asked = replace(self._prediction, options=replace(self._prediction.options, intervals=True))
-            self._prediction = with_intervals(self._analysis, asked, progress=told)
+            with_them = replace(self._prediction, options=replace(self._prediction.options, intervals=True))
+            self._prediction = with_intervals(self._analysis, with_them, progress=told)
             html.write_report(findings(self._recording, self._analysis, self._prediction), path)
             return str(path)
         made_by = {"made_by": software_versions()}
