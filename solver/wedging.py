@@ -44,7 +44,7 @@ def followed(body: Touchable, law: FrictionLaw, depth: float, direction: int) ->
 
 
 def deepest(scene: Scene, law: FrictionLaw, *, in_loops: bool = False) -> float | None:
-    """Return the largest indentation [mm] below the scene's with settled sliding under `law`, to 4 %.
+    """Return the largest indentation [mm] below the scene's with settled sliding under `law`, to 3 %.
 
     None where there is none, or where a finer mesh puts it elsewhere, as it does at coefficients far beyond the limit.
     `in_loops` as in `Body.of`.
@@ -61,11 +61,12 @@ def deepest(scene: Scene, law: FrictionLaw, *, in_loops: bool = False) -> float 
     low, high = 1e-3 * scene.loading.depth, scene.loading.depth
     if not slides(low):
         return None
-    while high > 1.02 * low:
+    while high > 1.01 * low:
         middle = sqrt(low * high)
         low, high = (middle, high) if slides(middle) else (low, middle)
-    body, meshed = _body(scene, low, 1.6 * FINENESS, in_loops), low
-    return low if slides(0.97 * low) and not slides(1.05 * low) else None
+    found = sqrt(low * high)
+    body, meshed = _body(scene, found, 1.6 * FINENESS, in_loops), found
+    return found if slides(0.97 * found) and not slides(1.03 * found) else None
 
 
 def _body(scene: Scene, depth: float, fineness: float, in_loops: bool) -> Touchable:
