@@ -7,7 +7,7 @@ import numpy as np
 
 from solver import finite_forced, sliding
 from solver.existence import steady
-from solver.failures import NotConverged, SolveFailure, beyond_friction
+from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.finite_finger import FiniteFinger
 from solver.finite_forced import Given
 from solver.kernels import STICK
@@ -19,6 +19,7 @@ from solver.scene import Scene
 LEADING = 1e-3  # tolerance of states that only lead to others [mm]
 GOOD, CLOSE = 1e-7, 1e-7  # tolerance of the states of a course [mm], and by the indentation where that is less
 PRESSES = 40  # steps of the pre-indentation, and of a drag that grows
+BEFORE_LIMIT = 0.99  # of the largest depth, at which a force is still looked for
 SEARCHES = 60  # steps of a search for the depth at which a force is met
 MET = 1e-9  # relative difference within which it is
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
@@ -77,9 +78,9 @@ def _settled_under(
             pass
     try:
         slides = _sliding_under(finger, scene, force, stop, start)
-    except SolveFailure:
+    except SolveFailure as failure:
         if drag is None:
-            raise
+            raise _under_force(scene, force, failure) from failure
         return course(scene, finger, stop, times)[-1]  # the drag may be met before sliding would fold the skin
     most = abs(float(slides.force[0]))
     if drag is None or most * (1.0 - ALL_SLIPS) <= drag <= most * (1.0 + ALL_SLIPS):
@@ -87,6 +88,19 @@ def _settled_under(
     if drag > most:
         raise beyond_friction(drag, most, force)
     return course(scene, finger, stop, times)[-1]
+
+
+def _under_force(scene: Scene, force: float, failure: SolveFailure) -> SolveFailure:
+    """Return why there is no slide under a normal force, found by searching depths: no limit of friction is known."""
+    if not isinstance(failure, NoSteadyState):
+        return failure
+    depth = failure.limit_indentation
+    ends = "" if depth is None else f": with this friction there is settled sliding up to {depth:.3g} mm of indentation"
+    return NoSteadyState(
+        f"No settled sliding at mu = {float(scene.friction.mu):.3g} was found under a normal force of {force:.4g} "
+        f"N/mm{ends}; ask for less force, less friction or small strain.",
+        limit_indentation=depth,
+    )
 
 
 def _sliding_under(
@@ -122,7 +136,15 @@ def _deeper(finger: FiniteFinger, shape: Shape, force: float, stop: Callable[[],
     low = shape
     for _ in range(SEARCHES):  # deeper until it presses as hard
         begin = low if low.touching.any() else None
-        high = steady(newton, low.pull._replace(depth=low.pull.depth + step), outline, start=begin, stop=stop)
+        try:
+            high = steady(newton, low.pull._replace(depth=low.pull.depth + step), outline, start=begin, stop=stop)
+        except NoSteadyState as failure:  # but shortly before that it may press as hard
+            last = BEFORE_LIMIT * (failure.limit_indentation or 0.0)
+            if last <= low.pull.depth:
+                raise
+            high = steady(newton, low.pull._replace(depth=last), outline, start=begin, stop=stop)
+            if high.force[1] < force:
+                raise
         if high.force[1] >= force:
             break
         low, step = high, 1.5 * step

@@ -174,3 +174,14 @@ def test_any_forces_lead_to_a_state_that_has_them_or_to_a_sentence(drawn):
     assert found.sed_ending > 0.0
     for name in ("equilibrium_x", "equilibrium_y", "penetration", "tension", "cone_violation"):
         assert found.audits[name] < 1e-7
+
+
+@pytest.mark.slow
+def test_at_finite_strain_a_force_is_met_up_to_the_largest_depth_and_refused_without_a_limit_of_friction_beyond():
+    pressed = Scene(friction=Friction(0.3), loading=Loading(normal_force=0.35), solve=Solve("finite", tolerance=COARSE))
+    found = solve(pressed)  # a step of the search goes beyond the depth at which the skin folds, and 0.35 lies before
+    assert found.normal_force == pytest.approx(0.35, rel=1e-8)
+    with pytest.raises(NoSteadyState, match=r"under a normal force of 0\.35") as refused:
+        solve(replace(pressed, friction=Friction(0.4)))
+    assert refused.value.limit_mu is None  # that of the depth at which the search ended would be none of this scene
+    assert refused.value.limit_indentation < 2.2
