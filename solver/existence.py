@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from solver.crossing import crosses_itself, least_stretch
+from solver import kernels
 from solver.failures import NoSteadyState, NotConverged
 from solver.limit import largest_depth, largest_friction, leapt
 from solver.mesh import Indices
@@ -59,8 +59,7 @@ def steady(
 
 def doubts(newton: Newton, shape: Shape, outline: Indices) -> tuple[str, ...]:
     """Return the sentence that a state needs whose skin is squeezed nearly as far as surfaces fold, or none."""
-    nodes = newton.body.mesh.nodes[outline]
-    least = least_stretch(nodes, nodes + shape.u[outline])
+    least = kernels.squeezed(newton.body.mesh.nodes, shape.u, outline)
     if least >= SOUND:
         return ()
     return (
@@ -71,6 +70,5 @@ def doubts(newton: Newton, shape: Shape, outline: Indices) -> tuple[str, ...]:
 
 def sound(newton: Newton, shape: Shape, outline: Indices) -> bool:
     """Return whether the skin is nowhere squeezed so far that it may have folded, and does not cross itself."""
-    nodes = newton.body.mesh.nodes[outline]
-    moved = nodes + shape.u[outline]
-    return least_stretch(nodes, moved) >= SOUND and not crosses_itself(moved)
+    nodes = newton.body.mesh.nodes
+    return kernels.squeezed(nodes, shape.u, outline) >= SOUND and not kernels.crosses(nodes, shape.u, outline)

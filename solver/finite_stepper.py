@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.crossing import least_stretch
+from solver import kernels
 from solver.finite_finger import FiniteFinger
 from solver.finite_forced import Given, corrected
 from solver.kernels import OPEN, SLIP, STICK
@@ -95,8 +95,7 @@ class FiniteStepper:
             if done is None or done[1] > FURTHEST or done[0].state[0] != OPEN or done[0].state[-1] != OPEN:
                 return self._lose(normal)
             shape = done[0]
-        outline = newton.body.mesh.nodes[self._finger.geometry.whole]
-        if least_stretch(outline, outline + shape.u[self._finger.geometry.whole]) < FOLDING:
+        if kernels.squeezed(newton.body.mesh.nodes, shape.u, self._finger.geometry.whole) < FOLDING:
             return self._lose(normal)
         self.shape = shape
         x, y = shape.force

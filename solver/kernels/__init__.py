@@ -8,6 +8,7 @@ from solver.kernels.carrying import carry
 from solver.kernels.compiling import CAP, OPEN, SLIP, STICK
 from solver.kernels.elements import advance, assemble, energies, forces
 from solver.kernels.fronts import condense, eliminate, unfold
+from solver.kernels.outline import crosses, squeezed
 from solver.kernels.overstress import add_overstress
 from solver.kernels.skin import impose, restate, settle, solve, tributary
 
@@ -21,6 +22,7 @@ __all__ = [
     "assemble",
     "carry",
     "condense",
+    "crosses",
     "eliminate",
     "energies",
     "forces",
@@ -28,6 +30,7 @@ __all__ = [
     "restate",
     "settle",
     "solve",
+    "squeezed",
     "tributary",
     "unfold",
 ]

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from solver import kernels, kernels_numpy
+from solver.crossing import crosses_itself, least_stretch
 from solver.finite_body import FiniteBody
 from solver.hyperelastic import NeoHooke, Ogden
 from solver.kernels import CAP, OPEN, SLIP, STICK
@@ -190,3 +191,16 @@ def test_probed_energy_of_an_even_squeeze_is_the_laws_own():
     Q = np.sum(F * F) - 2.0 - 2.0 * np.log(np.linalg.det(F))
     expected = body.shear / 2.0 * Q + body.lame / 2.0 * np.log(np.linalg.det(F)) ** 2
     np.testing.assert_allclose(probes.energy(body, u), expected[probes.element], rtol=1e-9)
+
+
+def test_the_compiled_outline_is_squeezed_and_crosses_itself_where_the_plain_one_is():
+    draw, seen = np.random.default_rng(5), set()
+    for spread in np.geomspace(0.01, 1.0, 40):
+        nodes = np.stack([np.linspace(0.0, 3.0, 24), np.zeros(24)], axis=1)
+        u = spread * draw.normal(size=nodes.shape)
+        outline = np.arange(2, 22)
+        before, after = nodes[outline], (nodes + u)[outline]
+        assert kernels.squeezed(nodes, u, outline) == pytest.approx(least_stretch(before, after), rel=1e-13)
+        assert kernels.crosses(nodes, u, outline) == crosses_itself(after)
+        seen.add(kernels.crosses(nodes, u, outline))
+    assert seen == {True, False}

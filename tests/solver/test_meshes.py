@@ -67,7 +67,7 @@ def test_lines_lie_where_contact_ends_and_elements_are_shortest_there():
     assert max(inside[0], inside[-1]) < inside[1:-1].mean()
 
 
-@settings(deadline=None, max_examples=10)
+@settings(deadline=None, max_examples=8)
 @given(
     edges=st.lists(st.tuples(st.floats(-5.0, -0.5), st.floats(0.05, 4.5)), min_size=1, max_size=4),
     fineness=st.sampled_from([4.0, 7.0, 10.0]),

@@ -61,8 +61,7 @@ COURSES = [(1.5, 0.62, -1), (1.5, 0.24, -1), (2.0, 0.28, 1)]  # depth [mm], mu, 
     ("kinematics", "depth", "mu", "direction"),
     [
         *(("small", *course) for course in COURSES),
-        *(pytest.param("finite", *course, marks=pytest.mark.slow) for course in COURSES[:2]),
-        ("finite", *COURSES[2]),
+        *(pytest.param("finite", *course, marks=pytest.mark.slow) for course in COURSES),
     ],
 )
 def test_one_call_a_reading_keeps_the_response_within_two_per_cent_of_its_peak(kinematics, depth, mu, direction):
