@@ -16,6 +16,7 @@ from sessions.analysis.wild import wild_readings
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+_LONG = 1.8  # times the usual step: a reading is missing in between
 _AXIS_NAMES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 
 
@@ -62,9 +63,14 @@ def soundness(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSetti
     saturated = beyond | clipped
     stalled = np.concatenate([[False], steps <= 0.0])
     good = ~(frozen | saturated | wild | stalled)
-    broken = (np.diff(block.sequence) != 1) | (steps > 1.8 * step) | (steps <= 0.0)
+    long = (np.diff(block.sequence) == 1) & (steps > _LONG * step)
+    # A few long steps are readings that a stream without numbers lost; as many as this are another rate.
+    another = bool(long.mean() > settings.uneven)
+    widest = float(np.percentile(forward, 98)) if another else step
+    broken = (np.diff(block.sequence) != 1) | (steps > _LONG * widest) | (steps <= 0.0)
     neighbours = steps[~broken]
-    even = bool(len(neighbours) and np.ptp(np.percentile(neighbours, [2, 98])) <= settings.uneven * step)
+    spread = np.ptp(np.percentile(neighbours, [2, 98])) if len(neighbours) else np.inf
+    even = bool(not another and spread <= settings.uneven * step)
     segments = _segments(good, broken)
     dead = tuple(
         name

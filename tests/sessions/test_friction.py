@@ -125,6 +125,15 @@ def test_lost_readings_are_counted_and_cost_nothing_where_they_are_few():
     assert found.strokes[0].tau_max == pytest.approx(0.01, rel=0.01)
 
 
+def test_a_rate_that_changes_midway_is_named_and_costs_no_stroke():
+    t = times(8.0)
+    raw = felt(stroke(t, mu=0.5) + stroke(t, mu=0.3, begin=5.0, end=7.0))
+    later = np.concatenate([t[t < 4.0], 4.0 + np.arange(1600) / 400.0])  # 200 Hz, then 400 Hz, both in true time
+    found = analysed(block(later, np.column_stack([np.interp(later, t, column) for column in raw.T])))
+    assert [one.mu_dynamic for one in found.strokes] == pytest.approx([0.5, 0.3], rel=0.01)
+    assert "irregular_time" in names(found)
+
+
 def test_a_long_gap_in_the_stroke_withholds_its_peaks_but_not_its_mean():
     kept = np.ones(len(T), bool)
     kept[400:430] = False
