@@ -33,7 +33,7 @@ def summary(report: Report) -> tuple[str, ...]:
     for experiment in report.experiments:
         seds = [p.sed for p in report.predictions if p.experiment == experiment.name and p.sed is not None]
         if seds:
-            sentences.append(_predicted(experiment, min(seds), max(seds)))
+            sentences.append(_predicted(experiment, min(seds), max(seds), report.model.split(",")[0]))
         if experiment.paths:
             sentences.append(paths_sentence(experiment.name, experiment.paths))
     missing = sum(p.sed is None for p in report.predictions)
@@ -53,10 +53,10 @@ def _strokes(report: Report) -> str:
     return words + (f", from µ = {digits(min(values), 2)} to {digits(max(values), 2)}." if values else ".")
 
 
-def _predicted(experiment: Experiment, low: float, high: float) -> str:
+def _predicted(experiment: Experiment, low: float, high: float, strain: str) -> str:
     """Return how prediction and score go together in one experiment."""
     name, ends = _capital(experiment.name), f"{digits(1e3 * low, 2)} to {digits(1e3 * high, 2)} kPa"
-    words = f"{name}: the predicted SED runs from {ends}"
+    words = f"{name}: the SED predicted{f' at {strain}' if strain else ''} runs from {ends}"
     words += f" (a range of {spread_share(low, high)})"
     return words + related_words(experiment.score_relation) + "."
 

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from sessions.exports.report_tables.cells import Cell, Column, Group, Notes, Table
 from sessions.exports.wording import NONE, correlation, digits, significant
 from sessions.pooling.pooled import StudyFindings
+from sessions.report.predictions import model_in_short as model_of
 
 
 def study_table(
@@ -50,7 +51,4 @@ def p_value(p: float) -> str:
 
 def model_in_short(study: StudyFindings) -> str:
     """Return which solver model the SEDs are of."""
-    model = study.options.prediction
-    return (
-        f"{model.kinematics} strain, settled sliding, τ max {model.tau_reading}, contact area {study.options.area.law}"
-    )
+    return model_of(study.options.prediction, study.options.area)

@@ -26,7 +26,7 @@ from sessions.report.contents import (
     Trace,
 )
 from sessions.report.experiments import experiments
-from sessions.report.predictions import fields, left_out, modelled, predicted_seds, predictions
+from sessions.report.predictions import fields, left_out, model_in_short, modelled, predicted_seds, predictions
 from sessions.report.strokes import course, flaws, strokes
 from sessions.sealing import NUMBERS, sealed_sentence
 
@@ -95,6 +95,7 @@ def findings(
         fields=fields(prediction),
         planted=tuple(planted or ()),
         sealed=_sealed(recording, tables, predicted),
+        model="" if prediction is None else model_in_short(prediction.options, analysis.settings.area),
         modelled=modelled(prediction),
         left_out=left_out(prediction),
         again=facts.again(recording, analysis),

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.afferent import AfferentSettings, Firing, parameters
-from sessions.prediction import SessionPrediction, TrialPrediction
+from sessions.analysis.area import AreaLaw
+from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction
 from sessions.report.contents import Fact, Field, History, PredictionFinding
 
 _SCENE = {"finger": "mm, degrees", "materials": "E in MPa", "receptor": "mm"}  # what all trials share, with its units
@@ -64,6 +65,15 @@ def fields(found: SessionPrediction | None) -> tuple[Field, ...]:
                 chosen[row.block] = row
     made = [field_of(name, row) for name, row in chosen.items()]
     return tuple(field for field in made if field is not None)
+
+
+def model_in_short(options: PredictionOptions, area: AreaLaw) -> str:
+    """Return in a few words which model SEDs are of.
+
+    >>> model_in_short(PredictionOptions(), AreaLaw())
+    'small strain, settled sliding, τ max computed, contact area fixed'
+    """
+    return f"{options.kinematics} strain, settled sliding, τ max {options.tau_reading}, contact area {area.law}"
 
 
 def modelled(found: SessionPrediction | None) -> tuple[Fact, ...]:

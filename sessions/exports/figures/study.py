@@ -6,6 +6,7 @@
 from sessions.exports.figures.paths import CAPTION, paths_panel
 from sessions.exports.figures.scores import score_panel
 from sessions.exports.figures.style import GREEN, GREY, Panel, Plate, look, sheet, svg
+from sessions.exports.study_cells import model_in_short
 from sessions.exports.wording import correlation
 from sessions.pooling.pooled import DescriptorFindings, StudyFindings
 from sessions.report import Answers, Experiment
@@ -19,7 +20,11 @@ def study_plates(study: StudyFindings) -> tuple[Plate, ...]:
         relations = tuple(_relation(one, simulated=simulated) for one in study.descriptors if one.points)
     along = (paths_panel(one.descriptor, one.paths, simulated=simulated) for one in study.descriptors if one.paths)
     paths = tuple(panel for panel in along if panel is not None)
-    plates = (Plate("scores", SCORES, scores), Plate("relation", RELATION, relations), Plate("paths", CAPTION, paths))
+    plates = (
+        Plate("scores", SCORES, scores),
+        Plate("relation", f"{RELATION} Model: {model_in_short(study)}.", relations),
+        Plate("paths", CAPTION, paths),
+    )
     return tuple(plate for plate in plates if plate.panels)
 
 

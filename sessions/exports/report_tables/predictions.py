@@ -42,7 +42,8 @@ def prediction_table(report: Report) -> Table | None:
         "Predictions: SED averaged over the ending in the settled state (1 kPa = 1 mJ/cm³). Which µ: the mean over the "
         "steady window, or the maximum. Interval: what the uncertainty of friction alone makes of the SED, by "
         "derivatives, or where marked * by solving draws; the model's own error is not in it. Estimated error: of one "
-        "SED, from the mesh; differences between stimuli, which share the mesh, are more accurate."
+        "SED, from the mesh; differences between stimuli, which share the mesh, are more accurate. "
+        f"Model: {report.model}."
     )
     return Table("table-predictions", caption, columns, groups, notes.listed())
 
@@ -160,7 +161,7 @@ def force_table(report: Report) -> Table | None:
     width = "the finger's width" if report.width is None else f"a width of {report.width:g} mm"
     caption = (
         f"Forces of the model, per mm and times {width} (assumed), beside the means measured over the steady window. "
-        "Depth to match: indentation at which the model would press as hard as the subject did."
+        f"Depth to match: indentation at which the model would press as hard as the subject did. Model: {report.model}."
     )
     groups = grouped(report, report.predictions, lambda p: p.experiment, row)
     return Table("table-forces", caption, columns, groups, notes.listed())
@@ -202,7 +203,7 @@ def direction_table(report: Report) -> Table | None:
     caption = (
         "Both directions at equal depth, each with its trial's friction. Intervals: what the uncertainty of friction "
         "makes of each, by derivatives, or where marked * by solving draws. Last column: SED while sliding from distal "
-        "to proximal over SED while sliding from proximal to distal."
+        f"to proximal over SED while sliding from proximal to distal. Model: {report.model}."
     )
     groups = grouped(report, report.predictions, lambda p: p.experiment, row)
     return Table("table-directions", caption, columns, groups, notes.listed())
