@@ -165,12 +165,14 @@ def holm(ps: Sequence[float]) -> tuple[float, ...]:
 def standardised(table: Table) -> dict[str, dict[int, float]]:
     """Return scores as each subject's own z-scores, which takes away the part of the scale a subject uses.
 
-    A subject whose scores do not vary is left out: nothing can be said of the order it gave.
+    A subject whose scores do not vary is left out: nothing can be said of the order it gave. So is one who did not
+    score every stimulus: its mean and spread are those of a part of the scale.
     """
     rows: dict[str, dict[int, float]] = {}
+    stimuli = len({index for row in table.values() for index in row})
     for subject, row in table.items():
         values = np.array(list(row.values()))
-        if len(values) > 1 and (spread := float(values.std(ddof=1))) > 0.0:
+        if len(values) == stimuli > 1 and (spread := float(values.std(ddof=1))) > 0.0:
             rows[subject] = {index: (score - float(values.mean())) / spread for index, score in row.items()}
     return rows
 

@@ -53,7 +53,7 @@ _OWN: Mapping[str, str] = {
     SIMULATED: "yes where transducer or subject were simulated",
     "session": "folder of the session",
     "subject": "code of the subject",
-    "excluded": "why a person left the trial out of every number of the study; empty where it counts",
+    "excluded": "why the trial is left out of every number of the study; empty where it counts",
 }
 
 
@@ -101,10 +101,12 @@ def trials_csv(study: StudyFindings) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow([*mark, "session", "subject", *heads, "excluded"])
+    copies = dict(study.copies)
     for visit in study.visits:
         for row in visit.rows:
             decision = decided(study.excluded, visit.subject, row.descriptor)
             why = "" if decision is None else decision.why
+            why = f"the same recording as {copies[visit.session]}" if visit.session in copies else why
             told = ["yes" if visit.simulated else "no"] if mark else []
             writer.writerow([*told, visit.session, visit.subject, *(_plain(getattr(row, n)) for n in names), why])
     return out.getvalue()

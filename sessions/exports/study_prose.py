@@ -63,6 +63,10 @@ def who(study: StudyFindings) -> list[Fact]:
 def excluded(study: StudyFindings) -> list[str]:
     """Return a sentence for all that does not count, by whom and why, and for each doubt about what does."""
     said = [f"Session {folder} could not be read, and nothing of it counts: {why}." for folder, why in study.failed]
+    said += [
+        f"Session {session} holds the same recording as {first} (their SHA-256 agree), and counts nothing."
+        for session, first in study.copies
+    ]
     for one in study.excluded:
         what = f"trials on {one.descriptor}" if one.descriptor else "every trial"
         if any(v.subject == one.subject and one.descriptor in ("", r.descriptor) for v in study.visits for r in v.rows):

@@ -42,7 +42,8 @@ def _visits(study: StudyFindings) -> Table:
 
 
 def _visit_row(visit: Visit, study: StudyFindings) -> tuple[Cell, ...]:
-    out = [e.descriptor or "nothing" for e in study.excluded if e.subject == visit.subject]
+    out = ["nothing"] if visit.session in dict(study.copies) else []
+    out += [e.descriptor or "nothing" for e in study.excluded if e.subject == visit.subject]
     counted = "yes" if not out else ("no" if "nothing" in out else f"without {', '.join(out)}")
     return (
         Cell(visit.session),
@@ -143,8 +144,8 @@ def _normalised(study: StudyFindings) -> Table:
     )
     caption = (
         "Scores as they were given and standardised: each subject's own mean taken away and the rest divided by its "
-        "own standard deviation over the surfaces it scored, which takes away what part of the scale a subject uses. "
-        "t intervals of the mean over subjects."
+        "own standard deviation over the surfaces, which takes away what part of the scale a subject uses; of the "
+        "subjects who scored every surface. t intervals of the mean over subjects."
     )
     return study_table("table-normalised", caption, columns, _by_descriptor(study, rows))
 

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable
 from sessions.exports.report_tables.cells import Cell, Column, Group, Notes, Table
 from sessions.exports.study_cells import model_in_short
 from sessions.exports.wording import places, sed, significant, tau
+from sessions.pooling.exclusions import decided
 from sessions.pooling.pooled import StudyFindings
 from sessions.pooling.visit import TrialRow, Visit
 
@@ -33,7 +34,10 @@ def trials_table(study: StudyFindings) -> Table | None:
         Column("flaws"),
     )
     groups = tuple(
-        Group(f"{visit.session}, {descriptor}", tuple(_rows(visit, descriptor, notes)))
+        Group(
+            f"{visit.session}, {descriptor}{_left_out(study, visit, descriptor)}",
+            tuple(_rows(visit, descriptor, notes)),
+        )
         for visit in study.visits
         for descriptor in dict.fromkeys(row.descriptor for row in visit.rows)
     )
@@ -45,6 +49,12 @@ def trials_table(study: StudyFindings) -> Table | None:
         "stands: their own intervals come from how subjects and trials differ, which holds these errors too."
     )
     return Table("table-trials", caption, columns, groups, notes.listed())
+
+
+def _left_out(study: StudyFindings, visit: Visit, descriptor: str) -> str:
+    if visit.session in dict(study.copies):
+        return " (a copy: counts nothing)"
+    return "" if decided(study.excluded, visit.subject, descriptor) is None else " (left out of every number above)"
 
 
 def _rows(visit: Visit, descriptor: str, notes: Notes) -> Iterable[tuple[Cell, ...]]:

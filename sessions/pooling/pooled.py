@@ -148,6 +148,7 @@ class StudyFindings:
     options: VisitOptions
     visits: tuple[Visit, ...]  # all that were read, those left out too
     failed: tuple[tuple[str, str], ...]  # folder, why it could not be read
+    copies: tuple[tuple[str, str], ...]  # session that counts nothing, and the one whose recording it holds again
     excluded: tuple[Exclusion, ...]
     reversed: tuple[tuple[str, str, float], ...]  # subject, descriptor, r of score with index: still counted
     descriptors: tuple[DescriptorFindings, ...]
@@ -173,8 +174,10 @@ def pooled(
     nothing but the comparison.
     """
     ordered = tuple(sorted(visits, key=lambda visit: visit.session))
-    kept = [(v, row) for v in ordered for row in v.rows if decided(exclusions, v.subject, row.descriptor) is None]
-    tables = [_table(visit, [row for v, row in kept if v is visit]) for visit in ordered]
+    copies = _copies(ordered)
+    counted = [visit for visit in ordered if visit.session not in copies]
+    kept = [(v, row) for v in counted for row in v.rows if decided(exclusions, v.subject, row.descriptor) is None]
+    tables = [_table(visit, [row for v, row in kept if v is visit]) for visit in counted]
     asked = options or VisitOptions()
     found = tuple(
         _descriptor(name, asked, tables, [(v, row) for v, row in kept if row.descriptor == name])
@@ -186,6 +189,7 @@ def pooled(
         options=asked,
         visits=ordered,
         failed=tuple(sorted(failed)),
+        copies=tuple(copies.items()),
         excluded=exclusions,
         reversed=reversed_subjects(tables),
         descriptors=found,
@@ -193,6 +197,15 @@ def pooled(
         friction=None if planted is None else _friction(ordered, planted["strokes"]),
         flaws=() if planted is None else _flaws(ordered, dict(failed), planted.get("spoilt", {})),
     )
+
+
+def _copies(visits: Sequence[Visit]) -> dict[str, str]:
+    """Return the sessions that hold the recording of an earlier one once more, each with that one's name."""
+    first: dict[str, str] = {}
+    for visit in visits:
+        if visit.sha256:
+            first.setdefault(visit.sha256, visit.session)
+    return {v.session: first[v.sha256] for v in visits if v.sha256 and first[v.sha256] != v.session}
 
 
 def _with_holm(found: Sequence[DescriptorFindings]) -> tuple[DescriptorFindings, ...]:

@@ -21,7 +21,7 @@ from sessions.report.predictions import modelled
 from sessions.sealing import NUMBERS, sealed_sentence
 from sessions.uncertainty import with_intervals
 
-FORM = 7  # raised when a row holds something else: what was stored before is then computed anew
+FORM = 8  # raised when a row holds something else: what was stored before is then computed anew
 
 
 NO_INTERVAL = "intervals of the SED were not asked for"
@@ -171,6 +171,7 @@ def _row(
     answer = None if prediction is None else next((p for p in prediction.trials if p.trial == trial.number), None)
     if friction is None:
         missing = "The visit recorded no forces." if answer is None else answer.reasons.get("sed", "")
+        missing = "The trial was not done." if record.outcome == "open" else missing
         return replace(row, flaws=flaws, why=missing)
     stroke = analysis.strokes[friction.stroke]
     intervals = stroke_intervals(stroke, friction.stroke)

@@ -43,6 +43,14 @@ def test_a_decision_leaves_a_subject_out_of_every_number_and_is_told():
     assert "asked to" in study_page(with_it, "x")
 
 
+def test_the_same_recording_in_two_folders_counts_once_and_is_named():
+    first, again = replace(VISITS[0], sha256="a" * 64), replace(VISITS[0], session="S01-backup", sha256="a" * 64)
+    found = pooled([*VISITS[1:], again, first])
+    assert found.descriptors == pooled([*VISITS[1:], first]).descriptors
+    assert "Session S01-backup holds the same recording as S01" in study_page(found, "x")
+    assert trials_csv(found).count("the same recording as S01") == 5
+
+
 def test_scores_that_fall_with_the_index_are_doubted_and_kept():
     found = pooled([*VISITS[:9], visit(10, gain=-0.8)])
     assert [(subject, descriptor) for subject, descriptor, _ in found.reversed] == [("S10", "stickiness")]

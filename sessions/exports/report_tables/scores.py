@@ -84,8 +84,8 @@ def relation_table(report: Report) -> Table | None:
     )
     caption = (
         f"Relation of the predicted SED ({report.model}) to scores and to the stimuli's indices. The forces are those "
-        "of one subject: a case study. Intervals: Fisher's z, for rho as by Bonett and Wright (2000). p: two-sided, counted over "
-        "all orders. Last column: r when the stimulus of that index is left out."
+        "of one subject: a case study. Intervals: Fisher's z, for rho as by Bonett and Wright (2000). p: two-sided, "
+        "counted over all orders. Last column: r when the stimulus of that index is left out."
     )
     return Table("table-relation", caption, columns, tuple(groups), notes.listed())
 
