@@ -125,8 +125,11 @@ def risen(
     """Return the settled state above `low`, `foot` of the same scene; for the arguments see `climbed`."""
     sizing = sizing or sized(fineness, low)
     steps = steps_asked(scene, low.finger, low.shape, stop)
-    top = climbed(scene, fineness, low, stop, make, before, sizing, 1 if steps is None else steps.times)
+    slides = scene.undragged() if scene.loading.dragged and low.shape.pull.sense != 0 else scene
+    top = climbed(slides, fineness, low, stop, make, before, sizing, 1 if steps is None else steps.times)
     if top.shape.pull.sense == 0 or not top.finger.bounded_at_an_edge(top.shape):
+        if slides is not scene:  # a drag near the limit of friction, which the slide has told the edges of
+            top = climbed(scene, fineness, low, stop, make, None, sizing)
         return Ascent(low, top, steps=steps)
     again = still_sharing(scene.finger, scene.receptor, sized(fineness, top), sizing)
     return Ascent(low, climbed(scene, fineness, top, stop, make, None, again), top)

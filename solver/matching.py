@@ -11,7 +11,7 @@ from solver.pressing import depth_of, sliding_under
 from solver.scene import Friction, Scene
 
 FINENESS = 6.0  # good to some tenths of a per cent of the depth
-NEARLY = 0.98  # of what makes it slide, from which a finger that is dragged is as deep as one that slides
+NEARLY = 0.5  # of what makes it slide, from which a finger that is dragged is about as deep as one that slides
 DEEPEST = 0.85  # of the tissue between first touch and bone: beyond, a small-strain depth means nothing
 
 
