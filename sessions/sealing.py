@@ -57,9 +57,12 @@ def digest(numbers: Sequence[Mapping[str, Any]]) -> str:
 def sealed_sentence(recording: Recording, predicted: Sequence[Mapping[str, Any]]) -> str:
     """Return what a report says: whether the predictions it shows (`NUMBERS` of each) were sealed, when and how blind.
 
-    Raises RecordingError where the seal cannot be read.
+    A seal that cannot be read proves nothing, and stands in the way of nothing else.
     """
-    seal = load_derived(recording.folder, SEAL)
+    try:
+        seal = load_derived(recording.folder, SEAL)
+    except RecordingError:
+        return f"A seal of predictions is there, but {SEAL} is damaged and proves nothing; restore a copy of it."
     if seal is None:
         return "The predictions were made after the scores had been given, and had not been sealed before."
     numbers: list[dict[str, Any]] = seal.get("numbers") or []

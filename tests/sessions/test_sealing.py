@@ -84,3 +84,9 @@ def test_a_seal_that_was_changed_is_found_and_none_replaces_another(session):
 def test_without_blinding_a_seal_says_that_nothing_hid_the_scores(session):
     seal_prediction(Recording.open(session), PREDICTION)
     assert "when nothing hid which score" in said(session)
+
+
+def test_a_damaged_seal_is_told_and_stops_no_report(session):
+    seal_prediction(Recording.open(session), PREDICTION)
+    (session / SEAL).write_bytes((session / SEAL).read_bytes()[:-20])
+    assert "is damaged and proves nothing" in said(session)
