@@ -135,7 +135,10 @@ def loaded(progress: Progress) -> None:
     progress(0.0, "loading compiled loops")
     for kinematics in ("small", "finite"):
         scene = cases(kinematics)[-1]
-        solve(replace(scene, solve=replace(scene.solve, tolerance=0.1)))
+        asked = replace(scene, solve=replace(scene.solve, tolerance=0.1))
+        solve(asked, in_loops=True)
+        if kinematics == "small":
+            solve(replace(asked, solve=replace(asked.solve, course="history")), in_loops=True)
         stepper(scene).step(1e-3, 0.0)
 
 
