@@ -77,7 +77,8 @@ def with_intervals(
 ) -> SessionPrediction:
     """Return a prediction with an interval of each SED it holds, where its options ask for them.
 
-    They are of each trial, of the same slid the other way (where asked for by `both_ways`), and of each variant.
+    They are of each trial, of the same slid the other way (where asked for by `both_ways`), and of each variant
+    where the options ask for those too.
     The friction found and the ends of its intervals are solved together, five scenes a trial, seven where the force
     drives the model, two fewer where the skin does not reach tau_max. Raises Cancelled where `progress`, told the part
     done, returns False.
@@ -86,7 +87,8 @@ def with_intervals(
         return prediction
     rows, options = prediction.trials, prediction.options
     drawn = [_draws(analysis, row, settings) for row in rows]
-    variants = [one.variant for one in next((row.alternatives for row in rows if row.alternatives), ())]
+    first = next((row.alternatives for row in rows if row.alternatives), ())
+    variants = [one.variant for one in first] if options.beside_intervals else []
     share = 1.0 / (1 + len(variants))
     scale = tau_scale(options)
     along = [_solved(row, row.prediction, "sed", one, scale) for row, one in zip(rows, drawn, strict=True)]
@@ -109,7 +111,9 @@ def with_intervals(
             opposite_interval=other[at],
             alternatives=tuple(
                 replace(one, interval=column[at]) for one, column in zip(row.alternatives, columns, strict=True)
-            ),
+            )
+            if variants
+            else row.alternatives,
         )
         for at, row in enumerate(rows)
     )

@@ -88,6 +88,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         kinematics=options.kinematics,
         beside=options.beside,
         intervals=options.intervals,
+        beside_intervals=options.intervals,
     )
     recording = visit(options.session, options.subject)
     analysis = analysed(recording, console, area_law(options))
