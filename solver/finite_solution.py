@@ -13,7 +13,7 @@ import numpy as np
 from solver import evidence, kernels_numpy
 from solver.climbing import Ascent, Climbed, foot, risen, sized_together
 from solver.existence import doubts
-from solver.failures import Cancelled, SolveFailure
+from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.finite_ends import times_on_way
 from solver.finite_errors import error_estimates
 from solver.finite_finger import FiniteFinger
@@ -113,6 +113,8 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         relaxing = RelaxingCourse(scene, finger, stop, times=times) if scene.materials.relax else None
         way = course(scene, finger, stop, times) if relaxing is None else relaxing.shapes
         shape = way[-1]
+    if not shape.touching.any():
+        raise NotConverged(f"No contact was found at {shape.pull.depth:g} mm of indentation: ask for more depth.")
     driven = scene.driven(shape.pull.depth)
     body = finger.newton.body
     newton = finger.newton if relaxing is None else relaxing.newton

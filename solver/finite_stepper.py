@@ -6,6 +6,7 @@ iteration leaves over, the next reading's takes up.
 """
 
 from dataclasses import replace
+from math import isfinite
 
 import numpy as np
 
@@ -56,8 +57,11 @@ class FiniteStepper:
 
         `normal` [N/mm] presses the finger, `tangential` [N/mm] is the surface's pull on it along +x. A state is lost
         where contact leaves the skin that may touch, and where skin is squeezed so far that it may have folded: it is
-        sought again once the normal force has eased. One that has not caught up with the forces is not told of.
+        sought again once the normal force has eased. One that has not caught up with the forces is not told of. A
+        reading that is no number is nan too, and leaves the state as it was.
         """
+        if not isfinite(normal + tangential):
+            return float("nan")
         if normal < LIGHT:
             self.forget()
             return 0.0

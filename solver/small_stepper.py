@@ -6,6 +6,7 @@ the contact forces). A reading is then an active-set search on a matrix of some 
 """
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Self
 
 import numpy as np
@@ -121,9 +122,11 @@ class SmallStepper:
         """Take one reading and return the SED averaged over the ending [MPa]; nan where the state was lost.
 
         `normal` [N/mm] presses the finger, `tangential` [N/mm] is the surface's pull on it along +x. Backward Euler: a
-        point sticks where it was, or slips from there against its friction force. After nan the next reading starts
-        afresh from the untouched finger.
+        point sticks where it was, or slips from there against its friction force. A lost state starts afresh from the
+        untouched finger with the next reading; a reading that is no number is nan too, and leaves the state as it was.
         """
+        if not isfinite(normal + tangential):
+            return float("nan")
         if normal < LIGHT:
             self.forget()
             return 0.0
@@ -134,7 +137,8 @@ class SmallStepper:
             finger.gap, finger.length, finger.compliance, self.mu, self.tau, normal, pull, slides, self._anchor,
             self.state, self._sense, self._force, self._moved, self._motion,
         )  # fmt: skip
-        if ended == LOST or self.state[0] != OPEN or self.state[-1] != OPEN:
+        beyond = self.state[0] != OPEN or self.state[-1] != OPEN
+        if ended == LOST or beyond or not isfinite(float(self._motion.sum())):
             self.forget()
             return float("nan")
         k = len(self.state)

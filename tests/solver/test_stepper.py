@@ -84,6 +84,16 @@ def test_a_lifted_finger_has_no_response_and_starts_afresh(kinematics):
     np.testing.assert_array_equal(follows.outline(), undeformed.outline())
 
 
+@pytest.mark.parametrize("kinematics", KINEMATICS)
+def test_a_reading_that_is_no_number_costs_that_reading_alone(kinematics):
+    follows, unspoilt = made(kinematics, 0.4), made(kinematics, 0.4)
+    for part in (0.2, 0.4, 0.6, 0.8, 1.0):
+        expected = unspoilt.step(0.01 * part, 0.002 * part)
+        for nonsense in ((np.nan, 0.0), (0.01, np.nan), (np.inf, 0.0)):
+            assert np.isnan(follows.step(*nonsense))
+        assert follows.step(0.01 * part, 0.002 * part) == expected
+
+
 def pressed_then_dragged(normal, drag):
     """Yield forces [N/mm]: 100 readings of pressing, 200 of a drag that grows, 5 held."""
     yield from ((normal * n / 100, 0.0) for n in range(1, 101))
