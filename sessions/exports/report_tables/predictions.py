@@ -69,7 +69,8 @@ def afferent_table(report: Report) -> Table | None:
     groups = grouped(report, report.predictions, lambda p: p.experiment, row)
     caption = (
         "Firing of an SA-II afferent: an illustration. No fitted map from SED to the rate of a human SA-II afferent is "
-        "known; every parameter below is assumed. The order of the settled rates is that of the SED whatever they are."
+        "known; every parameter below is assumed. The order of the settled rates is that of the SED as "
+        "long as no rate lies at a bound and every SED is beyond the threshold."
     )
     return Table("table-afferent", caption, columns, groups, notes.listed())
 
