@@ -9,9 +9,10 @@ from daq_app.cli import WrongValue
 from daq_app.console import Console
 from sessions.analysis import Analysis, AnalysisSettings, analyse
 from sessions.analysis.area import AreaLaw
-from sessions.analysis.bootstrap import BootstrapSettings, intervals_of
+from sessions.analysis.bootstrap import BootstrapSettings, drawn_from, intervals_of
 from sessions.blinding import revealed
 from sessions.decisions import Decisions
+from sessions.gain_error import ANALYSIS, checked_gain_error
 from sessions.plan import SessionPlan
 from sessions.prediction import PredictionOptions, Progress, SessionPrediction, predict
 from sessions.recording import Recording, RecordingError
@@ -22,21 +23,31 @@ from sessions.toml_file import SettingsError, from_table
 from sessions.uncertainty import with_intervals
 from sessions.visits import force_visit
 
-ANALYSIS = "analysis.json"
 PREDICTION = "prediction.json"
 
 
 def analysed(
-    recording: Recording, console: Console, area: AreaLaw | None = None, bootstrap: BootstrapSettings | None = None
+    recording: Recording,
+    console: Console,
+    area: AreaLaw | None = None,
+    *,
+    seed: int | None = None,
+    gain_error: float | None = None,
 ) -> Analysis:
     """Return the analysis of a session, tau_max told by a law of the area, and keep it in the session's folder.
 
-    `bootstrap` says what the intervals kept with it are drawn from. Where nobody says, both are as in the analysis that
-    was kept before: what somebody set is not lost by a verb that says nothing of it.
+    `seed` is that of the intervals kept with it; `gain_error` is how uncertain each axis' gain is [-]. Where nobody
+    says, all three are as in the analysis that was kept before: what somebody set is not lost by a verb that says
+    nothing of it.
     """
     before = _kept(recording, ANALYSIS)
-    analysis = analyse(recording, settings_of(before) if area is None else AnalysisSettings(area=area))
-    _keep(recording, ANALYSIS, analysis_document(analysis, bootstrap or bootstrap_of(before)), console)
+    stood = settings_of(before)
+    settings = AnalysisSettings(
+        area=area or stood.area, gain_error=stood.gain_error if gain_error is None else gain_error
+    )
+    analysis = analyse(recording, settings)
+    drawn = drawn_from(settings, bootstrap_of(before).seed if seed is None else seed)
+    _keep(recording, ANALYSIS, analysis_document(analysis, drawn), console)
     return analysis
 
 
@@ -98,7 +109,10 @@ def _predicted(
 
 def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = None) -> dict[str, Any]:
     """Return an analysis with its bootstrap intervals, as it is kept and printed."""
-    return {**analysis.to_dict(), "bootstrap": intervals_of(analysis.strokes, bootstrap)}
+    return {
+        **analysis.to_dict(),
+        "bootstrap": intervals_of(analysis.strokes, bootstrap or drawn_from(analysis.settings)),
+    }
 
 
 def analysed_again(recording: Recording, stored: Mapping[str, Any], decisions: Decisions) -> dict[str, Any]:
@@ -115,10 +129,12 @@ def bootstrap_of(stored: Mapping[str, Any]) -> BootstrapSettings:
 def settings_of(stored: Mapping[str, Any]) -> AnalysisSettings:
     """Return the settings with which a stored analysis, or that under a stored prediction, is made once more.
 
-    The law of the contact area is all that can be asked for; the rest is the program's. Raises SettingsError.
+    The law of the contact area and the calibration's error are all that can be asked for; the rest is the program's.
+    Raises SettingsError.
     """
-    area: Mapping[str, Any] = (stored.get("settings") or stored).get("area") or {}
-    return AnalysisSettings(area=from_table(area, AreaLaw, "area"))
+    held: Mapping[str, Any] = stored.get("settings") or stored
+    area = from_table(held.get("area") or {}, AreaLaw, "area")
+    return AnalysisSettings(area=area, gain_error=checked_gain_error(held.get("gain_error")))
 
 
 def made_under(stored: Mapping[str, Any], decisions: Decisions) -> bool:

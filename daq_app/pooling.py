@@ -20,6 +20,7 @@ from typing import Any
 from daq_app.console import Console
 from sessions.blinding import UNBLINDING
 from sessions.decisions import DECISIONS
+from sessions.gain_error import ANALYSIS, gain_error_set
 from sessions.pooling.visit import FORM, Visit, VisitOptions, visit_of
 from sessions.recording import Recording
 from sessions.recording.provenance import software_versions
@@ -70,7 +71,11 @@ class Shelf:
 
 def content_of(session: Path) -> dict[str, bytes]:
     """Return the files of a session that its numbers come from. Raises OSError."""
-    return {name: (session / name).read_bytes() for name in CONTENT if (session / name).is_file()}
+    held = {name: (session / name).read_bytes() for name in CONTENT if (session / name).is_file()}
+    gain_error = gain_error_set(session)  # of its analysis a study takes this alone: what somebody set
+    if gain_error is not None:
+        held[ANALYSIS] = json.dumps({"settings": {"gain_error": gain_error}}).encode()
+    return held
 
 
 def visits(

@@ -115,6 +115,7 @@ class SessionPrediction:
     options: PredictionOptions
     decisions: tuple[Decision, ...] = ()  # of people about the strokes, in force
     area: AreaLaw = FIXED  # by which tau_max was told
+    gain_error: float | None = None  # of each axis, which the intervals hold [-]; None: the assumed one
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, None where honesty allows no number."""
@@ -123,6 +124,7 @@ class SessionPrediction:
             "trials": [trial.to_dict() for trial in self.trials],
             "decisions": [decision.to_dict() for decision in self.decisions],
             "area": asdict(self.area),
+            "gain_error": self.gain_error,
             "width": self.width,
             "width_origin": self.width_origin,
             "options": asdict(self.options),
@@ -203,6 +205,7 @@ def predict(
         options=asked,
         decisions=analysis.decisions,
         area=analysis.settings.area,
+        gain_error=analysis.settings.gain_error,
     )
 
 

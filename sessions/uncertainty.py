@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sessions.alternative import Variant
 from sessions.analysis import Analysis
-from sessions.analysis.bootstrap import BootstrapSettings, FrictionDraws, friction_draws
+from sessions.analysis.bootstrap import BootstrapSettings, FrictionDraws, drawn_from, friction_draws
 from sessions.prediction import (
     Prediction,
     PredictionOptions,
@@ -86,6 +86,7 @@ def with_intervals(
     if not prediction.options.intervals:
         return prediction
     rows, options = prediction.trials, prediction.options
+    settings = settings or drawn_from(analysis.settings)
     drawn = [_draws(analysis, row, settings) for row in rows]
     first = next((row.alternatives for row in rows if row.alternatives), ())
     variants = [one.variant for one in first] if options.beside_intervals else []
@@ -120,7 +121,7 @@ def with_intervals(
     return replace(prediction, trials=told)
 
 
-def _draws(analysis: Analysis, row: TrialPrediction, settings: BootstrapSettings | None) -> FrictionDraws | str:
+def _draws(analysis: Analysis, row: TrialPrediction, settings: BootstrapSettings) -> FrictionDraws | str:
     """Return what friction may have been in each repeat, or why that is not known."""
     if row.prediction is None or row.stroke is None or row.mu is None or row.tau_max is None:
         return row.reasons.get("sed", "nothing was predicted")

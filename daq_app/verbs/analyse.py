@@ -8,10 +8,11 @@ import argparse
 from pathlib import Path
 
 from daq_app.area_option import add_area, area_law
+from daq_app.calibration_option import add_calibration, calibration_error
 from daq_app.cli import WrongValue
 from daq_app.console import Console, number, table
 from daq_app.derived import analysed, analysis_document
-from sessions.analysis.bootstrap import BootstrapSettings, StrokeIntervals, stroke_intervals
+from sessions.analysis.bootstrap import StrokeIntervals, drawn_from, stroke_intervals
 from sessions.analysis.tilt import Tilt
 from sessions.recording import Recording
 
@@ -25,21 +26,19 @@ WAYS = {1: "p → d", -1: "d → p", None: "–"}
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the session folder."""
     parser.add_argument("session", type=Path, metavar="SESSION", help="a session folder")
-    parser.add_argument(
-        "--calibration-error",
-        type=float,
-        metavar="PERCENT",
-        help="standard uncertainty of each axis of the transducer (1, assumed)",
-    )
+    add_calibration(parser)
     parser.add_argument("--bootstrap-seed", type=int, default=0, metavar="SEED", help="of the intervals (0)")
     add_area(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Analyse the session, keep the result in its folder and print it."""
-    chosen = _bootstrap(options)
+    given = calibration_error(options)
+    if options.bootstrap_seed < 0:
+        raise WrongValue(f"--bootstrap-seed {options.bootstrap_seed} is not allowed: a whole number from 0 on")
     recording = Recording.open(options.session)
-    analysis = analysed(recording, console, area_law(options), chosen)
+    analysis = analysed(recording, console, area_law(options), seed=options.bootstrap_seed, gain_error=given)
+    chosen = drawn_from(analysis.settings, options.bootstrap_seed)
     console.result(analysis_document(analysis, chosen))
     if recording.simulated_sentence:
         console.say(recording.simulated_sentence)
@@ -85,17 +84,6 @@ def _leaning(tilt: Tilt, levelled: tuple[float, float]) -> str:
     ]
     done = f"levelled by {levelled[0]:g}° and {levelled[1]:g}°" if levelled != (0.0, 0.0) else "not levelled"
     return f"tilt of the face, if the hand pressed straight down: {', '.join(told)}; {tilt.kind}; {done}"
-
-
-def _bootstrap(options: argparse.Namespace) -> BootstrapSettings:
-    percent: float | None = options.calibration_error
-    if percent is not None and not 0.0 <= percent <= 20.0:
-        raise WrongValue(f"--calibration-error {percent:g} is not allowed: 0 to 20 (per cent)")
-    if options.bootstrap_seed < 0:
-        raise WrongValue(f"--bootstrap-seed {options.bootstrap_seed} is not allowed: a whole number from 0 on")
-    if percent is None:
-        return BootstrapSettings(seed=options.bootstrap_seed)
-    return BootstrapSettings(seed=options.bootstrap_seed, gain_error=percent / 100.0, gain_error_origin="set")
 
 
 def _row(found: StrokeIntervals) -> list[str]:

@@ -71,7 +71,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     after = tried(recording, decision, before, analysis)
     made = append(recording, decision)
     if stored is not None:
-        analysed(recording, console, settings_of(stored).area, bootstrap_of(stored))
+        analysed(recording, console, settings_of(stored).area, seed=bootstrap_of(stored).seed)
     older = (recording.folder / PREDICTION).is_file()
     changed = _changes(analysis, after)
     console.result({"decision": made.to_dict(), "changes": changed, "prediction_is_older": older})

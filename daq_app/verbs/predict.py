@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from daq_app.area_option import add_area, area_law
+from daq_app.calibration_option import add_calibration, calibration_error
 from daq_app.cli import WrongValue
 from daq_app.console import Console, number, table
 from daq_app.derived import analysed, predicted, visit
@@ -74,6 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="hash and keep the prediction, so that it is shown to be older than unblinding",
     )
     add_area(parser)
+    add_calibration(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -91,7 +93,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         beside_intervals=options.intervals,
     )
     recording = visit(options.session, options.subject)
-    analysis = analysed(recording, console, area_law(options))
+    analysis = analysed(recording, console, area_law(options), gain_error=calibration_error(options))
     prediction = predicted(recording, analysis, console, asked)
     seal = {"sealed_sha256": seal_prediction(recording, prediction.to_dict())} if options.seal else {}
     firing = _firing(prediction, options) if options.afferent else {}

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from daq_app.area_option import add_area, area_law
+from daq_app.calibration_option import add_calibration, calibration_error
 from daq_app.console import Console
 from daq_app.derived import analysed, asked_before, predicted, visit
 from sessions.afferent import AfferentSettings, session_firing
@@ -51,6 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--figures", type=Path, metavar="DIR", help="also write every picture as SVG, its data as CSV")
     add_area(parser)
+    add_calibration(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -63,7 +65,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     for one in (recording, *others):
         if one.plan.blinded:
             raise Blinded(f"{one.folder} is blinded: a report tells scores by index; 'daq-app unblind' opens the key")
-    analysis = analysed(recording, console, area_law(options))
+    analysis = analysed(recording, console, area_law(options), gain_error=calibration_error(options))
     prediction = predicted(recording, analysis, console, _asked(recording, options))
     from sessions.exports import html
     from sessions.report import findings, score_table

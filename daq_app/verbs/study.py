@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from daq_app.area_option import add_area, area_law
+from daq_app.calibration_option import add_calibration, calibration_error
 from daq_app.cli import WrongValue
 from daq_app.console import Console
 from daq_app.pooling import Shelf, visits
@@ -69,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "strain, not at finite strain, where it takes five times as long)",
     )
     add_area(parser)
+    add_calibration(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -79,7 +81,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         raise RecordingError(f"{folder} holds no session: give the folder that holds a folder for each of them")
     intervals = options.kinematics == "small" if options.intervals is None else options.intervals
     model = PredictionOptions(options.tau, course="steady", kinematics=options.kinematics, intervals=intervals)
-    asked = VisitOptions(model, area_law(options) or FIXED, options.paths)
+    asked = VisitOptions(model, area_law(options) or FIXED, options.paths, calibration_error(options))
     shelf = Shelf(out / "results", asked)
     done, failed = visits(sessions, asked, shelf, console, scheduler=options.scheduler, workers=options.workers)
     planted = folder / PLANTED

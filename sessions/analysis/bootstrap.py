@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sessions.analysis.friction import Rule
 from sessions.analysis.instants import break_away_draws, slide_onset_draws
+from sessions.analysis.settings import AnalysisSettings
 from sessions.analysis.stroke import Interval, Stroke, StrokeCurve
 
 Array = NDArray[np.float64]
@@ -56,9 +57,13 @@ class BootstrapSettings:
         return (
             f"{100 * self.confidence:g} % percentile interval of {self.repeats} block-bootstrap repeats (blocks of "
             f"{self.block:g} s, seed {self.seed}): sensor noise, zero and its drift, calibration "
-            f"({100 * self.gain_error:g} % of each axis, {self.gain_error_origin}), choice of window (ends up to "
-            f"{100 * self.inwards:g} % inwards)"
+            f"({self.calibration}), choice of window (ends up to {100 * self.inwards:g} % inwards)"
         )
+
+    @property
+    def calibration(self) -> str:
+        """The calibration's uncertainty, for people: 0.3 % of each axis, set."""
+        return f"{100 * self.gain_error:g} % of each axis, {self.gain_error_origin}"
 
     @property
     def kinds(self) -> Mapping[str, str]:
@@ -74,6 +79,13 @@ class BootstrapSettings:
             "slide_onset": f"the share of the steady speed that tells it, {low:g} to {high:g} %, and noise and "
             "unevenness of the speed; none where a person decided it",
         }
+
+
+def drawn_from(settings: AnalysisSettings, seed: int = 0) -> BootstrapSettings:
+    """Return what the intervals of an analysis are drawn from: the calibration's error that was set, or the assumed."""
+    if settings.gain_error is None:
+        return BootstrapSettings(seed=seed)
+    return BootstrapSettings(seed=seed, gain_error=settings.gain_error, gain_error_origin="set")
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,11 @@ def tried(recording: Recording, decision: Decision, before: Decisions, now: Anal
 
     Raises DecisionError where the decision cannot be, or would change nothing.
     """
-    found = analyse(recording, AnalysisSettings(area=now.settings.area), before.with_line(decision))
+    found = analyse(
+        recording,
+        AnalysisSettings(area=now.settings.area, gain_error=now.settings.gain_error),
+        before.with_line(decision),
+    )
     known = {flaw.sentence for flaw in now.flaws}
     for flaw in found.flaws:
         if flaw.name is FlawName.DECISION and flaw.sentence not in known and decision.undoes is None:

@@ -41,9 +41,11 @@ def trials_table(study: StudyFindings) -> Table | None:
         for visit in study.visits
         for descriptor in dict.fromkeys(row.descriptor for row in visit.rows)
     )
+    known = dict.fromkeys(visit.calibration for visit in study.visits if visit.calibration)
+    calibrations = f" (calibration: {'; '.join(known)})" if known else ""
     caption = (
         "Every trial, from which all numbers above come. µ: what the model got; τ max, normal force N and speed of the "
-        "stroke; intervals of µ, τ max and speed by block bootstrap. SED: at "
+        f"stroke; intervals of µ, τ max and speed by block bootstrap{calibrations}. SED: at "
         f"{model_in_short(study)}; its interval is what the uncertainty of friction makes of it, the error that "
         "estimated from its mesh. A dash says why. Means, correlations and models above take each number as it "
         "stands: their own intervals come from how subjects and trials differ, which holds these errors too."

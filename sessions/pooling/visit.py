@@ -8,8 +8,9 @@ import msgspec
 
 from sessions.analysis import Analysis, AnalysisSettings, analyse
 from sessions.analysis.area import FIXED, AreaLaw
-from sessions.analysis.bootstrap import stroke_intervals
+from sessions.analysis.bootstrap import drawn_from, stroke_intervals
 from sessions.blinding import revealed
+from sessions.gain_error import gain_error_set
 from sessions.paths import Seds, trial_paths
 from sessions.plan import Block
 from sessions.prediction import PredictionOptions, SessionPrediction, predict
@@ -34,6 +35,7 @@ class VisitOptions:
     prediction: PredictionOptions = field(default_factory=lambda: PredictionOptions(course="steady", intervals=True))
     area: AreaLaw = FIXED  # by which tau_max is told; the paths have areas of their own
     paths: Literal["none", "small", "finite"] = "none"  # many paths too, and at which strain; see `sessions.paths`
+    gain_error: float | None = None  # of each axis of every transducer [-]; None: what was set for each session
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +95,7 @@ class Visit:
     sha256: str = ""  # of its `session.sqlite`
     sealed: str = ""  # whether its predictions were sealed before its scores, "" where it predicts nothing
     decisions: tuple[str, ...] = ()  # of people about its strokes, in force
+    calibration: str = ""  # the calibration's uncertainty that its intervals hold, set or assumed
     model: tuple[tuple[str, str, str], ...] = ()  # what was modelled: name, value, remark
 
     def to_dict(self) -> dict[str, Any]:
@@ -111,7 +114,8 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
     Raises Blinded while the stimuli's key is sealed, RecordingError where the session cannot be read.
     """
     known = revealed(recording)
-    analysis = analyse(known, AnalysisSettings(area=options.area))
+    gain_error = gain_error_set(known.folder) if options.gain_error is None else options.gain_error
+    analysis = analyse(known, AnalysisSettings(area=options.area, gain_error=gain_error))
     prediction = None
     if known.plan.forces:
         prediction = with_intervals(analysis, predict(analysis, known.plan, options.prediction), both_ways=False)
@@ -139,6 +143,7 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
         sha256=file_sha256(known.folder / LIVE_FILE),
         sealed="" if prediction is None else _sealed(known, prediction),
         decisions=tuple(decision.sentence for decision in analysis.decisions),
+        calibration=drawn_from(analysis.settings).calibration,
         model=tuple((fact.name, fact.value, fact.remark) for fact in modelled(prediction) if fact.name != "audits"),
     )
 
@@ -174,7 +179,7 @@ def _row(
         missing = "The trial was not done." if record.outcome == "open" else missing
         return replace(row, flaws=flaws, why=missing)
     stroke = analysis.strokes[friction.stroke]
-    intervals = stroke_intervals(stroke, friction.stroke)
+    intervals = stroke_intervals(stroke, friction.stroke, drawn_from(analysis.settings))
     mu_low, mu_high = (intervals.mu_max if friction.rule == "maximum" else intervals.mu_dynamic) or (None, None)
     tau_max_low, tau_max_high = intervals.tau_max or (None, None)
     speed_low, speed_high = intervals.speed or (None, None)

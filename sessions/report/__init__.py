@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from sessions.afferent import Firing
 from sessions.analysis import Analysis
-from sessions.analysis.bootstrap import BootstrapSettings
+from sessions.analysis.bootstrap import drawn_from
 from sessions.analysis.scores import MeanScore, Relation, ScoreTable, joined, score_table
 from sessions.paths import Seds
 from sessions.prediction import SessionPrediction
@@ -101,8 +101,8 @@ def findings(
         again=facts.again(recording, analysis),
         commands=facts.commands(recording, predicted=prediction is not None),
         width=None if prediction is None else prediction.width,
-        interval_kind=BootstrapSettings().kind,
-        interval_kinds=dict(BootstrapSettings().kinds),
+        interval_kind=drawn_from(analysis.settings).kind,
+        interval_kinds=dict(drawn_from(analysis.settings).kinds),
         afferent=more.afferent,
     )
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.analysis.analysis import Analysis
-from sessions.analysis.bootstrap import NUMBERS, stroke_intervals
+from sessions.analysis.bootstrap import NUMBERS, drawn_from, stroke_intervals
 from sessions.analysis.flaws import Flaw
 from sessions.analysis.forces import in_face_frame
 from sessions.analysis.stroke import Stroke
@@ -25,7 +25,7 @@ def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ..
     found: list[StrokeFinding] = []
     for position, stroke in enumerate(analysis.strokes):
         trial = None if stroke.trial is None else planned.get(stroke.trial)
-        intervals = stroke_intervals(stroke, position)
+        intervals = stroke_intervals(stroke, position, drawn_from(analysis.settings))
         found.append(
             StrokeFinding(
                 number=position + 1,

@@ -17,11 +17,15 @@ import pytest
 from report_session import record
 
 from daq_app.cli import run
-from daq_app.pooling import Shelf
-from sessions.analysis import AnalysisSettings, forces
-from sessions.pooling.visit import VisitOptions
+from daq_app.pooling import Shelf, content_of
+from sessions.analysis import AnalysisSettings, analyse, forces
+from sessions.gain_error import gain_error_set
+from sessions.pooling.visit import VisitOptions, visit_of
+from sessions.prediction import PredictionOptions
+from sessions.recording import Recording
 from sessions.recording.archive import seal
 from sessions.recording.schema import COLUMNS
+from sessions.report import findings
 
 ROOT = Path(__file__).parents[2]
 SCENE = """
@@ -413,6 +417,45 @@ def test_a_law_of_the_contact_area_is_recorded_and_verify_goes_by_it(small, caps
         assert one["tau_max"] * one["contact_area"] <= other["tau_max"] * 100.0 * (1 + 1e-9)
         assert one["contact_area"] > 100.0  # every stroke of the simulated subject presses harder than 1 N
     assert run(["verify", str(small)]) == 0
+
+
+def test_a_calibration_error_that_was_set_is_taken_by_every_verb_until_another_is_set(small, capsys):
+    run(["analyse", str(small), "--json"])
+    assumed = printed(capsys)["bootstrap"]
+    assert assumed["settings"]["gain_error_origin"] == "assumed"
+    run(["analyse", str(small), "--calibration-error", "0.1", "--json"])
+    known = printed(capsys)["bootstrap"]
+    for one, other in zip(known["strokes"], assumed["strokes"], strict=True):
+        assert one["mu_max"][1] - one["mu_max"][0] < 0.5 * (other["mu_max"][1] - other["mu_max"][0])
+    run(["analyse", str(small), "--json"])
+    assert printed(capsys)["bootstrap"] == known
+    assert run(["predict", str(small), "--beside", "none", "--json"]) == 0
+    assert printed(capsys)["gain_error"] == 0.001
+    assert json.loads((small / "analysis.json").read_text())["bootstrap"] == known
+    assert run(["verify", str(small)]) == 0
+    recording = Recording.open(small)
+    analysis = analyse(recording, AnalysisSettings(gain_error=gain_error_set(small)))
+    assert "0.1 % of each axis, set" in findings(recording, analysis).interval_kind
+    plain = PredictionOptions(course="steady")
+    assert visit_of(recording, VisitOptions(plain), {}).calibration == "0.1 % of each axis, set"
+    assert visit_of(recording, VisitOptions(plain, gain_error=0.003), {}).calibration == "0.3 % of each axis, set"
+
+
+def test_a_study_computes_a_session_again_once_another_calibration_error_was_set(small, tmp_path):
+    shelf = Shelf(tmp_path / "results", VisitOptions())
+    before = shelf.key(small)
+    run(["analyse", str(small)])
+    assert shelf.key(small) == before  # nobody set one
+    run(["analyse", str(small), "--calibration-error", "0.1"])
+    assert shelf.key(small) != before
+    sent = content_of(small)
+    assert json.loads(sent["analysis.json"]) == {"settings": {"gain_error": 0.001}}
+
+
+@pytest.mark.parametrize("verb", ["analyse", "predict", "report", "study"])
+def test_a_calibration_error_that_is_none_is_refused_with_exit_code_2(recorded, capsys, verb):
+    assert run([verb, str(recorded if verb != "study" else recorded.parent), "--calibration-error", "-1"]) == 2
+    assert "--calibration-error" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("words", [["--area", "round"], ["--area", "1.5"], ["--area-force", "2"]])
