@@ -1,6 +1,8 @@
 """How the loops are compiled and kept on disk, and the words they share."""
 
+import logging
 from collections.abc import Callable
+from functools import cache
 from typing import Any, TypeVar
 
 import numba
@@ -32,7 +34,16 @@ class _Kept(FunctionCache):
         # what loops need while they run: the memory of arrays
         rtsys.initialize(target_context)  # pyright: ignore[reportUnknownMemberType]
         with self._guard_against_spurious_io_errors():
-            return super()._load_overload(sig, target_context)  # pyright: ignore
+            kept = super()._load_overload(sig, target_context)  # pyright: ignore
+        if kept is None:
+            _tell()
+        return kept  # pyright: ignore
+
+
+@cache
+def _tell() -> None:
+    """Say, once a process, why the first run ever takes so long."""
+    logging.getLogger(__name__).warning("Compiling the solver's loops, once on this machine: up to a minute.")
 
 
 def compiled(function: Compiled) -> Compiled:
