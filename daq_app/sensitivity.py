@@ -2,7 +2,7 @@
 
 import importlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from typing import Any, cast
 
@@ -30,6 +30,7 @@ USUAL: Mapping[str, tuple[float, float]] = {
     "friction.mu": (0.9, 1.1),
     "friction.tau_max": (0.7, 1.3),
 }
+_NARROW = 0.05  # half an interval of an index that is narrow enough to order by [-]
 ANGLE, ANGLE_SPAN = "finger.contact_angle", 5.0  # [degrees]
 
 
@@ -44,6 +45,12 @@ class Index:
     first_error: float  # half of its 95 % bootstrap interval
     total: float  # with all it does together with others
     total_error: float
+    one_sided: bool  # the range does not reach to both sides of the scene's own value
+
+    @property
+    def impossible(self) -> bool:
+        """Say whether these cannot be shares of a variance, so that they are noise of too few samples."""
+        return self.first < 0.0 or self.total > 1.0 or self.first > self.total
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -117,8 +124,34 @@ def sensitivity(
     columns = zip(
         design, *(np.asarray(result[name]).tolist() for name in ("S1", "S1_conf", "ST", "ST_conf")), strict=True
     )
-    indices = [Index(name, *design[name], *values) for name, *values in columns]
+    indices = [Index(name, *design[name], *values, _one_sided(scene, name, design[name])) for name, *values in columns]
     return tuple(sorted(indices, key=lambda index: -index.total)), found
+
+
+def doubts(indices: Sequence[Index], samples: int) -> tuple[str, ...]:
+    """Return what to doubt in the indices of a design of so many samples: one-sided ranges, impossible shares."""
+    told: list[str] = []
+    beside = [one.name for one in indices if one.one_sided]
+    if beside:
+        told.append(
+            f"Varied to one side of the scene's own value only: {', '.join(beside)}; their shares, and those of all "
+            "others, are of these ranges."
+        )
+    wrong = [one for one in indices if one.impossible]
+    if wrong:
+        widest = max(max(one.first_error, one.total_error) for one in indices)
+        enough = 2 ** math.ceil(math.log2(max(samples * (widest / _NARROW) ** 2, 2.0 * samples)))
+        told.append(
+            f"Noise of too few samples: {', '.join(one.name for one in wrong)} (a share below 0 or above 1, or alone "
+            f"above that with others). As intervals narrow with the root of the samples, about {enough} would bring "
+            f"each to ±{_NARROW:g}."
+        )
+    return tuple(told)
+
+
+def _one_sided(scene: Scene, name: str, span: tuple[float, float]) -> bool:
+    own = _value(scene, name)
+    return own is not None and not span[0] < own < span[1]
 
 
 def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:

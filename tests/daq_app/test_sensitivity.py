@@ -1,11 +1,12 @@
 """Sobol indices of a scene: against closed forms with a stand-in for the solver, and once with the solver itself."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from daq_app.cli import run
-from daq_app.sensitivity import TooFewAnswers, checked, sensitivity, usual_design, with_values
+from daq_app.sensitivity import Index, TooFewAnswers, checked, doubts, sensitivity, usual_design, with_values
 from sessions.toml_file import SettingsError
 from solver.failures import NotConverged
 from solver.scene import Friction, Loading, Scene
@@ -41,6 +42,20 @@ def test_of_a_product_about_zero_nothing_acts_alone():
         lambda s: (s.friction.mu - middle["friction.mu"]) * ((s.loading.indentation or 0.0) - 1.0),
     )
     assert all(abs(one.first) < 0.05 and one.total == pytest.approx(1.0, abs=0.05) for one in indices)
+
+
+def test_a_range_to_one_side_and_an_impossible_share_are_named_with_the_samples_that_would_do():
+    design = {"friction.mu": (0.4, 0.6), "loading.indentation": (0.5, 1.5)}
+    sound, noisy = Index("a", 0, 1, 0.6, 0.1, 0.7, 0.1, False), Index("b", 0, 1, 0.4, 0.2, 0.3, 0.1, False)
+    assert doubts([sound], 16) == ()
+    (sentence,) = doubts([sound, noisy], 16)
+    assert "b (" in sentence
+    assert "about 256 would" in sentence  # a half interval of 0.2 is to become 0.05: sixteen times as many
+    for wrong in (replace(sound, total=1.1), replace(sound, first=-0.1)):
+        assert "a (" in doubts([wrong], 16)[0]
+    indices, _ = sensitivity(SCENE, design, 64, 0, quiet, lambda s: s.friction.mu + (s.loading.indentation or 0.0))
+    assert {one.name for one in indices if one.one_sided} == {"friction.mu"}
+    assert "friction.mu" in doubts(indices, 64)[0]
 
 
 def test_values_reach_their_places_and_no_others():
