@@ -124,7 +124,10 @@ def sensitivity(
     columns = zip(
         design, *(np.asarray(result[name]).tolist() for name in ("S1", "S1_conf", "ST", "ST_conf")), strict=True
     )
-    indices = [Index(name, *design[name], *values, _one_sided(scene, name, design[name])) for name, *values in columns]
+    indices = [
+        Index(name, *design[name], *values, one_sided=_one_sided(scene, name, design[name]))
+        for name, *values in columns
+    ]
     return tuple(sorted(indices, key=lambda index: -index.total)), found
 
 
