@@ -42,7 +42,7 @@ def live(time_, wrench, status=None, stream=1):
 
 
 @functools.cache
-def solved(scene):
+def solved(scene, **_):
     """Solve a scene once for all tests."""
     return solve(scene)
 
@@ -143,7 +143,7 @@ def test_a_full_solve_that_fails_says_why_and_keeps_what_was_shown(follower):
 
 
 def test_a_solve_that_finds_nothing_is_marked_in_the_last_state_that_was_followed(follower, monkeypatch):
-    def wedged(_scene):
+    def wedged(_scene, **_):
         raise NoSteadyState("at 1.5 mm of indentation the finger wedges")
 
     monkeypatch.setattr("daq_app.window.live_follower.solve", wedged)
