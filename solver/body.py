@@ -10,6 +10,7 @@ from numpy.linalg import LinAlgError
 from solver.contact import Touchable
 from solver.dissection import Reduced, Tree, places
 from solver.elements import line
+from solver.handed_in import check_body, check_held, check_loads
 from solver.mesh import Array, Indices, Mesh
 from solver.stiffness import Elastic, Isotropic
 
@@ -42,14 +43,20 @@ class Body:
         tree: Tree | None = None,
         *,
         in_loops: bool = False,
+        checked: bool = False,
     ) -> "Body":
         """Reduce a body of `materials` by region under dead `loads` (nodes, 2) [N/mm].
 
         Held nodes move with the drive, and by `prescribed` (held, 2) [mm] relative to it. A body that nothing holds
         names in `free` the motions along which the surface alone balances the loads. `tree` is the `elimination` of the
         mesh, where it was made before. With `in_loops` compiled loops do all that, and find its contact: to round-off
-        the same, many times as fast once they are loaded. Raises LinAlgError where the body is not held and not free.
+        the same, many times as fast once they are loaded. Raises BodyError and MeshError, unless `checked` before, and
+        LinAlgError where what is held or free leaves it a motion.
         """
+        if not checked:
+            check_body(mesh, materials)
+            check_loads(mesh, loads, prescribed)
+            check_held(mesh, free)
         whole = _in_loops(mesh, materials) if in_loops else None
         elastic = Elastic.of(mesh, materials) if whole is None else whole.elastic
         moved = np.zeros(mesh.nodes.shape)

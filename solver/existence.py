@@ -1,9 +1,14 @@
 """The settled sliding state where there is one, and where there is none, how far there would be."""
 
 from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
 
 from solver import kernels
 from solver.failures import NoSteadyState, NotConverged
+from solver.kernels import CAP, OPEN
 from solver.limit import largest_depth, largest_friction, leapt
 from solver.mesh import Indices
 from solver.newton import Newton, Pull, Shape
@@ -37,6 +42,11 @@ def steady(
             continue
         if sound(newton, shape, outline) or (proven and begin is not None and not leapt(newton, begin, shape, outline)):
             return shape
+    if pull.tau < np.inf:
+        with suppress(NotConverged):
+            shape = _all_at_the_bound(newton, pull, tolerance, stop)
+            if sound(newton, shape, outline):
+                return shape
     branch = largest_friction(newton, pull, outline, pull.mu, stop)
     if not branch.limited:
         return settled(newton, pull, branch.last, tolerance, stop)
@@ -66,6 +76,17 @@ def doubts(newton: Newton, shape: Shape, outline: Indices) -> tuple[str, ...]:
         f"The skin is squeezed to {100 * least:.0f} % of its length at one place, where neo-Hookean surfaces fold from "
         "54 % on: whether there is settled sliding here depends on the mesh, within a tenth of the friction.",
     )
+
+
+def _all_at_the_bound(newton: Newton, pull: Pull, tolerance: float, stop: Callable[[], bool]) -> Shape:
+    """Return the settled state begun where nothing rubs, all that touches there first thought to slip at the bound.
+
+    A low bound with a large coefficient of friction is felt where hardly anything presses: there slip is a bad guess.
+    Raises NotConverged.
+    """
+    bare = settled(newton, pull._replace(mu=0.0), None, tolerance, stop)
+    state = np.where(bare.touching, CAP, OPEN).astype(bare.state.dtype)
+    return settled(newton, pull, replace(bare, state=state, pull=pull), tolerance, stop)
 
 
 def sound(newton: Newton, shape: Shape, outline: Indices) -> bool:

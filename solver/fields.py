@@ -102,7 +102,7 @@ def _energies(prediction: Prediction, sketch: Sketch) -> Array:
     # Imported here: a picture at small strain need not wait for the compiled loops to be loaded.
     from solver.finite_body import FiniteBody, FiniteProbes
 
-    body = FiniteBody.of(prediction.mesh, finite_laws(scene.materials))
+    body = FiniteBody.of(prediction.mesh, finite_laws(scene.materials), checked=True)
     count = len(sketch.probes.element)
     places = Endings(sketch.probes, np.ones(count), np.arange(count), count)
     return FiniteProbes.of(body, places).energy(body, prediction.displacement)

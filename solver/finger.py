@@ -38,7 +38,7 @@ class FingerModel:
         geometry = finger_mesh(scene.finger, scene.receptor, sizing)
         tree = planned(geometry.mesh, in_loops=in_loops)
         begun = perf_counter()
-        body = Body.of(geometry.mesh, settled_moduli(scene.materials), tree=tree, in_loops=in_loops)
+        body = Body.of(geometry.mesh, settled_moduli(scene.materials), tree=tree, in_loops=in_loops, checked=True)
         took = perf_counter() - begun
         at_touch = endings(geometry, body.elastic, scene.receptor, np.zeros(1))
         return FingerModel(scene.receptor, geometry, body, at_touch, took)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from solver import kernels
 from solver.elements import Q2P1
 from solver.elimination import Plan
+from solver.handed_in import check_body, check_held
 from solver.hyperelastic import Law
 from solver.mesh import Array, Indices, Mesh
 from solver.receptor import Endings
@@ -43,8 +44,14 @@ class FiniteBody:
     middle: Narrow  # (k,) 1 at the middle of an edge of the skin, 0 at its ends
 
     @staticmethod
-    def of(mesh: Mesh, laws: Sequence[Law]) -> "FiniteBody":
-        """Prepare `mesh`, whose regions are made of `laws`. The centre of an element is never held."""
+    def of(mesh: Mesh, laws: Sequence[Law], *, checked: bool = False) -> "FiniteBody":
+        """Prepare `mesh`, whose regions are made of `laws`. The centre of an element is never held.
+
+        Raises BodyError and MeshError, unless it was `checked` before.
+        """
+        if not checked:
+            check_body(mesh, laws)
+            check_held(mesh)
         corners = mesh.nodes[mesh.elements]  # (e, 9, 2)
         jacobian = np.swapaxes(corners, 1, 2)[:, None] @ _SLOPES  # (e, q, 2, 2)
         det = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]

@@ -39,9 +39,9 @@ class FiniteFinger:
         """
         try:
             made = finger_mesh(scene.finger, scene.receptor, sizing)
-            body = FiniteBody.of(made.mesh, finite_laws(scene.materials))
+            body = FiniteBody.of(made.mesh, finite_laws(scene.materials), checked=True)
         except (MeshError, LinAlgError) as bad:
-            raise SceneError("finger", scene.finger, f"no mesh fits it ({bad})") from bad
+            raise SceneError("finger.tip_radius", scene.finger.tip_radius, f"no mesh fits this finger ({bad})") from bad
         at_touch = FiniteProbes.of(body, endings(made, body, scene.receptor, np.zeros(1)))
         return FiniteFinger(scene.receptor, made, Newton(body, None if beside is None else beside.newton), at_touch)
 

@@ -20,6 +20,7 @@ from solver.finite_finger import FiniteFinger
 from solver.finite_relaxing import RelaxingCourse, RelaxingNewton
 from solver.finite_states import course, presses
 from solver.kernels import CAP, OPEN, SLIP, STICK
+from solver.matching import within_reach
 from solver.mesh import Array
 from solver.mesher import Sizing
 from solver.newton import EQUILIBRIUM, Newton, Shape
@@ -115,6 +116,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         shape = way[-1]
     if not shape.touching.any():
         raise NotConverged(f"No contact was found at {shape.pull.depth:g} mm of indentation: ask for more depth.")
+    within_reach(scene, shape.pull.depth)
     driven = scene.driven(shape.pull.depth)
     body = finger.newton.body
     newton = finger.newton if relaxing is None else relaxing.newton

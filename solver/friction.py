@@ -15,6 +15,13 @@ class FrictionLaw:
     mu: float  # coefficient of friction [-]
     tau_max: float  # traction bound [MPa], infinite where there is none
 
+    def __post_init__(self) -> None:
+        """Raise ValueError for friction that is negative or no number."""
+        if not 0.0 <= self.mu < np.inf:
+            raise ValueError(f"mu = {self.mu} is not allowed: a coefficient of friction is a number from 0 on")
+        if not self.tau_max >= 0.0:
+            raise ValueError(f"tau_max = {self.tau_max} is not allowed: a bound is a traction from 0 on, or infinite")
+
     def limit(self, force: Array, length: Array) -> Array:
         """Return the largest tangential force (n,) [N/mm] at points pressed with `force` (n,) [N/mm].
 

@@ -3,12 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from numpy.linalg import LinAlgError
+
 from solver.contact import Contact, ContactLost
+from solver.failures import NoSteadyState, NotConverged
 from solver.finger import FingerModel
 from solver.friction import FrictionLaw
+from solver.grid import MeshError
 from solver.mesher import Sizing
 from solver.pressing import depth_of, sliding_under
-from solver.scene import Friction, Scene
+from solver.scene import SHALLOW, Friction, Scene
 
 FINENESS = 6.0  # good to some tenths of a per cent of the depth
 NEARLY = 0.5  # of what makes it slide, from which a finger that is dragged is about as deep as one that slides
@@ -38,7 +42,10 @@ def expected_depth(scene: Scene, *, in_loops: bool = False) -> float:
     if force is None:
         return scene.loading.depth
     deepest = DEEPEST * scene.finger.pulp_thickness()
-    finger = FingerModel.of(scene, Sizing(FINENESS, deepest), in_loops=in_loops)
+    try:
+        finger = FingerModel.of(scene, Sizing(FINENESS, deepest), in_loops=in_loops)
+    except (MeshError, LinAlgError):  # who makes the meshes that count will tell
+        return deepest
     found = _pressed(finger, scene, force, deepest)
     drag = scene.tangential_force or 0.0
     held = scene.loading.direction == 0 or scene.loading.dragged
@@ -46,7 +53,27 @@ def expected_depth(scene: Scene, *, in_loops: bool = False) -> float:
         # Then it goes about as deep as one that slides with so much drag and no more.
         friction = Friction(min(drag / force, float(scene.friction.mu)), scene.friction.tau_max)
         found = _pressed(finger, replace(scene, friction=friction), force, deepest)
-    return deepest if found is None else depth_of(found)
+    return deepest if found is None else max(depth_of(found), SHALLOW)
+
+
+def within_reach(scene: Scene, depth: float, most: float | None = None) -> None:
+    """Raise SolveFailure where a given force has led to a `depth` [mm] that no model of the tissue reaches.
+
+    `most` is the normal force [N/mm] that the tissue carries down to the bone, where that is known.
+    """
+    force, room = scene.normal_force, scene.finger.pulp_thickness()
+    if force is None or SHALLOW <= depth < room:
+        return
+    if depth < SHALLOW:
+        raise NotConverged(
+            f"A normal force of {force:.3g} N/mm presses the finger {depth:.1g} mm deep only: below {SHALLOW:g} mm "
+            "round-off is as large as what there is to find; ask for more."
+        )
+    carried = "" if most is None else f": with this friction the {room:.3g} mm of tissue carry up to {most:.3g} N/mm"
+    raise NoSteadyState(
+        f"A normal force of {force:.3g} N/mm would press the finger {depth:.3g} mm deep, to its bone{carried}; "
+        "ask for less."
+    )
 
 
 def _pressed(finger: FingerModel, scene: Scene, normal_force: float, deepest: float) -> Contact | None:

@@ -156,7 +156,11 @@ class RelaxingBody:
         key = f"{step:.9e}"
         if key not in self._steps:
             body = Body.of(
-                self.mesh, [law.within(step) for law in self._laws], tree=self._tree, in_loops=self._in_loops
+                self.mesh,
+                [law.within(step) for law in self._laws],
+                tree=self._tree,
+                in_loops=self._in_loops,
+                checked=True,
             )
             t = body.touchable
             across = t.normal_by_tangential

@@ -11,6 +11,9 @@ from typing import Literal
 Slide = Literal["+x", "-x", "none"]
 Law = Literal["hooke", "neo-hookean", "ogden"]
 TISSUES = ("epidermis", "dermis", "fat", "bone")  # in the order of the mesh's regions
+SHALLOW = 1e-6  # least indentation [mm]: below, round-off is as large as what there is to find
+FEEBLE = 1e-12  # least friction that is not none [-, MPa]: below, round-off is as large as the drag
+APART = 1e10  # largest ratio of two tissues' stiffnesses: beyond, round-off swallows the softer one
 LAWS_OF = {"small": ("hooke",), "finite": ("neo-hookean", "ogden")}  # that each kinematics has
 
 
@@ -25,10 +28,11 @@ class SceneError(ValueError):
         self.allowed = allowed
 
 
-def _within(key: str, value: float, low: float, high: float, unit: str = "") -> None:
-    """Raise SceneError unless low <= value <= high (nan is never within)."""
+def _within(key: str, value: float, low: float, high: float, unit: str = "", *, zero: bool = False) -> None:
+    """Raise SceneError unless low <= value <= high (nan is never within); `zero` says that 0 is allowed beside."""
     if not low <= value <= high:
-        raise SceneError(key, value, f"it must lie between {low:g} and {high:g}{unit and ' ' + unit}")
+        allowed = f"it must {'be 0 or ' if zero else ''}lie between {low:g} and {high:g}{unit and ' ' + unit}"
+        raise SceneError(key, value, allowed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,9 +189,10 @@ class Friction:
 
     def __post_init__(self) -> None:
         """Check ranges."""
-        _within("friction.mu", self.mu, 0.0, 1e6)
-        if self.tau_max is not None:
-            _within("friction.tau_max", self.tau_max, 0.0, 1e12, "MPa")
+        if self.mu != 0.0:
+            _within("friction.mu", self.mu, FEEBLE, 1000.0, zero=True)
+        if self.tau_max is not None and self.tau_max != 0.0:
+            _within("friction.tau_max", self.tau_max, FEEBLE, 1e12, "MPa", zero=True)
 
     @property
     def cap(self) -> float:
@@ -216,7 +221,7 @@ class Loading:
             allowed = "give either an indentation or a normal force"
             raise SceneError("loading.indentation", self.indentation, allowed)
         if self.indentation is not None:
-            _within("loading.indentation", self.indentation, 1e-9, 20.0, "mm")
+            _within("loading.indentation", self.indentation, SHALLOW, 20.0, "mm")
         if self.normal_force is not None:
             _within("loading.normal_force", self.normal_force, 1e-9, 1e6)
         if self.force_unit not in ("N/mm", "N"):
@@ -311,12 +316,18 @@ class Scene:
         """Check what several tables decide together."""
         _within("width", self.width, 0.1, 1000.0, "mm")
         self._check_laws()
+        self._check_stiffnesses()
         skin = self.finger.epidermis + self.finger.dermis
         half = self.receptor.ending[0] / 2.0
         if not half < self.receptor.depth < self.finger.tip_radius - half:
             raise SceneError("receptor.depth", self.receptor.depth, "the ending must lie between skin and finger axis")
         if self.receptor.depth + half > skin + 1e-9:
             raise SceneError("receptor.depth", self.receptor.depth, f"the ending must end within {skin:g} mm of skin")
+        along, angle = self.receptor.ending[1], math.radians(self.finger.contact_angle)
+        room = 2.0 * (self.finger.shaft_length + (self.finger.tip_radius - self.receptor.depth) * angle)
+        if not along < 0.999 * room:
+            allowed = f"along the skin it must end before the cut, and stay below {0.999 * room:.3g} mm"
+            raise SceneError("receptor.ending", self.receptor.ending, allowed)
         room = self.finger.pulp_thickness()
         if self.loading.indentation is not None and self.loading.indentation >= room:
             allowed = f"it must stay below the {room:.3g} mm of tissue between first touch and bone"
@@ -325,6 +336,14 @@ class Scene:
         if drag is not None and push is not None and drag > self.friction.mu * push * (1.0 + 1e-12):
             allowed = f"friction carries at most mu times the normal force, {self.friction.mu * push:.4g}"
             raise SceneError("loading.tangential_force", drag, allowed)
+
+    def _check_stiffnesses(self) -> None:
+        meshed = TISSUES if self.finger.bone == "meshed" else TISSUES[:-1]
+        softest = min(self.materials.of(name).E for name in meshed)
+        for name in meshed:
+            if not APART * softest * (1.0 + 1e-9) >= self.materials.of(name).E:
+                allowed = f"it must be at most {APART:g} times that of the softest tissue, {softest:g} MPa"
+                raise SceneError(f"materials.{name}.E", self.materials.of(name).E, allowed)
 
     def _check_laws(self) -> None:
         kinematics = self.solve.kinematics

@@ -1,16 +1,17 @@
 """Settled states of a scene at small strain on one mesh, the states beside them, and what is estimated of them."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
-from solver.contact import CAP, STICK, Contact, ContactLost, Course
+from solver.contact import CAP, STICK, Contact, ContactLost, Course, forced
 from solver.failures import NoSteadyState, beyond_friction
 from solver.finger import FingerModel
 from solver.friction import FrictionLaw
 from solver.load_steps import HALF
-from solver.matching import DEEPEST
+from solver.matching import DEEPEST, within_reach
 from solver.mesh import Array
 from solver.pressing import depth_of, sliding_under
 from solver.relaxing import RelaxingBody, RelaxingWay, march_relaxing
@@ -45,9 +46,8 @@ def settled(scene: Scene, finger: FingerModel, times: float = 1.0) -> Contact:
     except ContactLost:
         if loading.tangential_force is None:
             raise
-        return (
-            march(touch, law, loading, times=times).instants[-1].contact
-        )  # the drag may be met where sliding would wedge
+        # the drag may be met where sliding would wedge
+        return march(touch, law, loading, times=times).instants[-1].contact
     if loading.tangential_force is None:
         return found
     most = float(np.abs(found.tangential.sum()))
@@ -56,6 +56,33 @@ def settled(scene: Scene, finger: FingerModel, times: float = 1.0) -> Contact:
     if loading.tangential_force >= most * (1.0 - ALL_SLIPS):
         return found
     return march(touch, law, loading, times=times).instants[-1].contact
+
+
+def followed_under(scene: Scene, finger: FingerModel) -> tuple[Contact | None, float]:
+    """Return settled sliding under the normal force of a scene, followed from mu = 0, as `wedging.followed` does.
+
+    Raises NoSteadyState where that force presses the finger to its bone.
+    """
+    law, touch, force = law_of(scene), finger.body.touchable, scene.normal_force or 0.0
+    direction, deepest = scene.loading.direction, DEEPEST * scene.finger.pulp_thickness()
+    try:
+        first = sliding_under(touch, replace(law, mu=0.0), force, direction, deepest)
+    except ContactLost:
+        return None, 0.0
+    reached, limit = followed(forced(touch, force), law, 0.0, direction, first)
+    if limit == 0.0:
+        in_tissue(scene, finger, depth_of(first))
+    return reached, limit
+
+
+def in_tissue(scene: Scene, finger: FingerModel, depth: float) -> None:
+    """Raise SolveFailure where a given force has led to a `depth` [mm] that means nothing, as beyond the bone."""
+    room, most = scene.finger.pulp_thickness(), None
+    if depth >= room:
+        with suppress(ContactLost):
+            slide = Course(finger.body.touchable, law_of(scene)).sliding(room, scene.loading.direction or 1)
+            most = float(slide.normal.sum())
+    within_reach(scene, depth, most)
 
 
 def depends_on_way(scene: Scene, contact: Contact) -> bool:

@@ -1,6 +1,7 @@
 """From scenes to predictions: one mesh for all that share a finger, and an error estimate with every answer."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -27,6 +28,8 @@ from solver.small_errors import error_estimates, steps_asked, times_on_way
 from solver.small_states import (
     all_numbers,
     depends_on_way,
+    followed_under,
+    in_tissue,
     indentation,
     laid,
     law_of,
@@ -37,10 +40,10 @@ from solver.small_states import (
 from solver.stepping import March
 from solver.wedging import WIDE, deepest, followed
 
+MIXED = "nearly incompressible tissues, or ones whose stiffnesses differ by many orders of magnitude,"
 UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]
 DOUBTED = 1e-8  # and from which it is told
 PIERCED = 1e-7  # part of the indentation by which skin may lie too low without it being told [-]
-SAME = 1e-6  # relative difference of normal forces up to which two states under a given force are one
 ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements
 LOW = 1e-8  # part of the indentation by which skin may lie too low before it is laid on the surface again [-]
 
@@ -237,11 +240,14 @@ def _solve_on(
     """Solve all scenes on one mesh, and on two coarser ones for the estimate; look wider where contact reaches out."""
     done: list[_Answer | None] = []
     for margin in (1.0, 4.0, WIDE):
-        begun = perf_counter()
-        fine = _meshed(scenes[0], Sizing(fineness, depth, margin=margin), in_loops)
-        setup = perf_counter() - begun - fine.solve_s
-        begun = perf_counter()
-        coarse = _coarser(scenes[0], Sizing(fineness, depth, margin=margin), in_loops)
+        try:
+            begun = perf_counter()
+            fine = _meshed(scenes[0], Sizing(fineness, depth, margin=margin), in_loops)
+            setup = perf_counter() - begun - fine.solve_s
+            begun = perf_counter()
+            coarse = _coarser(scenes[0], Sizing(fineness, depth, margin=margin), in_loops)
+        except NotConverged as failure:
+            return [failure] * len(scenes)
         estimate = (perf_counter() - begun) / len(scenes)
         shared = _Shared(fineness, fine, coarse, setup, fine.solve_s / len(scenes), estimate, widest=margin == WIDE)
         done = []
@@ -284,8 +290,10 @@ def _report(progress: Progress | None, part: float) -> None:
 def _meshed(scene: Scene, sizing: Sizing, in_loops: bool) -> FingerModel:
     try:
         return FingerModel.of(scene, sizing, in_loops=in_loops)
-    except (MeshError, LinAlgError) as bad:
-        raise SceneError("finger", scene.finger, f"no mesh fits it ({bad})") from bad
+    except MeshError as bad:
+        raise SceneError("finger.tip_radius", scene.finger.tip_radius, f"no mesh fits this finger ({bad})") from bad
+    except LinAlgError as bad:
+        raise NotConverged(f"Round-off has swallowed the finger's stiffness ({bad}): {MIXED} do that.") from bad
 
 
 def _direct(scene: Scene, shared: _Shared, times: float = 1.0) -> Contact | None:
@@ -307,15 +315,12 @@ def _direct(scene: Scene, shared: _Shared, times: float = 1.0) -> Contact | None
         why = str(lost)
     if not shared.widest:
         return None
-    if direction == 0 or (scene.normal_force is not None and contact is None):
+    if direction == 0:
         raise _no_answer(scene, why, 0.0, finger)
-    depth = scene.loading.depth if contact is None else indentation(scene, contact)
-    reached, limit = followed(finger.body.touchable, law_of(scene), depth, direction)
-    if scene.normal_force is not None and contact is not None:
-        # the way leads to sliding at that depth: is that the state that the forces lead to?
-        if reached is None or abs(reached.normal.sum() / scene.normal_force - 1.0) > SAME:
-            raise _no_answer(scene, why, 0.0, finger)
-        return contact
+    if scene.normal_force is None:
+        reached, limit = followed(finger.body.touchable, law_of(scene), scene.loading.depth, direction)
+    else:
+        reached, limit = followed_under(scene, finger)
     if reached is None:
         raise _no_answer(scene, why, limit, finger)
     return reached
@@ -350,6 +355,7 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
     skin = finger.skin_displacement(contact)
     displacement = finger.body.displacement(skin)[:, :, 0]
     depth = indentation(scene, contact)
+    in_tissue(scene, finger, depth)
     if finger.reaches_out(contact, displacement, depth):
         return None
     checks = audits(finger, law, contact, depth, displacement)
@@ -366,7 +372,7 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
     if unbalanced > UNSOUND:
         message = f"Forces balance to {unbalanced:.1g} only at {depth:g} mm indentation"
         raise NotConverged(
-            f"{message}: round-off has swallowed the answer, as with contacts far smaller than the mesh."
+            f"{message}: round-off has swallowed the answer; contacts far smaller than the mesh, {MIXED} do that."
         )
     if way is not None:
         checks |= course_audits(finger, way)
@@ -420,9 +426,7 @@ def _unbalanced(checks: dict[str, float]) -> float:
 def _doubts(unbalanced: float, penetration: float) -> tuple[str, ...]:
     told: list[str] = []
     if unbalanced > DOUBTED:
-        told.append(
-            f"Forces balance to {unbalanced:.1g} only: materials near the incompressible limit magnify round-off."
-        )
+        told.append(f"Forces balance to {unbalanced:.1g} only: {MIXED} magnify round-off.")
     if penetration > PIERCED:
         told.append(f"The skin lies {penetration:.1g} of the indentation too low: stiff layers magnify round-off.")
     return tuple(told)
@@ -494,11 +498,16 @@ def _no_answer(scene: Scene, why: str, limit_mu: float, finger: FingerModel) -> 
     if scene.friction.tau_max is not None:
         at += f" with tau_max = {scene.friction.tau_max:g} MPa"
     if scene.loading.direction == 0 or limit_mu <= 0.0:
-        return NotConverged(f"No settled state was found at {at}: {why}, from every first guess tried.")
-    limit_depth = deepest(scene, law_of(scene), in_loops=finger.body.touchable.in_loops)
+        return NotConverged(f"No settled state was found at {at}, from any first guess: {why}.")
+    forced = scene.normal_force is not None
+    limit_depth = None
+    if not forced:
+        with suppress(LinAlgError):  # of stiffnesses that a mesh for less depth does not stand
+            limit_depth = deepest(scene, law_of(scene), in_loops=finger.body.touchable.in_loops)
     message = (
         f"There is no steady sliding at {at}: the drag presses the finger against the surface faster than it yields, "
-        f"so it wedges; followed from mu = 0, steady sliding at this depth ends at mu = {limit_mu:.3g}"
+        f"so it wedges; followed from mu = 0, steady sliding {'under this force' if forced else 'at this depth'} "
+        f"ends at mu = {limit_mu:.3g}"
     )
     if limit_depth is not None:
         message += f", and at this friction at {limit_depth:.3g} mm"

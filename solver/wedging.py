@@ -12,6 +12,7 @@ from solver.body import Body
 from solver.contact import Contact, ContactLost, Course, Touchable
 from solver.friction import FrictionLaw
 from solver.mesher import Sizing, finger_mesh
+from solver.pressing import depth_of
 from solver.scene import Scene
 from solver.tissues import settled_moduli
 
@@ -22,13 +23,19 @@ PATIENCE = 15  # corrections of states that a small step may take
 CLOSE = 0.005  # relative step of mu below which a limit is taken as found
 
 
-def followed(body: Touchable, law: FrictionLaw, depth: float, direction: int) -> tuple[Contact | None, float]:
+def followed(
+    body: Touchable, law: FrictionLaw, depth: float, direction: int, first: Contact | None = None
+) -> tuple[Contact | None, float]:
     """Return the settled sliding state reached by following it from mu = 0, and the largest mu that has one.
 
-    The state is None where that mu falls short of the law's.
+    The state is None where that mu falls short of the law's. Under a given force, with `body` free to move up, `first`
+    is the state at mu = 0; the mu is then 0 where contact grew beyond the skin that may touch: nothing is known.
     """
-    reached, step = 0.0, law.mu
-    state = Course(body, replace(law, mu=0.0)).sliding(depth, direction)
+    reached, step, unknown = 0.0, law.mu, False
+    try:
+        state = Course(body, replace(law, mu=0.0)).sliding(depth, direction) if first is None else first
+    except ContactLost:
+        return None, 0.0
     while reached < law.mu and step > CLOSE * max(reached, min(0.01, law.mu)):
         aim = min(reached + step, law.mu)
         try:
@@ -37,10 +44,15 @@ def followed(body: Touchable, law: FrictionLaw, depth: float, direction: int) ->
             step /= 2.0
             continue
         if found.touching[0] or found.touching[-1]:  # the skin that may touch ends: what lies beyond is not known
+            step, unknown = step / 2.0, first is not None
+            continue
+        if first is not None and not depth_of(found) > 0.0:  # pressed by a surface that it does not reach
             step /= 2.0
             continue
         state, reached, step = found, aim, 2.0 * step
-    return (state if reached == law.mu else None), reached
+    if reached == law.mu:
+        return state, reached
+    return None, 0.0 if unknown else reached
 
 
 def deepest(scene: Scene, law: FrictionLaw, *, in_loops: bool = False) -> float | None:
@@ -71,4 +83,4 @@ def deepest(scene: Scene, law: FrictionLaw, *, in_loops: bool = False) -> float 
 
 def _body(scene: Scene, depth: float, fineness: float, in_loops: bool) -> Touchable:
     mesh = finger_mesh(scene.finger, scene.receptor, Sizing(fineness, depth, margin=WIDE)).mesh
-    return Body.of(mesh, settled_moduli(scene.materials), in_loops=in_loops).touchable
+    return Body.of(mesh, settled_moduli(scene.materials), in_loops=in_loops, checked=True).touchable

@@ -50,6 +50,15 @@ def test_friction_without_measure_is_the_bound_alone():
     assert sed[0] == pytest.approx(sed[1], rel=1e-3)
 
 
+def test_a_bound_next_to_nothing_leaves_the_frictionless_state_whatever_the_coefficient():
+    newton, probes, outline = finger(5)
+    sed = [
+        probes.average(newton.body, steady(newton, Pull(1.0, mu, tau, 1), outline).u)[0]
+        for mu, tau in ((0.0, np.inf), (1000.0, 1e-9))
+    ]
+    assert sed[0] == pytest.approx(sed[1], rel=1e-6)
+
+
 @pytest.mark.parametrize("depth", [1e-6, 1e-4, 1e-2])
 def test_a_finger_that_barely_touches_has_an_answer(depth):
     newton, _, outline = finger(5)

@@ -21,6 +21,24 @@ from solver.scene import Finger, Friction, Loading, Material, Materials, Recepto
         (lambda: Friction(0.3, -1.0), "friction.tau_max"),
         (lambda: Friction(math.inf), "friction.mu"),
         (lambda: Loading(0.0), "loading.indentation"),
+        (lambda: Loading(1e-9), "loading.indentation"),
+        (lambda: Friction(1e-300), "friction.mu"),
+        (lambda: Friction(0.3, 1e-300), "friction.tau_max"),
+        (
+            lambda: Scene(
+                friction=Friction(0.3),
+                loading=Loading(1.0),
+                finger=Finger(shaft_length=5.0),
+                receptor=Receptor(ending=(0.2, 20.0)),
+            ),
+            "receptor.ending",
+        ),
+        (
+            lambda: Scene(
+                friction=Friction(0.3), loading=Loading(1.0), materials=Materials(epidermis=Material(1e9, 0.3))
+            ),
+            "materials.epidermis.E",
+        ),
         (lambda: Loading(2.0, "sideways"), "loading.slide"),
         (lambda: Loading(2.0, "+x", 0.0), "loading.speed"),
         (lambda: Receptor(ending=(0.2, 0.0)), "receptor.ending"),
