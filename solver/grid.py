@@ -36,12 +36,20 @@ def quality(mesh: Mesh) -> dict[str, float]:
 
     Raises MeshError where an element is folded (its Jacobian is not positive at every corner and quadrature point).
     """
-    at = np.concatenate([Q2P1.points, Q2P1.corners])
+    jacobian, det = jacobians(mesh, np.concatenate([Q2P1.points, Q2P1.corners]))
+    sides = np.linalg.norm(jacobian, axis=-2)  # lengths of the two tangents
+    aspect = np.maximum(sides[..., 0] / sides[..., 1], sides[..., 1] / sides[..., 0])
+    return {"jacobian_ratio": float((det.min(axis=1) / det.max(axis=1)).min()), "aspect": float(aspect.max())}
+
+
+def jacobians(mesh: Mesh, at: Array) -> tuple[Array, Array]:
+    """Return the Jacobians (e, p, 2, 2) of all elements at local coordinates `at` (p, 2), and their determinants.
+
+    Raises MeshError where one is not positive: the element is folded there.
+    """
     jacobian = np.swapaxes(mesh.nodes[mesh.elements], 1, 2)[:, None] @ Q2P1.shape(at)[1]
     det = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
     if not det.min() > 0.0:
         worst = mesh.nodes[mesh.elements[int(det.min(axis=1).argmin()), 8]]
         raise MeshError(f"an element of the mesh is folded, near x = {worst[0]:.3g}, y = {worst[1]:.3g} mm")
-    sides = np.linalg.norm(jacobian, axis=-2)  # lengths of the two tangents
-    aspect = np.maximum(sides[..., 0] / sides[..., 1], sides[..., 1] / sides[..., 0])
-    return {"jacobian_ratio": float((det.min(axis=1) / det.max(axis=1)).min()), "aspect": float(aspect.max())}
+    return jacobian, det

@@ -5,7 +5,8 @@ from typing import Protocol
 
 import numpy as np
 
-from solver.grid import quality
+from solver.elements import Q2P1
+from solver.grid import jacobians
 from solver.mesh import Array, Mesh
 
 
@@ -28,7 +29,10 @@ class Stiff(Protocol):
 
 
 def check_body(mesh: Mesh, materials: Sequence[Stiff]) -> None:
-    """Raise BodyError where numbers of `mesh` or of its `materials` by region make no body, MeshError where folded."""
+    """Raise BodyError where numbers of `mesh` or of its `materials` by region make no body.
+
+    Raises MeshError where an element is folded at a point of its quadrature, which is all that is asked of it.
+    """
     count = len(mesh.nodes)
     if not np.isfinite(mesh.nodes).all():
         worst = int(np.argmin(np.isfinite(mesh.nodes).all(axis=1)))
@@ -54,7 +58,7 @@ def check_body(mesh: Mesh, materials: Sequence[Stiff]) -> None:
                 f"material {number}, {material}, is none that can be computed; E must be above 0 and nu from 0 to "
                 "0.4999999, since nu = 0.5 leaves no energy of volume change"
             )
-    quality(mesh)
+    jacobians(mesh, Q2P1.points)
 
 
 def check_loads(mesh: Mesh, loads: Array | None, prescribed: Array | None) -> None:
@@ -73,6 +77,6 @@ def check_held(mesh: Mesh, free: Sequence[str] = ()) -> None:
     """Raise BodyError where nothing holds a body and no motion of it is `free` for the surface to balance."""
     if not len(mesh.held) and not free:
         raise BodyError(
-            "nothing holds the body; name the nodes that are driven in mesh.held, or at small strain the motions along "
-            'which the surface alone balances the loads, as free = ("y", "turn")'
+            "nothing holds the body; name the nodes that are driven in mesh.held, or the motions along which the "
+            'surface alone balances the loads, as free = ("y", "turn")'
         )

@@ -22,7 +22,6 @@ TISSUE = [Hooke(0.08, 0.48)]
     ("make", "told"),
     [
         (lambda: Body.of(NOT_HELD, TISSUE), "nothing holds the body"),
-        (lambda: FiniteBody.of(NOT_HELD, [NeoHooke(0.08, 0.48)]), "nothing holds the body"),
         (lambda: Body.of(MESH, TISSUE, NAN), "row 0 of loads is not finite"),
         (lambda: Body.of(MESH, TISSUE, NAN[:3]), "loads has the shape"),
         (lambda: Body.of(MESH, TISSUE, None, np.zeros((1, 2))), "prescribed has the shape"),
