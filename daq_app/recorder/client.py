@@ -33,6 +33,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
@@ -180,17 +181,14 @@ class Recorder:
         """Send requests; a pipe that is full holds up nobody else."""
         pipe = self._process.stdin
         assert pipe is not None
-        try:
+        with pipe, suppress(OSError, ValueError):  # it is gone: the reader says so
             while True:
                 self._something_to_send.wait()
                 self._something_to_send.clear()
                 while self._to_send:
                     packed = self._to_send.popleft()
                     if packed is None:
-                        pipe.close()
                         return
                     rest = memoryview(packed)
                     while rest:
                         rest = rest[os.write(pipe.fileno(), rest) :]
-        except (OSError, ValueError):
-            return  # it is gone: the reader says so

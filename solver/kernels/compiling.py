@@ -47,7 +47,11 @@ def _tell() -> None:
 
 
 def compiled(function: Compiled) -> Compiled:
-    """Return `function` compiled when first called, kept on disk; numba itself declares no types."""
-    loop: Any = numba.njit(fastmath=_FAST)(function)  # pyright: ignore
+    """Return `function` compiled when first called, kept on disk; numba itself declares no types.
+
+    What a loop calls is compiled into it. Else each loop's code would hold a copy of what it calls, optimised once
+    more, the copy a process loads first would serve all, and last bits would fall by what was called first.
+    """
+    loop: Any = numba.njit(fastmath=_FAST, forceinline=True)(function)  # pyright: ignore
     loop._cache = _Kept(function)  # noqa: SLF001 - what njit(cache=True) does, with its own class
     return loop

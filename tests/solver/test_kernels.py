@@ -1,6 +1,9 @@
 # ruff: noqa: N806 - the letters of the literature
 """The compiled loops agree with their NumPy twin, and the tangent with differences."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -204,3 +207,29 @@ def test_the_compiled_outline_is_squeezed_and_crosses_itself_where_the_plain_one
         assert kernels.crosses(nodes, u, outline) == crosses_itself(after)
         seen.add(kernels.crosses(nodes, u, outline))
     assert seen == {True, False}
+
+
+@pytest.mark.slow
+def test_no_bit_depends_on_which_loops_a_process_called_before():
+    solved = (
+        "from dataclasses import replace\n"
+        "from solver.reference import SLIPPERINESS, scene\n"
+        "from solver.solution import solve\n"
+        "asked = scene(SLIPPERINESS[0])\n"
+        "asked = replace(asked, solve=replace(asked.solve, kinematics='finite'))\n"
+        "found = solve(asked)\n"
+        "print(found.sed_ending.hex(), found.error_estimate.hex(), found.normal_force.hex())\n"
+    )
+    before = (
+        "import numpy as np\n"
+        "from solver import kernels\n"
+        "states, zero = np.zeros(3, np.int32), np.zeros(3)\n"
+        "kernels.tributary(np.arange(3.0), np.array([0, 1, 0], np.int32), zero)\n"
+        "kernels.solve(np.eye(2).ravel(), np.zeros((2, 4)), 2)\n"
+        "kernels.restate(states, states.copy(), np.zeros((3, 2)), zero, zero, zero, 0.1, 0.1, 1)\n"
+    )
+    first, then = (
+        subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+        for script in (solved, before + solved)
+    )
+    assert first == then
