@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyqtgraph
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtTest import QTest
@@ -136,7 +137,10 @@ def test_an_edge_is_moved_by_keys_and_recorded_with_enter(window):
     assert moved.time == pytest.approx(stroke.steady[0] + 0.045)
 
 
-def test_an_edge_that_is_dragged_is_recorded_where_it_is_let_go_and_escape_takes_a_key_back(application, window):
+def test_an_edge_that_is_dragged_is_recorded_where_it_is_let_go_and_escape_takes_a_key_back(
+    application, window, monkeypatch
+):
+    monkeypatch.setitem(pyqtgraph.CONFIG_OPTIONS, "mouseRateLimit", 0)  # this mouse is quicker than any hand
     stroke = chosen(window.state).stroke
     view = window.stroke.stroke
     for _ in range(3):  # axes take their width when they are painted
