@@ -39,7 +39,7 @@ class Subject:
 SUBJECTS = (
     Subject("machine", "machine", 0.0, 0.0, machine.measure),
     Subject("truth", "overkill solves for the truth", 30.0, 1.5, truth.measure),
-    Subject("speed", "time against true error", 30.0, 3.5, speed.measure),
+    Subject("speed", "time against true error", 38.0, 3.5, speed.measure),
     Subject("estimates", "estimates against true errors", 25.0, 1.8, estimates.measure),
     Subject("costs", "cost breakdown", 6.0, 0.6, costs.measure),
     Subject("warm", "the warm stepper", 10.0, 1.5, warm.measure),
