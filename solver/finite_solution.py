@@ -5,6 +5,7 @@ where tissues relax, in time (`solver.finite_relaxing`).
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import groupby
 from time import perf_counter
 
@@ -208,9 +209,10 @@ def _balanced(
         x = shape.place(newton.body)[:, 0]
         if not newton.linearise(shape, shape.pull, x):
             break
-        after, _, changed = newton.moved(shape, shape.pull, newton.steps[:, EQUILIBRIUM].copy(), x)
+        after, _, _ = newton.moved(shape, shape.pull, newton.steps[:, EQUILIBRIUM].copy(), x)
+        after = replace(after, state=shape.state, sense=shape.sense)  # a step of nanometres turns no slip into stick
         better = audits(after)
-        if changed or not _unbalanced(better) < _unbalanced(checks):
+        if _contradicting(better) > max(_contradicting(checks), ROUGH) or _unbalanced(better) >= _unbalanced(checks):
             break
         shape, checks = after, better
     return shape, checks
@@ -218,6 +220,10 @@ def _balanced(
 
 def _unbalanced(checks: dict[str, float]) -> float:
     return max(checks[name] for name in ("equilibrium_x", "equilibrium_y", "inner_forces"))
+
+
+def _contradicting(checks: dict[str, float]) -> float:
+    return max(checks[name] for name in ("penetration", "tension", "cone_violation"))
 
 
 def _audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: Newton) -> dict[str, float]:

@@ -76,7 +76,7 @@ scene_parts = {
     ),
     "tissues": st.tuples(tissue, tissue, tissue),
     "depth": st.floats(-5.0, 0.3).map(lambda power: 10**power),
-    "mu": st.one_of(st.floats(0.0, 1.5), st.sampled_from([1e-9, 1000.0])),
+    "mu": st.one_of(st.floats(1e-12, 1.5), st.sampled_from([0.0, 1e-9, 1000.0])),
     "bound": st.sampled_from([None, None, 0.0, 1e-9, 0.003, 0.03, 1e9]),
     "slide": st.sampled_from(["+x", "-x", "none"]),
     "course": st.sampled_from(["steady", "steady", "history"]),
