@@ -14,7 +14,7 @@ from solver.friction import FrictionLaw
 from solver.mesh import Array
 from solver.prediction import Skin
 from solver.scene import Scene
-from solver.solution import skin_of
+from solver.small_solution import skin_of
 from solver.stepping import Instant, Progress, Way, course
 
 

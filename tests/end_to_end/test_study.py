@@ -180,9 +180,11 @@ def test_a_cluster_without_workers_is_given_up_in_a_sentence(study, tmp_path, mo
 
     monkeypatch.setattr(pooling, "WITHOUT_WORKERS", 0.5)
     asked = ([study / "S01"], STEADY, Shelf(tmp_path, STEADY), Console(as_json=True))
-    with distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster:  # noqa: SIM117
-        with pytest.raises(pooling.SchedulerError, match="no worker"):
-            visits(*asked, scheduler=cluster.scheduler_address)
+    with (
+        distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster,
+        pytest.raises(pooling.SchedulerError, match="no worker"),
+    ):
+        visits(*asked, scheduler=cluster.scheduler_address)
 
 
 @pytest.mark.usefixtures("pool")

@@ -1,0 +1,350 @@
+"""From scenes at small strain to predictions: one mesh for all that share a finger, an error estimate with each.
+
+Settled sliding is found directly and refused where it does not exist (`solver.wedging`); the course is marched, and
+where tissues relax, in time (`solver.relaxing`).
+"""
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+from numpy.linalg import LinAlgError
+
+from solver.audits import audits, course_audits
+from solver.contact import NAMES, SLIP, STICK, Contact, ContactLost
+from solver.evidence import model, warnings
+from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure
+from solver.finger import FingerModel
+from solver.grid import MeshError
+from solver.load_steps import Steps
+from solver.mesh import Array
+from solver.mesher import Sizing
+from solver.prediction import History, Prediction, Row, Skin
+from solver.receptor import ROW
+from solver.scene import Scene, SceneError
+from solver.small_errors import error_estimates, steps_asked, times_on_way
+from solver.small_states import (
+    all_numbers,
+    depends_on_way,
+    followed_under,
+    in_tissue,
+    indentation,
+    laid,
+    law_of,
+    marched,
+    settled,
+    shift_of,
+)
+from solver.stepping import March
+from solver.wedging import WIDE, deepest, followed
+
+MIXED = "nearly incompressible tissues, or ones whose stiffnesses differ by many orders of magnitude,"
+UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]
+DOUBTED = 1e-8  # and from which it is told
+PIERCED = 1e-7  # part of the indentation by which skin may lie too low without it being told [-]
+ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements
+LOW = 1e-8  # part of the indentation by which skin may lie too low before it is laid on the surface again [-]
+
+Answer = Prediction | SolveFailure
+Watch = Callable[[int, Answer, FingerModel, March | None], None]  # told each answer as it is found, and how
+Progress = Callable[[float], bool]  # told the part done, 0 to 1; returns False to stop the work (Cancelled is raised)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shared:
+    """What scenes solved together share, and each one's part of what it took [s]."""
+
+    fineness: float
+    fine: FingerModel
+    coarse: tuple[FingerModel, ...]
+    setup_s: float
+    solve_s: float
+    estimate_s: float
+    widest: bool  # whether contact was looked for wherever it can be
+
+
+def answers(
+    scenes: list[Scene],
+    depth: float,
+    fineness: float,
+    progress: Progress | None,
+    watch: Watch | None,
+    in_loops: bool,
+) -> list[Answer]:
+    """Solve all scenes on one mesh, and on two coarser ones for the estimate; look wider where contact reaches out."""
+    done: list[Answer | None] = []
+    for margin in (1.0, 4.0, WIDE):
+        try:
+            begun = perf_counter()
+            fine = _meshed(scenes[0], Sizing(fineness, depth, margin=margin), in_loops)
+            setup = perf_counter() - begun - fine.solve_s
+            begun = perf_counter()
+            coarse = _coarser(scenes[0], Sizing(fineness, depth, margin=margin), in_loops)
+        except NotConverged as failure:
+            return [failure] * len(scenes)
+        estimate = (perf_counter() - begun) / len(scenes)
+        shared = _Shared(fineness, fine, coarse, setup, fine.solve_s / len(scenes), estimate, widest=margin == WIDE)
+        done = []
+        for number, scene in enumerate(scenes):
+            _report(progress, number / len(scenes))
+            answer, way = _answer(scene, shared, _of_all(progress, number, len(scenes)))
+            if watch is not None and answer is not None:
+                watch(number, answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer, fine, way)
+            done.append(answer)
+        if all(answer is not None for answer in done):
+            break
+    lost = NotConverged("The skin touched the surface beyond every part of it where contact was looked for.")
+    return [lost if answer is None else answer for answer in done]
+
+
+def _coarser(scene: Scene, sizing: Sizing, in_loops: bool) -> tuple[FingerModel, FingerModel]:
+    """Return the two fingers of the estimate: elements twice as long, and those moved along the skin by half of one."""
+    twice = replace(sizing, fineness=sizing.fineness / 2.0)
+    return _meshed(scene, twice, in_loops), _meshed(scene, replace(twice, shift=True), in_loops)
+
+
+def _of_all(progress: Progress | None, number: int, count: int) -> Progress | None:
+    """Return what is told the part done of one of `count` scenes."""
+    return None if progress is None else lambda part: progress((number + part) / count)
+
+
+def _answer(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[Answer | None, March | None]:
+    """Return the answer, None where contact must be looked for on more of the skin; and the way where it has one."""
+    try:
+        return _predicted(scene, shared, progress) or (None, None)
+    except SolveFailure as failure:
+        return failure, None
+
+
+def _report(progress: Progress | None, part: float) -> None:
+    if progress is not None and not progress(part):
+        raise Cancelled
+
+
+def _meshed(scene: Scene, sizing: Sizing, in_loops: bool) -> FingerModel:
+    try:
+        return FingerModel.of(scene, sizing, in_loops=in_loops)
+    except MeshError as bad:
+        raise SceneError("finger.tip_radius", scene.finger.tip_radius, f"no mesh fits this finger ({bad})") from bad
+    except LinAlgError as bad:
+        raise NotConverged(f"Round-off has swallowed the finger's stiffness ({bad}): {MIXED} do that.") from bad
+
+
+def _direct(scene: Scene, shared: _Shared, times: float = 1.0) -> Contact | None:
+    """Return the settled state; None where contact must be looked for on more of the skin.
+
+    Where it depends on its way, that takes so many `times` the usual load steps. Near a limit, or beyond it, guesses
+    can end in states that no sliding leads to. Where none was found, or one that is folded, only what is reached by
+    following the state from mu = 0 counts. Raises NoSteadyState, NotConverged.
+    """
+    finger, direction = shared.fine, scene.loading.direction
+    contact: Contact | None = None
+    try:
+        contact = settled(scene, finger, times)
+        on_way = direction == 0 or bool((contact.state == STICK).any())
+        if on_way or not _folded(finger, contact):
+            return contact
+        why = "the state found is folded"
+    except ContactLost as lost:
+        why = str(lost)
+    if not shared.widest:
+        return None
+    if direction == 0:
+        raise _no_answer(scene, why, 0.0, finger)
+    if scene.normal_force is None:
+        reached, limit = followed(finger.body.touchable, law_of(scene), scene.loading.depth, direction)
+    else:
+        reached, limit = followed_under(scene, finger)
+    if reached is None:
+        raise _no_answer(scene, why, limit, finger)
+    return reached
+
+
+def _in_steps(scene: Scene, shared: _Shared) -> tuple[Contact | None, Steps | None]:
+    """Return the settled state as `_direct` does, and the load steps it took where it depends on its way."""
+    contact = _direct(scene, shared)
+    if contact is None or not depends_on_way(scene, contact):
+        return contact, None
+    steps = steps_asked(scene, shared.coarse[0])
+    return (contact if steps.times == 1 else _direct(scene, shared, steps.times)), steps
+
+
+def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[Prediction, March | None] | None:
+    """Return the prediction of one scene, and its way where it has one that can be drawn from forces alone.
+
+    None where contact must be looked for on more of the skin.
+    """
+    finger, law = shared.fine, law_of(scene)
+    begun = perf_counter()
+    contact, steps = _in_steps(scene, shared)
+    if contact is None:
+        return None
+    times = times_on_way(scene, shared.coarse[0]) if steps is None else steps.times
+    way: March | None = None
+    over_time: Array | None = None
+    direct = contact
+    if scene.solve.course == "history":
+        way, over_time = marched(scene, finger, progress, times)
+        contact = way.instants[-1].contact
+    skin = finger.skin_displacement(contact)
+    displacement = finger.body.displacement(skin)[:, :, 0]
+    depth = indentation(scene, contact)
+    in_tissue(scene, finger, depth)
+    if finger.reaches_out(contact, displacement, depth):
+        return None
+    checks = audits(finger, law, contact, depth, displacement)
+    if _unbalanced(checks) > ROUGH:
+        forces = np.concatenate([contact.normal, contact.tangential])[:, None]
+        displacement = finger.body.balanced(displacement[:, :, None], forces)[:, :, 0]
+        checks = audits(finger, law, contact, depth, displacement)
+        slides = way is None and scene.normal_force is None and not (contact.state == STICK).any()
+        if slides and checks["penetration"] > LOW:
+            contact, displacement = laid(finger, law, contact, depth, displacement)
+            checks = audits(finger, law, contact, depth, displacement)
+    unbalanced = _unbalanced(checks)
+    sed = finger.sed_ending(displacement)
+    if unbalanced > UNSOUND:
+        message = f"Forces balance to {unbalanced:.1g} only at {depth:g} mm indentation"
+        raise NotConverged(
+            f"{message}: round-off has swallowed the answer; contacts far smaller than the mesh, {MIXED} do that."
+        )
+    if way is not None:
+        checks |= course_audits(finger, way)
+        if over_time is not None:  # what the balance of work leaves over is what the tissues took by relaxing
+            checks["course_viscous_work"] = checks.pop("course_work_balance")
+        if over_time is None or not (contact.state == STICK).any():  # stuck and relaxing, the end depends on the way
+            checks["course_against_direct"] = abs(finger.sed_ending(finger.displacement(direct)) / sed - 1.0)
+    left = model(scene.driven(depth), finger, contact, displacement)
+    history = None if way is None else _history(scene, finger, way, over_time)
+    row = Row(ROW, finger.sed_row(displacement))
+    solved = perf_counter()
+    numbers, shift = all_numbers(scene, finger, contact), shift_of(scene, contact)
+    numbers[0] = sed
+    off = error_estimates(scene, shared.fineness, shared.coarse, numbers, steps)
+    found = Prediction(
+        scene=scene,
+        sed_ending=sed,
+        sed_point=finger.sed_point(displacement),
+        normal_force=float(contact.normal.sum()),
+        tangential_force=_drag(scene, contact.tangential.sum()),
+        contact_width=float(numbers[5]),
+        indentation=depth,
+        shift=shift,
+        error_estimate=off.sed,
+        normal_force_error=off.normal,
+        tangential_force_error=off.tangential,
+        indentation_error=off.indentation,
+        shift_error=None if shift is None else off.shift,
+        contact_width_error=off.width,
+        dofs=finger.body.dofs,
+        newton_iterations=contact.iterations if way is None else way.iterations,
+        wall_s=solved - begun + shared.solve_s,
+        setup_s=shared.setup_s,
+        estimate_s=perf_counter() - solved + shared.estimate_s,
+        row=row,
+        model=left,
+        audits=checks,
+        skin=skin_of(finger, contact, skin[:, 0]),
+        mesh=finger.geometry.mesh,
+        displacement=displacement,
+        history=history,
+        warnings=(*warnings(scene, left["left_out"]), *_doubts(unbalanced, checks["penetration"])),
+    )
+    return found, way if over_time is None else None
+
+
+def _unbalanced(checks: dict[str, float]) -> float:
+    return max(checks[name] for name in ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance"))
+
+
+def _doubts(unbalanced: float, penetration: float) -> tuple[str, ...]:
+    told: list[str] = []
+    if unbalanced > DOUBTED:
+        told.append(f"Forces balance to {unbalanced:.1g} only: {MIXED} magnify round-off.")
+    if penetration > PIERCED:
+        told.append(f"The skin lies {penetration:.1g} of the indentation too low: stiff layers magnify round-off.")
+    return tuple(told)
+
+
+def _drag(scene: Scene, tangential: float) -> float:
+    """Return the drag opposing the slide [N/mm]; without a slide, the size of the tangential force."""
+    if scene.loading.direction == 0:
+        return abs(float(tangential))
+    return 0.0 - scene.loading.direction * float(tangential)  # never -0
+
+
+def skin_of(finger: FingerModel, contact: Contact, skin: Array) -> Skin:
+    """Return the skin that may touch, in a state of contact with its displacement (2 k,), normal first [mm]."""
+    mesh, k = finger.geometry.mesh, len(contact.state)
+    length = finger.body.touchable.length
+    return Skin(
+        x=mesh.nodes[mesh.skin, 0] + skin[k:],
+        gap=np.where(contact.touching, 0.0, contact.gap),
+        pressure=contact.normal / length,
+        traction=contact.tangential / length,
+        state=tuple(NAMES[int(s)] for s in contact.state),
+    )
+
+
+def _over_time(finger: FingerModel, contacts: Sequence[Contact]) -> Array:
+    """Return the SED of ending and point (m, 2) [MPa] of elastic states, unfolded together where the ending is."""
+    mesh, elastic = finger.geometry.mesh, finger.body.elastic
+    forces = np.stack([np.concatenate([c.normal, c.tangential]) for c in contacts], axis=1)
+    nodes = np.union1d(finger.ending.nodes(mesh), finger.point.nodes(mesh))
+    displacement = finger.body.displacement(finger.body.skin_displacement(forces), only=nodes)
+    return np.stack([patch.average(mesh, elastic, displacement)[0] for patch in (finger.ending, finger.point)], axis=1)
+
+
+def _history(scene: Scene, finger: FingerModel, way: March, over_time: Array | None) -> History:
+    """Return the course as arrays."""
+    contacts = [instant.contact for instant in way.instants]
+    sed = _over_time(finger, contacts) if over_time is None else over_time
+    touching = np.array([c.touching.sum() for c in contacts])
+    slipping = np.array([(c.state >= SLIP).sum() for c in contacts])
+    return History(
+        time=np.array([i.time for i in way.instants]),
+        bone_x=np.array([i.travel for i in way.instants]),
+        bone_y=np.array([-i.depth for i in way.instants]),
+        sed_ending=sed[:, 0],
+        sed_point=sed[:, 1],
+        normal_force=np.array([c.normal.sum() for c in contacts]),
+        tangential_force=np.array([_drag(scene, c.tangential.sum()) for c in contacts]),
+        contact_width=np.array([finger.contact_width(c, np.concatenate([c.gap, c.shift])) for c in contacts]),
+        slipping=slipping / np.maximum(touching, 1),
+    )
+
+
+def _folded(finger: FingerModel, contact: Contact) -> bool:
+    """Return whether tissue is turned inside out somewhere, as in states that no sliding leads to."""
+    return bool(np.prod(finger.stretches(finger.displacement(contact)), axis=0).min() <= 0.0)
+
+
+def _pressed(scene: Scene) -> str:
+    """Say how hard or deep the finger is pressed."""
+    force = scene.normal_force
+    return f"{scene.loading.depth:g} mm indentation" if force is None else f"a normal force of {force:g} N/mm"
+
+
+def _no_answer(scene: Scene, why: str, limit_mu: float, finger: FingerModel) -> NoSteadyState | NotConverged:
+    """Return the failure that says what is known."""
+    mu = float(scene.friction.mu)
+    at = f"{_pressed(scene)} and mu = {mu:g}"
+    if scene.friction.tau_max is not None:
+        at += f" with tau_max = {scene.friction.tau_max:g} MPa"
+    if scene.loading.direction == 0 or limit_mu <= 0.0:
+        return NotConverged(f"No settled state was found at {at}, from any first guess: {why}.")
+    forced = scene.normal_force is not None
+    limit_depth = None
+    if not forced:
+        with suppress(LinAlgError):  # of stiffnesses that a mesh for less depth does not stand
+            limit_depth = deepest(scene, law_of(scene), in_loops=finger.body.touchable.in_loops)
+    message = (
+        f"There is no steady sliding at {at}: the drag presses the finger against the surface faster than it yields, "
+        f"so it wedges; followed from mu = 0, steady sliding {'under this force' if forced else 'at this depth'} "
+        f"ends at mu = {limit_mu:.3g}"
+    )
+    if limit_depth is not None:
+        message += f", and at this friction at {limit_depth:.3g} mm"
+    return NoSteadyState(message + ".", limit_mu=limit_mu, limit_indentation=limit_depth)
