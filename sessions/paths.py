@@ -6,6 +6,7 @@ is met is solved: nothing is interpolated. Two paths share a solve where they co
 in traction bounds that the skin nowhere reaches.
 """
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +19,7 @@ from sessions.analysis import Analysis, FrictionParameters, analyse
 from sessions.analysis.area import FIXED, HERTZ, AreaLaw
 from sessions.analysis.friction import Rule
 from sessions.analysis.scores import relation
-from sessions.analysis.settings import AnalysisSettings
+from sessions.analysis.settings import AnalysisSettings, WindowRule
 from sessions.analysis.within import repeated_correlation
 from sessions.prediction import PredictionOptions, Progress, Scene, scenes_of, settled
 from sessions.recording import Recording
@@ -27,11 +28,12 @@ Kinematics = Literal["small", "finite"]
 Seds = tuple[float | None, ...]  # along each of `PATHS`, or only those at small strain [MPa]
 
 # Of each choice the usual one comes first.
-FILTERS: Mapping[str, float] = {"20 Hz": 20.0, "10 Hz": 10.0, "50 Hz": 50.0}
-WINDOWS: Mapping[str, tuple[float, float]] = {  # spread of T/N, and of the means of its quarters [-]
-    "within 10 %, quarters 5 %": (0.10, 0.05),
-    "within 5 %, quarters 2.5 %": (0.05, 0.025),
-    "within 20 %, quarters 10 %": (0.20, 0.10),
+FILTERS: Mapping[str, float] = {"20 Hz": 20.0, "none": math.inf}
+WINDOWS: Mapping[str, WindowRule] = {
+    "least variance, widened": "widened",
+    "least variance, half the slide": "least variance",
+    "middle half of the slide": "middle half",
+    "whole slide": "whole slide",
 }
 MUS: tuple[Rule, ...] = ("mean over steady window", "maximum")  # the usual one is the paper's for the descriptor
 AREAS: Mapping[str, tuple[AreaLaw, float]] = {  # law of the contact area, and its share of the planned one [-]
@@ -41,6 +43,7 @@ AREAS: Mapping[str, tuple[AreaLaw, float]] = {  # law of the contact area, and i
     "grows as N^2/3": (AreaLaw("hertz", HERTZ), 1.0),
 }
 RECEPTORS = ("ending", "its middle")
+SAME = 0.005  # correlations that differ by less are one result: pages print two decimals
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +67,7 @@ class Path:
 CHOICES = ("filter", "window", "mu", "area", "receptor", "kinematics")
 TOLD: Mapping[str, str] = {
     "filter": "cut-off of the forces' filter",
-    "window": "steady window: spread of T/N allowed",
+    "window": "steady window",
     "mu": "µ of the model",
     "area": "contact area",
     "receptor": "SED at the receptor",
@@ -97,13 +100,12 @@ def trial_paths(
     """
     paths = [path for path in PATHS if finite or path.kinematics == "small"]
     asked = replace(options or PredictionOptions(), course="steady")
-    laws = dict.fromkeys(law for law, _ in AREAS.values())
-    analyses = {(f, w, a): analyse(recording, _settings(f, w, a)) for f, w, a in product(FILTERS, WINDOWS, laws)}
+    analyses = _analyses(recording)
     usual = {one.trial: one for one in next(iter(analyses.values())).friction}
     scenes: dict[tuple[str, ...], Mapping[int, Scene]] = {}
     for path in paths:
         if path.receptor == RECEPTORS[0]:
-            varied = _varied(analyses[path.filter, path.window, AREAS[path.area][0]], path, usual)
+            varied = _varied(analyses, path, usual)
             kind = replace(asked, kinematics=path.kinematics)
             scenes[_without_receptor(path)] = scenes_of(varied, recording.plan, kind)
     wanted = dict.fromkeys(scene for of_path in scenes.values() for scene in of_path.values())
@@ -116,18 +118,30 @@ def _without_receptor(path: Path) -> tuple[str, ...]:
     return (path.filter, path.window, path.mu, path.area, path.kinematics)
 
 
-def _settings(cut_off: str, window: str, area: AreaLaw) -> AnalysisSettings:
-    spread, trend = WINDOWS[window]
-    return AnalysisSettings(cut_off=FILTERS[cut_off], steady_spread=spread, steady_trend=trend, area=area)
+def _analyses(recording: Recording) -> Mapping[tuple[str, str, AreaLaw], Analysis]:
+    """Return the analysis by filter, window and law of the area; with other laws than the first for one window only."""
+    first, *others = dict.fromkeys(law for law, _ in AREAS.values())
+    asked = [*product(FILTERS, WINDOWS, [first]), *product(FILTERS, list(WINDOWS)[:1], others)]
+    return {
+        (f, w, law): analyse(recording, AnalysisSettings(cut_off=FILTERS[f], steady_rule=WINDOWS[w], area=law))
+        for f, w, law in asked
+    }
 
 
-def _varied(analysis: Analysis, path: Path, usual: Mapping[int | None, FrictionParameters]) -> Analysis:
-    """Return the analysis with the friction that a path gives each trial."""
+def _varied(
+    analyses: Mapping[tuple[str, str, AreaLaw], Analysis],
+    path: Path,
+    usual: Mapping[int | None, FrictionParameters],
+) -> Analysis:
+    """Return the analysis with the friction that a path gives each trial; no window has a say in tau_max."""
+    (law, share), (window, *_) = AREAS[path.area], WINDOWS
+    analysis = analyses[path.filter, path.window, AREAS[next(iter(AREAS))][0]]
+    bounds = analyses[path.filter, window, law].strokes
     friction: list[FrictionParameters] = []
     for one in analysis.friction:
-        stroke = analysis.strokes[one.stroke]
+        stroke, bound = analysis.strokes[one.stroke], bounds[one.stroke].tau_max
         mu = stroke.mu_max if path.mu == "maximum" else stroke.mu_dynamic
-        tau_max = None if stroke.tau_max is None else stroke.tau_max / AREAS[path.area][1]
+        tau_max = None if bound is None else bound / share
         same = usual.get(one.trial, one)
         friction.append(replace(one, mu=mu, tau_max=tau_max, direction=same.direction, speed=same.speed))
     return replace(analysis, friction=tuple(friction))
@@ -255,6 +269,7 @@ class Spread:
 
     paths: int
     told: int  # of them with a correlation; the numbers below are theirs
+    distinct: int  # of these correlations, as many differ by more than `SAME`
     least: float
     lower: float  # quartile
     median: float
@@ -272,14 +287,24 @@ def correlations(findings: Iterable[PathFinding]) -> list[float | None]:
 def spread(values: Sequence[float | None]) -> Spread | None:
     """Return the distribution of correlations; None where there is none.
 
-    >>> spread([0.5, None, 0.7]).median
-    0.6
+    >>> of = spread([0.5, None, 0.7, 0.701])
+    >>> of.median, of.told, of.distinct
+    (0.7, 3, 2)
     """
-    held = [value for value in values if value is not None]
+    held = sorted(value for value in values if value is not None)
     if not held:
         return None
     least, lower, median, upper, greatest = np.quantile(held, [0.0, 0.25, 0.5, 0.75, 1.0]).tolist()
-    return Spread(len(values), len(held), least, lower, median, upper, greatest)
+    return Spread(len(values), len(held), _distinct(held), least, lower, median, upper, greatest)
+
+
+def _distinct(ordered: Sequence[float]) -> int:
+    """Return how many of some numbers in order lie more than `SAME` beyond the one counted before."""
+    counted: list[float] = []
+    for value in ordered:
+        if not counted or value - counted[-1] > SAME:
+            counted.append(value)
+    return len(counted)
 
 
 def by_choice(findings: Sequence[PathFinding]) -> tuple[tuple[str, str, Spread | None, bool], ...]:

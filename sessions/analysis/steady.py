@@ -9,6 +9,7 @@ from sessions.analysis.settings import AnalysisSettings
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Places = NDArray[np.int64]
 
 _EDGES = 121  # windows begin and end on a grid of so many instants
 FEWEST = 5  # readings in a window
@@ -18,13 +19,36 @@ _FEWEST_BLOCKS = 4  # of which a standard error is told
 
 
 def steady_window(ratio: Array, rate: float, whole: int, settings: AnalysisSettings) -> slice | None:
-    """Return the longest stretch over which T/N is steady, or None.
+    """Return the stretch over which T/N is steady, by the rule the settings name, or None.
 
     `ratio` (n,) [-] is nan where the finger does not slide or T/N means nothing; `whole` is how many readings the
     stroke has. Steady: the standard deviation is below 10 % of the mean and no quarter's mean lies more than 5 % from
-    it (settings), beyond what the scatter of few readings explains.
+    it (settings), beyond what the scatter of few readings explains. Of the steady stretches half as long as the slide
+    that of least variance is taken as it is ("least variance"), or widened to the longest steady stretch that holds it
+    ("widened"). "middle half" and "whole slide" ask for no steadiness.
     """
     shortest = max(settings.steady_share * whole, settings.steady_shortest * rate, FEWEST)
+    first, last, variance, steady = _stretches(ratio, shortest, settings)
+    if not len(first):
+        return None
+    length = last - first
+    if settings.steady_rule in ("middle half", "whole slide"):
+        most = int(np.argmax(length))
+        sliding = first[most] + np.flatnonzero(np.isfinite(ratio[first[most] : last[most]]))
+        aside = len(sliding) // 4 if settings.steady_rule == "middle half" else 0
+        return slice(int(sliding[aside]), int(sliding[-1 - aside]) + 1)
+    if not steady.any():
+        return None
+    best = _least(length, variance, steady, max(settings.steady_seed * np.isfinite(ratio).sum(), shortest), len(ratio))
+    if settings.steady_rule == "least variance":
+        return slice(int(first[best]), int(last[best]))
+    around = np.flatnonzero(steady & (first <= first[best]) & (last >= last[best]))
+    best = around[np.lexsort((variance[around], -length[around]))[0]]
+    return _trimmed(ratio, slice(int(first[best]), int(last[best])), settings)
+
+
+def _stretches(ratio: Array, shortest: float, settings: AnalysisSettings) -> tuple[Places, Places, Array, Mask]:
+    """Return where each sliding stretch of a grid begins and ends, the variance of T/N in it, and if it is steady."""
     edges = np.unique(np.linspace(0, len(ratio), _EDGES).round().astype(int))
     held = np.isfinite(ratio)
     value = np.where(held, ratio, 0.0)
@@ -35,8 +59,6 @@ def steady_window(ratio: Array, rate: float, whole: int, settings: AnalysisSetti
     n = count[last] - count[first]
     full = n >= _HELD * (last - first)
     first, last, n = first[full], last[full], n[full]
-    if not len(first):
-        return None
     mean = (total[last] - total[first]) / n
     variance = np.maximum((squares[last] - squares[first]) / n - mean**2, 0.0)
     allowed = settings.steady_trend * mean + 2.0 * np.sqrt(_QUARTERS * variance / n) * (n < _QUARTERS * FEWEST)
@@ -46,11 +68,15 @@ def steady_window(ratio: Array, rate: float, whole: int, settings: AnalysisSetti
         b = first + (last - first) * (quarter + 1) // _QUARTERS
         here = (total[b] - total[a]) / np.maximum(count[b] - count[a], 1.0)
         steady &= np.abs(here - mean) <= allowed
-    if not steady.any():
-        return None
-    length = np.where(steady, last - first, 0)
-    best = np.lexsort((variance, -length))[0]
-    return _trimmed(ratio, slice(int(first[best]), int(last[best])), settings)
+    return first, last, variance, steady
+
+
+def _least(length: Places, variance: Array, steady: Mask, wanted: float, readings: int) -> int:
+    """Return which steady stretch of the wanted length varies least; of the longest, where all are shorter."""
+    enough = length[steady & (length >= wanted)]
+    least = int(enough.min()) if len(enough) else int(length[steady].max())
+    alike = np.flatnonzero(steady & (length >= least) & (length <= least + readings / (_EDGES - 1)))
+    return int(alike[np.argmin(variance[alike])])
 
 
 def _trimmed(ratio: Array, window: slice, settings: AnalysisSettings) -> slice:

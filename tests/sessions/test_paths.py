@@ -5,10 +5,11 @@ from dataclasses import replace
 import pytest
 from report_session import record
 
-from sessions.analysis import analyse
+from sessions.analysis import AnalysisSettings, analyse
 from sessions.paths import (
     PATHS,
     RECEPTORS,
+    WINDOWS,
     PathTrial,
     by_choice,
     correlations,
@@ -64,6 +65,19 @@ def test_a_path_that_shared_its_solve_comes_to_what_its_own_solve_gives(recordin
             assert along[trial][n] == pytest.approx(value, rel=1e-9), (mu, area)
 
 
+def test_each_window_has_the_sed_of_the_mean_over_that_window(recording, analysis, along):
+    (deepest, scene), trial = scenes_of(analysis, recording.plan, STEADY).values(), 2  # slipperiness: the mean
+    mus = [
+        next(one.mu_dynamic for one in analyse(recording, AnalysisSettings(steady_rule=rule)).strokes if one.trial == 2)
+        for rule in WINDOWS.values()
+    ]
+    assert len(set(mus)) > 2  # the whole of this slide is steady
+    alone = settled([deepest, *(replace(scene, friction=replace(scene.friction, mu=mu)) for mu in mus)])[1:]
+    for window, answer in zip(WINDOWS, alone, strict=True):
+        (n,) = [n for n, path in enumerate(SMALL) if path == replace(SMALL[0], window=window)]
+        assert along[trial][n] == pytest.approx(answer.sed_ending, rel=1e-9)
+
+
 def test_finite_strain_is_left_out_unless_it_is_asked_for(along):
     assert {len(seds) for seds in along.values()} == {len(SMALL)}
     assert len(PATHS) > len(SMALL)
@@ -94,6 +108,7 @@ def test_one_path_is_the_usual_one_and_the_distribution_counts_them_all():
     assert usual.r == pytest.approx(1.0)
     whole = spread(correlations(found))
     assert (whole.paths, whole.told, whole.least, whole.greatest) == (len(SMALL), len(SMALL), -1.0, 1.0)
+    assert whole.distinct == 2  # of so many paths, one result for each receptor
 
 
 def test_a_path_that_leaves_too_few_surfaces_gives_no_correlation_and_is_counted():

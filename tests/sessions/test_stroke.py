@@ -1,5 +1,7 @@
 """Strokes: found, bounded, timed; forces in the face frame; steady windows and speed. Truth is in closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -222,6 +224,41 @@ def test_a_ratio_that_never_settles_has_no_steady_window():
     t = times(3.0)
     assert steady_window(0.3 + 0.2 * np.sin(2 * np.pi * 1.1 * t), 200.0, len(t), SETTINGS) is None
     assert steady_window(np.linspace(0.2, 0.8, 600), 200.0, 600, SETTINGS) is None
+
+
+def two_levels():
+    """Return T/N of a slide whose first 320 readings scatter by 6 % of 0.5 and whose last 280 by 1 % of 0.7."""
+    draw = np.random.default_rng(3)
+    return np.concatenate([0.5 + 0.03 * draw.standard_normal(320), 0.7 + 0.007 * draw.standard_normal(280)])
+
+
+def test_the_steady_window_grows_from_that_part_of_the_slide_in_which_the_ratio_varies_least():
+    """The longest steady stretch would be the first level."""
+    window = steady_window(two_levels(), 200.0, 600, replace(SETTINGS, steady_seed=0.4))
+    assert 310 <= window.start <= 325
+    assert window.stop == 600
+    even = 0.5 + 0.01 * np.random.default_rng(4).standard_normal(600)
+    window = steady_window(even, 200.0, 600, SETTINGS)
+    assert window.stop - window.start > 590  # all of it, not the half
+
+
+def test_the_stretch_of_least_variance_has_the_wanted_length_and_no_other_of_that_length_varies_less():
+    draw = np.random.default_rng(5)
+    ratio = 0.5 + 0.02 * (1.5 + np.sin(np.arange(600) / 70.0)) * draw.standard_normal(600)
+    window = steady_window(ratio, 200.0, 600, replace(SETTINGS, steady_rule="least variance"))
+    assert 295 <= window.stop - window.start <= 306
+    every = [ratio[start : start + 300].var() for start in range(0, 301, 5)]
+    assert ratio[window].var() == pytest.approx(min(every), rel=0.02)
+
+
+def test_the_middle_half_and_the_whole_slide_ask_for_no_steadiness():
+    ratio = np.concatenate([np.full(100, np.nan), np.linspace(0.2, 0.8, 400), np.full(100, np.nan)])
+    windows = {
+        rule: steady_window(ratio, 200.0, 600, replace(SETTINGS, steady_rule=rule))
+        for rule in ("middle half", "whole slide", "least variance", "widened")
+    }
+    assert (windows["least variance"], windows["widened"]) == (None, None)
+    assert (windows["middle half"], windows["whole slide"]) == (slice(200, 400), slice(100, 500))
 
 
 def test_a_mean_of_white_noise_lies_in_its_interval_as_often_as_it_says():

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 from sessions.exports.report_tables.cells import Cell, Column, Group, Table
 from sessions.exports.wording import NONE, correlation
-from sessions.paths import TOLD, PathFinding, Spread, by_choice, correlations, spread
+from sessions.paths import SAME, TOLD, PathFinding, Spread, by_choice, correlations, spread
 
 Named = tuple[str, Sequence[PathFinding]]
 
@@ -14,13 +14,25 @@ def paths_table(named: Iterable[Named]) -> Table | None:
     groups = [Group(name, _rows(findings)) for name, findings in named if findings]
     if not groups:
         return None
-    columns = ("choice", "", "usual", "paths with r", "least", "lower quartile", "median", "upper quartile", "greatest")
+    columns = (
+        "choice",
+        "",
+        "usual",
+        "paths with r",
+        "different r",
+        "least",
+        "lower quartile",
+        "median",
+        "upper quartile",
+        "greatest",
+    )
     caption = (
         "The correlation of predicted SED with scores as a distribution over paths of the analysis: every choice below "
         "crossed with every other at small strain; finite strain, where it was tried, with the other choices as usual. "
         "Every friction that was met is solved; paths share a solve only where they come to the same friction, or to "
         "bounds of traction that the skin nowhere reaches. All of them are reasonable and none is a sample of others: "
-        "quartiles describe, and are no intervals. A path of which fewer than three surfaces have an SED gives no r."
+        "quartiles describe, and are no intervals. Different r: how many are left where those that agree within "
+        f"{SAME:g} count once. A path of which fewer than three surfaces have an SED gives no r."
     )
     return Table("table-paths", caption, tuple(Column(name) for name in columns), tuple(groups), ())
 
@@ -33,7 +45,7 @@ def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
         return f"{start} none gives a correlation."
     return (
         f"{start} {whole.told} give a correlation, from {correlation(whole.least)} to {correlation(whole.greatest)}, "
-        f"median {correlation(whole.median)}."
+        f"median {correlation(whole.median)}; {whole.distinct} of these differ by more than {SAME:g}."
     )
 
 
@@ -50,6 +62,6 @@ def _rows(findings: Sequence[PathFinding]) -> tuple[tuple[Cell, ...], ...]:
 
 def _spread(of: Spread | None, paths: int) -> tuple[Cell, ...]:
     if of is None:
-        return (Cell(f"0 of {paths}"), *(Cell(NONE) for _ in range(5)))
+        return (Cell(f"0 of {paths}"), *(Cell(NONE) for _ in range(6)))
     numbers = (of.least, of.lower, of.median, of.upper, of.greatest)
-    return (Cell(f"{of.told} of {paths}"), *(Cell(correlation(value)) for value in numbers))
+    return (Cell(f"{of.told} of {paths}"), Cell(str(of.distinct)), *(Cell(correlation(value)) for value in numbers))
