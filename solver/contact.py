@@ -70,10 +70,11 @@ class Contact:
         return self.state != OPEN
 
 
-class _System:
+class System:
     """The linear system of one guess of states, factorised."""
 
     def __init__(self, body: Touchable, law: FrictionLaw, state: States, sense: Array) -> None:
+        """Factorise the system of `state` (k,), friction forces pointing along `sense` (k,)."""
         self.key = state.tobytes() + sense.tobytes()
         self.on = np.flatnonzero(state != OPEN)
         self.stuck = np.flatnonzero(state == STICK)
@@ -100,7 +101,7 @@ class _System:
         self.singular = self._factors is not None and bool(self._factors[2])
 
     def solve(self, right: Array) -> Array:
-        """Return the solution for the right-hand side `right`."""
+        """Return the solution for the right-hand side `right`, or for several side by side."""
         return right if self._factors is None else dgetrs(self._factors[0], self._factors[1], right)[0]
 
 
@@ -112,7 +113,7 @@ class Course:
         self.body = body
         self.law = law
         self._patience = 20 + 4 * len(body.gap) if patience is None else patience
-        self._system: _System | None = None
+        self._system: System | None = None
         self._entering = SLIP  # what a point is first thought to do when it comes to touch
         self._resultants = body.resultants
 
@@ -216,7 +217,7 @@ class Course:
         one_by_one = resticked = False
         for iteration in range(1, self._patience + 1):
             if self._system is None or self._system.key != state.tobytes() + sense.tobytes():
-                self._system = _System(self.body, self.law, state, sense)
+                self._system = System(self.body, self.law, state, sense)
             if self._system.singular:
                 touching = state != OPEN
                 if not free or resticked or (state == STICK).any() or not touching.any():
@@ -244,7 +245,7 @@ class Course:
 
     def _solved(
         self,
-        system: _System,
+        system: System,
         depth: float,
         travel: float,
         anchor: Array,

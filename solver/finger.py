@@ -35,7 +35,11 @@ class FingerModel:
 
         `in_loops` as in `Body.of`. Raises MeshError where the outline cannot be meshed.
         """
-        geometry = finger_mesh(scene.finger, scene.receptor, sizing)
+        return FingerModel.on(scene, finger_mesh(scene.finger, scene.receptor, sizing), in_loops=in_loops)
+
+    @staticmethod
+    def on(scene: Scene, geometry: FingerMesh, *, in_loops: bool = False) -> "FingerModel":
+        """Do the same on a mesh of the finger that was made before."""
         tree = planned(geometry.mesh, in_loops=in_loops)
         begun = perf_counter()
         body = Body.of(geometry.mesh, settled_moduli(scene.materials), tree=tree, in_loops=in_loops, checked=True)

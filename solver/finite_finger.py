@@ -38,12 +38,17 @@ class FiniteFinger:
         Raises SceneError where its outline cannot be meshed.
         """
         try:
-            made = finger_mesh(scene.finger, scene.receptor, sizing)
-            body = FiniteBody.of(made.mesh, finite_laws(scene.materials), checked=True)
+            return FiniteFinger.on(scene, finger_mesh(scene.finger, scene.receptor, sizing), beside)
         except (MeshError, LinAlgError) as bad:
             raise SceneError("finger.tip_radius", scene.finger.tip_radius, f"no mesh fits this finger ({bad})") from bad
-        at_touch = FiniteProbes.of(body, endings(made, body, scene.receptor, np.zeros(1)))
-        return FiniteFinger(scene.receptor, made, Newton(body, None if beside is None else beside.newton), at_touch)
+
+    @staticmethod
+    def on(scene: Scene, geometry: FingerMesh, beside: "FiniteFinger | None" = None) -> "FiniteFinger":
+        """Do the same on a mesh of the finger that was made before."""
+        body = FiniteBody.of(geometry.mesh, finite_laws(scene.materials), checked=True)
+        at_touch = FiniteProbes.of(body, endings(geometry, body, scene.receptor, np.zeros(1)))
+        newton = Newton(body, None if beside is None else beside.newton)
+        return FiniteFinger(scene.receptor, geometry, newton, at_touch)
 
     @cached_property
     def point(self) -> FiniteProbes:

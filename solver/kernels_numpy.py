@@ -28,6 +28,11 @@ def _excess(H: Array, log: Array) -> Array:
     return 2.0 * (np.trace(H, axis1=-2, axis2=-1) - log) + np.sum(H * H, axis=(-2, -1))
 
 
+def pressure(body: FiniteBody, u: Array) -> Array:
+    """Return the modes (e, 3) of the pressure lambda ln J at `u`."""
+    return body.lame[:, None] * _logarithm(body, _gradient(body, u))[1]
+
+
 def energy(body: FiniteBody, u: Array) -> float:
     """Return the energy stored in the body [N mm per mm]."""
     H = _gradient(body, u)

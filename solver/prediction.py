@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.mesh import Mesh
+from solver.mesher import FingerMesh
 from solver.scene import Scene
 
 Array = NDArray[np.float64]
@@ -69,7 +70,7 @@ class Prediction:
     model: Mapping[str, Any]  # what was modelled, what was left out, and the evidence that it could be
     audits: Mapping[str, float]  # checks; residuals relative unless their name says otherwise
     skin: Skin
-    mesh: Mesh
+    geometry: FingerMesh
     displacement: Array  # (nodes, 2) relative to the bone [mm]
     history: History | None = None
     evidence_s: float | None = None  # what marching and measuring the evidence in `model` took [s]; None: nothing was
@@ -79,6 +80,11 @@ class Prediction:
     shift_error: float | None = None  # estimated, of shift [mm]; None where there is none
     contact_width_error: float | None = None  # estimated, of contact_width, relative [-]
     warnings: tuple[str, ...] = field(default=())  # one sentence each
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh that the displacements are of."""
+        return self.geometry.mesh
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `daq-app solve --json` prints: plain numbers, lists and strings."""

@@ -247,7 +247,7 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
         model=left,
         audits=checks,
         skin=skin_of(finger, contact, skin[:, 0]),
-        mesh=finger.geometry.mesh,
+        geometry=finger.geometry,
         displacement=displacement,
         history=history,
         warnings=(*warnings(scene, left["left_out"]), *_doubts(unbalanced, checks["penetration"])),

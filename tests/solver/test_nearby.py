@@ -1,0 +1,70 @@
+"""A slide taken up again where its prediction stopped: the same state, and those beside it as they are solved alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.nearby import nearby
+from solver.scene import Friction, Loading, Scene, Solve
+from solver.solution import answers
+
+DRIVEN = {
+    "small, by depth": Scene(friction=Friction(0.44, 0.03), loading=Loading(2.0)),
+    "small, by force": Scene(friction=Friction(0.4), loading=Loading(normal_force=0.9, force_unit="N", slide="-x")),
+    "finite, by depth": Scene(friction=Friction(0.4, 0.008), loading=Loading(1.2, "-x"), solve=Solve("finite")),
+    "finite, by force": Scene(
+        friction=Friction(0.3, 0.02), loading=Loading(normal_force=0.9, force_unit="N"), solve=Solve("finite")
+    ),
+}
+
+
+def rubbed(scene, mu):
+    return replace(scene, friction=replace(scene.friction, mu=mu))
+
+
+@pytest.fixture(scope="module")
+def found():
+    return dict(zip(DRIVEN, answers(tuple(DRIVEN.values()), in_loops=True), strict=True))
+
+
+def taken_up(prediction):
+    (one,) = nearby([prediction], in_loops=True)
+    return one
+
+
+@pytest.mark.parametrize("name", DRIVEN)
+def test_taken_up_it_has_the_sed_that_was_predicted(found, name):
+    assert taken_up(found[name]).seds([DRIVEN[name]]) == pytest.approx([found[name].sed_ending], rel=1e-7)
+
+
+@pytest.mark.parametrize("name", DRIVEN)
+def test_its_tangent_says_where_states_beside_it_lie(found, name):
+    scene, one = DRIVEN[name], taken_up(found[name])
+    by = one.derivatives().sed
+    loads = replace(scene, friction=Friction(scene.friction.mu * (1 + 1e-5), scene.friction.tau_max))
+    here, there = one.seds([scene, loads])
+    assert there - here == pytest.approx(by.mu * 1e-5 * scene.friction.mu, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", DRIVEN)
+def test_states_beside_it_are_those_that_are_solved_alone(found, name):
+    # Alone, a scene at finite strain or under a force has a mesh of its own, so that its difference holds mesh error.
+    scene, one = DRIVEN[name], taken_up(found[name])
+    beside = rubbed(scene, 1.05 * scene.friction.mu)
+    (alone,) = answers([beside], in_loops=True)
+    here, there = one.seds([scene, beside])
+    assert there - here == pytest.approx(alone.sed_ending - here, rel=1e-6 if name == "small, by depth" else 0.05)
+
+
+@pytest.mark.parametrize("name", ["small, by depth", "finite, by depth"])
+def test_beyond_the_limit_of_sliding_there_is_no_state_and_none_is_invented(name):
+    scene = replace(DRIVEN[name], friction=Friction(0.3), loading=Loading(2.0))
+    (prediction,) = answers([scene], in_loops=True)
+    seds = taken_up(prediction).seds([rubbed(scene, 0.31), rubbed(scene, 1.9)])
+    assert np.isnan(seds).tolist() == [False, True]
+
+
+def test_a_finger_that_is_only_pressed_depends_on_its_way():
+    (pressed,) = answers([Scene(friction=Friction(0.4), loading=Loading(1.0, "none"))], in_loops=True)
+    assert taken_up(pressed) is None
