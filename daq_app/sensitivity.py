@@ -173,7 +173,8 @@ def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
 
 
 def _settled(scene: Scene) -> float:
-    return solve(replace(scene, solve=replace(scene.solve, course="steady")), in_loops=True).sed_ending
+    asked = replace(scene.solve, course="steady", evidence="quick")
+    return solve(replace(scene, solve=asked), in_loops=True).sed_ending
 
 
 def _value(scene: Any, name: str) -> float | None:  # noqa: ANN401  the scene or a table of it

@@ -280,12 +280,16 @@ class Receptor:
 
 @dataclass(frozen=True, slots=True)
 class Solve:
-    """How the scene is to be solved."""
+    """How the scene is to be solved.
+
+    Evidence: "quick" is what comes with the answer, "estimated" marches what tissues would still hold as well,
+    "measured" solves the scene again in several ways.
+    """
 
     kinematics: Literal["small", "finite"] = "small"  # small strain (the paper's), or finite strain
     course: Literal["steady", "history"] = "steady"  # "steady": the settled state alone; "history": all the way to it
     tolerance: float | None = None  # relative error asked for in the ending-averaged SED [-]; None: the solver's own
-    evidence: Literal["estimated", "measured"] = "estimated"  # that what was left out could be; measured: costs more
+    evidence: Literal["quick", "estimated", "measured"] = "estimated"  # that what was left out could be
 
     def __post_init__(self) -> None:
         """Check that we can do what is asked for."""
@@ -293,8 +297,8 @@ class Solve:
             raise SceneError("solve.kinematics", self.kinematics, 'it must be "small" or "finite"')
         if self.course not in ("steady", "history"):
             raise SceneError("solve.course", self.course, 'it must be "steady" or "history"')
-        if self.evidence not in ("estimated", "measured"):
-            raise SceneError("solve.evidence", self.evidence, 'it must be "estimated" or "measured"')
+        if self.evidence not in ("quick", "estimated", "measured"):
+            raise SceneError("solve.evidence", self.evidence, 'it must be "quick", "estimated" or "measured"')
         if self.tolerance is not None:
             _within("solve.tolerance", self.tolerance, 1e-4, 0.5)
 

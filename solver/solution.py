@@ -104,7 +104,7 @@ def _answers(
 
 def _with_evidence(found: Answer, progress: Progress | None, in_loops: bool) -> Answer:
     """Return the answer with its evidence marched, and measured where its scene asks for that."""
-    if not isinstance(found, Prediction):
+    if not isinstance(found, Prediction) or found.scene.solve.evidence == "quick":
         return found
     found = with_held(found, lambda: progress is not None and not progress(1.0), in_loops=in_loops)
     if found.scene.solve.evidence == "estimated":

@@ -5,12 +5,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
 from scipy.optimize import isotonic_regression
 
-from sessions.exports.figures.style import GREY, INK, TEXT
+from sessions.exports.figures.style import GREY, INK, TEXT, Sheet
+
+AT = 1.04  # where labels begin, in widths of the axes
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,31 +43,27 @@ def spread(wanted: Sequence[float], gap: float, low: float, high: float) -> list
     return [float(place) for place in places]
 
 
-def label_right(axes: Axes, labels: Sequence[Label], head: str = "") -> None:
+def label_right(drawn: Sheet, axes: Axes, labels: Sequence[Label], head: str = "") -> None:
     """Write labels right of the axes, each with a thin line to its point; `head` stands over the column of labels.
 
-    Limits of the axes must be set before.
+    They find their heights when the axes have theirs.
     """
-    figure = axes.get_figure(root=True)
-    if figure is None or not labels:
+    if not labels:
         return
-    figure.draw_without_rendering()  # settles the layout, so that heights are known
-    height = axes.get_window_extent().height / figure.dpi * 72  # [pt]
-    low, high = axes.get_ylim()
-    gap = 1.3 * TEXT * (high - low) / height
-    places = spread([label.y for label in labels], gap, low, high - (gap if head else 0.0))
-    for label, place in zip(labels, places, strict=True):
-        axes.annotate(
-            label.text,
-            xy=(label.x, label.y),
-            xytext=(1.04, place),
-            textcoords=("axes fraction", "data"),
-            va="center",
-            ha="left",
-            annotation_clip=False,
-            color=INK,
-            arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.4, "shrinkA": 1.0, "shrinkB": 0.0},
-        )
-    if head:
-        top = max(places) + gap
-        axes.annotate(head, xy=(1.04, top), xycoords=("axes fraction", "data"), va="center", ha="left", color=GREY)
+    write = partial(axes.text, transform=axes.get_yaxis_transform(), va="center", ha="left")
+    names = [write(AT, label.y, label.text, color=INK) for label in labels]
+    top = write(AT, labels[0].y, head, color=GREY)
+    lines = [axes.plot([], [], color=GREY, linewidth=0.4, clip_on=False, zorder=1)[0] for _ in labels]
+
+    def place() -> None:
+        height = axes.get_window_extent().height / drawn.figure.dpi * 72  # [pt]
+        (low, high), (left, right) = axes.get_ylim(), axes.get_xlim()
+        gap = 1.3 * TEXT * (high - low) / height
+        places = spread([label.y for label in labels], gap, low, high - (gap if head else 0.0))
+        end = left + (AT - 0.01) * (right - left)
+        for label, name, line, y in zip(labels, names, lines, places, strict=True):
+            name.set_y(y)
+            line.set_data([label.x, end], [label.y, y])
+        top.set_y(max(places) + gap)
+
+    drawn.then.append(place)

@@ -61,7 +61,7 @@ def response_panel(predictions: Sequence[PredictionFinding], name: str, *, simul
     whole.set_ylabel("SED [kPa]")
     sliding.set_ylabel("SED while sliding [kPa]")
     sliding.set_xlabel("time [s]")
-    label_right(sliding, labels, kind)
+    label_right(drawn, sliding, labels, kind)
     title = f"Predicted response in time, {name or 'all strokes'}"
     name = f"response-{name}" if name else "response"
     header = ("trial", "index", "time [s]", "SED [MPa]")

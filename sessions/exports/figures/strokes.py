@@ -89,7 +89,7 @@ def _draw(
     axes.set_xlim(0.0, max((t for _, _, t, _, _ in rows), default=1.0))
     _settle(axes, [v for _, _, _, v, _ in rows])
     if len(labels) <= MOST_LABELLED:
-        label_right(axes, labels, "index" if ordered and ordered[0][0].index is not None else "stroke")
+        label_right(drawn, axes, labels, "index" if ordered and ordered[0][0].index is not None else "stroke")
     return tuple(rows)
 
 

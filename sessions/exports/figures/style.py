@@ -5,7 +5,7 @@
 
 import io
 import re
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -26,6 +26,7 @@ GREY = "#767676"
 PALE = "#d9d9d9"
 
 TEXT = 8.5  # [pt]
+POINTS = 72.0  # in an inch: SVG is laid out in them
 DOTS = 220  # of a picture in pixels, in an inch
 _PIXELS: ContextVar[dict[str, bytes] | None] = ContextVar("pixels", default=None)  # see `in_pixels`
 _LOOK: dict[Any, Any] = {
@@ -90,6 +91,7 @@ class Sheet:
     figure: Figure
     axes: tuple[Axes, ...]
     hover: dict[str, str] = field(default_factory=dict[str, str])  # artist's gid: what hovering shows
+    then: list[Callable[[], None]] = field(default_factory=list[Callable[[], None]])  # once axes have their places
 
     def note(self, text: str) -> str:
         """Return a gid for an artist that shows `text` on hovering."""
@@ -105,7 +107,7 @@ def look() -> AbstractContextManager[None]:
 
 def sheet(width: float, height: float, heights: tuple[float, ...] = (1.0,), *, share_x: bool = False) -> Sheet:
     """Return an empty picture of that size [CSS px, 96 an inch] with one axes under another; call inside `look`."""
-    figure = Figure(figsize=(width / 96, height / 96), layout="constrained")
+    figure = Figure(figsize=(width / 96, height / 96), dpi=POINTS, layout="constrained")
     grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     axes: list[Axes] = []
     for row in range(len(heights)):
@@ -146,6 +148,12 @@ def svg(drawn: Sheet, name: str, title: str, *, simulated: bool) -> str:
     """Return the picture as an SVG document, inside `look`; the same drawing gives the same bytes."""
     if simulated:
         drawn.figure.suptitle("SIMULATED", x=0.995, ha="right", fontsize=6.5, color=GREY, fontweight="bold")
+    engine = drawn.figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(drawn.figure)
+    for place in drawn.then:
+        place()
+    drawn.figure.set_layout_engine(None)  # else it would be drawn once more, only to be laid out
     buffer = io.StringIO()
     with mpl.rc_context({"svg.hashsalt": name}):
         drawn.figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
