@@ -98,13 +98,16 @@ def _predicted(
     analysis: Analysis, plan: SessionPlan, options: PredictionOptions | None, progress: Progress
 ) -> SessionPrediction:
     """Return the prediction with all that its options ask for beside it."""
-    parts = 1 + (options is not None and options.beside != "none") + (options is not None and options.intervals)
+    intervals = options is not None and options.intervals
+    parts = 1 + intervals + (options is not None and options.beside != "none")
 
     def part(number: int) -> Progress:
         return lambda done: progress((number + done) / parts)
 
-    prediction = with_alternatives(predict(analysis, plan, options, part(0)), part(1))
-    return with_intervals(analysis, prediction, progress=part(parts - 1))
+    prediction = predict(analysis, plan, options, part(0))
+    if intervals:
+        prediction = with_intervals(analysis, prediction, progress=part(1))
+    return with_alternatives(prediction, part(parts - 1), analysis)
 
 
 def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = None) -> dict[str, Any]:

@@ -14,10 +14,11 @@ from sessions.analysis.area import FIXED, AreaLaw
 from sessions.decisions import Decision
 from sessions.plan import DISTAL_TO_PROXIMAL, PROXIMAL_TO_DISTAL, Block, SessionPlan, Stimulus, Trial
 from sessions.sed_interval import SedInterval
-from solver.failures import SolveFailure
+from solver.failures import Cancelled, SolveFailure
 from solver.fields import Fields, fields_of
 from solver.finger import FingerModel
 from solver.matching import matching_depths
+from solver.nearby import Nearby, nearby
 from solver.prediction import History, Prediction, Skin
 from solver.reference import SCALE
 from solver.reference import Reading as TauReading
@@ -225,12 +226,22 @@ def with_loads(scene: Scene, loads: Mapping[str, float]) -> Scene:
     )
 
 
-def seds_of(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[float | None, ...]:
-    """Return the settled SED [MPa] of scenes, solved together on one mesh, so that differences are those of the loads.
+def slides(predictions: Sequence[Prediction], progress: Progress | None = None) -> Iterator[Nearby | None]:
+    """Yield the slide of each prediction, from which others and derivatives are a few small systems away.
 
-    None where there is no settled state. Raises Cancelled.
+    None where there is none that does not depend on the way to it. Raises Cancelled.
     """
-    return tuple(None if one is None else one.sed_ending for one in settled(scenes, progress))
+    for number, slide in enumerate(nearby(predictions, in_loops=True)):
+        if progress is not None and not progress(number / len(predictions)):
+            raise Cancelled
+        yield slide
+
+
+def sed_by(slide: Nearby, scene: Scene) -> Mapping[str, float]:
+    """Return the derivatives of the SED by each load that `with_loads` knows, at the slide of a scene."""
+    by, force = slide.derivatives().sed, scene.loading.normal_force
+    driven = 0.0 if by.normal_force is None or force is None else by.normal_force * (scene.normal_force or 0.0) / force
+    return {"mu": by.mu, "tau_max": by.tau_max, "force": driven}
 
 
 def traction_reached(found: Prediction) -> float:

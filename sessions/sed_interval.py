@@ -13,7 +13,8 @@ class SedInterval:
     low: float | None  # [MPa]; None where `reason` says why
     high: float | None
     method: Method | None
-    by_mu: float | None = None  # derivative of the SED by mu [MPa]
-    by_tau_max: float | None = None  # derivative of the SED by tau_max as the model gets it [-]
-    by_force: float | None = None  # derivative of the SED by the normal force, where that drives the model [MPa/N]
+    # Derivatives by the converged tangent: where the method is sampling, they hold close to the friction found alone
+    by_mu: float | None = None  # of the SED by mu [MPa]
+    by_tau_max: float | None = None  # by tau_max as the model gets it [-]
+    by_force: float | None = None  # by the normal force, where that drives the model [MPa/N]
     reason: str = ""

@@ -4,9 +4,11 @@ Each variant is solved for all trials together on a mesh of its own, so that the
 accurate; between two they are as good as each one's error estimate.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from sessions.alternative import Alternative, Variant, variants
+from sessions.analysis import Analysis
 from sessions.prediction import (
     Prediction,
     Progress,
@@ -14,18 +16,25 @@ from sessions.prediction import (
     TrialPrediction,
     scene_along,
     solved,
+    tau_scale,
     traction_reached,
 )
+from sessions.uncertainty import Drawn, draws_of, intervals_of
 
 
-def with_alternatives(prediction: SessionPrediction, progress: Progress | None = None) -> SessionPrediction:
+def with_alternatives(
+    prediction: SessionPrediction, progress: Progress | None = None, analysis: Analysis | None = None
+) -> SessionPrediction:
     """Return a prediction with every trial predicted in the variants that its options ask for (`beside`) as well.
 
+    Where the options ask for the interval of each (`beside_intervals`), `analysis` is what the friction came from.
     Raises Cancelled where `progress`, told the part done, returns False.
     """
-    asked = tuple(variants(prediction.options.beside))
+    asked, options = tuple(variants(prediction.options.beside)), prediction.options
+    told = asked and analysis is not None and options.intervals and options.beside_intervals
+    drawn = draws_of(analysis, prediction) if told and analysis is not None else None
     along = [
-        _along(prediction, variant, _part(progress, number / len(asked), (number + 1) / len(asked)))
+        _along(prediction, variant, drawn, _part(progress, number / len(asked), (number + 1) / len(asked)))
         for number, variant in enumerate(asked)
     ]
     trials = tuple(
@@ -35,25 +44,42 @@ def with_alternatives(prediction: SessionPrediction, progress: Progress | None =
     return replace(prediction, trials=trials)
 
 
-def _along(prediction: SessionPrediction, variant: Variant, progress: Progress | None) -> tuple[Alternative, ...]:
-    """Return what each trial gives in one variant."""
-    usual = (prediction.options.kinematics, prediction.options.tau_reading)
-    if (variant.kinematics, variant.tau_reading, variant.driven) == (*usual, "depth"):
-        return tuple(_as_predicted(row, variant) for row in prediction.trials)
+def _along(
+    prediction: SessionPrediction, variant: Variant, drawn: Sequence[Drawn] | None, progress: Progress | None
+) -> tuple[Alternative, ...]:
+    """Return what each trial gives in one variant, with intervals where draws of its friction are given."""
+    rows, options = prediction.trials, prediction.options
+    found = _known(prediction, variant) or _solved(prediction, variant, progress)
+    out = [_alternative(row, variant, tau_max, one) for row, (tau_max, one) in zip(rows, found, strict=True)]
+    if drawn is not None:
+        scale = tau_scale(replace(options, tau_reading=variant.tau_reading))
+        intervals = intervals_of([one for _, one in found], drawn, scale)
+        out = [replace(one, interval=interval) for one, interval in zip(out, intervals, strict=True)]
+    return tuple(out)
+
+
+_Found = list[
+    tuple[float | None, Prediction | str]
+]  # for each trial the tau_max [MPa] that the model got, and what of it
+
+
+def _known(prediction: SessionPrediction, variant: Variant) -> _Found | None:
+    """Return what was predicted anyway: at the planned depth, slid either way."""
+    options = prediction.options
+    if (variant.kinematics, variant.tau_reading) != (options.kinematics, options.tau_reading):
+        return None
+    if variant.driven == "depth":
+        return [(row.tau_max, row.prediction or row.reasons.get("sed", "")) for row in prediction.trials]
+    if variant.driven == "other way":
+        return [(row.tau_max, row.opposite or row.reasons.get("opposite_sed", "")) for row in prediction.trials]
+    return None
+
+
+def _solved(prediction: SessionPrediction, variant: Variant, progress: Progress | None) -> _Found:
+    """Return the same of a variant that is solved now."""
     scenes = [scene_along(row, variant, prediction.options) for row in prediction.trials]
     answers = iter(solved([scene for scene in scenes if not isinstance(scene, str)], progress))
-    return tuple(
-        _none(row, variant, scene)
-        if isinstance(scene, str)
-        else _alternative(row, variant, scene.friction.tau_max, next(answers))
-        for row, scene in zip(prediction.trials, scenes, strict=True)
-    )
-
-
-def _as_predicted(row: TrialPrediction, variant: Variant) -> Alternative:
-    if row.prediction is None:
-        return _none(row, variant, row.reasons.get("sed", ""))
-    return _alternative(row, variant, row.tau_max, row.prediction)
+    return [(None, scene) if isinstance(scene, str) else (scene.friction.tau_max, next(answers)) for scene in scenes]
 
 
 def _alternative(row: TrialPrediction, variant: Variant, tau_max: float | None, found: Prediction | str) -> Alternative:

@@ -6,12 +6,11 @@ carries: a state beside it costs a few small systems, and its SED differs for it
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
-from solver.contact import NAMES, OPEN, Contact, ContactLost, Course, States, forced
+from solver.contact import NAMES, Contact, ContactLost, Course, States, forced
 from solver.derivatives import Derivatives, of_contact
 from solver.finger import FingerModel
 from solver.mesh import Array
@@ -36,56 +35,59 @@ class Nearby(Protocol):
 
 
 def nearby(predictions: Sequence[Prediction], *, in_loops: bool = False) -> Iterator[Nearby | None]:
-    """Yield the slide of each prediction, None where its finger does not slide and its state depends on the way to it.
+    """Yield the slide of each prediction.
 
-    `in_loops` as in `solver.solution.answers`. Each is done with when the next is asked for: they may share memory.
+    None where the finger does not slide, so that its state depends on the way to it, and where the state is not met
+    again. `in_loops` as in `solver.solution.answers`.
     """
     model: FingerModel | None = None
     for found in predictions:
         scene = found.scene
         if scene.loading.direction == 0 or found.shift is not None or "stick" in found.skin.state:
             yield None
-        elif scene.solve.kinematics == "finite":
+            continue
+        if scene.solve.kinematics == "finite":
             # Imported here: small strain need not wait for the compiled loops to be loaded.
-            from solver.finite_nearby import FiniteNearby
+            from solver.finite_nearby import met_again
 
-            yield FiniteNearby(found)
-        else:
-            if model is None or model.geometry is not found.geometry:
-                model = FingerModel.on(scene, found.geometry, in_loops=in_loops)
-            yield _SmallNearby(found, model)
+            yield met_again(found)
+            continue
+        if model is None or model.geometry is not found.geometry:
+            model = FingerModel.on(scene, found.geometry, in_loops=in_loops)
+        guess = np.array([NAMES.index(state) for state in found.skin.state], np.int8)
+        try:
+            yield _SmallNearby(scene, model, _slide(model, scene, guess))
+        except ContactLost:
+            yield None
 
 
-@dataclass(frozen=True, eq=False)  # without slots: what few ask for is made when they ask
+@dataclass(frozen=True, slots=True, eq=False)
 class _SmallNearby:
-    found: Prediction
+    scene: Scene
     finger: FingerModel
+    here: Contact
 
     def derivatives(self) -> Derivatives:
-        return of_contact(self.finger, self.found.scene, self._slide(self.found.scene))
+        return of_contact(self.finger, self.scene, self.here)
 
     def seds(self, scenes: Sequence[Scene]) -> Array:
-        out, here = np.full(len(scenes), np.nan), self._guess != OPEN
+        out = np.full(len(scenes), np.nan)
         held: list[tuple[int, Contact]] = []
         for number, scene in enumerate(scenes):
             try:
-                contact = self._slide(scene)
+                contact = _slide(self.finger, scene, self.here.state)
             except ContactLost:
                 continue
-            ends = contact.touching[[0, -1]] & ~here[[0, -1]]  # it may touch beyond the skin that was looked at
-            if not ends.any():
+            if not (contact.touching & ~self.here.touching)[[0, -1]].any():  # else skin may touch that nobody looked at
                 held.append((number, contact))
         if held:
             out[[number for number, _ in held]] = self.finger.sed_endings([contact for _, contact in held])
         return out
 
-    @cached_property
-    def _guess(self) -> States:
-        return np.array([NAMES.index(state) for state in self.found.skin.state], np.int8)
 
-    def _slide(self, scene: Scene) -> Contact:
-        """Return the slide of a scene, its points first thought to do what they do here. Raises ContactLost."""
-        touch, law, direction = self.finger.body.touchable, law_of(scene), scene.loading.direction
-        if scene.normal_force is None:
-            return Course(touch, law).sliding(scene.loading.depth, direction, self._guess)
-        return Course(forced(touch, scene.normal_force), law).sliding(0.0, direction, self._guess)
+def _slide(finger: FingerModel, scene: Scene, guess: States) -> Contact:
+    """Return the settled slide of a scene that a guess of its states leads to. Raises ContactLost."""
+    touch, law, direction = finger.body.touchable, law_of(scene), scene.loading.direction
+    if scene.normal_force is None:
+        return Course(touch, law).sliding(scene.loading.depth, direction, guess)
+    return Course(forced(touch, scene.normal_force), law).sliding(0.0, direction, guess)
