@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-Method = Literal["derivatives", "sampling"]
+Method = Literal["derivatives", "sampling"]  # by the solver's converged tangent; by draws that are solved
 
 
 @dataclass(frozen=True, slots=True)

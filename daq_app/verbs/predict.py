@@ -6,6 +6,7 @@ the same press slid the other way.
 
 import argparse
 from collections import defaultdict
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,8 @@ from solver.scene import Scene
 EXAMPLE = "daq-app predict recordings/P07 --tau as-printed"
 HEAD = ["trial", "surface", "mu", "tau_max [kPa]", "SED [kPa]", "error", "model N [N]", "measured [N]", "match [mm]"]
 
-INTERVALS = ["trial", "SED [kPa]", "by", "per 0.01 of mu [Pa]", "per kPa of tau_max [Pa]", "slid the other way", "by"]
+INTERVALS = ["trial", "SED [kPa]", "per 0.01 of mu [Pa]", "per kPa of tau_max [Pa]", "slid the other way [kPa]"]
+MARKED = "by the solver's tangent, or where marked * by solving draws"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -117,8 +119,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.say(table(rows, head=HEAD) if rows else "nothing to predict: no forces were recorded")
     _print_beside(prediction, console)
     if asked.intervals:
-        console.say("\n95 % interval of SED from the uncertainty of friction alone, not the model's own error:")
-        console.say(table([_row(row) for row in prediction.trials], head=INTERVALS))
+        _print_intervals(prediction, console)
         _print_beside_intervals(prediction, console)
     if firing:
         _print_firing(firing["afferent"], console)
@@ -162,41 +163,63 @@ def _cell(one: Alternative) -> str:
 
 
 def _print_beside_intervals(prediction: SessionPrediction, console: Console) -> None:
-    """Print the interval of each SED in every variant: by derivatives, or marked * by solving draws."""
+    """Print the interval of each SED in every variant, marked * where it is by solving draws."""
     rows = [row for row in prediction.trials if row.alternatives]
     if not rows:
         return
-    console.say("\nof the same trials side by side [kPa], by derivatives, or where marked * by solving draws:")
+    console.say(f"\nof the same trials side by side [kPa], {MARKED}:")
     head = ["trial", *(f"({n})" for n, _ in enumerate(rows[0].alternatives, 1))]
-    cells = [[_called(row), *(_ends(one.interval, mark=True) for one in row.alternatives)] for row in rows]
+    cells = [[_called(row), *(_ends(one.interval) for one in row.alternatives)] for row in rows]
     console.say(table(cells, head=head))
-    missing: defaultdict[str, list[str]] = defaultdict(list)
-    for row in rows:
-        for n, one in enumerate(row.alternatives, 1):
-            if one.sed is not None and one.interval is not None and one.interval.low is None:
-                missing[one.interval.reason].append(f"{_called(row)} ({n})")
-    for reason, which in missing.items():
-        console.say(f"{', '.join(which)}: no interval: {reason}")
+    missing = (
+        (f"{_called(row)} ({n})", one.interval)
+        for row in rows
+        for n, one in enumerate(row.alternatives, 1)
+        if one.sed is not None
+    )
+    _say_missing(missing, console)
+
+
+def _print_intervals(prediction: SessionPrediction, console: Console) -> None:
+    """Print the interval of each SED, marked * where it is by solving draws, and once why others have none."""
+    console.say(
+        "\n95 % interval of SED from the uncertainty of friction alone, not the model's own error, " + MARKED + ":"
+    )
+    console.say(table([_row(row) for row in prediction.trials], head=INTERVALS))
+    missing = [(_called(row), row.interval) for row in prediction.trials if row.sed is not None]
+    back = [
+        (f"{_called(row)} the other way", row.opposite_interval)
+        for row in prediction.trials
+        if row.opposite_sed is not None
+    ]
+    _say_missing([*missing, *back], console)
+
+
+def _say_missing(told: Iterable[tuple[str, SedInterval | None]], console: Console) -> None:
+    """Say once for each reason which SEDs have no interval: those without an SED have told theirs elsewhere."""
+    which: defaultdict[str, list[str]] = defaultdict(list)
+    for name, one in told:
+        if one is not None and one.low is None:
+            which[one.reason].append(name)
+    for reason, names in which.items():
+        console.say(f"{', '.join(names)}: no interval: {reason}")
 
 
 def _row(row: TrialPrediction) -> list[str]:
     one = row.interval or SedInterval(None, None, None)
-    other = row.opposite_interval
     return [
         _called(row),
-        one.reason or _ends(one),
-        one.method or "–",
+        _ends(one),
         number(None if one.by_mu is None else 1e4 * one.by_mu),
         number(None if one.by_tau_max is None else 1e3 * one.by_tau_max),
-        _ends(other),
-        "–" if other is None else other.method or "–",
+        _ends(row.opposite_interval),
     ]
 
 
-def _ends(one: SedInterval | None, *, mark: bool = False) -> str:
+def _ends(one: SedInterval | None) -> str:
     if one is None or one.low is None or one.high is None:
-        return "–"
-    star = "*" if mark and one.method == "sampling" else ""
+        return "none"
+    star = "*" if one.method == "sampling" else ""
     return f"{number(1e3 * one.low, 4)} to {number(1e3 * one.high, 4)}{star}"
 
 

@@ -342,7 +342,10 @@ _ALTERNATIVE = {
     "reason": ("", "why there is no number"),
     "traction": ("MPa", "greatest friction traction on the skin; a tau_max above it bounds nothing"),
     "sed_interval": ("MPa", "95 % interval of sed that the uncertainty of friction, and of a driving force, makes"),
-    "sed_interval_by": ("", "derivatives or sampling, or why there is no interval"),
+    "sed_interval_by": (
+        "",
+        "derivatives (by the converged tangent) or sampling (of draws), or why there is no interval",
+    ),
 }
 _PREDICTION = {
     "trial": ("", "number of the trial"),
@@ -359,7 +362,10 @@ _PREDICTION = {
     "speed": ("mm/s", "of the slide"),
     "sed": ("MPa", "strain-energy density averaged over the ending (mJ/mm3)"),
     "sed_interval": ("MPa", "95 % interval of sed that the uncertainty of friction makes, where it was asked for"),
-    "sed_interval_by": ("", "derivatives or sampling, or why there is no interval"),
+    "sed_interval_by": (
+        "",
+        "derivatives (by the converged tangent) or sampling (of draws), or why there is no interval",
+    ),
     "opposite_sed_interval": ("MPa", "likewise of opposite_sed"),
     "opposite_sed_interval_by": ("", "likewise"),
     "error_estimate": ("", "relative, of sed"),

@@ -91,8 +91,9 @@ def test_every_file_of_a_simulated_session_says_simulated(session, capsys):
 def test_predict_gives_a_row_a_trial_and_every_number_comes_out_again_in_another_process_to_the_last_bit(small, capsys):
     assert run(["predict", str(small), "--intervals", "--json"]) == 0
     document = printed(capsys)
-    assert [row["interval"]["method"] for row in document["trials"]] == ["derivatives"] * 2
     for row in document["trials"]:
+        assert row["interval"]["method"] in ("derivatives", "sampling")
+        assert row["interval"]["low"] < row["sed"] < row["interval"]["high"]
         assert row["sed"] > 0
         assert row["error_estimate"] > 0
         assert row["measured_normal"] > 0

@@ -41,8 +41,8 @@ def prediction_table(report: Report) -> Table | None:
     caption = (
         "Predictions: SED averaged over the ending in the settled state (1 kPa = 1 mJ/cm³). Which µ: the mean over the "
         "steady window, or the maximum. Interval: what the uncertainty of friction alone makes of the SED, by "
-        "derivatives (differences of solves), or where marked * by solving draws; the model's own error is not in "
-        "it. Estimated error: of one "
+        "derivatives (the solver's converged tangent), or where marked * by solving draws; the model's own error is "
+        "not in it. Estimated error: of one "
         "SED, from the mesh; differences between stimuli, which share the mesh, are more accurate. "
         f"Model: {report.model}."
     )
@@ -115,8 +115,8 @@ def beside_interval_table(report: Report) -> Table | None:
 
     caption = (
         "95 % intervals of the SEDs of the table before, column by column, that the uncertainty of friction makes, and "
-        "of the force where that drives the model: by derivatives (differences of solves), or where marked * by "
-        "solving draws."
+        "of the force where that drives the model: by derivatives (the solver's converged tangent), or where marked * "
+        "by solving draws."
     )
     columns = (*_who(report), *(Column(f"({n})", "kPa") for n in range(1, len(first) + 1)))
     groups = grouped(report, report.predictions, lambda p: p.experiment, row)
@@ -205,8 +205,8 @@ def direction_table(report: Report) -> Table | None:
 
     caption = (
         "Both directions at equal depth, each with its trial's friction. Intervals: what the uncertainty of friction "
-        "makes of each, by derivatives (differences of solves), or where marked * by solving draws. Last "
-        "column: SED while sliding from distal "
+        "makes of each, by derivatives (the solver's converged tangent), or where marked * by solving draws. "
+        "Last column: SED while sliding from distal "
         f"to proximal over SED while sliding from proximal to distal. Model: {report.model}."
     )
     groups = grouped(report, report.predictions, lambda p: p.experiment, row)
