@@ -113,11 +113,6 @@ def warnings(scene: Scene, left_out: Mapping[str, Any]) -> tuple[str, ...]:
         needs["viscosity"] = "give the tissues a Prony series"
     elif scene.materials.relax:
         needs["viscosity"] = 'ask for solve.course = "history"'
-    if scene.solve.course == "steady" and len(scene.loading.directions) > 1:
-        told.append(
-            "The last slide alone was solved; whether those before it settle was not looked at: "
-            'ask for solve.course = "history".'
-        )
     for name, cure in needs.items():
         change = left_out[name]["estimate"] if name in left_out else None
         if change is not None and change > WORTH_TELLING:

@@ -8,15 +8,24 @@ class SolveFailure(Exception):
 
     kind = "failed"
 
-    def __init__(self, message: str, *, limit_mu: float | None = None, limit_indentation: float | None = None) -> None:
+    def __init__(
+        self,
+        message: str,
+        *,
+        limit_mu: float | None = None,
+        limit_indentation: float | None = None,
+        limit_normal_force: float | None = None,
+    ) -> None:
         """Say at which load, why and what was tried; limits where they are known.
 
-        `limit_mu` is the largest coefficient of friction at this depth with this bound, `limit_indentation` [mm] the
-        largest depth at this coefficient and bound.
+        `limit_mu` is the largest coefficient of friction at this depth, or under this force, with this bound;
+        `limit_indentation` [mm] the largest depth at this coefficient and bound, `limit_normal_force` [N/mm] the
+        largest force, where one was given.
         """
         super().__init__(message)
         self.limit_mu = limit_mu
         self.limit_indentation = limit_indentation
+        self.limit_normal_force = limit_normal_force
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `daq-app solve --json` prints instead of a prediction."""
@@ -25,6 +34,7 @@ class SolveFailure(Exception):
                 "kind": self.kind,
                 "limit_mu": self.limit_mu,
                 "limit_indentation": self.limit_indentation,
+                "limit_normal_force": self.limit_normal_force,
                 "message": str(self),
             }
         }
@@ -37,7 +47,12 @@ class SolveFailure(Exception):
         """
         told = str(self)
         whole = told[:1].upper() + told[1:] + ("" if told.endswith(".") else ".")
-        return type(self)(whole, limit_mu=self.limit_mu, limit_indentation=self.limit_indentation)
+        return type(self)(
+            whole,
+            limit_mu=self.limit_mu,
+            limit_indentation=self.limit_indentation,
+            limit_normal_force=self.limit_normal_force,
+        )
 
 
 class NoSteadyState(SolveFailure):

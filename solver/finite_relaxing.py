@@ -21,7 +21,7 @@ from solver.mesh import Array, Indices
 from solver.newton import Newton, Shape
 from solver.overstress import Past
 from solver.scene import Scene
-from solver.stepping import DRAGGING_STEPS, DRAGGING_TIME, FURTHEST, HALVINGS, PRESSING_STEPS, PRESSING_TIME, Aim
+from solver.stepping import DRAGGING_STEPS, DRAGGING_TIME, HALVINGS, LONG, PRESSING_STEPS, PRESSING_TIME, Aim
 from solver.tissues import relaxing_laws
 
 RELAXED = 14.0  # times after which tissue counts as relaxed: e^-14 is 8e-7
@@ -153,7 +153,7 @@ class RelaxingCourse:
         """Slide until every touching point slips. Raises NotConverged where some never do."""
         depth = self.shapes[-1].pull.depth
         step, distance = FIRST / self._times * depth, 0.0
-        while distance < FURTHEST * depth:
+        while distance < LONG * depth:
             self._go(Aim(self._aim.time + step / abs(speed), self._aim.press, self._aim.along + np.sign(speed) * step))
             distance += step
             step = min(1.2 * step, LARGEST / self._times * depth)

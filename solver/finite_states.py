@@ -185,9 +185,9 @@ def course(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], times: 
     `times` the usual load steps are taken.
     """
     drag = scene.tangential_force
+    for leg in scene.earlier_slides():  # one that never settles is refused with its limits
+        settled(finger, leg, stop)
     if scene.normal_force is None:
-        for direction in set(scene.loading.directions[:-1]):  # a slide that never settles is refused with its limits
-            steady(finger.newton, pull_of(scene)._replace(sense=-direction), finger.geometry.whole, stop=stop)
         way = _Driven(scene, finger, stop, times)
     else:
         way = _Forced(scene, scene.normal_force, finger, stop, times)

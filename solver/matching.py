@@ -15,6 +15,7 @@ from solver.pressing import depth_of, sliding_under
 from solver.scene import SHALLOW, Friction, Scene
 
 FINENESS = 6.0  # good to some tenths of a per cent of the depth
+COVERED = 0.9  # of the highest skin that touches: a mesh for that depth looks for contact up to 1.25 times of it
 NEARLY = 0.5  # of what makes it slide, from which a finger that is dragged is about as deep as one that slides
 DEEPEST = 0.85  # of the tissue between first touch and bone: beyond, a small-strain depth means nothing
 
@@ -53,7 +54,11 @@ def expected_depth(scene: Scene, *, in_loops: bool = False) -> float:
         # Then it goes about as deep as one that slides with so much drag and no more.
         friction = Friction(min(drag / force, float(scene.friction.mu)), scene.friction.tau_max)
         found = _pressed(finger, replace(scene, friction=friction), force, deepest)
-    return deepest if found is None else max(depth_of(found), SHALLOW)
+    if found is None:
+        return deepest
+    # A strong drag lifts the bone while it lays ever more skin on the surface, which the mesh must be made for.
+    highest = float(finger.body.touchable.gap[found.touching].max())
+    return max(depth_of(found), COVERED * highest, SHALLOW)
 
 
 def within_reach(scene: Scene, depth: float, most: float | None = None) -> None:

@@ -29,6 +29,7 @@ from solver.small_states import (
     all_numbers,
     depends_on_way,
     followed_under,
+    gives_way,
     in_tissue,
     indentation,
     laid,
@@ -38,7 +39,7 @@ from solver.small_states import (
     shift_of,
 )
 from solver.stepping import March
-from solver.wedging import WIDE, deepest, followed
+from solver.wedging import WIDE, followed, limits
 
 MIXED = "nearly incompressible tissues, or ones whose stiffnesses differ by many orders of magnitude,"
 UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]
@@ -46,6 +47,11 @@ DOUBTED = 1e-8  # and from which it is told
 PIERCED = 1e-7  # part of the indentation by which skin may lie too low without it being told [-]
 ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements
 LOW = 1e-8  # part of the indentation by which skin may lie too low before it is laid on the surface again [-]
+
+YIELDS = (
+    "The drag lifts the bone: pressed a little harder, the finger would slide at a smaller depth. Under a weight, that "
+    "follows it down, this slide would not last; held at this depth, the finger slides under less force."
+)
 
 Answer = Prediction | SolveFailure
 Watch = Callable[[int, Answer, FingerModel, March | None], None]  # told each answer as it is found, and how
@@ -75,13 +81,15 @@ def answers(
 ) -> list[Answer]:
     """Solve all scenes on one mesh, and on two coarser ones for the estimate; look wider where contact reaches out."""
     done: list[Answer | None] = []
-    for margin in (1.0, 4.0, WIDE):
+    most = max(depth, min(WIDE * depth, scenes[0].finger.pulp_thickness()))  # for drags that lay much skin on
+    for margin, deep in ((1.0, depth), (4.0, depth), (WIDE, depth), (WIDE, most)):
+        sizing = Sizing(fineness, deep, margin=margin)
         try:
             begun = perf_counter()
-            fine = _meshed(scenes[0], Sizing(fineness, depth, margin=margin), in_loops)
+            fine = _meshed(scenes[0], sizing, in_loops)
             setup = perf_counter() - begun - fine.solve_s
             begun = perf_counter()
-            coarse = _coarser(scenes[0], Sizing(fineness, depth, margin=margin), in_loops)
+            coarse = _coarser(scenes[0], sizing, in_loops)
         except NotConverged as failure:
             return [failure] * len(scenes)
         estimate = (perf_counter() - begun) / len(scenes)
@@ -163,7 +171,13 @@ def _direct(scene: Scene, shared: _Shared, times: float = 1.0) -> Contact | None
 
 
 def _in_steps(scene: Scene, shared: _Shared) -> tuple[Contact | None, Steps | None]:
-    """Return the settled state as `_direct` does, and the load steps it took where it depends on its way."""
+    """Return the settled state as `_direct` does, and the load steps it took where it depends on its way.
+
+    Where the course is asked for, an earlier slide that never settles is refused as the last one is, with its limits.
+    """
+    before = scene.earlier_slides() if scene.solve.course == "history" else ()
+    if any(_direct(leg, shared) is None for leg in before):
+        return None, None
     contact = _direct(scene, shared)
     if contact is None or not depends_on_way(scene, contact):
         return contact, None
@@ -250,7 +264,10 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
         geometry=finger.geometry,
         displacement=displacement,
         history=history,
-        warnings=(*warnings(scene, left["left_out"]), *_doubts(unbalanced, checks["penetration"])),
+        warnings=(
+            *warnings(scene, left["left_out"]),
+            *_doubts(unbalanced, checks["penetration"], yields=gives_way(scene, finger, contact)),
+        ),
     )
     return found, way if over_time is None else None
 
@@ -259,8 +276,8 @@ def _unbalanced(checks: dict[str, float]) -> float:
     return max(checks[name] for name in ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance"))
 
 
-def _doubts(unbalanced: float, penetration: float) -> tuple[str, ...]:
-    told: list[str] = []
+def _doubts(unbalanced: float, penetration: float, *, yields: bool) -> tuple[str, ...]:
+    told = [YIELDS] if yields else []
     if unbalanced > DOUBTED:
         told.append(f"Forces balance to {unbalanced:.1g} only: {MIXED} magnify round-off.")
     if penetration > PIERCED:
@@ -335,16 +352,19 @@ def _no_answer(scene: Scene, why: str, limit_mu: float, finger: FingerModel) -> 
         at += f" with tau_max = {scene.friction.tau_max:g} MPa"
     if scene.loading.direction == 0 or limit_mu <= 0.0:
         return NotConverged(f"No settled state was found at {at}, from any first guess: {why}.")
-    forced = scene.normal_force is not None
-    limit_depth = None
-    if not forced:
-        with suppress(LinAlgError):  # of stiffnesses that a mesh for less depth does not stand
-            limit_depth = deepest(scene, law_of(scene), in_loops=finger.body.touchable.in_loops)
+    limit_force = limit_depth = None
+    with suppress(LinAlgError):  # of stiffnesses that a mesh for less depth does not stand
+        limit_force, limit_depth = limits(scene, law_of(scene), in_loops=finger.body.touchable.in_loops)
+    known = ((limit_force, "N/mm"), (limit_depth, "mm"))
+    others = " and ".join(f"{limit:.3g} {unit}" for limit, unit in known if limit is not None)
+    along = "+x" if scene.loading.direction > 0 else "-x"
+    given = "at this depth" if scene.normal_force is None else "under this force"
     message = (
-        f"There is no steady sliding at {at}: the drag presses the finger against the surface faster than it yields, "
-        f"so it wedges; followed from mu = 0, steady sliding {'under this force' if forced else 'at this depth'} "
-        f"ends at mu = {limit_mu:.3g}"
+        f"There is no steady sliding along {along} at {at}: the drag presses the finger against the surface faster "
+        f"than it yields, so it wedges; followed from mu = 0, steady sliding {given} ends at mu = {limit_mu:.3g}"
     )
-    if limit_depth is not None:
-        message += f", and at this friction at {limit_depth:.3g} mm"
-    return NoSteadyState(message + ".", limit_mu=limit_mu, limit_indentation=limit_depth)
+    if others:
+        message += f", and with this friction at {others}"
+    return NoSteadyState(
+        f"{message}.", limit_mu=limit_mu, limit_indentation=limit_depth, limit_normal_force=limit_force
+    )

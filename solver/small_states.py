@@ -75,6 +75,19 @@ def followed_under(scene: Scene, finger: FingerModel) -> tuple[Contact | None, f
     return reached, limit
 
 
+def gives_way(scene: Scene, finger: FingerModel, contact: Contact) -> bool:
+    """Return whether a settled slide under a given force would be less deep under a little more force."""
+    direction, force = scene.loading.direction, scene.normal_force
+    if force is None or direction == 0 or (contact.state == STICK).any():
+        return False
+    more = forced(finger.body.touchable, (1.0 + NUDGE) * force)
+    try:
+        beside = Course(more, law_of(scene)).sliding(0.0, direction, contact.state)
+    except ContactLost:
+        return False
+    return depth_of(beside) < depth_of(contact)
+
+
 def in_tissue(scene: Scene, finger: FingerModel, depth: float) -> None:
     """Raise SolveFailure where a given force has led to a `depth` [mm] that means nothing, as beyond the bone."""
     room, most = scene.finger.pulp_thickness(), None

@@ -9,7 +9,7 @@ from solver.failures import SolveFailure
 from solver.finger import FingerModel
 from solver.holding import with_held
 from solver.matching import expected_depth
-from solver.measured import measured
+from solver.measured import COARSE, Answers, measured
 from solver.prediction import Prediction
 from solver.scene import Scene
 from solver.small_solution import Answer, Progress, Watch
@@ -107,9 +107,21 @@ def _with_evidence(found: Answer, progress: Progress | None, in_loops: bool) -> 
     if not isinstance(found, Prediction) or found.scene.solve.evidence == "quick":
         return found
     found = with_held(found, lambda: progress is not None and not progress(1.0), in_loops=in_loops)
+    found = _with_earlier_slides(found, lambda scenes: _answers(scenes, progress, in_loops=in_loops))
     if found.scene.solve.evidence == "estimated":
         return found
     return measured(found, lambda scenes: _answers(scenes, progress, in_loops=in_loops))
+
+
+def _with_earlier_slides(found: Prediction, solved: Answers) -> Prediction:
+    """Return a settled answer with a warning of every slide before that would not have settled, on a coarse mesh."""
+    before = found.scene.earlier_slides() if found.scene.solve.course == "steady" else ()
+    quick = [replace(leg, solve=replace(leg.solve, tolerance=COARSE, evidence="estimated")) for leg in before]
+    lost = [leg for leg in solved(quick) if isinstance(leg, SolveFailure)] if quick else []
+    told = (
+        f"A slide before this one, the other way, has no settled state that it could come from: {leg}" for leg in lost
+    )
+    return replace(found, warnings=(*found.warnings, *told))
 
 
 def _groups(scenes: Sequence[Scene]) -> list[list[int]]:

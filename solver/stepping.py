@@ -15,7 +15,8 @@ PRESSING_TIME = 1.0  # of the pre-indentation [s]
 PRESSING_STEPS = 25
 DRAGGING_TIME = 1.0  # within which a given tangential force grows [s]
 DRAGGING_STEPS = 25
-FURTHEST = 25.0  # travel after which sliding that has not settled is given up, in indentations
+LONG = 25.0  # travel within which all but slides near the wedging limit settle, in indentations
+FURTHEST = 100.0  # and after which a slide that has not settled is given up
 HALVINGS = 13  # how often a step that failed is cut in two before it is given up
 
 
@@ -162,7 +163,7 @@ def slide(way: Way, direction: int, speed: float, progress: Progress | None, tim
         distance += step
         way.go(at(distance))
         step = min(step * 1.2, largest)
-        _report(progress, 0.5 + 0.5 * distance / (FURTHEST * depth))
+        _report(progress, 0.5 + 0.5 * min(distance / (LONG * depth), 1.0))
     message = f"sliding had not settled after {distance:.1f} mm at {depth:.4g} mm indentation"
     raise NotConverged(f"{message}: the drag still grew, as it does where the finger wedges itself in.")
 

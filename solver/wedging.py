@@ -5,20 +5,24 @@ yields less than it is pressed: the forces of the settled state grow without bou
 it there is no settled state. The limit is reached by following the state as the coefficient grows.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
-from math import sqrt
+from math import log2, sqrt
+
+import numpy as np
 
 from solver.body import Body
-from solver.contact import Contact, ContactLost, Course, Touchable
+from solver.contact import Contact, ContactLost, Course, Touchable, forced
 from solver.friction import FrictionLaw
 from solver.mesher import Sizing, finger_mesh
-from solver.pressing import depth_of
+from solver.pressing import depth_of, sliding_under
 from solver.scene import Scene
 from solver.tissues import settled_moduli
 
 WIDE = 16.0  # margin at which nearly all the palmar skin may touch
-FINENESS = 7.0  # of the meshes on which the limit of depth is looked for: it hardly depends on the mesh
-NEAR = (0.5, 1.5)  # depths that a mesh serves, by the depth it was made for
+FINENESS = 7.0  # of the meshes on which limits of depth and force are looked for: they hardly depend on the mesh
+FINER = 1.6  # times as fine is the mesh on which a limit of depth is looked at once more
+BEYOND = 2.0  # times the largest depth met as a force grew, up to which the largest is looked for
 PATIENCE = 15  # corrections of states that a small step may take
 CLOSE = 0.005  # relative step of mu below which a limit is taken as found
 
@@ -55,32 +59,95 @@ def followed(
     return None, 0.0 if unknown else reached
 
 
-def deepest(scene: Scene, law: FrictionLaw, *, in_loops: bool = False) -> float | None:
-    """Return the largest indentation [mm] below the scene's with settled sliding under `law`, to 3 %.
+class Fingers:
+    """Meshes of one finger, each for depths around a power of two."""
+
+    def __init__(self, scene: Scene, *, in_loops: bool = False) -> None:
+        """Make none yet; `in_loops` as in `Body.of`."""
+        self._scene, self._in_loops = scene, in_loops
+        self._made: dict[int, Touchable] = {}
+
+    def at(self, depth: float) -> Touchable:
+        """Return a body whose mesh serves `depth` [mm], from 0.7 to 1.4 times the one it was made for."""
+        power = round(log2(depth))
+        if power not in self._made:
+            self._made[power] = self.made_for(2.0**power, FINENESS)
+        return self._made[power]
+
+    def made_for(self, depth: float, fineness: float) -> Touchable:
+        """Return a body with a mesh of its own."""
+        scene = self._scene
+        mesh = finger_mesh(scene.finger, scene.receptor, Sizing(fineness, depth, margin=WIDE)).mesh
+        return Body.of(mesh, settled_moduli(scene.materials), in_loops=self._in_loops, checked=True).touchable
+
+
+def limits(scene: Scene, law: FrictionLaw, *, in_loops: bool = False) -> tuple[float | None, float | None]:
+    """Return the largest normal force [N/mm] and depth [mm] with settled sliding under `law`, each to 3 %.
+
+    Below those of the scene; the force is None where the scene gives none, and either where it is not known. `in_loops`
+    as in `Body.of`.
+    """
+    fingers = Fingers(scene, in_loops=in_loops)
+    if scene.normal_force is None:
+        return None, _deepest(fingers, scene, law)
+    found = _strongest(fingers, scene, scene.normal_force, law)
+    return (None, None) if found is None else (found[0], _deepest(fingers, scene.driven(BEYOND * found[1]), law))
+
+
+def _deepest(fingers: Fingers, scene: Scene, law: FrictionLaw) -> float | None:
+    """Return the largest indentation [mm] below the scene's with settled sliding.
 
     None where there is none, or where a finer mesh puts it elsewhere, as it does at coefficients far beyond the limit.
-    `in_loops` as in `Body.of`.
     """
-    body: Touchable | None = None
-    meshed = 0.0  # depth that the body's mesh was made for [mm]
+    direction = scene.loading.direction
 
     def slides(depth: float) -> bool:
-        nonlocal body, meshed
-        if body is None or not NEAR[0] * meshed <= depth <= NEAR[1] * meshed:
-            body, meshed = _body(scene, depth, FINENESS, in_loops), depth
-        return followed(body, law, depth, scene.loading.direction)[0] is not None
+        return followed(fingers.at(depth), law, depth, direction)[0] is not None
 
-    low, high = 1e-3 * scene.loading.depth, scene.loading.depth
-    if not slides(low):
+    found = _largest(slides, scene.loading.depth)
+    if found is None:
+        return None
+    finer = fingers.made_for(found, FINER * FINENESS)
+    ends = [followed(finer, law, part * found, direction)[0] is None for part in (0.97, 1.03)]
+    return found if ends == [False, True] else None
+
+
+def _strongest(fingers: Fingers, scene: Scene, force: float, law: FrictionLaw) -> tuple[float, float] | None:
+    """Return the largest normal force [N/mm] below `force` with settled sliding, and the largest depth [mm] on the way.
+
+    None where there is none.
+    """
+    direction, depths = scene.loading.direction, [0.0]
+    bone = scene.finger.pulp_thickness()
+
+    def slides(force: float) -> bool:
+        try:
+            body, first = _rubless(fingers, force, direction, bone)
+        except ContactLost:
+            return False
+        found = followed(forced(body, force), law, 0.0, direction, first)[0]
+        if found is not None:
+            depths.append(depth_of(found))
+        return found is not None
+
+    most = _largest(slides, force)
+    return None if most is None else (most, max(depths))
+
+
+def _rubless(fingers: Fingers, force: float, direction: int, bone: float) -> tuple[Touchable, Contact]:
+    """Return the state under `force` [N/mm] without friction, on a mesh for the depth it has. Raises ContactLost."""
+    bare = FrictionLaw(0.0, np.inf)
+    about = depth_of(sliding_under(fingers.at(bone / 2.0), bare, force, direction, bone))
+    body = fingers.at(about)
+    return body, sliding_under(body, bare, force, direction, bone)
+
+
+def _largest(exists: Callable[[float], bool], high: float) -> float | None:
+    """Return up to where below `high` there is what `exists`, within 1 %; None where not even a thousandth of it."""
+    low = 1e-3 * high
+    if not exists(low):
         return None
     while high > 1.01 * low:
         middle = sqrt(low * high)
-        low, high = (middle, high) if slides(middle) else (low, middle)
-    found = sqrt(low * high)
-    body, meshed = _body(scene, found, 1.6 * FINENESS, in_loops), found
-    return found if slides(0.97 * found) and not slides(1.03 * found) else None
-
-
-def _body(scene: Scene, depth: float, fineness: float, in_loops: bool) -> Touchable:
-    mesh = finger_mesh(scene.finger, scene.receptor, Sizing(fineness, depth, margin=WIDE)).mesh
-    return Body.of(mesh, settled_moduli(scene.materials), in_loops=in_loops, checked=True).touchable
+        low, high = (middle, high) if exists(middle) else (low, middle)
+    return sqrt(low * high)

@@ -152,7 +152,7 @@ FORCED = st.builds(
 
 
 @given(drawn=FORCED)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=6, deadline=None)
 def test_any_forces_lead_to_a_state_that_has_them_or_to_a_sentence(drawn):
     drag = None if drawn["part"] is None else drawn["part"] * drawn["mu"] * drawn["normal_force"]
     given_scene = Scene(

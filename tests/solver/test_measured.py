@@ -8,7 +8,7 @@ import pytest
 
 from solver.holding import relaxing
 from solver.reference import SLIPPERINESS, STICKINESS, scene
-from solver.scene import Friction, Loading, Material, Relaxation, Scene, SceneError, Solve
+from solver.scene import Material, Relaxation, SceneError, Solve
 from solver.solution import solve
 
 
@@ -49,12 +49,6 @@ def test_without_being_asked_nothing_is_measured_but_what_tissues_still_hold_and
     assert found.evidence_s > 0.0
     assert all("measured" not in told["how"] for told in found.model["left_out"].values())
     assert "marched" in entry(found, "viscosity")["how"]
-
-
-def test_a_way_of_several_slides_that_was_not_gone_is_told():
-    asked = Scene(friction=Friction(0.4), loading=Loading(1.0, ("+x", "-x")), solve=Solve(tolerance=0.5))
-    assert any("last slide alone" in told for told in solve(asked).warnings)
-    assert not any("last slide alone" in told for told in solve(replace(asked, loading=Loading(1.0, "-x"))).warnings)
 
 
 def test_a_bone_too_soft_to_count_as_rigid_is_told():

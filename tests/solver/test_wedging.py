@@ -1,0 +1,110 @@
+"""Where settled sliding ends at small strain: under a given force, at a depth, and on the way to the last slide."""
+
+import pytest
+
+from solver.failures import NoSteadyState
+from solver.scene import Friction, Loading, Scene, Solve
+from solver.solution import solve
+
+COARSE = 0.5  # tolerance that the coarsest mesh meets
+LIFTED = "The drag lifts the bone"
+
+
+def pressed(force, mu, slide="+x", tau_max=None, course="steady"):
+    return Scene(
+        friction=Friction(mu, tau_max),
+        loading=Loading(None, slide, normal_force=force),
+        solve=Solve("small", course, COARSE),
+    )
+
+
+def driven(depth, mu, slide="+x", tau_max=None, course="steady"):
+    return Scene(friction=Friction(mu, tau_max), loading=Loading(depth, slide), solve=Solve("small", course, COARSE))
+
+
+def refusal(scene):
+    with pytest.raises(NoSteadyState) as refused:
+        solve(scene)
+    return refused.value
+
+
+def test_where_a_drag_lifts_the_bone_the_slide_is_found_as_the_course_finds_it_and_is_told():
+    found = solve(pressed(0.1, 1.5, course="history"))
+    assert found.indentation == pytest.approx(0.229, rel=0.01)  # the same on four times as many elements
+    assert found.audits["course_against_direct"] < 1e-9
+    assert any(LIFTED in told for told in found.warnings)
+    # at the same depth there is a slide with less force too, and that is where a finger driven there ends
+    other = solve(driven(found.indentation, 1.5))
+    assert other.normal_force < 0.5 * found.normal_force
+
+
+def test_a_drag_that_does_not_lift_the_bone_is_not_told():
+    assert not any(LIFTED in told for told in solve(pressed(0.03, 1.5)).warnings)
+
+
+def test_under_a_force_a_refusal_tells_the_largest_friction_force_and_depth_and_they_hold_to_3_percent():
+    told = refusal(pressed(0.1, 2.0))
+    assert told.limit_mu == pytest.approx(1.675, rel=0.01)  # where the depth falls to 0, on twice as fine a mesh
+    assert solve(pressed(0.1, 0.97 * told.limit_mu)).normal_force == pytest.approx(0.1, rel=1e-9)
+    assert solve(pressed(0.97 * told.limit_normal_force, 2.0)).indentation > 0.0
+    assert solve(driven(0.97 * told.limit_indentation, 2.0)).normal_force > 0.0
+    assert told.to_dict()["error"]["limit_normal_force"] == told.limit_normal_force
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tau_max", [None, 0.03])
+@pytest.mark.parametrize("slide", ["+x", "-x"])
+@pytest.mark.parametrize("mu", [0.8, 1.3, 2.0, 3.0])
+@pytest.mark.parametrize("force", [0.02, 0.1, 0.3])
+def test_every_force_ends_in_an_answer_or_in_limits_that_hold_to_3_percent(force, mu, slide, tau_max):
+    try:
+        assert solve(pressed(force, mu, slide, tau_max)).normal_force == pytest.approx(force, rel=1e-9)
+    except NoSteadyState as told:
+        for within in (
+            pressed(force, 0.97 * told.limit_mu, slide, tau_max),
+            pressed(0.97 * told.limit_normal_force, mu, slide, tau_max),
+            driven(0.97 * told.limit_indentation, mu, slide, tau_max),
+        ):
+            solve(within)
+        for beyond in (
+            pressed(force, 1.03 * told.limit_mu, slide, tau_max),
+            pressed(1.03 * told.limit_normal_force, mu, slide, tau_max),
+            driven(1.03 * told.limit_indentation, mu, slide, tau_max),
+        ):
+            refusal(beyond)
+
+
+@pytest.mark.slow
+def test_a_drag_that_lays_on_far_more_skin_than_the_depth_would_is_refused_with_its_limits():
+    told = refusal(driven(0.03, 3.0, tau_max=0.03))
+    assert told.limit_mu == pytest.approx(2.81, rel=0.03)
+    assert told.limit_indentation == pytest.approx(0.0223, rel=0.03)
+
+
+def test_a_slide_that_settles_late_near_the_limit_is_gone_to_its_end():
+    found = solve(driven(2.0, 1.25, course="history"))
+    assert found.history.bone_x[-1] > 25 * 2.0
+    assert found.audits["course_against_direct"] < 1e-9
+
+
+def test_an_earlier_slide_without_a_settled_state_is_refused_with_its_limits_where_the_course_is_asked_for():
+    told = refusal(driven(2.0, 1.25, ("-x", "+x"), course="history"))
+    assert "along -x" in str(told)
+    assert told.limit_mu == pytest.approx(1.2, rel=0.03)
+    assert told.limit_indentation == pytest.approx(1.81, rel=0.03)
+
+
+def test_an_earlier_slide_without_a_settled_state_is_told_where_the_last_one_alone_is_solved():
+    warned = [told for told in solve(driven(2.0, 1.25, ("-x", "+x"))).warnings if "A slide before this one" in told]
+    assert len(warned) == 1
+    assert "along -x at 2 mm" in warned[0]
+
+
+@pytest.mark.slow
+def test_at_finite_strain_an_earlier_slide_whose_skin_folds_is_told():
+    given = Scene(friction=Friction(0.67), loading=Loading(2.0, ("+x", "-x")), solve=Solve("finite", "steady", COARSE))
+    assert any("the skin behind the contact folds" in told for told in solve(given).warnings)
+
+
+def test_slides_that_all_settle_need_no_warning():
+    assert not any("A slide before" in told for told in solve(driven(1.0, 0.4, ("+x", "-x"))).warnings)
