@@ -78,6 +78,11 @@ class FingerModel:
         """Return the displacement (nodes, 2) of all nodes relative to the bone [mm]."""
         return self.body.displacement(self.skin_displacement(contact))[:, :, 0]
 
+    def balanced(self, contact: Contact, displacement: Array) -> Array:
+        """Return `displacement` (nodes, 2) of a state of contact with less round-off in it, as `Body.balanced`."""
+        forces = np.concatenate([contact.normal, contact.tangential])[:, None]
+        return self.body.balanced(displacement[:, :, None], forces)[:, :, 0]
+
     def sed_ending(self, displacement: Array) -> float:
         """Return the SED averaged over the reference ending [MPa] for displacements (nodes, 2)."""
         return float(self.ending.average(self.geometry.mesh, self.body.elastic, displacement[:, :, None])[0, 0])

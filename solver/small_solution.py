@@ -17,6 +17,7 @@ from solver.contact import NAMES, SLIP, STICK, Contact, ContactLost
 from solver.evidence import model, warnings
 from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure
 from solver.finger import FingerModel
+from solver.friction import FrictionLaw
 from solver.grid import MeshError
 from solver.load_steps import Steps
 from solver.mesh import Array
@@ -45,8 +46,7 @@ MIXED = "nearly incompressible tissues, or ones whose stiffnesses differ by many
 UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]
 DOUBTED = 1e-8  # and from which it is told
 PIERCED = 1e-7  # part of the indentation by which skin may lie too low without it being told [-]
-ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements
-LOW = 1e-8  # part of the indentation by which skin may lie too low before it is laid on the surface again [-]
+ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements once more
 
 YIELDS = (
     "The drag lifts the bone: pressed a little harder, the finger would slide at a smaller depth. Under a weight, that "
@@ -208,15 +208,8 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
     in_tissue(scene, finger, depth)
     if finger.reaches_out(contact, displacement, depth):
         return None
-    checks = audits(finger, law, contact, depth, displacement)
-    if _unbalanced(checks) > ROUGH:
-        forces = np.concatenate([contact.normal, contact.tangential])[:, None]
-        displacement = finger.body.balanced(displacement[:, :, None], forces)[:, :, 0]
-        checks = audits(finger, law, contact, depth, displacement)
-        slides = way is None and scene.normal_force is None and not (contact.state == STICK).any()
-        if slides and checks["penetration"] > LOW:
-            contact, displacement = laid(finger, law, contact, depth, displacement)
-            checks = audits(finger, law, contact, depth, displacement)
+    free = way is None and scene.normal_force is None and not (contact.state == STICK).any()
+    contact, displacement, checks = _balanced(finger, law, contact, depth, displacement, slides=free)
     unbalanced = _unbalanced(checks)
     sed = finger.sed_ending(displacement)
     if unbalanced > UNSOUND:
@@ -270,6 +263,22 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
         ),
     )
     return found, way if over_time is None else None
+
+
+def _balanced(
+    finger: FingerModel, law: FrictionLaw, contact: Contact, depth: float, displacement: Array, *, slides: bool
+) -> tuple[Contact, Array, dict[str, float]]:
+    """Return a state, its displacement and their audits with less round-off; `slides` at a given depth, all of it."""
+    if slides:
+        contact, displacement = laid(finger, law, contact, depth, displacement)
+    checks = audits(finger, law, contact, depth, displacement)
+    if _unbalanced(checks) > ROUGH:
+        if slides:
+            contact, displacement = laid(finger, law, contact, depth, displacement)
+        else:
+            displacement = finger.balanced(contact, displacement)
+        checks = audits(finger, law, contact, depth, displacement)
+    return contact, displacement, checks
 
 
 def _unbalanced(checks: dict[str, float]) -> float:

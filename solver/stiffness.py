@@ -113,12 +113,14 @@ class Probes:
     def displacement_gradient(self, mesh: Mesh, displacement: Array) -> Array:
         """Return du_a/dx_b (p, 2, 2, ...) for displacements (nodes, 2, ...)."""
         moved = displacement[mesh.elements[self.element]]  # (p, 9, 2, ...)
+        moved = moved - moved[:, 8:]  # what moves an element as a whole would drown small strains in round-off
         slopes = np.swapaxes(self.gradient, 1, 2) @ moved.reshape(len(moved), 9, -1)
         return np.swapaxes(slopes.reshape(len(moved), 2, *moved.shape[2:]), 1, 2)
 
     def volume_strain(self, mesh: Mesh, elastic: Elastic, displacement: Array) -> Array:
         """Return the elements' best fit of the volume strain (p, ...) for displacements (nodes, 2, ...)."""
         moved = displacement[mesh.elements[self.element]]  # (p, 9, 2, ...)
+        moved = moved - moved[:, 8:]
         flat = moved.reshape(len(self.element), 18, *moved.shape[3:])
         row = self.modes[:, None] @ elastic.dilatation[self.element]  # (p, 1, 18)
         return (row @ flat.reshape(len(flat), 18, -1)).reshape(len(flat), *flat.shape[2:])

@@ -1,0 +1,87 @@
+"""The same study with the kernels of other processors: NumPy's, the linear algebra's, the compiled loops', its threads.
+
+What each library picks for the processor it finds can be chosen by hand, in a process of its own.
+"""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from daq_app.console import Console
+from daq_app.synthetic import synthetic_study
+
+NEAR = 1e-12
+# A mean, its spread and its interval, or an effect and its interval, are one quantity: each counts against the largest.
+ONE_QUANTITY = ("estimate", "mean", "sd", "low", "high")
+# Probabilities, correlations, and the estimated error of an SED as a part of it: numbers that are counted against 1.
+AGAINST_ONE = (
+    "error_estimate",
+    "friedman_p",
+    "p",
+    "p_holm",
+    "page_p",
+    "pearson",
+    "r",
+    "repeated_holm",
+    "spearman_p",
+    "without",
+    "without_subject",
+)
+
+
+def others(cache):
+    """Return the kernels to try, name and environment of each; loops for another processor are kept in `cache`."""
+    from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
+
+    plain = {"NPY_DISABLE_CPU_FEATURES": " ".join(name for name in __cpu_dispatch__ if __cpu_features__[name])}
+    loops = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(cache)}
+    return {
+        "Haswell's linear algebra": {"OPENBLAS_CORETYPE": "Haswell"},
+        "two threads": {"OPENBLAS_NUM_THREADS": "2"},
+        "oldest": {"OPENBLAS_CORETYPE": "Prescott", **loops, **plain},
+    }
+
+
+def numbers(found, path=(), scale=None):
+    """Yield where each number of a study stands, the number, and the size it counts against."""
+    if isinstance(found, dict):
+        kin = [abs(found[name]) for name in ONE_QUANTITY if isinstance(found.get(name), float)]
+        for name, value in found.items():
+            own = max(kin, default=None) if name in ONE_QUANTITY else 1.0 if name in AGAINST_ONE else None
+            yield from numbers(value, (*path, name), own)
+    elif isinstance(found, list):
+        for i, value in enumerate(found):
+            yield from numbers(value, (*path, i), scale)
+    elif isinstance(found, float):
+        yield path, found, abs(found) if scale is None else scale
+
+
+def study(folder, out, kernels):
+    """Return the numbers of a study computed by a process with the kernels asked for."""
+    command = [sys.executable, "-m", "daq_app", "study", str(folder), "--out", str(out), "--json"]
+    clean = {name: value for name, value in os.environ.items() if name != "OPENBLAS_CORETYPE"}
+    environment = {**clean, "OPENBLAS_NUM_THREADS": "1", **kernels}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 3, done.stderr  # 3: one session was damaged on purpose
+    return {path: (value, size) for path, value, size in numbers(json.loads((out / "study.json").read_bytes()))}
+
+
+@pytest.mark.slow
+def test_kernels_of_other_processors_give_every_number_of_a_study_within_1e_12(tmp_path):
+    folder = tmp_path / "study"
+    synthetic_study(folder, 1, Console(as_json=True), subjects=4)
+    here = study(folder, tmp_path / "here", {})
+    assert study(folder, tmp_path / "again", {}) == here  # to the last bit
+    assert len(here) > 1000
+    for name, kernels in others(tmp_path / "loops").items():
+        there = study(folder, tmp_path / name, kernels)
+        assert there.keys() == here.keys()
+        off = {
+            path: abs(there[path][0] - value) / max(size, np.finfo(float).tiny) for path, (value, size) in here.items()
+        }
+        worst = max(off, key=lambda path: off[path])
+        assert off[worst] <= NEAR, (name, worst, here[worst], there[worst])
