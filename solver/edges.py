@@ -19,8 +19,8 @@ def edges(geometry: FingerMesh, force: Array, touching: NDArray[np.bool_]) -> tu
     `force` (k,) [N/mm] are the normal forces on the nodes that may touch.
     """
     arcs = arcs_of(geometry)
-    high = _edge(arcs, force, touching)
-    low = _edge(-arcs[::-1], force[::-1], touching[::-1])
+    high = last_edge(arcs, force, touching)
+    low = last_edge(-arcs[::-1], force[::-1], touching[::-1])
     return None if high is None or low is None or high <= -low else (-low, high)
 
 
@@ -48,8 +48,12 @@ def arcs_of(geometry: FingerMesh) -> Array:
     return with_middles(geometry.arcs)[np.searchsorted(geometry.whole, geometry.mesh.skin)]
 
 
-def _edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float | None:
-    """Return where contact ends towards the last of the nodes at `arcs` (k,)."""
+def last_edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float | None:
+    """Return where contact ends towards the last of the nodes at `arcs` (k,) [mm]; None where it is too short to tell.
+
+    `force` (k,) is what falls to nothing there like the square root of the distance; nodes alternate between ends and
+    middles of edges, an end first.
+    """
     on = np.flatnonzero(touching)
     if len(on) < FEWEST:
         return None

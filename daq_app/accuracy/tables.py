@@ -226,11 +226,11 @@ def problems(found: Measured) -> Table:
     cells = [
         (
             row.problem, row.source, row.quantity, number(row.expected, 5), number(row.obtained, 5), percent(row.off),
-            percent(row.allowed), "met" if row.met else "MISSED",
+            row.of, percent(row.allowed), "met" if row.met else "MISSED",
         )
         for row in rows
     ]  # fmt: skip
-    header = ("problem", "source", "quantity", "expected", "obtained", "off", "allowed", "verdict")
+    header = ("problem", "source", "quantity", "expected", "obtained", "off", "of", "allowed", "verdict")
     return Table("problems", "Published problems, run through the same code as the finger.", header, tuple(cells))
 
 

@@ -19,8 +19,9 @@ from daq_app.accuracy.published.bodies import (
     stress,
     touching_within,
 )
+from daq_app.accuracy.published.zones import half_above, half_width
 from solver.body import Body, edge_load
-from solver.contact import CAP, OPEN, STICK, Contact, Course, Touchable, forced
+from solver.contact import OPEN, STICK, Contact, Course, Touchable, forced
 from solver.friction import FrictionLaw
 from solver.materials import Hooke
 from solver.mesh import Array
@@ -155,12 +156,11 @@ def light(nu: float = 0.4999, wide: float = 100.0) -> Light:
     )
 
 
-def stick_width(body: Light, state: Contact) -> float:
-    """Return half the distance from the first to the last sticking node."""
-    return float(np.ptp(body.x[state.state == STICK])) / 2
+def stick_width(light: Light, state: Contact, mu: float) -> float:
+    """Return half the width of the stick: what friction could carry and does not, mu p - q, falls to nothing there."""
+    return half_width(light.x, mu * state.normal + state.tangential, state.state == STICK)
 
 
-def capped_width(body: Light, state: Contact) -> float:
-    """Return half the distance from the first to the last node at the bound, 0 where there is none."""
-    at = body.x[state.state == CAP]
-    return float(np.ptp(at)) / 2 if len(at) else 0.0
+def capped_width(light: Light, state: Contact, law: FrictionLaw) -> float:
+    """Return half the width of what slips at the bound: where mu p crosses it."""
+    return half_above(light.x, law.mu * state.normal / light.length - law.tau_max)

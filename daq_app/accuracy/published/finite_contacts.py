@@ -7,9 +7,10 @@ from itertools import pairwise
 import numpy as np
 
 from daq_app.accuracy.published.bodies import graded, mirrored, mound
+from daq_app.accuracy.published.zones import half_above, half_width
 from solver.finite_body import FiniteBody
 from solver.hyperelastic import NeoHooke
-from solver.kernels import CAP
+from solver.kernels import STICK
 from solver.march import march
 from solver.mesh import Array
 from solver.newton import Newton, Pull, Shape
@@ -66,18 +67,17 @@ class LightFinite:
         return float(self.pressed.reaction[middle, 1] / self.length[middle])
 
     def capped(self, mu: float, k: float) -> tuple[float, float]:
-        """Return Q/(mu P) in full slip under the bound k mu p0, and half the width at the bound by a."""
+        """Return Q/(mu P) in full slip under the bound k mu p0, and half the width by a in which mu p is above it."""
         pull = self.pressed.pull._replace(mu=mu, tau=k * mu * self.peak, sense=1)
         state = settled(self.newton, pull)
-        at = self.x[state.state == CAP]
         drag = float(state.force[0]) / (mu * float(state.force[1]))
-        return drag, (float(np.ptp(at)) / 2 if len(at) else 0.0) / self.half_width
+        width = half_above(self.x, state.reaction[:, 1] / self.length - k * self.peak)
+        return drag, width / self.half_width
 
     def sheared(self, mu: float, part: float) -> tuple[float, float, float]:
         """Return Q/(mu P) once the surface has moved so that `part` acts or more, half the stick by a, q(0)/(mu p0).
 
-        What friction could carry and does not, mu p - q, is distributed as a Hertz pressure over the stick: half its
-        width c is told by the second moment, c = 2 sqrt(<x^2>), to a part of an element.
+        What friction could carry and does not, mu p - q, falls to nothing at the ends of the stick.
         """
         pull = self.pressed.pull._replace(mu=mu, sense=0)
         (state,) = march(self.newton, [pull])
@@ -86,7 +86,7 @@ class LightFinite:
             travel += STEP
             (state,) = march(self.newton, [pull._replace(travel=travel)], state)
         spare, middle = mu * state.reaction[:, 1] - state.reaction[:, 0], len(self.x) // 2
-        sticks = 2.0 * float(np.sqrt(spare @ self.x**2 / spare.sum()))
+        sticks = half_width(self.x, spare, state.state == STICK)
         traction = float(state.reaction[middle, 0] / self.length[middle]) / (mu * self.peak)
         drag = float(state.force[0]) / (mu * float(state.force[1]))
         return drag, sticks / self.half_width, traction

@@ -1,0 +1,31 @@
+"""Half the width of a zone on the skin, such as where it sticks, known to a part of an element."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.edges import last_edge
+from solver.mesh import Array
+
+
+def half_width(x: Array, force: Array, inside: NDArray[np.bool_]) -> float:
+    """Return half the width of the zone of nodes `inside` (k,), at whose ends a `force` (k,) falls as a pressure does.
+
+    nan where it is too short to tell.
+    """
+    high, low = last_edge(x, force, inside), last_edge(-x[::-1], force[::-1], inside[::-1])
+    return float("nan") if high is None or low is None else (high + low) / 2.0
+
+
+def half_above(x: Array, value: Array) -> float:
+    """Return half the width of the zone in which `value` (k,) lies above 0, interpolated between nodes; 0 if nowhere.
+
+    >>> half_above(np.array([-2.0, -1.0, 0.0, 1.0, 2.0]), np.array([-1.0, -0.5, 0.5, -1.5, -2.0]))
+    0.375
+    """
+    above = np.flatnonzero(value > 0.0)
+    if not len(above):
+        return 0.0
+    first, last = int(above[0]), int(above[-1])
+    low = np.interp(0.0, value[first - 1 : first + 1], x[first - 1 : first + 1])
+    high = np.interp(0.0, value[last : last + 2][::-1], x[last : last + 2][::-1])
+    return float(high - low) / 2.0
