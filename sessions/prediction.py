@@ -22,7 +22,7 @@ from solver.nearby import Nearby, nearby
 from solver.prediction import History, Prediction, Skin
 from solver.reference import SCALE
 from solver.reference import Reading as TauReading
-from solver.scene import Friction, Loading, Scene, SceneError, Slide, Solve
+from solver.scene import Finger, Friction, Loading, Scene, SceneError, Slide, Solve
 from solver.solution import answers
 from solver.stepping import March
 
@@ -201,8 +201,8 @@ def predict(
     return SessionPrediction(
         simulated=analysis.simulated,
         trials=tuple(rows),
-        width=_template(asked).width,
-        width_origin="assumed" if base is None or base.width == _template(PredictionOptions()).width else "set",
+        width=_template(asked).finger.width,
+        width_origin="assumed" if base is None or base.finger.width == Finger().width else "set",
         options=asked,
         decisions=analysis.decisions,
         area=analysis.settings.area,
@@ -336,8 +336,9 @@ def with_own_finger(options: PredictionOptions, plan: SessionPlan) -> Prediction
         published.finger,
         tip_radius=plan.finger.tip_radius or published.finger.tip_radius,
         contact_angle=plan.contact_angle,
+        width=plan.finger.width or published.finger.width,
     )
-    scene = replace(published, finger=own, width=plan.finger.width or published.width)
+    scene = replace(published, finger=own)
     return options if scene == published else replace(options, scene=scene)
 
 
@@ -441,7 +442,7 @@ def opposite(scene: Scene) -> Scene:
 
 def _force_per_mm(prepared: _Prepared) -> float | None:
     measured = prepared.row.measured_normal
-    return None if measured is None or prepared.scene is None else measured / prepared.scene.width
+    return None if measured is None or prepared.scene is None else measured / prepared.scene.finger.width
 
 
 def _filled(
@@ -477,8 +478,8 @@ def _filled(
         error_estimate=found.error_estimate,
         normal_per_mm=found.normal_force,
         tangential_per_mm=found.tangential_force,
-        normal_force=found.normal_force * scene.width,
-        tangential_force=found.tangential_force * scene.width,
+        normal_force=found.normal_force * scene.finger.width,
+        tangential_force=found.tangential_force * scene.finger.width,
         wall_s=found.wall_s,
         prediction=found,
         reasons=reasons,

@@ -85,7 +85,7 @@ def _solved(prediction: SessionPrediction, variant: Variant, progress: Progress 
 def _alternative(row: TrialPrediction, variant: Variant, tau_max: float | None, found: Prediction | str) -> Alternative:
     if isinstance(found, str):
         return replace(_none(row, variant, found), tau_max=tau_max)
-    width = found.scene.width
+    width = found.scene.finger.width
     return Alternative(
         variant,
         tau_max,

@@ -187,9 +187,10 @@ def _inertia(scene: Scene, normal: float, length: float) -> dict[str, Any]:
     pressure = normal / length if length else 0.0
     speed = max(scene.loading.speed if scene.loading.direction else 0.0, scene.loading.depth)
     return {
-        "estimate": DENSITY * speed**2 / pressure if pressure else None,
+        "estimate": 2.0 * DENSITY * speed**2 / pressure if pressure else None,
         "from": {"mean_pressure_MPa": pressure, "speed_mm_s": speed},
-        "how": "pressure of moving tissue (density times speed squared, 1.1 g/cm3) by the mean contact pressure",
+        "how": "pressure of moving tissue (density times speed squared, 1.1 g/cm3) by the mean contact pressure, "
+        "twice for an energy",
     }
 
 
@@ -239,8 +240,11 @@ def _history(scene: Scene, sticking: float, slide: float) -> dict[str, Any]:
 
 
 def _width(scene: Scene, width: float) -> dict[str, Any]:
+    nu = max(tissue.nu for tissue in scene.materials.by_region)
     return {
-        "estimate": width / scene.width,
-        "from": {"contact_width_mm": width, "finger_width_mm": scene.width},
-        "how": "plane strain asks for a finger much wider than its contact: contact width by finger width",
+        "estimate": nu**2 * min(1.0, width / scene.finger.width),
+        "from": {"contact_width_mm": width, "finger_width_mm": scene.finger.width, "poisson_ratio": nu},
+        "how": "within half a contact width of either side of the finger tissue is free to widen, as in plane stress, "
+        "and nu squared softer: that by the part of the finger's width so near a side; that the pulp is round "
+        "across its width too is not in it, and changes more",
     }

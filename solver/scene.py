@@ -46,6 +46,7 @@ class Finger:
     bone_radius: float = 1.5  # [mm]
     bone_centre: tuple[float, float] = (-1.0, 0.75)  # centre of the bone's arc, finger frame [mm]
     contact_angle: float = 45.0  # between finger axis and surface, tip down [degrees]
+    width: float = 15.0  # used only where forces in N meet forces per mm [mm]; assumed
     bone: Literal["rigid", "meshed"] = "rigid"  # "meshed": of its own material, driven at its core
     cut: Literal["free", "driven"] = "free"  # "driven": the cut through the soft tissues moves with the bone
     nail_length: float = 0.0  # of a nail plate fixed to the bone, on the dorsal skin back from the tip's arc [mm]
@@ -61,6 +62,7 @@ class Finger:
             raise SceneError("finger.bone_centre", self.bone_centre, "it must be two finite lengths in mm")
         _within("finger.bone_centre[0]", self.bone_centre[0], -0.8 * self.shaft_length, self.tip_radius, "mm")
         _within("finger.contact_angle", self.contact_angle, 10.0, 90.0, "degrees")
+        _within("finger.width", self.width, 0.1, 1000.0, "mm")
         if self.bone not in ("rigid", "meshed"):
             raise SceneError("finger.bone", self.bone, 'it must be "rigid" or "meshed"')
         if self.cut not in ("free", "driven"):
@@ -309,7 +311,6 @@ class Scene:
 
     title: str = ""
     finger: Finger = field(default_factory=Finger)
-    width: float = 15.0  # of the finger, used only where forces in N meet forces per mm [mm]; assumed
     materials: Materials = field(default_factory=Materials)
     friction: Friction
     loading: Loading
@@ -318,7 +319,6 @@ class Scene:
 
     def __post_init__(self) -> None:
         """Check what several tables decide together."""
-        _within("width", self.width, 0.1, 1000.0, "mm")
         self._check_laws()
         self._check_stiffnesses()
         skin = self.finger.epidermis + self.finger.dermis
@@ -374,7 +374,7 @@ class Scene:
         return self._per_mm(self.loading.tangential_force)
 
     def _per_mm(self, force: float | None) -> float | None:
-        return force / self.width if force is not None and self.loading.force_unit == "N" else force
+        return force / self.finger.width if force is not None and self.loading.force_unit == "N" else force
 
     @property
     def loading_per_mm(self) -> Loading:

@@ -7,7 +7,7 @@ from statistics import median
 import numpy as np
 
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, timed, within
-from daq_app.accuracy.methods import FINITE, METHODS, PLAIN, SMALL, Meshed, Method
+from daq_app.accuracy.methods import FINITE, METHODS, NUMPY, PLAIN, SMALL, Meshed, Method
 from daq_app.accuracy.truth import JUDGED, Truth, cases, known
 from solver.contact import ContactLost
 from solver.failures import SolveFailure
@@ -16,11 +16,17 @@ from solver.scene import Scene
 
 MESHES = {  # elements to a tip radius; 840 to 15,000 unknowns, and 1,370 to 11,000 where meshes follow the contact
     SMALL.name: (2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0),
+    NUMPY.name: (2.5, 4.0, 6.0, 8.0, 12.0),
     FINITE.name: (6.0, 6.5, 8.0, 10.0, 12.0, 16.0, 20.0),
     PLAIN.name: (3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 14.0),
 }
 LITTLE = 0.25  # patience of a quick run
-QUICK = {SMALL.name: (2.5, 3.0, 5.0, 8.0), FINITE.name: (6.5, 10.0, 20.0), PLAIN.name: (4.0, 8.0)}
+QUICK = {
+    SMALL.name: (2.5, 3.0, 5.0, 8.0),
+    NUMPY.name: (2.5,),
+    FINITE.name: (6.5, 10.0, 20.0),
+    PLAIN.name: (4.0, 8.0),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +77,7 @@ def _row(method: Method, fineness: float, truths: dict[str, Truth], patience: fl
     """Return the row of one mesh; `patience` is how long its times are repeated, by that of a full run."""
     chosen = [scene for scene in cases(method.kinematics) if scene.title in truths]
     deepest = max(chosen, key=lambda scene: scene.loading.depth)
-    prepared, setup = _made(method, deepest, fineness, 0.3 * patience)
+    prepared, setup, beside = _made(method, deepest, fineness, 0.3 * patience)
     mesh = method.meshed(deepest, fineness, False)
     mesh.share(chosen)
     first: list[float] = []
@@ -90,7 +96,8 @@ def _row(method: Method, fineness: float, truths: dict[str, Truth], patience: fl
         solved.append(scene)
         first.append(timed(lambda s=scene: mesh.numbers(mesh.solve(s)), 5, 0.25 * patience))
     together = timed(lambda: mesh.numbers_together([mesh.solve(scene) for scene in solved]), 5, 0.5 * patience)
-    onward, floors = _onward(mesh, solved, patience)
+    onward, between = _onward(mesh, solved, patience)
+    floors = beside if prepared else between  # of the same moments as most of the work
     next_s = median(onward) if onward else None
     return Speed(
         method.name, method.kinematics, method.element, method.order, method.linear_solver, method.start,
@@ -99,19 +106,21 @@ def _row(method: Method, fineness: float, truths: dict[str, Truth], patience: fl
     )  # fmt: skip
 
 
-def _made(method: Method, scene: Scene, fineness: float, most_s: float) -> tuple[float, float]:
-    """Return what a mesh's assembly and factorisation, and what the rest of it took: medians.
+def _made(method: Method, scene: Scene, fineness: float, most_s: float) -> tuple[float, float, list[float]]:
+    """Return medians of what a mesh's assembly and factorisation, and what the rest took; and floors in turn with them.
 
     One is forgotten before the next is made, as in a process that solves again and again, which is given memory once.
     """
     spans: list[tuple[float, float]] = []
+    floors: list[float] = []
     began = clock()
     while len(spans) < 5 and (not spans or clock() - began < most_s):
         mesh = method.meshed(scene, fineness, False)
         spans.append((mesh.prepared_s, mesh.setup_s))
+        floors.append(mesh.floor())
         del mesh
     prepared, setup = zip(*spans, strict=True)
-    return median(prepared), median(setup)
+    return median(prepared), median(setup), floors
 
 
 def _onward(mesh: Meshed, scenes: list[Scene], most_s: float) -> tuple[list[float], list[float]]:

@@ -16,7 +16,8 @@ from daq_app.accuracy.histories import Marched
 from daq_app.accuracy.methods import MAIN, Kinematics
 from daq_app.accuracy.processes import Cold, Memory
 from daq_app.accuracy.speed import MESHES, QUICK, Speed
-from daq_app.accuracy.warm import Warm
+from daq_app.accuracy.truth import JUDGED, cases
+from daq_app.accuracy.warm import SURFACES, Warm
 
 AGREED = 1e-10  # a course and the direct state, relative
 PEAK = 0.02  # error of the warm stepper, by the peak
@@ -35,6 +36,7 @@ class Target:
     floors: float | None  # measured by the floor
     how: str  # which way, mesh and error
     tried: bool = True  # whether all that could have met it was measured: time may have been over before
+    part: str = ""  # what was measured, where that is not all that was asked
 
     @property
     def verdict(self) -> str:
@@ -43,9 +45,10 @@ class Target:
             return "missed" if self.tried and self.how != "" else "not measured"
         if self.reach is None:
             return "reported"
+        where = f" by {self.part}" if self.part else ""
         if self.aim is not None and self.measured <= self.aim:
-            return "aim met"
-        return "reach met" if self.measured <= self.reach else "missed"
+            return f"aim met{where}"
+        return f"reach met{where}" if self.measured <= self.reach else "missed"
 
 
 def measure(asked: Asked, found: Found) -> Iterator[Target]:
@@ -106,7 +109,8 @@ def _at_error(
         return Target(work, _percent(error), "ms", reach, aim, None, None, how, tried)
     took, best = min(good, key=lambda pair: pair[0])
     how = f"{best.method}, {best.dofs} unknowns, error {_percent(best.judged_error or 0.0)}"
-    return Target(work, _percent(error), "ms", reach, aim, 1e3 * took, took / best.floor_s, how)
+    part = f"{best.surfaces} of them" if kinematics == "small" and best.surfaces < len(cases("small")) else ""
+    return Target(work, _percent(error), "ms", reach, aim, 1e3 * took, took / best.floor_s, how, part=part)
 
 
 def _warm(found: Found, work: str, kinematics: str, reach: float, aim: float) -> Target:
@@ -117,7 +121,8 @@ def _warm(found: Found, work: str, kinematics: str, reach: float, aim: float) ->
     worst = max(row.worst_error for row in rows)
     how = f"error {_percent(worst)} of peak, median {1e3 * median(r.median_s for r in rows):.3g} ms"
     slowest = 1e3 * max(row.p99_s for row in rows)
-    return Target(work, at, "ms", reach, aim, slowest if worst <= PEAK else None, None, how)
+    part = _part(len(rows), len(SURFACES), "surfaces")
+    return Target(work, at, "ms", reach, aim, slowest if worst <= PEAK else None, None, how, part=part)
 
 
 def _marched(found: Found) -> Target:
@@ -125,9 +130,11 @@ def _marched(found: Found) -> Target:
     if not rows:
         return Target(work, "1e-10", "times", 60.0, 30.0, None, None, "")
     off = max(abs(row.difference) for row in rows)
-    how = f"largest difference {off:.0e}, both kinematics"
+    small = sum(row.kinematics == "small" for row in rows)
+    how = f"largest difference {off:.0e}; courses: {small} at small strain, {len(rows) - small} at finite strain"
     times = max(row.marched_s / row.direct_s for row in rows)
-    return Target(work, "1e-10", "times", 60.0, 30.0, times if off <= AGREED else None, None, how)
+    part = _part(len(rows), 2 * len(JUDGED), "courses")
+    return Target(work, "1e-10", "times", 60.0, 30.0, times if off <= AGREED else None, None, how, part=part)
 
 
 def _cold(found: Found) -> Target:
@@ -144,6 +151,10 @@ def _guaranteed(row: Guaranteed) -> Target:
     how = f"{row.dofs} unknowns, estimate {_percent(row.worst_estimate)}{error}"
     work = f"guaranteed tolerance, {row.kinematics} strain, {row.surfaces} surfaces, mesh to evidence included"
     return Target(work, _percent(row.tolerance), "ms", None, None, 1e3 * row.took_s, None, how)
+
+
+def _part(measured: int, asked: int, what: str) -> str:
+    return f"{measured} of {asked} {what}" if measured < asked else ""
 
 
 def _percent(part: float) -> str:

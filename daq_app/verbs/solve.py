@@ -75,7 +75,7 @@ def _print(found: "Prediction", title: str, console: Console) -> None:
     console.say(table(rows, head=["", "", "", "error, estimated"]))
     left = [[name, _percent(entry["estimate"])] for name, entry in found.model["left_out"].items()]
     console.say(
-        "\nLeft out of the model, and by how much that may have changed the SED (--json says how that was found):"
+        "\nLeft out of the model, and what of the SED that is estimated to have changed (--json says how it was found):"
     )
     console.say(table(left, head=["", ""]).lstrip("\n"))
     console.say("\nChecks of the state found (0 is perfect; a volume of 1 is one that did not change):")

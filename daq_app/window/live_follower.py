@@ -149,7 +149,7 @@ class Follower:
             self._mu = max(self._mu, abs(pull) / normal)
             self._tangential = max(self._tangential, abs(pull))
         self._small.mu, self._small.tau = self._mu, self._bound()
-        normal, pull = normal / self._scene.width, pull / self._scene.width
+        normal, pull = normal / self._scene.finger.width, pull / self._scene.finger.width
         small = self._small.step(normal, pull)
         if self._finite is not None:
             finite = self._finite.step(normal, pull, self._mu, self._bound())

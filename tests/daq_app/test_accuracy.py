@@ -129,6 +129,12 @@ def test_a_mesh_that_is_only_compared_with_meets_no_aim():
     assert all(row.measured is None for row in rows)
 
 
+def test_an_aim_met_by_a_part_of_what_was_asked_says_by_which_part(example):
+    small = [r for r in targets.measure(FOREVER, Found([speed("small", 900, 0.005, 3e-4)])) if r.reach == 5.0]
+    assert [row.verdict for row in small] == ["aim met by 6 of them"]
+    assert verdict(example, "warm stepper, finite strain, p99 of a reading").verdict == "aim met by 1 of 4 surfaces"
+
+
 def test_pictures_and_tables_can_be_made_again_from_the_data_alone(example, written):
     data = json.loads((written[0].parent / "accuracy.json").read_text(encoding="utf-8"))
     again = restored(data)

@@ -178,7 +178,7 @@ def test_the_bound_read_as_printed_is_a_named_choice_that_leaves_next_to_no_drag
 
 
 def test_another_finger_is_taken_from_a_scene(tables):
-    other = Scene(finger=Finger(tip_radius=6.0), width=12.0, friction=Friction(0.1), loading=Loading(1.0))
+    other = Scene(finger=Finger(tip_radius=6.0, width=12.0), friction=Friction(0.1), loading=Loading(1.0))
     found = predict(tables, PLAN, PredictionOptions(scene=other, course="steady"))
     assert (found.width, found.width_origin) == (12.0, "set")
     assert found.trials[0].prediction.scene.finger.tip_radius == 6.0
@@ -259,7 +259,6 @@ def test_the_subjects_own_finger_and_angle_are_predicted_unless_another_finger_i
     assert with_own_finger(PredictionOptions(), PLAN).scene is None
     own = replace(PLAN, finger=OwnFinger(tip_radius=6.5, width=17.0), contact_angle=40.0)
     scene = with_own_finger(PredictionOptions(), own).scene
-    assert scene.finger == replace(Finger(), tip_radius=6.5, contact_angle=40.0)
-    assert scene.width == 17.0
-    other = Scene(friction=Friction(0.0), loading=Loading(1.0), width=12.0)
+    assert scene.finger == replace(Finger(), tip_radius=6.5, contact_angle=40.0, width=17.0)
+    other = Scene(friction=Friction(0.0), loading=Loading(1.0), finger=Finger(width=12.0))
     assert with_own_finger(PredictionOptions(scene=other), own).scene == other

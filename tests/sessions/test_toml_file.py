@@ -1,4 +1,6 @@
+import re
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 import pytest
@@ -6,7 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sessions.toml_file import NotAllowed, SettingsError, from_table, load_toml
+from solver.reference import STICKINESS
+from solver.reference import scene as published
 from solver.scene import Scene
+
+CONTRACT = Path(__file__).resolve().parents[3] / "shared" / "design" / "contract.md"
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,3 +132,13 @@ def test_a_right_scene_file_gives_the_scene(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(SCENE)
     assert load_toml(path, Scene).friction.mu == 0.67
+
+
+@pytest.mark.skipif(not CONTRACT.exists(), reason="the contract is not beside the project")
+def test_the_scene_file_that_the_contract_shows_is_read_as_it_stands(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(re.search(r"```toml\n(title.*?)```", CONTRACT.read_text(encoding="utf-8"), re.DOTALL)[1])
+    read = load_toml(path, Scene)
+    assert read.finger == published(STICKINESS[4]).finger
+    assert (read.friction, read.loading.indentation) == (published(STICKINESS[4]).friction, 2.0)
+    assert read.solve.tolerance == 0.01

@@ -47,7 +47,7 @@ from solver.scene import Finger, Friction, Loading, Material, Materials, Recepto
         (lambda: Solve(tolerance=0.0), "solve.tolerance"),
         (lambda: Scene(friction=Friction(0.3), loading=Loading(4.8)), "loading.indentation"),
         (lambda: Scene(friction=Friction(0.3), loading=Loading(2.0), receptor=Receptor(depth=2.5)), "receptor.depth"),
-        (lambda: Scene(friction=Friction(0.3), loading=Loading(2.0), width=0.0), "width"),
+        (lambda: Finger(width=0.0), "finger.width"),
     ],
 )
 def test_what_cannot_be_run_is_refused_in_one_sentence_that_names_key_value_and_what_is_allowed(make, key):

@@ -107,7 +107,9 @@ def test_pressed_much_deeper_than_its_mesh_was_made_for_it_ends_in_the_full_solv
         solve=Solve("finite", tolerance=0.05),
     )
     follows = stepper(replace(asked, loading=Loading(1.5, "-x")))
-    told = [follows.step(*forces) for forces in pressed_then_dragged(2.0 / asked.width, 2.0 / asked.width)]
+    told = [
+        follows.step(*forces) for forces in pressed_then_dragged(2.0 / asked.finger.width, 2.0 / asked.finger.width)
+    ]
     found = solve(asked)
     assert not np.isnan(told).any()
     assert abs(told[-1] - found.sed_ending) < 0.02 * max(told)

@@ -68,7 +68,7 @@ def test_laws_that_do_not_fit_are_refused_with_their_key(tissue, kinematics, key
 def test_a_scene_file_may_hold_every_option(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(
-        '[finger]\nbone = "meshed"\ncut = "driven"\nnail_length = 10\n'
+        '[finger]\nbone = "meshed"\ncut = "driven"\nnail_length = 10\nwidth = 15.0\n'
         '[materials.dermis]\nE = 0.08\nnu = 0.48\nlaw = "hooke"\nprony = [{ g = 0.2, tau = 0.07 }]\n'
         '[friction]\nmu = 0.5\n[loading]\nnormal_force = 1.5\nforce_unit = "N"\nslide = ["+x", "-x"]\n'
         '[solve]\nevidence = "measured"\n'
