@@ -114,8 +114,8 @@ def speeds(found: Measured) -> Table:
     )  # fmt: skip
     caption = (
         "Time against true error, mesh by mesh. Order: of the element's displacements. Floor: one assembly, "
-        "factorisation and solve. First, next: a surface from undeformed, a further one. What lost to these is drawn in "
-        "the decision on what the solver is made of, docs/decisions."
+        "factorisation and solve. First, next: a surface from undeformed, a further one. What lost to these is in "
+        "a picture of the decision on what the solver is made of, docs/decisions."
     )
     return Table("speeds", caption, header, tuple(cells))
 
