@@ -1,4 +1,4 @@
-"""Processor time of the analysis of a session of ten trials, without and with its bootstrap intervals.
+"""Processor time of the analysis of a session of ten trials, of its bootstrap intervals, and of those of its SEDs.
 
 Run from the repository's root: python -m benchmarks.analysis [SESSION]; without one a simulated one is recorded first.
 """
@@ -13,7 +13,10 @@ from statistics import median
 from daq_app.cli import run
 from sessions.analysis import analyse
 from sessions.analysis.bootstrap import intervals_of
+from sessions.prediction import PredictionOptions, predict
 from sessions.recording import Recording
+from sessions.side_by_side import with_alternatives
+from sessions.uncertainty import with_intervals
 
 RUNS = 9
 
@@ -25,13 +28,27 @@ def main() -> None:
         if len(sys.argv) < 2:
             words = ["run", "sensotact-friction", "--device", "sim:?seed=7&rate=200", "--subject", "P01", "--headless"]
             run([*words, "--simulate-subject", "1", "--seed", "3", "--pace", "20", "--out", str(folder)])
-        strokes = analyse(Recording.open(folder)).strokes  # what is loaded once is loaded now
+        recording = Recording.open(folder)
+        analysis = analyse(recording)  # what is loaded once is loaded now
+        strokes = analysis.strokes
         intervals_of(strokes)
+        prediction = predict(
+            analysis, recording.plan, PredictionOptions(course="steady", intervals=True, beside="small")
+        )
+        carried = with_intervals(analysis, prediction)
+        with_alternatives(carried)
         alone = _taken(lambda: analyse(Recording.open(folder)))
         drawn = _taken(lambda: intervals_of(strokes))
+        solved = _taken(lambda: predict(analysis, recording.plan, prediction.options))
+        told = _taken(lambda: with_intervals(analysis, prediction))
+        beside = _taken(lambda: with_alternatives(carried))
     print(f"{len(strokes)} strokes, medians of {RUNS}, processor time")
     print(f"opened and analysed   {1000 * alone:6.0f} ms   (reach 1000)")
     print(f"bootstrap intervals   {1000 * drawn:6.0f} ms   (both together: reach 5000)")
+    ways = [one.method for row in carried.trials for one in (row.interval, row.opposite_interval) if one]
+    print(f"predicted both ways   {1000 * solved:6.0f} ms   at small strain")
+    print(f"intervals of the SEDs {1000 * told:6.0f} ms   {len(ways)} of them, {ways.count('sampling')} by sampling")
+    print(f"side by side          {1000 * beside:6.0f} ms   at small strain")
 
 
 def _taken(work: Callable[[], object]) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 from numpy.linalg import LinAlgError
 
@@ -12,7 +13,7 @@ from solver.friction import FrictionLaw
 from solver.grid import MeshError
 from solver.mesher import Sizing
 from solver.pressing import depth_of, sliding_under
-from solver.scene import SHALLOW, Friction, Scene
+from solver.scene import SHALLOW, Friction, Loading, Scene, Solve
 
 FINENESS = 6.0  # good to some tenths of a per cent of the depth
 COVERED = 0.9  # of the highest skin that touches: a mesh for that depth looks for contact up to 1.25 times of it
@@ -32,7 +33,7 @@ def matching_depths(
     if not scenes:
         return ()
     deepest = DEEPEST * scenes[0].finger.pulp_thickness()
-    finger = FingerModel.of(scenes[0], Sizing(FINENESS, deepest), in_loops=in_loops)
+    finger = _finger(_bare(scenes[0], deepest), in_loops)
     pressed = [_pressed(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True)]
     return tuple(None if found is None else depth_of(found) for found in pressed)
 
@@ -44,7 +45,7 @@ def expected_depth(scene: Scene, *, in_loops: bool = False) -> float:
         return scene.loading.depth
     deepest = DEEPEST * scene.finger.pulp_thickness()
     try:
-        finger = FingerModel.of(scene, Sizing(FINENESS, deepest), in_loops=in_loops)
+        finger = _finger(_bare(scene, deepest), in_loops)
     except (MeshError, LinAlgError):  # who makes the meshes that count will tell
         return deepest
     found = _pressed(finger, scene, force, deepest)
@@ -79,6 +80,18 @@ def within_reach(scene: Scene, depth: float, most: float | None = None) -> None:
         f"A normal force of {force:.3g} N/mm would press the finger {depth:.3g} mm deep, to its bone{carried}; "
         "ask for less."
     )
+
+
+def _bare(scene: Scene, deepest: float) -> Scene:
+    """Return the scene without all that its mesh does not depend on."""
+    bare = replace(scene, title="", friction=Friction(0.0), loading=Loading(deepest))
+    return replace(bare, solve=Solve(scene.solve.kinematics))
+
+
+@lru_cache(maxsize=1)
+def _finger(bare: Scene, in_loops: bool) -> FingerModel:
+    """Return the finger on a rough mesh: surfaces of one finger follow each other and share it. Raises MeshError."""
+    return FingerModel.of(bare, Sizing(FINENESS, bare.loading.depth), in_loops=in_loops)
 
 
 def _pressed(finger: FingerModel, scene: Scene, normal_force: float, deepest: float) -> Contact | None:

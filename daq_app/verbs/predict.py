@@ -125,10 +125,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
         _print_firing(firing["afferent"], console)
     if seal:
         console.say(f"sealed: SHA-256 {seal['sealed_sha256']} in {recording.folder / SEAL}")
+    without: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
     for row in prediction.trials:
         for reason in dict.fromkeys(row.reasons.values()):
             missing = ", ".join(name for name, why in row.reasons.items() if why == reason)
-            console.say(f"{row.trial or (row.stroke or 0) + 1}: no {missing.replace('_', ' ')}: {reason}")
+            without[missing.replace("_", " "), reason].append(_called(row))
+    for (missing, reason), trials in without.items():
+        console.say(f"{', '.join(trials)}: no {missing}: {reason}")
     return 3 if any(row.sed is None for row in prediction.trials) else 0
 
 

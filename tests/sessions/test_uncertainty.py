@@ -213,3 +213,20 @@ def test_at_finite_strain_intervals_of_200_visits_hold_the_sed_of_the_friction_p
         (planted,) = solved([with_loads(row.prediction.scene, {"mu": truth.mu, "tau_max": truth.tau_max})])
         held.append(row.interval.low <= planted <= row.interval.high)
     assert 0.90 <= np.mean(held) <= 0.98
+
+
+@pytest.mark.slow
+def test_at_finite_strain_no_interval_is_told_where_draws_or_all_have_no_settled_slide():
+    analysis, plan = shallow(planted_truth.visit(1), 2)
+    beyond = predict(analysis, plan, replace(FINITE, indentation=2.0))
+    (row,) = with_intervals(analysis, beyond).trials
+    assert row.interval.low is None
+    assert row.interval.reason == row.reasons["sed"]
+    assert "settled sliding up to mu = 0.3" in row.interval.reason
+    near = predict(analysis, plan, replace(FINITE, indentation=1.83))  # of at most 1.84 mm with the friction found
+    (row,) = with_intervals(analysis, near).trials
+    assert row.interval.low is None
+    assert "of 60 draws of the friction have no settled state" in row.interval.reason
+    largest = int(np.argmax(friction_draws(analysis.strokes[0], 0, "maximum").mu))
+    mu, tau_max, _ = (column[largest] for column in friction_draws(analysis.strokes[0], 0, "maximum"))
+    assert settled([with_loads(row.prediction.scene, {"mu": mu, "tau_max": tau_max})]) == (None,)
