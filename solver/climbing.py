@@ -8,10 +8,9 @@ by a per cent: there the lines are moved once more, to the edges that the fine m
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
-from solver.existence import sound
 from solver.failures import NoSteadyState, SolveFailure
 from solver.finite_ends import steps_asked
 from solver.finite_finger import FiniteFinger
@@ -19,11 +18,13 @@ from solver.finite_states import course, roughly, settled
 from solver.load_steps import Steps
 from solver.mesher import Sizing, sharing, still_sharing
 from solver.newton import Shape
+from solver.reach import sound
 from solver.scene import Scene
 
 ROUGH = 3.0  # fineness of the mesh that finds the edges
 NEARLY = 0.98  # of the friction limit, from which contact is where it is when the finger slides
 MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
+WIDER = 6.0  # the same where contact was met at the end of that skin
 
 
 Maker = Callable[[Scene, Sizing], FiniteFinger]  # of meshes; whoever wants may keep what it makes
@@ -82,23 +83,40 @@ def foot(
     Raises NoSteadyState, NotConverged, Cancelled.
     """
     depth = expected if scene.normal_force is not None else scene.loading.depth
-    begun = perf_counter()
-    finger = make(scene, Sizing(ROUGH, depth, margin=MARGIN))
-    setup = perf_counter() - begun
+    margin = MARGIN
     try:
-        shape = _on_rough(finger, scene, stop, near.shape if near is not None and near.finger is finger else None)
-        if sound(finger.newton, shape, finger.geometry.whole):
-            return Climbed(finger, shape, setup)
-        depth = shape.pull.depth
+        low = _rough(scene, depth, margin, stop, make, near)
+        if low.finger.runs_out(low.shape):
+            margin = WIDER
+            low = _rough(scene, depth, margin, stop, make, near)
+        if sound(low.finger, low.shape):
+            return low
+        depth = low.shape.pull.depth
     except SolveFailure:
         pass
-    sizing = Sizing(fineness, depth, margin=MARGIN)
     try:
-        return _on(scene, sizing, None, stop, make)
+        return _plain(scene, Sizing(fineness, depth, margin=margin), stop, make)
     except NoSteadyState:
         if not scene.loading.dragged:
             raise
-        return _on(scene.undragged(), sizing, None, stop, make)
+        return _plain(scene.undragged(), Sizing(fineness, depth, margin=margin), stop, make)
+
+
+def _rough(
+    scene: Scene, depth: float, margin: float, stop: Callable[[], bool], make: Maker, near: Climbed | None
+) -> Climbed:
+    begun = perf_counter()
+    finger = make(scene, Sizing(ROUGH, depth, margin=margin))
+    setup = perf_counter() - begun
+    shape = _on_rough(finger, scene, stop, near.shape if near is not None and near.finger is finger else None)
+    return Climbed(finger, shape, setup)
+
+
+def _plain(scene: Scene, sizing: Sizing, stop: Callable[[], bool], make: Maker) -> Climbed:
+    found = _on(scene, sizing, None, stop, make)
+    if sizing.margin < WIDER and found.finger.runs_out(found.shape):
+        return _on(scene, replace(sizing, margin=WIDER), None, stop, make)
+    return found
 
 
 def _on_rough(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: Shape | None) -> Shape:

@@ -1,8 +1,13 @@
 """Whether a deformed outline crosses itself, and how far its skin is squeezed."""
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.mesh import Array
+
+Flags = NDArray[np.bool_]
 
 
 def crosses_itself(outline: Array) -> bool:
@@ -22,10 +27,34 @@ def crosses_itself(outline: Array) -> bool:
     return bool(crossing.any()) and bool(np.triu(crossing, 2).any())
 
 
-def least_stretch(before: Array, after: Array) -> float:
-    """Return the least ratio of a piece's deformed to its undeformed length, for polylines (n, 2).
+class Pinch(NamedTuple):
+    """How far the skin is squeezed where it is, and whether it has a crease.
 
-    A neo-Hookean half-space in plane strain wrinkles at 0.544 (Biot 1963, Appl. Sci. Res. A 12, 168).
+    A neo-Hookean half-space in plane strain wrinkles at a stretch of 0.544 (Biot 1963, Appl. Sci. Res. A 12, 168).
     """
-    steps = [np.diff(points, axis=0) for points in (before, after)]
-    return float((np.hypot(steps[1][:, 0], steps[1][:, 1]) / np.hypot(steps[0][:, 0], steps[0][:, 1])).min())
+
+    least: float  # ratio of deformed to undeformed length of a half of an element's side
+    place: int  # the element that it belongs to
+    lowest: float  # stretch, at the ends of elements too: nearer the truth where elements are large
+    kink: float  # largest jump of the tangent, by undeformed length, from one element to the next: a crease has one
+
+
+def pinched(before: Array, after: Array, loose: Flags) -> Pinch:
+    """Return how far polylines of elements with three nodes each, (2 a + 1, 2), are squeezed where `loose` (a,)."""
+    start = [np.diff(points, axis=0)[::2] for points in (before, after)]
+    end = [np.diff(points, axis=0)[1::2] for points in (before, after)]
+    pieces = np.stack([_long(after) / _long(before) for before, after in (start, end)], axis=1)
+    sizes = [_long(3.0 * start[0] - end[0]), _long(3.0 * end[0] - start[0])]
+    first, last = (
+        (3.0 * a - b) / size[:, None] for a, b, size in zip((start[1], end[1]), (end[1], start[1]), sizes, strict=True)
+    )
+    pieces[~loose] = np.inf
+    joined = loose[1:] & loose[:-1]
+    jumps = _long(first[1:] - last[:-1])[joined]
+    lowest = min(float(_long(side)[loose].min(initial=np.inf)) for side in (first, last))
+    least, place = float(pieces.min()), int(pieces.min(axis=1).argmin())
+    return Pinch(least, place, min(lowest, least), float(jumps.max(initial=0.0)))
+
+
+def _long(steps: Array) -> Array:
+    return np.hypot(steps[:, 0], steps[:, 1])

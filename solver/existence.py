@@ -1,81 +1,107 @@
 """The settled sliding state where there is one, and where there is none, how far there would be."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
-from solver import kernels
+from solver import reach
 from solver.failures import NoSteadyState, NotConverged
+from solver.finite_finger import FiniteFinger
 from solver.kernels import CAP, OPEN
-from solver.limit import largest_depth, largest_friction, leapt
-from solver.mesh import Indices
-from solver.newton import Newton, Pull, Shape
+from solver.limit import CREASE, follow
+from solver.newton import BY_FRICTION, Newton, Pull, Shape
+from solver.reach import Reach, sound
 from solver.sliding import settled
 
-SQUEEZED = " It folds before its limit point, at one place, and on finer meshes with up to a tenth less friction."
-SOUND = 0.6  # least stretch of the skin that needs no proof: neo-Hookean surfaces fold from 0.544 on (Biot 1963)
+ALIKE = 0.1  # relative difference of SED and forces within which a state is that of another mesh
 
 
 def steady(
-    newton: Newton,
+    finger: FiniteFinger,
     pull: Pull,
-    outline: Indices,
     tolerance: float = 1e-10,
     start: Shape | None = None,
     stop: Callable[[], bool] = lambda: False,
-    *,
-    proven: bool = False,
 ) -> Shape:
     """Return the settled sliding state under `pull`, proven to lie on the branch that begins without friction.
 
-    A state whose skin is squeezed so far that it might have folded, or that was not found directly, is approached by
-    raising the friction coefficient along the branch. `outline` (o,) are the nodes of the whole skin in order; `start`
-    a state nearby; where that is `proven`, so is what it leads to without a leap. Raises NoSteadyState with both limits
-    where the branch ends before, NotConverged where it cannot be begun, Cancelled where `stop` says so.
+    A state, sought from `start` first, whose skin is squeezed so far that it might have folded, or that is not found
+    directly, is proven by following the branch on meshes made for it (`solver.reach`). Raises NoSteadyState with both
+    limits where the branch ends before, NotConverged where it cannot be begun, Cancelled where `stop` says so.
     """
-    for begin in dict.fromkeys((start, None)):  # where the nearby state leads nowhere, the undeformed one may
-        try:
-            shape = settled(newton, pull, begin, tolerance, stop)
-        except NotConverged:
-            continue
-        if sound(newton, shape, outline) or (proven and begin is not None and not leapt(newton, begin, shape, outline)):
+    found: list[Shape] = []
+    for shape in _tried(finger.newton, pull, tolerance, start, stop):
+        if sound(finger, shape):
             return shape
+        found.append(shape)
+    proof = reach.of_friction(finger.scene, pull, pull.mu, stop)
+    if proof.limited:
+        raise _refused(finger, pull, proof.value, stop)
+    for shape in found:
+        if _proven(finger, shape, proof):
+            return shape
+    begin = settled(finger.newton, pull._replace(mu=0.0), None, tolerance, stop)
+    branch = follow(finger, begin, BY_FRICTION, pull.mu, 0.0, stop)
+    if not branch.limited:
+        shape = settled(finger.newton, pull, branch.last, tolerance, stop)
+        if _proven(finger, shape, proof):
+            return shape
+    raise NotConverged(
+        f"At {pull.depth:.3g} mm of indentation and mu = {pull.mu:.3g} there is settled sliding, but near the limit of "
+        "friction, and this mesh does not find it"
+    )
+
+
+def _tried(
+    newton: Newton, pull: Pull, tolerance: float, start: Shape | None, stop: Callable[[], bool]
+) -> Iterator[Shape]:
+    """Yield the states found directly: from `start`, from undeformed, and from all skin slipping at the bound."""
+    for begin in dict.fromkeys((start, None)):
+        with suppress(NotConverged):
+            yield settled(newton, pull, begin, tolerance, stop)
     if pull.tau < np.inf:
         with suppress(NotConverged):
-            shape = _all_at_the_bound(newton, pull, tolerance, stop)
-            if sound(newton, shape, outline):
-                return shape
-    branch = largest_friction(newton, pull, outline, pull.mu, stop)
-    if not branch.limited:
-        return settled(newton, pull, branch.last, tolerance, stop)
+            yield _all_at_the_bound(newton, pull, tolerance, stop)
+
+
+def doubts(finger: FiniteFinger, shape: Shape, stop: Callable[[], bool] = lambda: False) -> tuple[str, ...]:
+    """Return the sentence that a settled slide needs whose friction is as large as may be, or none."""
+    if shape.pull.sense == 0 or sound(finger, shape):
+        return ()
+    proof = reach.of_friction(finger.scene, shape.pull, shape.pull.mu, stop)
+    if not proof.near:
+        return ()
+    return (
+        f"The skin is squeezed to {100 * proof.least:.0f} % of its length at one place and folds at "
+        f"{100 * proof.folds:.0f} %: this is within some 2 % of the largest friction with settled sliding, which is "
+        "known as well.",
+    )
+
+
+def _refused(finger: FiniteFinger, pull: Pull, largest: float, stop: Callable[[], bool]) -> NoSteadyState:
     depth = None
-    try:
-        deepest = largest_depth(newton, pull, outline, stop)
-    except NotConverged:
-        beyond = ""
-    else:
-        depth = deepest.value
-        beyond = f", and with this friction up to {depth:.3g} mm"
-    raise NoSteadyState(
-        f"At {pull.depth:.3g} mm of indentation there is settled sliding up to mu = {branch.value:.3g}{beyond}, but "
+    beyond = ""
+    with suppress(NotConverged):
+        deepest = reach.of_depth(finger.scene, pull, stop)
+        if deepest.limited:
+            depth = deepest.value
+            beyond = f", and with this friction up to {depth:.3g} mm"
+    return NoSteadyState(
+        f"At {pull.depth:.3g} mm of indentation there is settled sliding up to mu = {largest:.3g}{beyond}, but "
         f"not at mu = {pull.mu:.3g}: the skin behind the contact folds; ask for less depth, less friction or small "
-        f"strain.{SQUEEZED if branch.squeezed else ''}",
-        limit_mu=branch.value,
+        "strain.",
+        limit_mu=largest,
         limit_indentation=depth,
     )
 
 
-def doubts(newton: Newton, shape: Shape, outline: Indices) -> tuple[str, ...]:
-    """Return the sentence that a state needs whose skin is squeezed nearly as far as surfaces fold, or none."""
-    least = kernels.squeezed(newton.body.mesh.nodes, shape.u, outline)
-    if least >= SOUND:
-        return ()
-    return (
-        f"The skin is squeezed to {100 * least:.0f} % of its length at one place, where neo-Hookean surfaces fold from "
-        "54 % on: whether there is settled sliding here depends on the mesh, within a tenth of the friction.",
-    )
+def _proven(finger: FiniteFinger, shape: Shape, proof: Reach) -> bool:
+    """Return whether a state is the one that was reached along the branch on another mesh, and not a folded one."""
+    if finger.pinch(shape).kink > CREASE or finger.crosses(shape):
+        return False
+    return bool(np.all(np.abs(finger.numbers(shape) - proof.numbers) <= ALIKE * np.abs(proof.numbers)))
 
 
 def _all_at_the_bound(newton: Newton, pull: Pull, tolerance: float, stop: Callable[[], bool]) -> Shape:
@@ -87,9 +113,3 @@ def _all_at_the_bound(newton: Newton, pull: Pull, tolerance: float, stop: Callab
     bare = settled(newton, pull._replace(mu=0.0), None, tolerance, stop)
     state = np.where(bare.touching, CAP, OPEN).astype(bare.state.dtype)
     return settled(newton, pull, replace(bare, state=state, pull=pull), tolerance, stop)
-
-
-def sound(newton: Newton, shape: Shape, outline: Indices) -> bool:
-    """Return whether the skin is nowhere squeezed so far that it may have folded, and does not cross itself."""
-    nodes = newton.body.mesh.nodes
-    return kernels.squeezed(nodes, shape.u, outline) >= SOUND and not kernels.crosses(nodes, shape.u, outline)

@@ -7,7 +7,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.linalg import LinAlgError
 
+from solver import kernels
 from solver.carrying import Bridge, Places
+from solver.crossing import Pinch
 from solver.edges import edges, width
 from solver.finite_body import FiniteBody, FiniteProbes
 from solver.grid import MeshError
@@ -16,7 +18,7 @@ from solver.mesh import Array
 from solver.mesher import FingerMesh, Sizing, finger_mesh
 from solver.newton import Newton, Shape
 from solver.receptor import ROW, endings, middle
-from solver.scene import Receptor, Scene, SceneError
+from solver.scene import Scene, SceneError
 from solver.tissues import finite_laws
 
 RUBS = 1e-3  # drag by normal force from which a traction bound matters
@@ -26,7 +28,7 @@ RUBS = 1e-3  # drag by normal force from which a traction bound matters
 class FiniteFinger:
     """A finger on one mesh, ready for any surface."""
 
-    receptor: Receptor
+    scene: Scene  # whose finger it is; its friction and load may be those of another surface
     geometry: FingerMesh
     newton: Newton
     ending: FiniteProbes  # the reference ending alone
@@ -48,19 +50,19 @@ class FiniteFinger:
         body = FiniteBody.of(geometry.mesh, finite_laws(scene.materials), checked=True)
         at_touch = FiniteProbes.of(body, endings(geometry, body, scene.receptor, np.zeros(1)))
         newton = Newton(body, None if beside is None else beside.newton)
-        return FiniteFinger(scene.receptor, geometry, newton, at_touch)
+        return FiniteFinger(scene, geometry, newton, at_touch)
 
     @cached_property
     def point(self) -> FiniteProbes:
         """The middle of the reference ending."""
         body = self.newton.body
-        return FiniteProbes.of(body, middle(self.geometry, body, self.receptor))
+        return FiniteProbes.of(body, middle(self.geometry, body, self.scene.receptor))
 
     @cached_property
     def row(self) -> FiniteProbes:
         """The row of receptors."""
         body = self.newton.body
-        return FiniteProbes.of(body, endings(self.geometry, body, self.receptor, ROW))
+        return FiniteProbes.of(body, endings(self.geometry, body, self.scene.receptor, ROW))
 
     def sed_ending(self, shape: Shape) -> float:
         """Return the SED averaged over the reference ending [MPa]."""
@@ -99,6 +101,19 @@ class FiniteFinger:
     def places(self) -> Places:
         """Where nodes and quadrature points lie, for states that are carried."""
         return Places.of(self.geometry, self.newton.body)
+
+    def runs_out(self, shape: Shape) -> bool:
+        """Return whether contact reaches an end of the skin that is looked at."""
+        return bool(shape.touching[[0, -1]].any())
+
+    def pinch(self, shape: Shape) -> Pinch:
+        """Return how far the skin is squeezed, and whether it has a crease."""
+        geometry = self.geometry
+        return Pinch(*kernels.pinched(geometry.mesh.nodes, shape.u, geometry.whole, geometry.loose))
+
+    def crosses(self, shape: Shape) -> bool:
+        """Return whether the skin crosses itself."""
+        return kernels.crosses(self.geometry.mesh.nodes, shape.u, self.geometry.whole)
 
     def edges(self, shape: Shape) -> tuple[float, float] | None:
         """Return the arc positions [mm] where contact ends; None where it is too short to tell."""

@@ -161,7 +161,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         geometry=finger.geometry,
         displacement=shape.u,
         history=_history(scene, finger, way, relaxing, times) if way else None,
-        warnings=(*evidence.warnings(driven, model["left_out"]), *doubts(newton, shape, finger.geometry.whole)),
+        warnings=(*evidence.warnings(driven, model["left_out"]), *doubts(finger, shape, stop)),
     )
 
 

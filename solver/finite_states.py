@@ -11,7 +11,6 @@ from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_fr
 from solver.finite_finger import FiniteFinger
 from solver.finite_forced import Given
 from solver.kernels import STICK
-from solver.limit import leapt
 from solver.march import march
 from solver.newton import Pull, Shape
 from solver.scene import Scene
@@ -40,7 +39,7 @@ def settled(
         return _settled_under(finger, scene, scene.normal_force, stop, start, times)
     if scene.loading.direction == 0 and scene.friction.mu > 0.0:
         return course(scene, finger, stop, times)[-1]
-    return steady(finger.newton, _pull_sliding(scene), finger.geometry.whole, start=start, stop=stop, proven=True)
+    return steady(finger, _pull_sliding(scene), start=start, stop=stop)
 
 
 def roughly(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: Shape | None = None) -> Shape:
@@ -107,15 +106,14 @@ def _sliding_under(
     finger: FiniteFinger, scene: Scene, force: float, stop: Callable[[], bool], start: Shape | None
 ) -> Shape:
     """Return settled sliding under the normal force of a scene, from `start` or reached as the force grows."""
-    newton, outline = finger.newton, finger.geometry.whole
+    newton = finger.newton
     sense = -(scene.loading.direction or 1)
     if start is not None:
         try:
             pull = start.pull._replace(mu=float(scene.friction.mu), tau=scene.friction.cap, sense=sense)
             near = replace(start, pull=pull)
             shape = finite_forced.balanced(newton, near, Given(force, None))
-            stays = not leapt(newton, start, shape, outline)
-            return steady(newton, shape.pull, outline, start=shape, stop=stop, proven=stays)
+            return steady(finger, shape.pull, start=shape, stop=stop)
         except NotConverged:
             pass
     begin = finite_forced.untouched(newton, float(scene.friction.mu), scene.friction.cap)
@@ -126,23 +124,22 @@ def _sliding_under(
             shape = reached
     except NotConverged:
         return _deeper(finger, shape, force, stop)
-    return steady(newton, shape.pull, outline, start=shape, stop=stop)
+    return steady(finger, shape.pull, start=shape, stop=stop)
 
 
 def _deeper(finger: FiniteFinger, shape: Shape, force: float, stop: Callable[[], bool]) -> Shape:
     """Return settled sliding under `force` [N/mm], looked for by depth from `shape` on. Raises as `settled`."""
-    newton, outline = finger.newton, finger.geometry.whole
     step = 0.1 * max(shape.pull.depth, 0.1)
     low = shape
     for _ in range(SEARCHES):  # deeper until it presses as hard
         begin = low if low.touching.any() else None
         try:
-            high = steady(newton, low.pull._replace(depth=low.pull.depth + step), outline, start=begin, stop=stop)
+            high = steady(finger, low.pull._replace(depth=low.pull.depth + step), start=begin, stop=stop)
         except NoSteadyState as failure:  # but shortly before that it may press as hard
             last = BEFORE_LIMIT * (failure.limit_indentation or 0.0)
             if last <= low.pull.depth:
                 raise
-            high = steady(newton, low.pull._replace(depth=last), outline, start=begin, stop=stop)
+            high = steady(finger, low.pull._replace(depth=last), start=begin, stop=stop)
             if high.force[1] < force:
                 raise
         if high.force[1] >= force:
@@ -153,7 +150,7 @@ def _deeper(finger: FiniteFinger, shape: Shape, force: float, stop: Callable[[],
     for _ in range(SEARCHES):  # regula falsi, held inside by bisection
         part = (force - low.force[1]) / (high.force[1] - low.force[1])
         depth = low.pull.depth + float(np.clip(part, 0.05, 0.95)) * (high.pull.depth - low.pull.depth)
-        found = steady(newton, low.pull._replace(depth=depth), outline, start=high, stop=stop)
+        found = steady(finger, low.pull._replace(depth=depth), start=high, stop=stop)
         if abs(found.force[1] / force - 1.0) < MET or high.pull.depth - low.pull.depth < 1e-12:
             return found
         low, high = (low, found) if found.force[1] > force else (found, high)

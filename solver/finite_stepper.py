@@ -10,10 +10,10 @@ from math import isfinite
 
 import numpy as np
 
-from solver import kernels
 from solver.finite_finger import FiniteFinger
 from solver.finite_forced import Given, corrected
 from solver.kernels import OPEN, SLIP, STICK
+from solver.limit import CREASE
 from solver.mesh import Array
 from solver.newton import Pull, Shape
 
@@ -99,12 +99,17 @@ class FiniteStepper:
             if done is None or done[1] > FURTHEST or done[0].state[0] != OPEN or done[0].state[-1] != OPEN:
                 return self._lose(normal)
             shape = done[0]
-        if kernels.squeezed(newton.body.mesh.nodes, shape.u, self._finger.geometry.whole) < FOLDING:
+        pinch = self._finger.pinch(shape)
+        if pinch.least < FOLDING:
             return self._lose(normal)
         self.shape = shape
         x, y = shape.force
         behind = max(abs(y - normal), abs(x - pull_back) if (shape.state == STICK).any() else 0.0)
-        return self._finger.sed_ending(shape) if behind <= MET * normal else float("nan")
+        if behind > MET * normal:
+            return float("nan")
+        if pinch.lowest < FOLDING or pinch.kink > CREASE:
+            return self._lose(normal)
+        return self._finger.sed_ending(shape)
 
     def _lose(self, normal: float) -> float:
         self.forget()

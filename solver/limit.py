@@ -1,8 +1,9 @@
-"""How far settled sliding exists: the branch of sliding states followed by its arc length to its limit point.
+"""A branch of settled sliding states, followed by its arc length to where it ends.
 
 Pressed hard and dragged against its tip, the skin behind the contact folds: the friction coefficient (or the depth)
-passes a maximum along the branch, and beyond it there is no settled state. Riks 1979, Int. J. Solids Struct. 15, 529;
-Crisfield 1981, Comput. Struct. 13, 55, with the plane of Riks.
+passes a maximum along the branch, or the skin is squeezed at one place until its surface loses stability
+(`solver.folding`); beyond, there is no settled state. Riks 1979, Int. J. Solids Struct. 15, 529; Crisfield 1981,
+Comput. Struct. 13, 55, with the plane of Riks.
 """
 
 from collections.abc import Callable
@@ -10,105 +11,112 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.crossing import crosses_itself, least_stretch
-from solver.failures import Cancelled, NotConverged
-from solver.mesh import Array, Indices
-from solver.newton import BY_DEPTH, BY_FRICTION, EQUILIBRIUM, Newton, Pull, Shape
-from solver.sliding import settled
+from solver.crossing import Pinch
+from solver.failures import Cancelled
+from solver.finite_finger import FiniteFinger
+from solver.mesh import Array
+from solver.newton import BY_FRICTION, EQUILIBRIUM, Newton, Pull, Shape
 
 LARGEST_MU = 2.0  # beyond this a coefficient of friction is not looked for
 TOLERANCE = 1e-6  # of a point on the branch [mm]
+FIRST, SHORTEST = 0.1, 1e-3  # steps along the branch, by what is looked through
+MOST = 400  # of them
 TURN = 0.7  # least cosine between the directions of the branch and of a step along it
 SQUEEZE = 0.85  # least ratio of the skin's least stretches at neighbouring points: a leap to a folded branch has less
-STEEP = 0.1  # least part of the value in the branch's direction, at an end that is no limit point
-FOLDED = 0.5  # and least stretch there may be: surfaces fold at 0.544 (Biot 1963); beyond, the mesh decides
+CREASE = 0.6  # kink from which skin has a crease: coarse meshes of smooth skin have 0.3, creases 1 and more
+APART = 0.04  # of the skin's least stretches at two points between which the stretch that folds is met
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Branch:
     """A branch of settled sliding states."""
 
-    last: Shape  # the state at the value asked for, or the last one before the limit
-    value: float  # of the coefficient or the depth [mm] there: the largest one met
+    states: tuple[Shape, ...]  # on the way, that at the value asked for or the last one before the limit being last
+    value: float  # of the coefficient or the depth [mm] at its end: the largest one met
     limited: bool  # whether the branch ends there, short of what was asked for
-    squeezed: bool = False  # whether it ends for the skin's squeeze alone, far from a limit point: as the mesh has it
+
+    @property
+    def last(self) -> Shape:
+        """The last state."""
+        return self.states[-1]
 
 
 def follow(
-    newton: Newton,
+    finger: FiniteFinger,
     start: Shape,
     by: int,
     target: float,
-    outline: Indices,
+    folds: float,
     stop: Callable[[], bool] = lambda: False,
 ) -> Branch:
     """Follow the branch from `start` until the friction coefficient (BY_FRICTION) or depth (BY_DEPTH) reaches `target`.
 
-    `outline` (o,) are the nodes of the whole skin in order, which must not cross itself. Raises Cancelled where `stop`
-    says so.
+    It ends where its value passes a maximum, or where the skin is squeezed to `folds` of its length. Raises Cancelled
+    where `stop` says so.
     """
-    shape, previous = start, None
-    value = _value(start.pull, by)
-    reach = min(abs(target - value), LARGEST_MU)
-    length = 0.1 * reach
-    largest, best = value, start
-    for _ in range(400):
+    way = [_Point(start, finger.pinch(start), value_of(start.pull, by))]
+    best = 0  # of them, by value
+    reach = min(abs(target - way[0].value), LARGEST_MU)
+    length = FIRST * reach
+    direction, rate = _tangent(finger.newton, start, by)
+    for _ in range(MOST):
         if stop():
             raise Cancelled
-        direction, rate = _tangent(newton, shape, by)
-        if previous is not None and direction @ previous[0] + rate * previous[1] < 0.0:
-            direction, rate = -direction, -rate
-        if previous is not None and rate <= 0.0:
-            return Branch(best, largest, limited=True)
-        while True:
-            found = _next(newton, shape, by, direction, rate, length, target)
-            if found is not None and not leapt(newton, shape, found, outline):
-                break
-            length /= 2.0
-            if length < 1e-4 * reach:
-                return Branch(best, largest, limited=True, squeezed=rate > STEEP)
-        easy = found.iterations - shape.iterations <= 5
-        previous, shape = (direction, rate), found
-        value = _value(shape.pull, by)
-        if value > largest:
-            largest, best = value, shape
-        if value >= target * (1.0 - 1e-12):
-            return Branch(shape, value, limited=False)
+        step = _further(finger, way[-1], by, direction, rate, length, target, SHORTEST * reach)
+        if step is None:
+            break
+        point, length = step
+        if point.pinch.least < folds:
+            last = way[-1]
+            part = min(max((last.pinch.least - folds) / (last.pinch.least - point.pinch.least), 0.0), 1.0)
+            value = max(way[best].value, last.value + part * (point.value - last.value))
+            return Branch(tuple(point.shape for point in way[: best + 1]), value, limited=True)
+        easy = point.shape.iterations - way[-1].shape.iterations <= 5
+        way.append(point)
+        if point.value > way[best].value:
+            best = len(way) - 1
+        if point.value >= target * (1.0 - 1e-12):
+            return Branch(tuple(point.shape for point in way), point.value, limited=False)
         length *= 1.5 if easy else 1.0
-    return Branch(best, largest, limited=True)
+        before = direction, rate
+        direction, rate = _tangent(finger.newton, point.shape, by)
+        if direction @ before[0] + rate * before[1] < 0.0:
+            direction, rate = -direction, -rate
+        if rate <= 0.0:
+            break
+    return Branch(tuple(point.shape for point in way[: best + 1]), way[best].value, limited=True)
 
 
-def largest_friction(
-    newton: Newton,
-    pull: Pull,
-    outline: Indices,
-    target: float | None = None,
-    stop: Callable[[], bool] = lambda: False,
-) -> Branch:
-    """Follow settled sliding at the depth and bound of `pull` from mu = 0 to `target`, LARGEST_MU where there is none.
-
-    Raises NotConverged where not even the frictionless state is found.
-    """
-    start = settled(newton, pull._replace(mu=0.0), None, TOLERANCE, stop)
-    return follow(newton, start, BY_FRICTION, LARGEST_MU if target is None else target, outline, stop)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Point:
+    shape: Shape
+    pinch: Pinch
+    value: float
 
 
-def largest_depth(newton: Newton, pull: Pull, outline: Indices, stop: Callable[[], bool] = lambda: False) -> Branch:
-    """Follow settled sliding at the friction of `pull` from a small depth to the depth of `pull`.
+def _further(
+    finger: FiniteFinger,
+    last: _Point,
+    by: int,
+    direction: Array,
+    rate: float,
+    length: float,
+    target: float,
+    shortest: float,
+) -> tuple[_Point, float] | None:
+    """Return the next point of the branch and how long the step was that led to it; None where no step does."""
+    while length >= shortest:
+        found = _next(finger.newton, last.shape, by, direction, rate, length, target)
+        if found is not None:
+            pinch = finger.pinch(found)
+            if pinch.least >= last.pinch.least - APART and not _leapt(finger, last.pinch, found, pinch):
+                return _Point(found, pinch, value_of(found.pull, by)), length
+        length /= 2.0
+    return None
 
-    Raises NotConverged where there is none even at a hundredth of that depth.
-    """
-    for part in (0.3, 0.1, 0.03, 0.01):
-        try:
-            start = settled(newton, pull._replace(depth=part * pull.depth), None, TOLERANCE, stop)
-        except NotConverged:
-            continue
-        if not _crossed(newton, start, outline):
-            return follow(newton, start, BY_DEPTH, pull.depth, outline, stop)
-    raise NotConverged(f"no sliding state was found at mu = {pull.mu:.3g} even at {0.01 * pull.depth:.3g} mm")
 
-
-def _value(pull: Pull, by: int) -> float:
+def value_of(pull: Pull, by: int) -> float:
+    """Return the coefficient of friction or the depth [mm]."""
     return pull.mu if by == BY_FRICTION else pull.depth
 
 
@@ -116,15 +124,9 @@ def _with(pull: Pull, by: int, value: float) -> Pull:
     return pull._replace(mu=value) if by == BY_FRICTION else pull._replace(depth=value)
 
 
-def _crossed(newton: Newton, shape: Shape, outline: Indices) -> bool:
-    return crosses_itself(newton.body.mesh.nodes[outline] + shape.u[outline])
-
-
-def leapt(newton: Newton, before: Shape, after: Shape, outline: Indices) -> bool:
+def _leapt(finger: FiniteFinger, before: Pinch, shape: Shape, after: Pinch) -> bool:
     """Return whether a step went to another branch, where the skin is folded."""
-    nodes = newton.body.mesh.nodes[outline]
-    squeezed = [least_stretch(nodes, nodes + shape.u[outline]) for shape in (before, after)]
-    return squeezed[1] < max(SQUEEZE * squeezed[0], FOLDED) or _crossed(newton, after, outline)
+    return after.least < SQUEEZE * before.least or after.kink > CREASE or finger.crosses(shape)
 
 
 def _tangent(newton: Newton, shape: Shape, by: int) -> tuple[Array, float]:
@@ -140,7 +142,7 @@ def _next(
 ) -> Shape | None:
     """Return the state `length` further along the branch, or at `target` where that is nearer; None where not found."""
     root = np.sqrt(len(newton.steps))
-    value = _value(start.pull, by)
+    value = value_of(start.pull, by)
     to_target = rate * length >= target - value
     shape, pull = start, start.pull
     gone = np.zeros(len(newton.steps))
@@ -148,7 +150,7 @@ def _next(
         if not newton.linearise(shape, pull, newton.skin_x):
             return None
         to, along = newton.steps[:, EQUILIBRIUM] / root, newton.steps[:, by] / root
-        now = _value(pull, by)
+        now = value_of(pull, by)
         if to_target:
             change = target - now
         else:
@@ -163,7 +165,7 @@ def _next(
         if not largest < 10.0:
             return None
         if largest < TOLERANCE and not changed:
-            way = np.sqrt(gone @ gone + (_value(pull, by) - value) ** 2)
-            straight = direction @ gone + rate * (_value(pull, by) - value)
+            way = np.sqrt(gone @ gone + (value_of(pull, by) - value) ** 2)
+            straight = direction @ gone + rate * (value_of(pull, by) - value)
             return shape if straight > TURN * way else None
     return None

@@ -6,6 +6,7 @@ from itertools import pairwise
 from math import ceil
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.grid import grid_mesh
 from solver.mesh import Array, Indices, Mesh
@@ -27,6 +28,11 @@ ENDING, FROM_ENDING = 0.7, 3.0  # the same for the ending
 GROWTH = 0.2  # of elements smaller than that, at the surface, with the depth below it [-]
 SHORT = (0.56, 0.4)  # half contacts shorter than that, by tip radius, have smaller elements: overlaps, known contacts
 NEAR = 0.15  # a line nearer to another, by the element's size, is left out
+BEYOND = 0.1  # skin beyond known edges that is looked at for contact, by its width
+FOLD = (0.015, 0.1)  # where the skin folds: of the tip radius, and of the epidermis if that is less
+AROUND, FROM_FOLD = 4.0, 0.5  # so many of these elements to each side are as small; growth from there [-]
+THIN = 2.0 / 3.0  # across the skin there, by that along it
+APART = 0.1  # skin nearer to where it is held is squeezed without bound, by tip radius
 FINEST = 1e-3  # smallest element by tip radius: thinner ones across the whole finger would drown in round-off [-]
 
 
@@ -49,6 +55,7 @@ class Sizing:
     margin: float = 1.0  # contact is looked for where undeformed skin lies lower than (1 + margin/4) indentation
     edges: tuple[float, float] | None = None  # arc positions where contact ends, where they are known: lines lie there
     sharing: Sharing | None = None  # with the meshes of other surfaces
+    fold: float | None = None  # arc position where the skin is squeezed most, where it is to be seen folding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,6 +68,7 @@ class FingerMesh:
     depths: Array  # (b + 1,) depths of the lines between the elements of the skin, outermost last; bone not included
     fat: int  # elements below the dermis: of the fat, and of the bone where it is meshed
     whole: Indices  # (2 a + 1,) nodes of all the skin, those that may touch and those that may not
+    loose: NDArray[np.bool_]  # (a,) elements along the skin that are not near where it is held
 
 
 def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMesh:
@@ -75,7 +83,7 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     fine = _fine(outline, sizing)
     row = _Row.of(outline, fine, receptor, sizing)
     arcs = row.lines(row.gaps() if sizing.sharing is None else sizing.sharing.gaps, shift=sizing.shift)
-    lines, fat = _layers(finger, fine, size, receptor)
+    lines, fat = _layers(finger, fine, size, receptor, np.inf if sizing.fold is None else THIN * _fold(finger))
     every_arc = with_middles(arcs)
     depths = with_middles(lines)
     core = outline.tissue(every_arc, np.asarray(lines[0]))[:, None]
@@ -94,15 +102,30 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     long, wide = points.shape[0], points.shape[1]
     number: Indices = np.arange(long * wide, dtype=np.int64).reshape(long, wide)
     held = [number[:, 0]]
+    loose = np.ones(len(arcs) - 1, bool)
     if finger.cut == "driven":
         held += [number[0], number[-1]]
         low, high = max(low, 1), min(high, len(arcs) - 2)
+        loose &= _far(arcs, outline.palmar_cut, outline.palmar_cut, finger)
+        loose &= _far(arcs, outline.dorsal_cut, outline.dorsal_cut, finger)
     if finger.nail_length > 0.0:
         nail = np.flatnonzero((every_arc >= outline.dorsal - 1e-9) & (every_arc <= outline.nail_end + 1e-9))
         held.append(number[nail, -1])
         high = min(high, int(nail[0]) // 2 - 1)
+        loose &= _far(arcs, outline.dorsal, outline.nail_end, finger)
     mesh = grid_mesh(points, layers, slice(2 * low, 2 * high + 1), np.unique(np.concatenate(held)))
-    return FingerMesh(mesh, outline, arcs, lines, below, number[:, -1].copy())
+    return FingerMesh(mesh, outline, arcs, lines, below, number[:, -1].copy(), loose)
+
+
+def _far(arcs: Array, start: float, stop: float, finger: Finger) -> NDArray[np.bool_]:
+    """Return which elements (a,) between the lines at `arcs` lie apart from skin held between `start` and `stop`."""
+    apart = APART * finger.tip_radius
+    return (arcs[1:] < start - apart) | (arcs[:-1] > stop + apart)
+
+
+def _fold(finger: Finger) -> float:
+    """Return the size along the skin of elements where it folds [mm]."""
+    return max(min(FOLD[0] * finger.tip_radius, FOLD[1] * finger.epidermis), 2.0 * FINEST * finger.tip_radius)
 
 
 def _lower_than(outline: Outline, height: float) -> tuple[float, float]:
@@ -117,9 +140,12 @@ def _lower_than(outline: Outline, height: float) -> tuple[float, float]:
 
 def _touchable(outline: Outline, arcs: Array, sizing: Sizing) -> tuple[int, int]:
     """Return the first and last of the lines at `arcs` between which the skin may touch."""
-    touching = _lower_than(outline, sizing.indentation * (1.0 + 0.25 * sizing.margin))
-    low = max(int(np.searchsorted(arcs, touching[0])) - 1, 0)
-    return low, min(int(np.searchsorted(arcs, touching[1])), len(arcs) - 1)
+    first, last = _lower_than(outline, sizing.indentation * (1.0 + 0.25 * sizing.margin))
+    if sizing.edges is not None:  # contact that friction turns round the tip may end higher up
+        beyond = BEYOND * (sizing.edges[1] - sizing.edges[0])
+        first, last = min(first, sizing.edges[0] - beyond), max(last, sizing.edges[1] + beyond)
+    low = max(int(np.searchsorted(arcs, first)) - 1, 0)
+    return low, min(int(np.searchsorted(arcs, last)), len(arcs) - 1)
 
 
 def _fine(outline: Outline, sizing: Sizing) -> float:
@@ -175,11 +201,19 @@ class _Row:
         scale = 1.0 / sizing.fineness
         away = np.concatenate([[0.0], np.geomspace(1e-9, 1.0, 1000)])
         palmar, dorsal = low + (outline.palmar_cut - low) * away, high + (outline.dorsal_cut - high) * away
-        arc = np.unique(np.concatenate([palmar, np.linspace(low, high, 1000), dorsal]))
+        arc = np.concatenate([palmar, np.linspace(low, high, 1000), dorsal])
+        if sizing.fold is not None:
+            near = sizing.fold + np.linspace(-1.0, 1.0, 2001) * outline.finger.tip_radius
+            arc = np.concatenate([arc, near[(near > outline.palmar_cut) & (near < outline.dorsal_cut)]])
+        arc = np.unique(arc)
         asked = fine + scale * (AWAY[0] * np.maximum(low - arc, 0.0) + AWAY[1] * np.maximum(arc - high, 0.0))
         if sizing.edges is not None:
             inside = np.maximum(np.minimum(arc - low, high - arc), 0.0)
             asked += np.minimum(scale * TOWARDS * inside, (MIDDLE / EDGE - 1.0) * fine)
+        if sizing.fold is not None:
+            least = _fold(outline.finger)
+            from_fold = np.maximum(np.abs(arc - sizing.fold) - AROUND * least, 0.0)
+            asked = np.minimum(asked, least + FROM_FOLD * from_fold)
         half = receptor.ending[1] / 2.0
         frame = outline.along(0.0, receptor.depth, np.array([-half, half])).tolist()
         ends = [outline.palmar_cut, outline.palmar, *frame, outline.dorsal, outline.dorsal_cut]
@@ -267,8 +301,11 @@ def still_sharing(finger: Finger, receptor: Receptor, sizing: Sizing, before: Si
     return kept if (one.edges, len(one.ends)) == (other.edges, len(other.ends)) else sizing
 
 
-def _layers(finger: Finger, fine: float, size: float, receptor: Receptor) -> tuple[Array, Array]:
-    """Return the depths of the lines in the skin, from the fat outwards, and those in the fat from 0 (bone) to 1."""
+def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: float) -> tuple[Array, Array]:
+    """Return the depths of the lines in the skin, from the fat outwards, and those in the fat from 0 (bone) to 1.
+
+    Elements at the surface are no taller than `thin` [mm].
+    """
     skin = finger.epidermis + finger.dermis
     thick = finger.pulp_thickness() - skin
     depth = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 1000)]) * (skin + thick)
@@ -276,6 +313,7 @@ def _layers(finger: Finger, fine: float, size: float, receptor: Receptor) -> tup
     of_bone = AT_BONE + FROM_BONE * (skin + thick - depth) / finger.tip_radius
     of_ending = ENDING + FROM_ENDING * np.abs(depth - receptor.depth) / finger.tip_radius
     asked = np.minimum(size * np.minimum(BULK, np.minimum(of_bone, of_ending)), TALL * (fine + GROWTH * depth))
+    asked = np.minimum(asked, thin + FROM_FOLD * depth)
     half = receptor.ending[0] / 2.0
     ends = _distinct(0.0, finger.epidermis, skin, skin + thick, receptor.depth - half, receptor.depth + half)
     # one element between epidermis and ending would be too stiff in shear whatever its size

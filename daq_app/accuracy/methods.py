@@ -186,8 +186,7 @@ class FiniteMeshed:
 
     def solve(self, scene: Scene, before: State | None = None) -> State:
         """Return the settled shape, from `before` where it is given."""
-        newton, outline = self.finger.newton, self.finger.geometry.whole
-        return steady(newton, pull_of(scene), outline, start=before)
+        return steady(self.finger, pull_of(scene), start=before)
 
     def share(self, scenes: Sequence[Scene]) -> None:
         """Do nothing: all surfaces share one mesh."""

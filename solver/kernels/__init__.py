@@ -8,7 +8,7 @@ from solver.kernels.carrying import carry
 from solver.kernels.compiling import CAP, OPEN, SLIP, STICK
 from solver.kernels.elements import advance, assemble, energies, forces
 from solver.kernels.fronts import condense, eliminate, unfold
-from solver.kernels.outline import crosses, squeezed
+from solver.kernels.outline import crosses, pinched
 from solver.kernels.overstress import add_overstress
 from solver.kernels.skin import impose, restate, settle, solve, tributary
 
@@ -27,10 +27,10 @@ __all__ = [
     "energies",
     "forces",
     "impose",
+    "pinched",
     "restate",
     "settle",
     "solve",
-    "squeezed",
     "tributary",
     "unfold",
 ]

@@ -2,22 +2,38 @@
 
 import numpy as np
 
-from solver.kernels.compiling import Array, Wide, compiled
+from solver.kernels.compiling import Array, Flags, Wide, compiled
 
 
 @compiled
-def squeezed(nodes: Array, u: Array, outline: Wide) -> float:
-    """Return the least ratio of deformed to undeformed length of the pieces between the nodes of `outline` (o,).
+def pinched(nodes: Array, u: Array, outline: Wide, loose: Flags) -> tuple[float, int, float, float]:
+    """Return how far the skin is squeezed where its elements are `loose` (a,), as `solver.crossing.pinched` has it.
 
-    `nodes` (n, 2) undeformed, `u` (n, 2) displacements.
+    `nodes` (n, 2) undeformed, `u` (n, 2) displacements, `outline` (2 a + 1,) the nodes of the skin in order.
     """
-    least = np.inf
-    for i in range(outline.shape[0] - 1):
-        a, b = outline[i], outline[i + 1]
-        x, y = nodes[b, 0] - nodes[a, 0], nodes[b, 1] - nodes[a, 1]
-        moved_x, moved_y = x + u[b, 0] - u[a, 0], y + u[b, 1] - u[a, 1]
-        least = min(least, np.sqrt((moved_x * moved_x + moved_y * moved_y) / (x * x + y * y)))
-    return least
+    least, place, lowest, kink = np.inf, 0, np.inf, 0.0
+    before_x, before_y = np.nan, np.nan  # tangent at the end of the element before
+    for j in range(loose.shape[0]):
+        if not loose[j]:
+            before_x, before_y = np.nan, np.nan
+            continue
+        a, b, c = outline[2 * j], outline[2 * j + 1], outline[2 * j + 2]
+        px, py = nodes[b, 0] - nodes[a, 0], nodes[b, 1] - nodes[a, 1]
+        qx, qy = nodes[c, 0] - nodes[b, 0], nodes[c, 1] - nodes[b, 1]
+        dx, dy = px + u[b, 0] - u[a, 0], py + u[b, 1] - u[a, 1]
+        ex, ey = qx + u[c, 0] - u[b, 0], qy + u[c, 1] - u[b, 1]
+        one = np.sqrt((dx * dx + dy * dy) / (px * px + py * py))
+        other = np.sqrt((ex * ex + ey * ey) / (qx * qx + qy * qy))
+        if min(one, other) < least:
+            least, place = min(one, other), j
+        size = np.hypot(3.0 * px - qx, 3.0 * py - qy)
+        x, y = (3.0 * dx - ex) / size, (3.0 * dy - ey) / size
+        if before_x == before_x:  # is a number
+            kink = max(kink, np.hypot(x - before_x, y - before_y))
+        size = np.hypot(3.0 * qx - px, 3.0 * qy - py)
+        before_x, before_y = (3.0 * ex - dx) / size, (3.0 * ey - dy) / size
+        lowest = min(lowest, np.hypot(x, y), np.hypot(before_x, before_y))
+    return least, place, min(lowest, least), kink
 
 
 @compiled

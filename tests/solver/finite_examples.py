@@ -5,13 +5,14 @@ from functools import cache
 import numpy as np
 
 from solver.finite_body import FiniteBody, FiniteProbes
+from solver.finite_finger import FiniteFinger
 from solver.hyperelastic import NeoHooke
 from solver.materials import Hooke
 from solver.mesh import Mesh
 from solver.mesher import Sizing, finger_mesh
 from solver.newton import Newton
 from solver.receptor import endings
-from solver.scene import Finger, Materials, Receptor
+from solver.scene import Finger, Friction, Loading, Materials, Receptor, Scene, Solve
 from solver.stiffness import Elastic
 
 
@@ -25,6 +26,13 @@ def finger(fineness, indentation=2.0, margin=2.0, nu=0.48):
     elastic = Elastic.of(made.mesh, [Hooke(E, nu) for E in moduli])
     probes = FiniteProbes.of(body, endings(made, elastic, Receptor(), np.zeros(1)))
     return Newton(body), probes, made.whole
+
+
+@cache
+def published(fineness, indentation=2.0):
+    """Return the same finger as scenes have it."""
+    scene = Scene(friction=Friction(0.0), loading=Loading(indentation), solve=Solve("finite"))
+    return FiniteFinger.of(scene, Sizing(fineness, indentation, margin=3.0))
 
 
 def block(columns=3, rows=2, width=2.0, height=1.0, distortion=0.0, seed=0, held="top"):

@@ -1,17 +1,16 @@
 """A settled sliding state is given only where there is one."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
+from solver.climbing import ascended
 from solver.existence import steady
 from solver.failures import NoSteadyState
 from solver.newton import Pull
 from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
 from solver.sliding import settled
 from solver.solution import solve
-from tests.solver.finite_examples import finger
+from tests.solver.finite_examples import published
 
 TOWARDS_TIP = -1
 
@@ -20,64 +19,78 @@ SLOW = pytest.mark.slow
 
 
 @pytest.mark.parametrize(
-    ("mu", "tau"),
+    ("mu", "tau", "deepest"),
     [
-        (0.44, 0.015478),
-        pytest.param(0.48, 0.019038, marks=SLOW),
-        pytest.param(0.64, 0.049998, marks=SLOW),
-        pytest.param(0.67, 0.05255, marks=SLOW),
+        (0.44, 0.015478, 1.85),
+        pytest.param(0.48, 0.019038, 1.75, marks=SLOW),
+        pytest.param(0.64, 0.049998, 1.45, marks=SLOW),
+        pytest.param(0.67, 0.05255, 1.43, marks=SLOW),
     ],
 )
-def test_four_surfaces_have_no_settled_sliding_at_two_millimetres_and_the_refusal_says_how_far_they_have(mu, tau):
-    newton, _, outline = finger(8, margin=3.0)
+def test_four_surfaces_have_no_settled_sliding_at_two_millimetres_and_the_refusal_says_how_far_they_have(
+    mu, tau, deepest
+):
     with pytest.raises(NoSteadyState, match="folds") as refusal:
-        steady(newton, Pull(2.0, mu, tau, TOWARDS_TIP), outline)
-    assert refusal.value.limit_mu == pytest.approx(0.375, rel=0.04)
-    assert "finer meshes" not in str(refusal.value)
-    assert 1.4 < refusal.value.limit_indentation < 1.9
+        steady(published(8), Pull(2.0, mu, tau, TOWARDS_TIP))
+    assert refusal.value.limit_mu == pytest.approx(0.373, rel=0.03)
+    assert refusal.value.limit_indentation == pytest.approx(deepest, rel=0.03)
 
 
 def test_a_sound_state_is_the_direct_one():
-    newton, _, outline = finger(5)
+    finger = published(5)
     pull = Pull(1.5, 0.44, 0.03009, 1)
-    shape = steady(newton, pull, outline)
-    np.testing.assert_array_equal(shape.u, settled(newton, pull).u)
+    shape = steady(finger, pull)
+    np.testing.assert_array_equal(shape.u, settled(finger.newton, pull).u)
 
 
 def test_friction_without_measure_is_the_bound_alone():
-    newton, probes, outline = finger(6, margin=3.0)
-    sed = [probes.average(newton.body, steady(newton, Pull(1.0, mu, 0.005, 1), outline).u)[0] for mu in (50.0, 1000.0)]
+    finger = published(6)
+    sed = [finger.sed_ending(steady(finger, Pull(1.0, mu, 0.005, 1))) for mu in (50.0, 1000.0)]
     assert sed[0] == pytest.approx(sed[1], rel=1e-3)
 
 
 def test_a_bound_next_to_nothing_leaves_the_frictionless_state_whatever_the_coefficient():
-    newton, probes, outline = finger(5)
-    sed = [
-        probes.average(newton.body, steady(newton, Pull(1.0, mu, tau, 1), outline).u)[0]
-        for mu, tau in ((0.0, np.inf), (1000.0, 1e-9))
-    ]
+    finger = published(5)
+    sed = [finger.sed_ending(steady(finger, Pull(1.0, mu, tau, 1))) for mu, tau in ((0.0, np.inf), (1000.0, 1e-9))]
     assert sed[0] == pytest.approx(sed[1], rel=1e-6)
 
 
 @pytest.mark.parametrize("depth", [1e-6, 1e-4, 1e-2])
 def test_a_finger_that_barely_touches_has_an_answer(depth):
-    newton, _, outline = finger(5)
-    shape = steady(newton, Pull(depth, 0.5, 0.01, 1), outline)
+    shape = steady(published(5), Pull(depth, 0.5, 0.01, 1))
     assert shape.touching.any()
     assert shape.force[1] > 0.0
 
 
-@pytest.mark.slow
-def test_where_skin_folds_at_one_place_before_its_limit_point_answers_and_refusals_say_that_the_mesh_has_a_part_in_it():
-    tissues = Materials(*(Material(modulus, 0.48) for modulus in (0.1525, 0.0775, 0.0303)))
-    asked = Scene(
+def drawn(mu, tolerance=None):
+    """Return a scene drawn at random, whose skin folds at mu = 0.74 (`test_limit`)."""
+    return Scene(
         finger=Finger(contact_angle=69.4),
-        materials=tissues,
-        friction=Friction(0.8),
+        materials=Materials(*(Material(modulus, 0.48) for modulus in (0.1525, 0.0775, 0.0303))),
+        friction=Friction(mu),
         loading=Loading(1.8, "+x"),
-        solve=Solve("finite"),
+        solve=Solve("finite", tolerance=tolerance),
     )
-    assert any("squeezed" in told for told in solve(asked).warnings)
-    assert not any("squeezed" in told for told in solve(replace(asked, friction=Friction(0.6))).warnings)
-    with pytest.raises(NoSteadyState, match="finer meshes"):
-        solve(replace(asked, friction=Friction(0.95)))
+
+
+@SLOW
+@pytest.mark.parametrize("fineness", [7.0, 10.0, 14.0, 20.0, 24.0])
+@pytest.mark.parametrize("mu", [0.8, 0.85, 0.9])
+def test_beyond_the_fold_every_mesh_refuses_also_where_it_has_a_creased_state(mu, fineness):
+    with pytest.raises(NoSteadyState):
+        ascended(drawn(mu), 1.8, fineness, lambda: False)
+
+
+@SLOW
+def test_every_mesh_has_the_state_below_the_fold_on_the_same_branch():
+    found = [ascended(drawn(0.71), 1.8, fineness, lambda: False).top for fineness in (7.0, 10.0, 14.0, 20.0)]
+    np.testing.assert_allclose([top.finger.sed_ending(top.shape) for top in found], 0.00286, rtol=0.01)
+
+
+@SLOW
+def test_answers_near_the_largest_friction_say_so_and_refusals_name_it():
+    assert any("squeezed" in told for told in solve(drawn(0.735)).warnings)
+    assert not any("squeezed" in told for told in solve(drawn(0.6)).warnings)
+    with pytest.raises(NoSteadyState, match="folds") as refusal:
+        solve(drawn(0.76))
+    assert refusal.value.limit_mu == pytest.approx(0.735, rel=0.03)  # on a mesh of half the size

@@ -3,49 +3,91 @@
 import numpy as np
 import pytest
 
-from solver.crossing import crosses_itself, least_stretch
-from solver.limit import follow, largest_depth, largest_friction
+from solver import mesher, reach
+from solver.folding import folds_at
+from solver.hyperelastic import NeoHooke, Ogden
+from solver.limit import follow
 from solver.newton import BY_FRICTION, Pull
+from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
 from solver.sliding import settled
-from tests.solver.finite_examples import finger
+from tests.solver.finite_examples import published
 
+SLOW = pytest.mark.slow
 TOWARDS_TIP = -1  # the bone goes along +x, so the surface pulls the skin along -x
+SQUEEZED = [(1.8, 69.4, (0.1525, 0.0775, 0.0303)), (1.73, 65.9, (0.1198, 0.0576, 0.0306))]  # drawn at random
 
 
-@pytest.mark.parametrize(("depth", "largest"), [(1.0, 0.987), (1.5, 0.609), (2.0, 0.373), (2.5, 0.233)])
+def squeezed(depth, angle, tissues):
+    """Return a scene whose branch ends because the skin is squeezed at one place, far from a limit point."""
+    return Scene(
+        finger=Finger(contact_angle=angle),
+        materials=Materials(*(Material(modulus, 0.48) for modulus in tissues)),
+        friction=Friction(0.85),
+        loading=Loading(depth, "+x"),
+        solve=Solve("finite"),
+    )
+
+
+@pytest.mark.parametrize(
+    ("depth", "largest"),
+    [pytest.param(1.0, 0.987, marks=SLOW), (1.5, 0.609), (2.0, 0.373), pytest.param(2.5, 0.233, marks=SLOW)],
+)
 def test_friction_has_the_limit_that_several_meshes_and_orders_of_another_code_found(depth, largest):
-    newton, _, outline = finger(8, margin=3.0)
-    branch = largest_friction(newton, Pull(depth, 0.0, np.inf, TOWARDS_TIP), outline)
-    assert branch.limited
-    assert branch.value == pytest.approx(largest, rel=0.03)
-    assert not crosses_itself(newton.body.mesh.nodes[outline] + branch.last.u[outline])
+    found = reach.of_friction(
+        Scene(friction=Friction(0.0), loading=Loading(depth)), Pull(depth, 0.0, np.inf, TOWARDS_TIP), 2.0
+    )
+    assert found.limited
+    assert found.value == pytest.approx(largest, rel=0.03)
 
 
 @pytest.mark.parametrize(
     ("mu", "tau", "largest"),
     [
         (0.44, 0.015478, 1.85),
-        pytest.param(0.48, 0.019038, 1.75, marks=pytest.mark.slow),
-        pytest.param(0.64, 0.049998, 1.45, marks=pytest.mark.slow),
+        pytest.param(0.48, 0.019038, 1.75, marks=SLOW),
+        pytest.param(0.64, 0.049998, 1.45, marks=SLOW),
         (0.67, 0.05255, 1.43),
     ],
 )
 def test_depth_has_the_limit_that_another_code_found(mu, tau, largest):
-    newton, _, outline = finger(8, margin=3.0)
-    branch = largest_depth(newton, Pull(2.0, mu, tau, TOWARDS_TIP), outline)
-    assert branch.limited
-    assert branch.value == pytest.approx(largest, rel=0.03)
+    found = reach.of_depth(Scene(friction=Friction(mu), loading=Loading(2.0)), Pull(2.0, mu, tau, TOWARDS_TIP))
+    assert found.limited
+    assert found.value == pytest.approx(largest, rel=0.03)
+
+
+@SLOW
+@pytest.mark.parametrize(("depth", "angle", "tissues"), SQUEEZED)
+def test_where_skin_folds_at_one_place_both_limits_are_those_of_a_mesh_of_half_the_size(
+    depth, angle, tissues, monkeypatch
+):
+    scene = squeezed(depth, angle, tissues)
+    pull = Pull(depth, 0.85, np.inf, TOWARDS_TIP)
+    mu, deepest = reach.of_friction(scene, pull, 2.0), reach.of_depth(scene, pull)
+    monkeypatch.setattr(reach, "FINENESS", 2.0 * reach.FINENESS)
+    monkeypatch.setattr(mesher, "FOLD", tuple(size / 2.0 for size in mesher.FOLD))
+    finer = squeezed(depth + 1e-9, angle, tissues)  # what was answered is not asked again
+    pull = pull._replace(depth=depth + 1e-9)
+    assert mu.value == pytest.approx(reach.of_friction(finer, pull, 2.0).value, rel=0.015)
+    assert deepest.value == pytest.approx(reach.of_depth(finer, pull).value, rel=0.01)
 
 
 def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
-    newton, _, outline = finger(5)
+    finger = published(5)
     pull = Pull(1.0, 0.5, 0.03, TOWARDS_TIP)
-    start = settled(newton, pull._replace(mu=0.0))
-    branch = follow(newton, start, BY_FRICTION, pull.mu, outline)
+    start = settled(finger.newton, pull._replace(mu=0.0))
+    branch = follow(finger, start, BY_FRICTION, pull.mu, 0.54)
     assert not branch.limited
-    np.testing.assert_allclose(branch.last.u, settled(newton, pull).u, atol=1e-6)
+    np.testing.assert_allclose(branch.last.u, settled(finger.newton, pull).u, atol=1e-6)
 
 
-def test_the_squeeze_of_a_line_is_its_shortest_pieces():
-    line = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
-    assert least_stretch(line, np.array([[0.0, 0.0], [0.5, 0.0], [2.0, 0.0]])) == 0.5
+@pytest.mark.parametrize("exponent", [None, 2.0])
+def test_a_surface_that_keeps_its_volume_folds_where_biot_found(exponent):
+    x = np.roots([1.0, 1.0, 3.0, -1.0])  # Biot 1963: x^3 + x^2 + 3 x - 1 = 0 for the square of the stretch
+    biot = float(np.sqrt(x[np.isreal(x)].real[0]))
+    law = NeoHooke(0.136, 0.4999999) if exponent is None else Ogden(0.136, 0.4999999, exponent)
+    assert folds_at(law) == pytest.approx(biot, rel=1e-5)
+
+
+def test_skin_that_stiffens_folds_later():
+    folds = [folds_at(Ogden(0.136, 0.48, exponent)) for exponent in (2.0, 3.0, 6.0, 9.0)]
+    assert folds == sorted(folds, reverse=True)
