@@ -65,4 +65,4 @@ class FiniteNearby:
                 there = finite_forced.balanced(newton, replace(here, pull=pull), Given(scene.normal_force, None), GOOD)
         except NotConverged:
             return None
-        return None if leapt(newton, here, there, self.finger.geometry.whole) else there
+        return None if leapt(self.finger, here, there) else there

@@ -9,10 +9,12 @@ is that of Dowaikh and Ogden (1990, IMA J. Appl. Math. 44, 261), here with any l
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.hyperelastic import Law, stress, tangent
 from solver.mesh import Array
 
+Waves = NDArray[np.complex128]
 STEP = 0.01  # of the stretch, between two looks
 LEAST = 0.05  # stretch down to which they are taken
 HALVINGS = 40
@@ -54,14 +56,16 @@ def _stable(law: Law, stretch: float) -> bool:
     return impedance is not None and float(np.linalg.det(impedance).real) > 0.0
 
 
-def _impedance(along: Array, mixed: Array, across: Array) -> Array | None:
+def _impedance(along: Array, mixed: Array, across: Array) -> Waves | None:
     """Return the impedance (2, 2) of waves exp(i (X + p Y)) that decay with depth; None where two do not.
 
     `along`, `mixed`, `across` (2, 2) are the moduli dP_aA/dF_bB with A, B = X, X; X, Y; Y, Y.
     """
     inverse = np.linalg.inv(across)
     system = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ along, -inverse @ (mixed + mixed.T)]])
-    p, waves = np.linalg.eig(system.astype(complex))
+    found = np.linalg.eig(system.astype(np.complex128))
+    p: Waves = np.asarray(found[0], np.complex128)
+    waves: Waves = np.asarray(found[1], np.complex128)
     decay = p.imag > 0.0
     if decay.sum() != 2:
         return None

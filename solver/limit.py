@@ -109,7 +109,7 @@ def _further(
         found = _next(finger.newton, last.shape, by, direction, rate, length, target)
         if found is not None:
             pinch = finger.pinch(found)
-            if pinch.least >= last.pinch.least - APART and not _leapt(finger, last.pinch, found, pinch):
+            if pinch.least >= last.pinch.least - APART and not leapt(finger, last.shape, found):
                 return _Point(found, pinch, value_of(found.pull, by)), length
         length /= 2.0
     return None
@@ -124,9 +124,10 @@ def _with(pull: Pull, by: int, value: float) -> Pull:
     return pull._replace(mu=value) if by == BY_FRICTION else pull._replace(depth=value)
 
 
-def _leapt(finger: FiniteFinger, before: Pinch, shape: Shape, after: Pinch) -> bool:
+def leapt(finger: FiniteFinger, before: Shape, after: Shape) -> bool:
     """Return whether a step went to another branch, where the skin is folded."""
-    return after.least < SQUEEZE * before.least or after.kink > CREASE or finger.crosses(shape)
+    one, other = finger.pinch(before), finger.pinch(after)
+    return other.least < SQUEEZE * one.least or other.kink > CREASE or finger.crosses(after)
 
 
 def _tangent(newton: Newton, shape: Shape, by: int) -> tuple[Array, float]:

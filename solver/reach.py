@@ -92,15 +92,19 @@ def _reach(asked: _Question) -> Reach:
     branch = _followed(rough, _start(rough, asked), asked, folds)
     if not branch.limited and sound(rough, branch.last):
         return _told(rough, branch, folds)
-    finger, states = rough, branch.states
-    for _ in range(2):
-        place = _squeezed(finger, states[-1])
-        fine = FiniteFinger.of(asked.scene, Sizing(FINENESS, asked.pull.depth, margin=MARGIN, fold=place))
-        branch = _followed(fine, _begun(fine, finger, states, asked), asked, folds)
-        if abs(_squeezed(fine, branch.last) - place) < ASTRAY:
-            break
-        finger, states = fine, branch.states
+    fine, branch, place = _finely(rough, branch.states, asked, folds)
+    if abs(_squeezed(fine, branch.last) - place) > ASTRAY:
+        fine, branch, _ = _finely(fine, branch.states, asked, folds)
     return _told(fine, branch, folds)
+
+
+def _finely(
+    finger: FiniteFinger, states: tuple[Shape, ...], asked: _Question, folds: float
+) -> tuple[FiniteFinger, Branch, float]:
+    """Follow the branch on a mesh that is fine where the last of these `states` is squeezed most; return that place."""
+    place = _squeezed(finger, states[-1])
+    fine = FiniteFinger.of(asked.scene, Sizing(FINENESS, asked.pull.depth, margin=MARGIN, fold=place))
+    return fine, _followed(fine, _begun(fine, finger, states, asked), asked, folds), place
 
 
 def _followed(finger: FiniteFinger, start: Shape, asked: _Question, folds: float) -> Branch:
