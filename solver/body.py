@@ -10,7 +10,7 @@ from numpy.linalg import LinAlgError
 from solver.contact import Touchable
 from solver.dissection import Reduced, Tree, places
 from solver.elements import line
-from solver.handed_in import check_body, check_held, check_loads
+from solver.handed_in import check_body, check_held, check_loads, loose
 from solver.mesh import Array, Indices, Mesh
 from solver.stiffness import Elastic, Isotropic
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 Motion = Literal["x", "y", "turn"]
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 _VALUES, _SLOPES = line(_POINTS)  # (q, 3)
+RIGID = 1e-12  # compliance of the skin where it is held along the surface, by the largest elsewhere [-]
 UNHELD = 1e14  # stiffness by its inverse, largest numbers, from which a body is taken to move freely [-]
 
 
@@ -31,7 +32,7 @@ class Body:
     elastic: Elastic
     reduced: "Reduced | ReducedInLoops"
     touchable: Touchable
-    prescribed: Array  # (nodes, 2) displacement of the held nodes relative to the drive, 0 elsewhere [mm]
+    prescribed: Array  # (nodes, 2) displacement of what is held relative to the drive, 0 elsewhere [mm]
 
     @staticmethod
     def of(
@@ -47,7 +48,7 @@ class Body:
     ) -> "Body":
         """Reduce a body of `materials` by region under dead `loads` (nodes, 2) [N/mm].
 
-        Held nodes move with the drive, and by `prescribed` (held, 2) [mm] relative to it. A body that nothing holds
+        What is held moves with the drive, and by `prescribed` (nodes, 2) [mm] relative to it. A body that nothing holds
         names in `free` the motions along which the surface alone balances the loads. `tree` is the `elimination` of the
         mesh, where it was made before. With `in_loops` compiled loops do all that, and find its contact: to round-off
         the same, many times as fast once they are loaded. Raises BodyError and MeshError, unless `checked` before, and
@@ -59,10 +60,9 @@ class Body:
             check_held(mesh, free)
         whole = _in_loops(mesh, materials) if in_loops else None
         elastic = Elastic.of(mesh, materials) if whole is None else whole.elastic
-        moved = np.zeros(mesh.nodes.shape)
+        moved = np.zeros(mesh.nodes.shape) if prescribed is None else prescribed.copy()
         force = np.zeros(mesh.nodes.size) if loads is None else loads.ravel().copy()
         if prescribed is not None:
-            moved[mesh.held] = prescribed
             unknowns = _unknowns(mesh)
             pushed = elastic.stiffness @ moved.ravel()[unknowns][:, :, None]
             np.subtract.at(force, unknowns.ravel(), pushed.ravel())
@@ -77,7 +77,7 @@ class Body:
     @property
     def dofs(self) -> int:
         """Return the number of unknown displacements."""
-        return 2 * (len(self.mesh.nodes) - len(self.mesh.held))
+        return 2 * len(self.mesh.nodes) - len(self.mesh.fixed)
 
     def skin_displacement(self, forces: Array) -> Array:
         """Return the displacement (2 k, c) of the skin, normal first, by surface forces (2 k, c); held bodies only."""
@@ -108,7 +108,7 @@ class Body:
         left = -self.reactions(displacement)
         left[self.mesh.skin, 1] += forces[:k]
         left[self.mesh.skin, 0] += forces[k:]
-        left[self.mesh.held] = 0.0
+        left[self.mesh.driven] = 0.0
         compliance = np.block(
             [[t.normal_by_normal, t.normal_by_tangential], [t.normal_by_tangential.T, t.tangential_by_tangential]]
         )
@@ -141,8 +141,7 @@ def _unknowns(mesh: Mesh) -> Indices:
 def elimination(mesh: Mesh) -> Tree:
     """Return the order in which the body's unknowns are eliminated: all but the skin's, normal ones first."""
     kept = np.concatenate([2 * mesh.skin + 1, 2 * mesh.skin])
-    fixed = np.concatenate([2 * mesh.held, 2 * mesh.held + 1])
-    return Tree.of(_unknowns(mesh), places(mesh.elements), fixed, kept)
+    return Tree.of(_unknowns(mesh), places(mesh.elements), mesh.fixed, kept)
 
 
 def planned(mesh: Mesh, *, in_loops: bool) -> Tree | None:
@@ -160,16 +159,22 @@ def _touchable(mesh: Mesh, stiffness: Array, loads: Array, free: Sequence[Motion
     k = len(mesh.skin)
     x, y = mesh.nodes[mesh.skin].T
     one, zero = np.ones(k), np.zeros(k)
-    if not len(mesh.held):
+    rigid = np.stack([np.r_[zero, one], np.r_[one, zero], np.r_[x, -y]], axis=1) @ loose(mesh)
+    if rigid.shape[1]:
         # Rigid motions cost no energy: a spring on each makes the matrix invertible, and stays unloaded, since the
         # surface's forces are asked to balance the loads along every motion that anything drives.
-        rigid = np.linalg.qr(np.stack([np.r_[zero, one], np.r_[one, zero], np.r_[x, -y]], axis=1))[0]
+        rigid = np.linalg.qr(rigid)[0]
         stiffness = stiffness + np.trace(stiffness) / (2 * k) * rigid @ rigid.T
-    compliance = np.linalg.inv(stiffness)
+    load = loads.sum(axis=1)
+    kept = np.flatnonzero(~np.r_[mesh.driven[mesh.skin, 1], mesh.driven[mesh.skin, 0]])
+    compliance = np.linalg.inv(stiffness[np.ix_(kept, kept)])
     if k and not np.abs(stiffness).max() * np.abs(compliance).max() < UNHELD:
         raise LinAlgError("the body is neither held nor balanced")
     compliance = (compliance + compliance.T) / 2.0
-    load = loads.sum(axis=1)
+    if len(kept) < 2 * k:  # what is held along the surface carries there whatever is asked of it, and hardly moves
+        inside, compliance = compliance, RIGID * float(compliance.diagonal().max()) * np.eye(2 * k)
+        compliance[np.ix_(kept, kept)] = inside
+        load = np.where(np.isin(np.arange(2 * k), kept), load, 0.0)
     moved = compliance @ load
     shapes = {"x": np.r_[zero, one], "y": np.r_[one, zero], "turn": np.r_[x, -y]}
     motions = np.stack([shapes[name] for name in free], axis=1) if free else np.zeros((2 * k, 0))

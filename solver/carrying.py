@@ -95,7 +95,7 @@ class Bridge:
             shape.u, shape.pressure, old.combination, old.centre, self.along, self.along_parts, self.across,
             self.across_parts, self.station, self.layer, self.new.points, new.weight, new.modes, u, pressure,
         )  # fmt: skip
-        u[new.mesh.held] = 0.0
+        u[new.mesh.driven] = 0.0
         return u, pressure
 
 

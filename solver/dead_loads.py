@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver.failures import NotConverged
+from solver.handed_in import check_loads
 from solver.mesh import Array
 from solver.newton import Newton, Pull, Shape
 
@@ -23,27 +24,29 @@ def loaded(
     start: Shape | None = None,
     steps: int = 4,
 ) -> Shape:
-    """Return the equilibrium under dead `loads` (nodes, 2) [N/mm], held nodes displaced by `prescribed` (held, 2) [mm].
+    """Return the equilibrium under dead `loads` (nodes, 2) [N/mm], what is held displaced by `prescribed` [mm].
 
-    From undeformed, or from `start` (whose contact states are then the first guess), in `steps` equal parts; one that
-    fails is halved. `pull` (its default: no contact depth, no friction) stays the same meanwhile. The loads stay on
-    `newton` for what follows. Raises ValueError for a load on the centre of an element, NotConverged where no
-    equilibrium is found.
+    `prescribed` (nodes, 2) is 0 where nothing holds. From undeformed, or from `start` (whose contact states are then
+    the first guess), in `steps` equal parts; one that fails is halved. `pull` (its default: no contact depth, no
+    friction) stays the same meanwhile. The loads stay on `newton` for what follows. Raises BodyError for arrays of
+    another shape, ValueError for a load on the centre of an element, NotConverged where no equilibrium is found.
     """
     body = newton.body
+    check_loads(body.mesh, loads, prescribed)
     shape = Shape.undeformed(body) if start is None else start
     pull = shape.pull if pull is None else pull
     shape = replace(shape, pull=pull)
     vector = np.zeros(body.size) if loads is None else _on_unknowns(newton, loads)
-    held_at = shape.u[body.mesh.held].copy()
-    moved = np.zeros(held_at.shape) if prescribed is None else prescribed - held_at
+    driven = body.mesh.driven
+    held_at = shape.u[driven]
+    moved = 0.0 if prescribed is None else prescribed[driven] - held_at
     before = newton.load.copy()
     done, part = 0.0, 1.0 / steps
     while done < 1.0:
         aim = min(done + part, 1.0)
         newton.load[:] = before + aim * (vector - before)
         u = shape.u.copy()
-        u[body.mesh.held] = held_at + aim * moved
+        u[driven] = held_at + aim * moved
         try:
             shape = newton.settle(replace(shape, u=u), pull)
         except NotConverged as reason:

@@ -46,17 +46,16 @@ class Plan:
 
         It does not depend on where nodes lie, so the last plans are kept for meshes that differ in nothing else.
         """
-        return _planned(len(mesh.nodes), mesh.elements.tobytes(), mesh.skin.tobytes(), mesh.held.tobytes())
+        return _planned(len(mesh.nodes), mesh.elements.tobytes(), mesh.skin.tobytes(), mesh.fixed.tobytes())
 
 
 @lru_cache(maxsize=4)
 def _planned(count: int, *numbers: bytes) -> Plan:
-    """Return the plan for `count` nodes and the numbers of elements' nodes (e, 9), of the skin and of held ones."""
-    elements, skin_nodes, held = (np.frombuffer(part, np.int64) for part in numbers)
+    """Return the plan for `count` nodes and the numbers of elements' nodes (e, 9), the skin's, and unknowns held."""
+    elements, skin_nodes, fixed = (np.frombuffer(part, np.int64) for part in numbers)
     elements = elements.reshape(-1, 9)
     raw = (2 * elements[:, :8, None] + np.arange(2)).reshape(-1, 16)
     skin = (2 * skin_nodes[:, None] + np.arange(2)).ravel()
-    fixed = np.concatenate([2 * held, 2 * held + 1])
     tree = Tree.of(raw, places(elements), fixed, skin, LEAF, flat=False)
     number = np.full(2 * count, -1)
     sequence = np.concatenate([*(part.inner for part in tree.parts), skin])

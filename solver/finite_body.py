@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from solver import kernels
 from solver.elements import Q2P1
 from solver.elimination import Plan
-from solver.handed_in import check_body
+from solver.handed_in import check_body, check_driven
 from solver.hyperelastic import Law
+from solver.kernels import HELD_X, HELD_Y
 from solver.mesh import Array, Indices, Mesh
 from solver.receptor import Endings
 
@@ -40,7 +41,7 @@ class FiniteBody:
     nodes: Narrow  # (e, 9)
     unknown: Narrow  # (e, 8, 2) of the outer nodes, -1 where fixed
     plan: Plan  # of the elimination
-    held: Narrow  # (k,) 1 where a node of the skin is held
+    held: Narrow  # (k,) whether a node of the skin is held: along x HELD_X, along y HELD_Y, both their sum
     middle: Narrow  # (k,) 1 at the middle of an edge of the skin, 0 at its ends
 
     @staticmethod
@@ -51,6 +52,7 @@ class FiniteBody:
         """
         if not checked:
             check_body(mesh, laws)
+            check_driven(mesh)
         corners = mesh.nodes[mesh.elements]  # (e, 9, 2)
         jacobian = np.swapaxes(corners, 1, 2)[:, None] @ _SLOPES  # (e, q, 2, 2)
         det = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
@@ -87,7 +89,7 @@ class FiniteBody:
             mesh.elements.astype(np.int32),
             plan.unknown.reshape(-1, 8, 2),
             plan,
-            np.isin(mesh.skin, mesh.held).astype(np.int32),
+            (mesh.driven[mesh.skin] @ np.array([HELD_X, HELD_Y])).astype(np.int32),
             at_middle,
         )
 

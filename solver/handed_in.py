@@ -9,6 +9,9 @@ from solver.elements import Q2P1
 from solver.grid import jacobians
 from solver.mesh import Array, Mesh
 
+HELD = 1e-9  # part of a motion of the body as a whole below which what is held does not move with it [-]
+MOTIONS = ("x", "y", "turn")  # of a body as a whole
+
 
 class BodyError(ValueError):
     """A body that cannot be solved as it was handed in: what is wrong, where, and what to do."""
@@ -37,7 +40,7 @@ def check_body(mesh: Mesh, materials: Sequence[Stiff]) -> None:
     if not np.isfinite(mesh.nodes).all():
         worst = int(np.argmin(np.isfinite(mesh.nodes).all(axis=1)))
         raise BodyError(f"node {worst} of the mesh has no finite position; give every node two lengths in mm")
-    for name in ("elements", "skin", "held"):
+    for name in ("elements", "skin", "held", "held_x", "held_y"):
         numbers = getattr(mesh, name)
         if numbers.size and not (numbers.min() >= 0 and numbers.max() < count):
             raise BodyError(f"mesh.{name} names a node that is not there; number the {count} nodes from 0")
@@ -62,21 +65,61 @@ def check_body(mesh: Mesh, materials: Sequence[Stiff]) -> None:
 
 
 def check_loads(mesh: Mesh, loads: Array | None, prescribed: Array | None) -> None:
-    """Raise BodyError unless dead `loads` are (nodes, 2) and `prescribed` (held, 2), and all of them finite."""
-    for name, given, rows in (("loads", loads, len(mesh.nodes)), ("prescribed", prescribed, len(mesh.held))):
+    """Raise BodyError unless dead `loads` and `prescribed` are (nodes, 2) and finite, and move only what is held."""
+    for name, given in (("loads", loads), ("prescribed", prescribed)):
         if given is None:
             continue
-        if given.shape != (rows, 2):
-            raise BodyError(f"{name} has the shape {given.shape}; it must be ({rows}, 2)")
+        if given.shape != mesh.nodes.shape:
+            raise BodyError(f"{name} has the shape {given.shape}; it must be {mesh.nodes.shape}, a row for every node")
         if not np.isfinite(given).all():
             row = int(np.argmin(np.isfinite(given).all(axis=1)))
             raise BodyError(f"row {row} of {name} is not finite; give 0 where there is none")
+    if prescribed is not None and prescribed[~mesh.driven].any():
+        row, along = (int(at[0]) for at in np.nonzero(prescribed * ~mesh.driven))
+        raise BodyError(
+            f"prescribed moves node {row} along {'xy'[along]}, where nothing holds it; name it in mesh.held, or in "
+            f"mesh.held_{'xy'[along]}"
+        )
+
+
+def loose(mesh: Mesh) -> Array:
+    """Return the motions (3, r) of the body as a whole that nothing holds, as parts of those in MOTIONS."""
+    if len(mesh.held) > 1:
+        return np.zeros((3, 0))
+    x, y = (mesh.nodes / np.ptp(mesh.nodes)).T
+    one, zero = np.ones_like(x), np.zeros_like(x)
+    moves = np.stack([np.c_[one, zero].ravel(), np.c_[zero, one].ravel(), np.c_[-y, x].ravel()], axis=1)[mesh.fixed]
+    _, sizes, ways = np.linalg.svd(np.concatenate([moves, np.zeros((3, 3))]), full_matrices=False)
+    ways[:, 2] /= np.ptp(mesh.nodes)
+    return ways[sizes[:3] < HELD * np.sqrt(len(mesh.fixed) + 1.0)].T
+
+
+def check_driven(mesh: Mesh) -> None:
+    """Raise BodyError where nothing holds a body at all, which its motions at finite strain ask for."""
+    if not mesh.driven.any():
+        raise BodyError(
+            "nothing holds the body; name the nodes that are driven in mesh.held, or along one direction alone in "
+            "mesh.held_x and mesh.held_y"
+        )
 
 
 def check_held(mesh: Mesh, free: Sequence[str] = ()) -> None:
-    """Raise BodyError where nothing holds a body and no motion of it is `free` for the surface to balance."""
-    if not len(mesh.held) and not free:
+    """Raise BodyError where what is held leaves a body a motion that is not `free` for the surface to balance.
+
+    Or where skin that may touch is held along y, and so cannot give way to the surface.
+    """
+    if not free and not mesh.driven.any():
         raise BodyError(
             "nothing holds the body; name the nodes that are driven in mesh.held, or the motions along which the "
             'surface alone balances the loads, as free = ("y", "turn")'
         )
+    left = loose(mesh)
+    left[[MOTIONS.index(name) for name in free]] = 0.0
+    if len(mesh.fixed) and np.abs(left).max(initial=0.0) > HELD:
+        raise BodyError(
+            "what is held leaves the body a motion as a whole; hold more of it, or name the motion in free, for the "
+            "surface to balance"
+        )
+    stiff = mesh.skin[mesh.driven[mesh.skin, 1]]
+    if len(stiff):
+        raise BodyError(f"node {stiff[0]} of the skin is held along y; leave its edge out of mesh.skin")

@@ -1,12 +1,14 @@
 """Mesh: nodes, nine-node quadrilaterals, regions, the skin that may touch and the nodes that are driven."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+_NONE: Indices = np.empty(0, np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,7 +26,9 @@ class Mesh:
     elements: Indices  # (e, 9)
     region: Indices  # (e,) number of the material of each element
     skin: Indices  # (2 k + 1,) nodes that may touch, along k edges: end, middle, end, middle, ... end
-    held: Indices  # (h,) nodes that are driven as a whole
+    held: Indices  # (h,) nodes that are driven as a whole, in both directions
+    held_x: Indices = field(default_factory=lambda: _NONE)  # nodes that are driven along x alone, and roll along y
+    held_y: Indices = field(default_factory=lambda: _NONE)  # the same along y: rollers, and planes of symmetry
 
     def __post_init__(self) -> None:
         """Make the arrays read-only views."""
@@ -32,3 +36,16 @@ class Mesh:
             view = getattr(self, f.name).view()
             view.flags.writeable = False
             object.__setattr__(self, f.name, view)
+
+    @property
+    def fixed(self) -> Indices:
+        """Return the numbers of the unknowns that are held, in order: x of node n is 2 n, y is 2 n + 1."""
+        both = np.concatenate([self.held, self.held_x]), np.concatenate([self.held, self.held_y])
+        return np.unique(np.concatenate([2 * both[0], 2 * both[1] + 1]))
+
+    @property
+    def driven(self) -> Flags:
+        """Return which components of which nodes are held, (n, 2)."""
+        out = np.zeros(2 * len(self.nodes), bool)
+        out[self.fixed] = True
+        return out.reshape(-1, 2)

@@ -68,19 +68,19 @@ class RelaxingBody:
     def ready(self, step: float, prescribed: Array | None = None) -> Touchable:
         """Return what the surface will feel of the body at the end of a `step` [s], its past as a displacement.
 
-        Held nodes are then displaced by `prescribed` (held, 2) [mm] relative to the drive.
+        What is held is then displaced by `prescribed` (nodes, 2) [mm] relative to the drive.
         """
         form = self._form(step)
         past = self._past(step)
         load = -np.einsum("eij,ej->ei", self.elastic.stiffness, past)
         moved = np.zeros(self.mesh.nodes.shape)
         if prescribed is not None:
-            moved[self.mesh.held] = prescribed
+            moved[self.mesh.driven] = prescribed[self.mesh.driven]
             local = moved[self.mesh.elements].reshape(len(load), 18)
             load -= np.einsum("eij,ej->ei", form.body.elastic.stiffness, local)
         nodes = np.zeros(self.mesh.nodes.shape)
         np.add.at(nodes, self.mesh.elements, load.reshape(-1, 9, 2))
-        nodes[self.mesh.held] = 0.0
+        nodes[self.mesh.driven] = 0.0
         free = form.body.reduced.under(nodes.reshape(-1, 1), form.compliance).reshape(nodes.shape) + moved
         self._next = form, free, step
         skin = free[self.mesh.skin]

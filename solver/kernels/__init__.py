@@ -5,7 +5,7 @@
 """
 
 from solver.kernels.carrying import carry
-from solver.kernels.compiling import CAP, OPEN, SLIP, STICK
+from solver.kernels.compiling import CAP, HELD_X, HELD_Y, OPEN, SLIP, STICK
 from solver.kernels.elements import advance, assemble, energies, forces
 from solver.kernels.fronts import condense, eliminate, unfold
 from solver.kernels.outline import crosses, pinched
@@ -14,6 +14,8 @@ from solver.kernels.skin import impose, restate, settle, solve, tributary
 
 __all__ = [
     "CAP",
+    "HELD_X",
+    "HELD_Y",
     "OPEN",
     "SLIP",
     "STICK",

@@ -18,6 +18,7 @@ Flags = NDArray[np.bool_]
 States = NDArray[np.int8]
 Compiled = TypeVar("Compiled", bound=Callable[..., Any])
 
+HELD_X, HELD_Y = 1, 2  # of a node of the skin that is held; both: their sum
 OPEN, STICK, SLIP, CAP = 0, 1, 2, 3  # states of a node of the skin
 _FAST = {"contract", "reassoc", "arcp", "nsz"}  # nan and infinity keep their meaning
 

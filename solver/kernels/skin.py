@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from solver.kernels.compiling import CAP, OPEN, SLIP, STICK, Array, Narrow, compiled
+from solver.kernels.compiling import CAP, HELD_X, HELD_Y, OPEN, SLIP, STICK, Array, Narrow, compiled
 
 # how the length of skin of an edge's first, middle and last node grows with the positions of the three: Simpson's rule
 _LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
@@ -44,28 +44,29 @@ def impose(
     """Write down the skin's system of contact: return its size f, and fill its `matrix` (f f,) and `right` (f, 4).
 
     `stiffness` (2 k, 2 k) and `force` (2 k,) are the body's as its skin feels them: x, y of one node, x, y of the next.
-    `held` (k,) is 1 where a node is fixed, `above` (k,) heights over the surface, `behind` (k,) distances of stuck
-    nodes from where they stick, `length` from `tributary`. The columns of `right` are the step to equilibrium, and its
-    derivatives with respect to depth, mu and travel of the surface along +x. `steps` (2 k, 4) is filled where the
-    contact's conditions prescribe displacements; what is unknown is listed in `free` (f,).
+    `held` (k,) says along what a node is fixed (HELD_X, HELD_Y, their sum), `above` (k,) heights over the surface,
+    `behind` (k,) distances of stuck nodes from where they stick, `length` from `tributary`. The columns of `right` are
+    the step to equilibrium, and its derivatives with respect to depth, mu and travel of the surface along +x. `steps`
+    (2 k, 4) is filled where the contact's conditions prescribe displacements; what is unknown is listed in `free`
+    (f,).
     """
     size = state.shape[0]
     steps[:, :] = 0.0
     f = 0
     for i in range(size):
         x, y = 2 * i, 2 * i + 1
-        if held[i] == 1:
-            continue
-        if state[i] != OPEN:
-            steps[y, 0], steps[y, 1] = -above[i], 1.0
-        if state[i] == STICK:
-            steps[x, 0], steps[x, 3] = -behind[i], 1.0
-        else:
-            free[f] = x
-            f += 1
-        if state[i] == OPEN:
-            free[f] = y
-            f += 1
+        if held[i] & HELD_X == 0:
+            if state[i] == STICK:
+                steps[x, 0], steps[x, 3] = -behind[i], 1.0
+            else:
+                free[f] = x
+                f += 1
+        if held[i] & HELD_Y == 0:
+            if state[i] == OPEN:
+                free[f] = y
+                f += 1
+            else:
+                steps[y, 0], steps[y, 1] = -above[i], 1.0
     spot = np.full(2 * size, -1)
     for r in range(f):
         spot[free[r]] = r
@@ -87,13 +88,13 @@ def impose(
                 square[r, c] = mine[free[c]]
             right[r, 0] = -force[row]
         for j in range(size):
-            if state[j] == OPEN or held[j] == 1:
+            if state[j] == OPEN or held[j] & HELD_Y != 0:
                 continue
             y = 2 * j + 1
             value = mine[y] - drag * other[y]
             right[r, 0] -= value * steps[y, 0]
             right[r, 1] -= value
-            if state[j] == STICK:
+            if state[j] == STICK and held[j] & HELD_X == 0:
                 value = mine[y - 1] - drag * other[y - 1]
                 right[r, 0] -= value * steps[y - 1, 0]
                 right[r, 3] -= value

@@ -29,6 +29,7 @@ def sheet(kind):
     mesh = block(np.linspace(0, 3, 5), np.linspace(0, tall, 5), held=False)
     low, high = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)
     edge = np.flatnonzero(np.any((mesh.nodes < low + 1e-9) | (mesh.nodes > high - 1e-9), axis=1))
+    mesh = replace(mesh, held=edge)
     if kind == "distorted":
         mesh = distorted(mesh, 0.45, 2)
     if kind == "curved":

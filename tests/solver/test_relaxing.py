@@ -30,7 +30,7 @@ def held_all_round(law):
     mesh = replace(mesh, held=boundary, skin=mesh.skin[:0])
     body = RelaxingBody(mesh, [law])
     count = len(mesh.elements)
-    return body, Probes.at(mesh, body.elastic, np.arange(count), np.full((count, 2), 0.3)), mesh.nodes[boundary]
+    return body, Probes.at(mesh, body.elastic, np.arange(count), np.full((count, 2), 0.3)), mesh.nodes * mesh.driven
 
 
 def course(law, gradient):

@@ -1,0 +1,180 @@
+"""Bodies held along one direction alone: rollers, planes of symmetry, and one component prescribed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from daq_app.accuracy.published.bodies import ring
+from daq_app.accuracy.published.locking import INNER, OUTER, YOUNG, widening
+from solver.body import Body, edge_load
+from solver.contact import Course, untouched
+from solver.dead_loads import loaded
+from solver.finite_body import FiniteBody
+from solver.friction import FrictionLaw
+from solver.handed_in import BodyError
+from solver.hyperelastic import NeoHooke
+from solver.march import march
+from solver.materials import Hooke
+from solver.mesh import Mesh
+from solver.newton import Newton, Pull
+from solver.shapes import block as round_block
+from tests.solver.finite_examples import block
+
+NO_SKIN = np.zeros((0, 1))
+CLEAR = Pull(-1e3, 0.0)
+
+
+def at(mesh, axis, value):
+    return np.flatnonzero(np.isclose(mesh.nodes[:, axis], value, atol=1e-12))
+
+
+def part(mesh, keep):
+    """The elements of `mesh` that are to be kept, its nodes numbered anew; and their numbers in the whole."""
+    elements = mesh.elements[keep]
+    old, new = np.unique(elements, return_inverse=True)
+    number = np.full(len(mesh.nodes), -1)
+    number[old] = np.arange(len(old))
+    skin, held = (number[nodes[number[nodes] >= 0]] for nodes in (mesh.skin, mesh.held))
+    return Mesh(mesh.nodes[old], new.reshape(elements.shape), mesh.region[keep], skin, held), old
+
+
+def cornered():
+    """A distorted block whose left side rolls along y and whose foot rolls along x; the top is free."""
+    mesh = block(columns=3, rows=3, distortion=0.15, seed=4)
+    return replace(mesh, skin=mesh.skin[:0], held=mesh.held[:0], held_x=at(mesh, 0, 0.0), held_y=at(mesh, 1, 0.0))
+
+
+def test_a_block_on_rollers_under_a_dead_traction_stretches_evenly_at_small_strain():
+    mesh = cornered()
+    top = at(mesh, 1, 1.0)
+    top = top[np.argsort(mesh.nodes[top, 0])]
+    loads = edge_load(mesh, top, np.ones((len(top), 1)) @ [[0.0, -1e-3]])
+    found = Body.of(mesh, [Hooke(1.0, 0.3)], loads).displacement(NO_SKIN)[:, :, 0]
+    exact = mesh.nodes * [1e-3 * 0.3 * 1.3, -1e-3 * (1.0 - 0.3**2)]  # plane strain
+    np.testing.assert_allclose(found, exact, atol=1e-15)
+
+
+def test_one_component_prescribed_leaves_the_other_free_at_small_strain():
+    mesh = cornered()
+    mesh = replace(mesh, held_y=np.union1d(mesh.held_y, at(mesh, 1, 1.0)))
+    moved = np.zeros(mesh.nodes.shape)
+    moved[at(mesh, 1, 1.0), 1] = -0.01
+    found = Body.of(mesh, [Hooke(1.0, 0.3)], prescribed=moved).displacement(NO_SKIN)[:, :, 0]
+    np.testing.assert_allclose(found, mesh.nodes * [0.01 * 0.3 / 0.7, -0.01], atol=1e-14)
+
+
+def test_one_component_prescribed_leaves_the_other_free_at_finite_strain():
+    """Sides free at a stretch of 0.8: the closed form of the law."""
+    mesh = cornered()
+    right = at(mesh, 0, 2.0)
+    skin = right[np.argsort(mesh.nodes[right, 1])][2:5]
+    mesh = replace(mesh, skin=skin, held_y=np.union1d(mesh.held_y, at(mesh, 1, 1.0)))
+    moved = np.zeros(mesh.nodes.shape)
+    moved[at(mesh, 1, 1.0), 1] = -0.2
+    found = loaded(Newton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)])), prescribed=moved, pull=CLEAR)
+    np.testing.assert_allclose(found.u, mesh.nodes * [0.224285, -0.2], atol=1e-6)
+    across = found.u[right, 0]
+    assert np.ptp(across) < 1e-9
+
+
+def halves():
+    """A round foot and its right half, which the plane of symmetry holds along x."""
+    whole = round_block(np.linspace(-2.0, 2.0, 9), np.linspace(0.0, 1.5, 4), radius=4.0)
+    half, old = part(whole, whole.nodes[whole.elements[:, 8], 0] > 0.0)
+    return whole, replace(half, held_x=np.setdiff1d(at(half, 0, 0.0), half.held)), old
+
+
+@pytest.mark.parametrize("in_loops", [False, True])
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_half_a_body_at_its_plane_of_symmetry_is_the_whole_to_round_off_at_small_strain(mu, in_loops):
+    whole, half, old = halves()
+
+    def pressed(mesh):
+        body = Body.of(mesh, [Hooke(0.08, 0.48)], in_loops=in_loops)
+        course, state = Course(body.touchable, FrictionLaw(mu, np.inf)), untouched(body.touchable)
+        for depth in (0.05, 0.1, 0.15):
+            state = course.step(state, depth, 0.0)
+        return state.normal.sum(), body.displacement(
+            body.skin_displacement(np.r_[state.normal, state.tangential][:, None])
+        )[:, :, 0]
+
+    (force, both), (part_of_it, one) = pressed(whole), pressed(half)
+    assert part_of_it == pytest.approx(force / 2.0, rel=1e-11)
+    np.testing.assert_allclose(one, both[old], atol=1e-13)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_half_a_body_at_its_plane_of_symmetry_is_the_whole_to_round_off_at_finite_strain(mu):
+    whole, half, old = halves()
+
+    def pressed(mesh):
+        newton = Newton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]))
+        *_, shape = march(newton, [Pull(depth, mu) for depth in (0.1, 0.2, 0.3)], None, 1e-13)
+        return shape.force[1], shape.u
+
+    (force, both), (part_of_it, one) = pressed(whole), pressed(half)
+    assert part_of_it == pytest.approx(force / 2.0, rel=1e-11)
+    np.testing.assert_allclose(one, both[old], atol=1e-12)
+
+
+def quarter(radial=5, around=20):
+    """A quarter of a thick cylinder on rollers, and its hole in order."""
+    whole, hole = ring(INNER, OUTER, radial, around)
+    centre = whole.nodes[whole.elements[:, 8]]
+    mesh, old = part(replace(whole, skin=whole.skin[:0]), (centre > 0.0).all(axis=1))
+    number = np.full(len(whole.nodes), -1)
+    number[old] = np.arange(len(old))
+    inside = number[hole[:-1]]
+    inside = inside[inside >= 0]
+    order = inside[np.argsort(-mesh.nodes[inside, 0])]
+    around_it = np.flatnonzero(np.isclose(np.hypot(*mesh.nodes.T), OUTER))
+    outside = around_it[np.argsort(mesh.nodes[around_it, 0])]
+    mesh = replace(mesh, skin=outside[2:5], held_x=at(mesh, 0, 0.0), held_y=at(mesh, 1, 0.0))
+    return mesh, order
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.4999999])
+def test_a_quarter_of_a_thick_cylinder_on_rollers_widens_as_the_closed_form_says(nu):
+    mesh, hole = quarter()
+    loads = edge_load(mesh, hole, mesh.nodes[hole] / INNER)
+    body = Body.of(mesh, [Hooke(YOUNG, nu)], loads)
+    free = np.concatenate([body.touchable.normal_free, body.touchable.tangential_free])
+    found = body.displacement(free[:, None])[hole, :, 0]
+    widened = np.sum(found * mesh.nodes[hole], axis=1)[::2] / INNER
+    np.testing.assert_allclose(widened, widening(nu), rtol=2e-4)
+
+
+def test_a_quarter_of_a_thick_cylinder_widens_so_at_finite_strain_under_a_small_pressure():
+    mesh, hole = quarter()
+    loads = 1e-4 * edge_load(mesh, hole, mesh.nodes[hole] / INNER)
+    found = loaded(Newton(FiniteBody.of(mesh, [NeoHooke(YOUNG, 0.49)])), loads, pull=CLEAR, steps=1)
+    widened = np.sum(found.u[hole] * mesh.nodes[hole], axis=1)[::2] / INNER
+    np.testing.assert_allclose(widened, 1e-4 * widening(0.49), rtol=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"held_y": np.array([3])}, "held along y; leave its edge out"),
+        ({"held": np.empty(0, np.int64), "held_x": np.array([0, 1])}, "leaves the body a motion"),
+        ({"held_x": np.array([10**6])}, "mesh.held_x names a node that is not there"),
+    ],
+)
+def test_what_is_held_so_that_it_cannot_be_solved_is_refused_in_a_sentence(change, told):
+    mesh = round_block(np.linspace(-1.0, 1.0, 3), np.linspace(0.0, 1.0, 3))
+    change = {name: mesh.skin[:1] if name == "held_y" else nodes for name, nodes in change.items()}
+    with pytest.raises(BodyError, match=told):
+        Body.of(replace(mesh, **change), [Hooke(0.08, 0.48)])
+
+
+def test_at_finite_strain_a_body_that_nothing_holds_is_refused_in_a_sentence():
+    mesh = round_block(np.linspace(-1.0, 1.0, 3), np.linspace(0.0, 1.0, 3), held=False)
+    with pytest.raises(BodyError, match="nothing holds the body"):
+        FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)])
+
+
+def test_what_nothing_holds_cannot_be_prescribed():
+    mesh = cornered()
+    with pytest.raises(BodyError, match=r"moves node \d+ along y, where nothing holds it"):
+        Body.of(mesh, [Hooke(0.08, 0.48)], prescribed=mesh.nodes * [0.0, 1.0])
