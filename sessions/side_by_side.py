@@ -49,11 +49,11 @@ def _along(
 ) -> tuple[Alternative, ...]:
     """Return what each trial gives in one variant, with intervals where draws of its friction are given."""
     rows, options = prediction.trials, prediction.options
-    found = _known(prediction, variant) or _solved(prediction, variant, progress)
+    found = _known(prediction, variant) or _solved(prediction, variant, _part(progress, 0.0, 0.8))
     out = [_alternative(row, variant, tau_max, one) for row, (tau_max, one) in zip(rows, found, strict=True)]
     if drawn is not None:
         scale = tau_scale(replace(options, tau_reading=variant.tau_reading))
-        intervals = intervals_of([one for _, one in found], drawn, scale)
+        intervals = intervals_of([one for _, one in found], drawn, scale, _part(progress, 0.8, 1.0))
         out = [replace(one, interval=interval) for one, interval in zip(out, intervals, strict=True)]
     return tuple(out)
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver import finite_forced, kernels, kernels_numpy, sliding
-from solver.contact import NAMES
 from solver.derivatives import Derivatives
 from solver.failures import NotConverged
 from solver.finite_derivatives import of_shape
@@ -14,6 +13,7 @@ from solver.finite_finger import FiniteFinger
 from solver.finite_forced import Given
 from solver.limit import leapt
 from solver.mesh import Array
+from solver.nearby import states
 from solver.newton import Pull, Shape
 from solver.prediction import Prediction
 from solver.scene import Scene
@@ -28,7 +28,7 @@ def met_again(found: Prediction) -> "FiniteNearby | None":
     length = np.empty(len(skin.x))
     kernels.tributary(skin.x, body.middle, length)
     pull = Pull(found.indentation, float(scene.friction.mu), scene.friction.cap, sense)
-    state = np.array([NAMES.index(name) for name in skin.state], np.int32)
+    state = states(skin).astype(np.int32)
     reaction = np.stack([skin.traction, skin.pressure], axis=1) * length[:, None]
     pressure = kernels_numpy.pressure(body, found.displacement)
     start = Shape(found.displacement, pressure, state, np.full(len(state), sense, np.int32), reaction, pull, 0)

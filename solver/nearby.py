@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from solver.contact import NAMES, Contact, ContactLost, Course, States, forced
+from solver.contact import NAMES, SLIP, Contact, ContactLost, Course, States, forced
 from solver.derivatives import Derivatives, of_contact
 from solver.finger import FingerModel
 from solver.mesh import Array
-from solver.prediction import Prediction
+from solver.prediction import Prediction, Skin
 from solver.scene import Scene
 from solver.small_states import law_of
 
@@ -37,13 +38,13 @@ class Nearby(Protocol):
 def nearby(predictions: Sequence[Prediction], *, in_loops: bool = False) -> Iterator[Nearby | None]:
     """Yield the slide of each prediction.
 
-    None where the finger does not slide, so that its state depends on the way to it, and where the state is not met
-    again. `in_loops` as in `solver.solution.answers`.
+    None where the finger is only pressed or held by a drag, so that its state depends on the way to it, and where the
+    state is not met again. `in_loops` as in `solver.solution.answers`.
     """
     model: FingerModel | None = None
     for found in predictions:
         scene = found.scene
-        if scene.loading.direction == 0 or found.shift is not None or "stick" in found.skin.state:
+        if scene.loading.direction == 0 or scene.loading.dragged:
             yield None
             continue
         if scene.solve.kinematics == "finite":
@@ -54,7 +55,7 @@ def nearby(predictions: Sequence[Prediction], *, in_loops: bool = False) -> Iter
             continue
         if model is None or model.geometry is not found.geometry:
             model = FingerModel.on(scene, found.geometry, in_loops=in_loops)
-        guess = np.array([NAMES.index(state) for state in found.skin.state], np.int8)
+        guess = states(found.skin).astype(np.int8)
         try:
             yield _SmallNearby(scene, model, _slide(model, scene, guess))
         except ContactLost:
@@ -83,6 +84,11 @@ class _SmallNearby:
         if held:
             out[[number for number, _ in held]] = self.finger.sed_endings([contact for _, contact in held])
         return out
+
+
+def states(skin: Skin) -> NDArray[np.int64]:
+    """Return the states (k,) of a skin that slides: what still stuck slips once it has settled."""
+    return np.array([SLIP if state == "stick" else NAMES.index(state) for state in skin.state])
 
 
 def _slide(finger: FingerModel, scene: Scene, guess: States) -> Contact:

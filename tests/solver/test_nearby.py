@@ -59,12 +59,23 @@ def test_states_beside_it_are_those_that_are_solved_alone(found, name):
 
 @pytest.mark.parametrize("name", ["small, by depth", "finite, by depth"])
 def test_beyond_the_limit_of_sliding_there_is_no_state_and_none_is_invented(name):
-    scene = replace(DRIVEN[name], friction=Friction(0.3), loading=Loading(2.0))
+    scene = replace(DRIVEN[name], friction=Friction(0.3), loading=Loading(1.2))
     (prediction,) = answers([scene], in_loops=True)
     seds = taken_up(prediction).seds([rubbed(scene, 0.31), rubbed(scene, 1.9)])
     assert np.isnan(seds).tolist() == [False, True]
 
 
-def test_a_finger_that_is_only_pressed_depends_on_its_way():
-    (pressed,) = answers([Scene(friction=Friction(0.4), loading=Loading(1.0, "none"))], in_loops=True)
-    assert taken_up(pressed) is None
+def test_a_finger_that_is_only_pressed_or_held_by_a_drag_depends_on_its_way():
+    pressed = Loading(1.0, "none")
+    held = Loading(normal_force=0.06, tangential_force=0.01)
+    found = answers([Scene(friction=Friction(0.4), loading=one) for one in (pressed, held)], in_loops=True)
+    assert [taken_up(one) for one in found] == [None, None]
+
+
+@pytest.mark.parametrize("name", ["small, by depth", "finite, by depth"])
+def test_the_end_of_a_course_that_has_nearly_settled_is_taken_up_as_the_settled_slide(found, name):
+    prediction = found[name]
+    stuck = tuple("stick" if state == "slip" and n % 3 else state for n, state in enumerate(prediction.skin.state))
+    assert "stick" in stuck
+    ended = replace(prediction, skin=replace(prediction.skin, state=stuck))
+    assert taken_up(ended).seds([DRIVEN[name]]) == pytest.approx([prediction.sed_ending], rel=1e-7)
