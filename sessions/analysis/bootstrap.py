@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from sessions.analysis.friction import Rule
 from sessions.analysis.instants import break_away_draws, slide_onset_draws
 from sessions.analysis.settings import AnalysisSettings
+from sessions.analysis.steady import strays
 from sessions.analysis.stroke import Interval, Stroke, StrokeCurve
 
 Array = NDArray[np.float64]
@@ -56,7 +57,7 @@ class BootstrapSettings:
         """What an interval is, for people."""
         return (
             f"{100 * self.confidence:g} % percentile interval of {self.repeats} block-bootstrap repeats (blocks of "
-            f"{self.block:g} s, seed {self.seed}): sensor noise, zero and its drift, calibration "
+            f"{self.block:g} s, allowing for neighbours that are alike, seed {self.seed}): sensor noise, zero and its drift, calibration "
             f"({self.calibration}), choice of window (ends up to {100 * self.inwards:g} % inwards)"
         )
 
@@ -76,8 +77,8 @@ class BootstrapSettings:
             "turned; with it the share of repeats whose direction is the one told",
             "break_away": "deviations from the fitted climb turned at random (wild bootstrap, the same blocks), zero, "
             "and where the fit ends; a gain moves no instant; none where a person decided it",
-            "slide_onset": f"the share of the steady speed that tells it, {low:g} to {high:g} %, and noise and "
-            "unevenness of the speed; none where a person decided it",
+            "slide_onset": f"a range rather: any share of the steady speed may tell it, {low:g} to {high:g} %, with noise "
+            "and unevenness of the speed; none where a person decided it",
         }
 
 
@@ -213,12 +214,15 @@ class _Repeats:
         return found | self._instants(found.get("speed"))
 
     def _top(self, force: Array, noise: float) -> Array:
-        """Return how far noise moves the greatest force (repeats,) [N], about its mean."""
+        """Return how far the true greatest force may lie from the one told (repeats,) [N].
+
+        Noise has raised the one told about as far as noise drawn once more raises that on average.
+        """
         high = force[force >= _TOP * np.nanmax(force)]
         every = max(1, round(self._settings.block / 4 / self._step))  # filtered readings nearer than this are alike
         high = high[::every]
         tops = (high + noise * self._draw.standard_normal((self._settings.repeats, len(high)))).max(axis=1)
-        return tops - tops.mean()
+        return tops - 2.0 * tops.mean() + high.max()
 
     def _single(self, value: float) -> Array:
         """Return a ratio that one short stretch gives (repeats,); the stretch is where T/N is nearest to it."""
@@ -249,10 +253,11 @@ class _Repeats:
         drawn = blocks[chosen]  # (repeats, blocks, 9)
         total = weight.sum(axis=1)
         means = np.einsum("rbc,rb->rc", drawn, weight) / total[:, None]
-        spread = np.sqrt(total / np.maximum(total - 1.0, 1.0))  # a mean of few blocks strays further than drawing shows
-        off = (means - blocks.mean(axis=0)) * spread[:, None]
+        # A mean of few blocks, or of blocks that are alike, strays further than drawing them shows.
+        further, free = strays(blocks[:, 0])
+        further *= np.sqrt(total / np.maximum(total - 1.0, 1.0) * free / self._draw.chisquare(free, len(total)))
         lightness = float(blocks[:, 1].mean())
-        mu = self._stroke.mu_dynamic + off[:, 0]
+        mu = self._stroke.mu_dynamic + (means[:, 0] - blocks[:, 0].mean()) * further
         found = {
             "mu_dynamic": mu * self._gain_t / self._gain_n
             + (self._zero_t - self._stroke.mu_dynamic * self._zero_n) * lightness

@@ -16,6 +16,7 @@ FEWEST = 5  # readings in a window
 _HELD = 0.95  # share of a window's readings that must have a ratio
 _QUARTERS = 4
 _FEWEST_BLOCKS = 4  # of which a standard error is told
+_ALIKE = 0.9  # most that neighbours may be alike: more cannot be told from so few
 
 
 def steady_window(ratio: Array, rate: float, whole: int, settings: AnalysisSettings) -> slice | None:
@@ -111,10 +112,25 @@ def mean_of(values: Array, rate: float, common: float, settings: AnalysisSetting
     if len(blocks) >= _FEWEST_BLOCKS:
         from scipy.special import stdtrit  # slow to load, and neither window nor recorder has need of it
 
-        error = float(blocks.std(ddof=1)) / len(blocks) ** 0.5
-        half = float(stdtrit(len(blocks) - 1, 0.5 + settings.confidence / 2) * np.hypot(error, common))
+        further, free = strays(blocks)
+        error = further * float(blocks.std(ddof=1)) / len(blocks) ** 0.5
+        half = float(stdtrit(free, 0.5 + settings.confidence / 2) * np.hypot(error, common))
         interval = (mean - half, mean + half)
     return Mean(mean, float(held.std(ddof=1)), len(held), interval)
+
+
+def strays(blocks: Array) -> tuple[float, float]:
+    """Return how much further than that of independent blocks (k,) their mean strays, and its degrees of freedom.
+
+    Neighbours that are alike count for fewer: of a first-order autoregression n (1 - r) / (1 + r) are independent
+    (Bayley and Hammersley 1946, Suppl. J. R. Stat. Soc. 8:184). White noise, whose r comes out at -1/n, counts in full.
+    """
+    n = len(blocks)
+    off = blocks - blocks.mean()
+    squares = float(off @ off)
+    alike = 0.0 if squares == 0.0 else min(max(float(off[1:] @ off[:-1]) / squares + 1.0 / n, 0.0), _ALIKE)
+    further = ((1.0 + alike) / (1.0 - alike)) ** 0.5
+    return further, max(n / further**2 - 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ from made_strokes import (
     with_info,
     wrench,
 )
+from scipy.signal import lfilter
 
 from sessions.analysis.forces import Filter, centre_of_pressure, friction_ratio, in_face_frame, normal_force
 from sessions.analysis.steady import mean_of, movement, steady_window
@@ -268,6 +269,15 @@ def test_a_mean_of_white_noise_lies_in_its_interval_as_often_as_it_says():
         low, high = mean_of(0.5 + 0.05 * draw.standard_normal(300), 200.0, 0.0, SETTINGS).interval
         inside += low <= 0.5 <= high
     assert 0.92 <= inside / 400 <= 0.98  # 0.95 within three standard deviations of 400 draws
+
+
+@pytest.mark.parametrize("alike", [0.05, 0.1])  # [s]
+def test_a_mean_of_a_ratio_that_wanders_lies_in_its_interval_as_often_as_it_says(alike):
+    draw, kept = np.random.default_rng(2), np.exp(-1 / (200.0 * alike))
+    steps = draw.standard_normal((400, 800)) * np.sqrt(1.0 - kept**2)
+    wandering = lfilter([1.0], [1.0, -kept], steps, axis=1)[:, 400:]
+    ends = [mean_of(0.5 + 0.02 * one, 200.0, 0.0, SETTINGS).interval for one in wandering]
+    assert 0.90 <= np.mean([low <= 0.5 <= high for low, high in ends]) <= 0.98
 
 
 def test_an_even_movement_is_all_explained_and_exact():
