@@ -57,8 +57,8 @@ class BootstrapSettings:
         """What an interval is, for people."""
         return (
             f"{100 * self.confidence:g} % percentile interval of {self.repeats} block-bootstrap repeats (blocks of "
-            f"{self.block:g} s, allowing for neighbours that are alike, seed {self.seed}): sensor noise, zero and its drift, calibration "
-            f"({self.calibration}), choice of window (ends up to {100 * self.inwards:g} % inwards)"
+            f"{self.block:g} s, neighbours being alike allowed for, seed {self.seed}): sensor noise, zero and its "
+            f"drift, calibration ({self.calibration}), choice of window (ends up to {100 * self.inwards:g} % inwards)"
         )
 
     @property
@@ -77,8 +77,8 @@ class BootstrapSettings:
             "turned; with it the share of repeats whose direction is the one told",
             "break_away": "deviations from the fitted climb turned at random (wild bootstrap, the same blocks), zero, "
             "and where the fit ends; a gain moves no instant; none where a person decided it",
-            "slide_onset": f"a range rather: any share of the steady speed may tell it, {low:g} to {high:g} %, with noise "
-            "and unevenness of the speed; none where a person decided it",
+            "slide_onset": f"a range rather: any share of the steady speed may tell it, {low:g} to {high:g} %, with "
+            "noise and unevenness of the speed; none where a person decided it",
         }
 
 
