@@ -1,8 +1,10 @@
 """Many sessions computed at once, on this computer's cores or a Dask cluster, each kept as soon as it is done."""
 
+import asyncio
 import hashlib
 import importlib
 import json
+import logging
 import multiprocessing
 import os
 import signal
@@ -30,6 +32,8 @@ from sessions.sealing import SEAL
 
 LOOK = 0.1  # between two looks whether something is done [s]
 WITHOUT_WORKERS = 30.0  # that a cluster may have no worker before it is given up [s]
+ANSWERS = 10.0  # that a scheduler may take to answer [s]
+AGAIN = "run this again once it is there: what is done is kept"
 CONTENT = (LIVE_FILE, f"{LIVE_FILE}-wal", UNBLINDING, SEAL, DECISIONS)  # all that a visit's numbers come from
 
 Answer = tuple[str, dict[str, Any] | str]  # session, and what it brings or why it brings nothing
@@ -194,21 +198,48 @@ def _end_with_parent() -> None:
 
 
 def _dask(folders: Sequence[Path], options: VisitOptions, address: str) -> Iterator[Answer]:
-    """Yield answers as they come, from the workers of a cluster."""
+    """Yield answers as they come, from the workers of a cluster. Raises SchedulerError."""
     try:
         library: Any = importlib.import_module("distributed")
     except ImportError as error:
         raise SchedulerError("a cluster needs the package distributed: pip install 'daq-app[cluster]'") from error
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it logs as errors is told in a sentence below
+    kind = asyncio.run(_identity(library, address))
+    if kind != "Scheduler":
+        raise SchedulerError(f"{address} is the address of a Dask {kind.lower()}: give that of its scheduler")
+    client: Any = library.Client(address, timeout=ANSWERS, set_as_default=False)
     try:
-        client: Any = library.Client(address, timeout=10, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
+        yield from _by_client(client, library.as_completed(loop=client.loop), folders, options, address)
+    except OSError as error:
+        raise SchedulerError(f"{address}: the scheduler is gone ({error}); {AGAIN}") from error
+    finally:
+        with suppress(OSError, TimeoutError):  # it may be gone
+            client.close()
+
+
+async def _identity(library: Any, address: str) -> str:  # noqa: ANN401 - distributed declares no types
+    """Return what answers at an address. Raises SchedulerError: a client alone waits for ever for what keeps silent."""
+    try:
+        async with asyncio.timeout(ANSWERS), library.rpc(address, timeout=ANSWERS) as there:
+            return str((await there.identity())["type"])
+    except Exception as error:  # any program may listen there and answer anything
+        why = " ".join(str(error).split()) or f"nothing within {ANSWERS:.0f} s"
         raise SchedulerError(
-            f"{address}: no Dask scheduler answers there ({error}); start one, or give no address"
+            f"{address}: no Dask scheduler answers there ({why}); start one, or give no address"
         ) from error
+
+
+def _by_client(
+    client: Any,  # noqa: ANN401
+    answers: Any,  # noqa: ANN401
+    folders: Sequence[Path],
+    options: VisitOptions,
+    address: str,
+) -> Iterator[Answer]:
+    """Yield answers as they come to a client of the cluster."""
     names: dict[Any, str] = {}
     waiting = list(reversed(folders))
     under_way: dict[str, Any] = {}
-    answers: Any = library.as_completed(loop=client.loop)
     seen = time.monotonic()  # when a worker was last there
     try:
         while waiting or under_way:
@@ -229,11 +260,13 @@ def _dask(folders: Sequence[Path], options: VisitOptions, address: str) -> Itera
                 time.sleep(LOOK)
                 continue
             future = next(answers)
+            if future.cancelled():  # nobody cancels but a client that has lost its scheduler
+                raise ConnectionError("the connection was lost")
             del under_way[future.key]
             if future.status == "finished":
                 yield future.result()
             else:
                 yield names[future.key], f"no worker could compute it ({future.exception()})"
     finally:
-        client.cancel(list(under_way.values()))
-        client.close()
+        with suppress(OSError, TimeoutError):  # the scheduler may be gone
+            client.cancel(list(under_way.values()))

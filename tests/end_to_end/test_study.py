@@ -2,6 +2,7 @@
 
 import json
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -185,6 +186,43 @@ def test_a_cluster_without_workers_is_given_up_in_a_sentence(study, tmp_path, mo
         pytest.raises(pooling.SchedulerError, match="no worker"),
     ):
         visits(*asked, scheduler=cluster.scheduler_address)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:{silent}", "tcp://127.0.0.1:9", "http://127.0.0.1:{silent}"])
+def test_an_address_where_no_scheduler_answers_is_told_in_a_sentence(study, tmp_path, monkeypatch, capsys, address):
+    monkeypatch.setattr(pooling, "ANSWERS", 0.5)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        given = address.format(silent=silent.getsockname()[1])
+        assert run(["study", str(study), "--out", str(tmp_path), "--scheduler", given, "--json"]) == 1
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert given in said
+    assert "no Dask scheduler answers there" in said
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_is_killed_ends_a_study_in_a_sentence(study, tmp_path, monkeypatch):
+    monkeypatch.setattr(pooling, "ANSWERS", 5.0)
+    monkeypatch.setattr(pooling, "WITHOUT_WORKERS", 300.0)
+    whole = pooling._by_client
+
+    def killed(*words):
+        scheduler.kill()
+        scheduler.wait()
+        yield from whole(*words)
+
+    told = tmp_path / "scheduler.json"
+    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
+    command += ["--no-dashboard", "--scheduler-file", str(told)]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as scheduler:
+        try:
+            _until(lambda: told.is_file() and told.read_text().endswith("}"))
+            address = json.loads(told.read_text())["address"]
+            monkeypatch.setattr(pooling, "_by_client", killed)
+            with pytest.raises(pooling.SchedulerError, match="the scheduler is gone"):
+                visits([study / "S01"], STEADY, Shelf(tmp_path, STEADY), Console(as_json=True), scheduler=address)
+        finally:
+            scheduler.kill()
 
 
 @pytest.mark.usefixtures("pool")
