@@ -6,7 +6,7 @@ those of mu and tau_max hang together. Where it does not, the solver is run at d
 which. A trial predicted by the force measured has the uncertainty of that force in it too.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -53,19 +53,16 @@ def with_intervals(
     """
     if not prediction.options.intervals:
         return prediction
-    rows, scale = prediction.trials, tau_scale(prediction.options)
+    rows = prediction.trials
     drawn = draws_of(analysis, prediction, settings)
-    columns: list[list[Prediction | str]] = [[row.prediction or _why(row, "sed") for row in rows]]
+    column: list[Prediction | str] = [row.prediction or _why(row, "sed") for row in rows]
     if both_ways:
-        columns.append([row.opposite or _why(row, "opposite_sed") for row in rows])
-    share = 1.0 / len(columns)
-    found = [
-        intervals_of(column, drawn, scale, _part(progress, number * share, share))
-        for number, column in enumerate(columns)
-    ]
-    usual, other = found[0], found[1] if both_ways else [None] * len(rows)
+        column += [row.opposite or _why(row, "opposite_sed") for row in rows]
+    found = intervals_of(column, [*drawn, *drawn][: len(column)], tau_scale(prediction.options), progress)
+    back = found[len(rows) :] or [None] * len(rows)
     trials = tuple(
-        replace(row, interval=one, opposite_interval=back) for row, one, back in zip(rows, usual, other, strict=True)
+        replace(row, interval=one, opposite_interval=other)
+        for row, one, other in zip(rows, found[: len(rows)], back, strict=True)
     )
     return replace(prediction, trials=trials)
 
@@ -172,7 +169,3 @@ def _extremes(carried: Array, draws: Array) -> Indices:
     axes = np.linalg.svd(units, full_matrices=False)[2]
     ranks = [round(end * (len(draws) - 1)) for end in _ENDS]
     return np.unique([np.argsort(way, kind="stable")[ranks] for way in (carried, *(units @ axes.T).T)])
-
-
-def _part(progress: Progress | None, low: float, share: float) -> Callable[[float], bool] | None:
-    return None if progress is None else lambda done: progress(low + share * done)
