@@ -190,6 +190,25 @@ def condense(
 
 
 @compiled
+def unfold_part(carried: Array, first: int, k: int, border: Narrow, top: Array, near: Array, out: Array) -> None:
+    """Fill the `k` displacements of `out` (n,) from `first` on, which one part of the body eliminates.
+
+    Those of its `border` (b,) are there; `top` (k, k + b) is its factor, `near` (b,) memory.
+    """
+    b = border.shape[0]
+    for j in range(b):
+        near[j] = out[border[j]]
+    for i in range(k - 1, -1, -1):
+        row = top[i]
+        total = carried[first + i]
+        for j in range(i + 1, k):
+            total += row[j] * out[first + j]
+        for j in range(b):
+            total += row[k + j] * near[j]
+        out[first + i] = -total / row[i]
+
+
+@compiled
 def unfold(
     carried: Array,
     skin: Array,
@@ -212,13 +231,4 @@ def unfold(
     for p in range(start.shape[0] - 1, -1, -1):
         k, b, first = inner[p], border[p], start[p]
         top = factors[factor_at[p] : factor_at[p] + k * (k + b)].reshape(k, k + b)
-        for j in range(b):
-            near[j] = out[numbers[border_at[p] + j]]
-        for i in range(k - 1, -1, -1):
-            row = top[i]
-            total = carried[first + i]
-            for j in range(i + 1, k):
-                total += row[j] * out[first + j]
-            for j in range(b):
-                total += row[k + j] * near[j]
-            out[first + i] = -total / row[i]
+        unfold_part(carried, first, k, numbers[border_at[p] : border_at[p] + b], top, near, out)

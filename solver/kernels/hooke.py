@@ -7,6 +7,7 @@
 import numpy as np
 
 from solver.kernels.compiling import Array, Flags, Narrow, Wide, compiled
+from solver.kernels.fronts import unfold_part
 
 
 @compiled
@@ -177,16 +178,7 @@ def displace(
                 continue
             k, b, first = inner[p], border[p], start[p]
             top = factors[factor_at[p] : factor_at[p] + k * (k + b)].reshape(k, k + b)
-            for j in range(b):
-                near[j] = inside[numbers[border_at[p] + j]]
-            for i in range(k - 1, -1, -1):
-                row = top[i]
-                total = carried[first + i]
-                for j in range(i + 1, k):
-                    total += row[j] * inside[first + j]
-                for j in range(b):
-                    total += row[k + j] * near[j]
-                inside[first + i] = -total / row[i]
+            unfold_part(carried, first, k, numbers[border_at[p] : border_at[p] + b], top, near, inside)
         for e in range(nodes.shape[0]):
             if not used[e]:
                 continue
