@@ -12,7 +12,7 @@ from sessions.analysis.area import AreaLaw
 from sessions.analysis.bootstrap import BootstrapSettings, drawn_from, intervals_of
 from sessions.blinding import revealed
 from sessions.decisions import Decisions
-from sessions.gain_error import ANALYSIS, checked_gain_error
+from sessions.gain_error import checked_gain_error, gain_error_set, set_gain_error
 from sessions.plan import SessionPlan
 from sessions.prediction import PredictionOptions, Progress, SessionPrediction, predict
 from sessions.recording import Recording, RecordingError
@@ -23,6 +23,7 @@ from sessions.toml_file import SettingsError, from_table
 from sessions.uncertainty import with_intervals
 from sessions.visits import force_visit
 
+ANALYSIS = "analysis.json"
 PREDICTION = "prediction.json"
 
 
@@ -37,18 +38,35 @@ def analysed(
     """Return the analysis of a session, tau_max told by a law of the area, and keep it in the session's folder.
 
     `seed` is that of the intervals kept with it; `gain_error` is how uncertain each axis' gain is [-]. Where nobody
-    says, all three are as in the analysis that was kept before: what somebody set is not lost by a verb that says
-    nothing of it.
+    says, area and seed are as in the analysis that was kept before, and the gain's error as it was last set: what
+    somebody set is not lost by a verb that says nothing of it. Raises RecordingError where the last is damaged.
     """
     before = _kept(recording, ANALYSIS)
-    stood = settings_of(before)
-    settings = AnalysisSettings(
-        area=area or stood.area, gain_error=stood.gain_error if gain_error is None else gain_error
-    )
+    if gain_error is None:
+        gain_error = gain_error_set(recording.folder)
+    else:
+        try:
+            set_gain_error(recording.folder, gain_error)
+        except RecordingError as error:
+            console.note(f"not kept: {error}")
+    settings = AnalysisSettings(area=area or settings_of(before).area, gain_error=gain_error)
     analysis = analyse(recording, settings)
     drawn = drawn_from(settings, bootstrap_of(before).seed if seed is None else seed)
     _keep(recording, ANALYSIS, analysis_document(analysis, drawn), console)
     return analysis
+
+
+def made_otherwise(recording: Recording, now: AnalysisSettings) -> str | None:
+    """Say that the kept prediction has another law of the area or calibration error; None where it has not."""
+    before = _kept(recording, PREDICTION)
+    if not before:
+        return None
+    stood = settings_of(before)
+    other = ["another law of the contact area"] if stood.area != now.area else []
+    other += ["another calibration error"] if stood.gain_error != now.gain_error else []
+    if not other:
+        return None
+    return f"{PREDICTION} was made with {' and '.join(other)}: 'daq-app predict' makes it anew"
 
 
 def asked_before(recording: Recording) -> PredictionOptions | None:
@@ -120,7 +138,8 @@ def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = 
 
 def analysed_again(recording: Recording, stored: Mapping[str, Any], decisions: Decisions) -> dict[str, Any]:
     """Return the analysis made once more as the document `stored` was. Raises SettingsError where that is damaged."""
-    return analysis_document(analyse(recording, settings_of(stored), decisions), bootstrap_of(stored))
+    drawn = bootstrap_of(stored) if "bootstrap" in stored else None
+    return analysis_document(analyse(recording, settings_of(stored), decisions), drawn)
 
 
 def bootstrap_of(stored: Mapping[str, Any]) -> BootstrapSettings:

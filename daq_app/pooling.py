@@ -22,7 +22,7 @@ from typing import Any
 from daq_app.console import Console
 from sessions.blinding import UNBLINDING
 from sessions.decisions import DECISIONS
-from sessions.gain_error import ANALYSIS, gain_error_set
+from sessions.gain_error import GAIN_ERROR
 from sessions.pooling.visit import FORM, Visit, VisitOptions, visit_of
 from sessions.recording import Recording
 from sessions.recording.provenance import software_versions
@@ -34,7 +34,8 @@ LOOK = 0.1  # between two looks whether something is done [s]
 WITHOUT_WORKERS = 30.0  # that a cluster may have no worker before it is given up [s]
 ANSWERS = 10.0  # that a scheduler may take to answer [s]
 AGAIN = "run this again once it is there: what is done is kept"
-CONTENT = (LIVE_FILE, f"{LIVE_FILE}-wal", UNBLINDING, SEAL, DECISIONS)  # all that a visit's numbers come from
+# All that a visit's numbers come from.
+CONTENT = (LIVE_FILE, f"{LIVE_FILE}-wal", UNBLINDING, SEAL, DECISIONS, GAIN_ERROR)
 
 Answer = tuple[str, dict[str, Any] | str]  # session, and what it brings or why it brings nothing
 
@@ -75,11 +76,7 @@ class Shelf:
 
 def content_of(session: Path) -> dict[str, bytes]:
     """Return the files of a session that its numbers come from. Raises OSError."""
-    held = {name: (session / name).read_bytes() for name in CONTENT if (session / name).is_file()}
-    gain_error = gain_error_set(session)  # of its analysis a study takes this alone: what somebody set
-    if gain_error is not None:
-        held[ANALYSIS] = json.dumps({"settings": {"gain_error": gain_error}}).encode()
-    return held
+    return {name: (session / name).read_bytes() for name in CONTENT if (session / name).is_file()}
 
 
 def visits(

@@ -11,7 +11,7 @@ from daq_app.area_option import add_area, area_law
 from daq_app.calibration_option import add_calibration, calibration_error
 from daq_app.cli import WrongValue
 from daq_app.console import Console, number, table
-from daq_app.derived import analysed, analysis_document
+from daq_app.derived import analysed, analysis_document, made_otherwise
 from sessions.analysis.bootstrap import StrokeIntervals, drawn_from, stroke_intervals
 from sessions.analysis.tilt import Tilt
 from sessions.recording import Recording
@@ -38,6 +38,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
         raise WrongValue(f"--bootstrap-seed {options.bootstrap_seed} is not allowed: a whole number from 0 on")
     recording = Recording.open(options.session)
     analysis = analysed(recording, console, area_law(options), seed=options.bootstrap_seed, gain_error=given)
+    older = made_otherwise(recording, analysis.settings)
+    if older is not None:
+        console.note(older)
     chosen = drawn_from(analysis.settings, options.bootstrap_seed)
     console.result(analysis_document(analysis, chosen))
     if recording.simulated_sentence:

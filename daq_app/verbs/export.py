@@ -9,11 +9,20 @@ from pathlib import Path
 
 from daq_app.cli import FLAWED
 from daq_app.console import Console
-from daq_app.derived import ANALYSIS, PREDICTION, analysed_again, made_under, predicted_again, settings_of
+from daq_app.derived import (
+    ANALYSIS,
+    PREDICTION,
+    analysed_again,
+    made_otherwise,
+    made_under,
+    predicted_again,
+    settings_of,
+)
 from sessions.analysis import analyse
 from sessions.blinding import revealed
 from sessions.decisions import read
 from sessions.exports import FORMATS, ExportSource, export
+from sessions.gain_error import gain_error_set
 from sessions.recording import Recording
 from sessions.recording.derived import load_derived
 from sessions.recording.provenance import software_versions
@@ -51,9 +60,14 @@ def _source(recording: Recording, console: Console) -> ExportSource:
     made_by = {"made_by": software_versions()}
     analysis, prediction = load_derived(recording.folder, ANALYSIS), load_derived(recording.folder, PREDICTION)
     if analysis is None or not made_under(analysis, decided):
-        analysis = made_by | analysed_again(recording, analysis or {}, decided)
+        analysis = made_by | analysed_again(
+            recording, analysis or {"gain_error": gain_error_set(recording.folder)}, decided
+        )
     if prediction is not None and not made_under(prediction, decided):
         console.note(f"{PREDICTION} was made under other decisions than those in force, and is made anew")
         found = analyse(recording, settings_of(prediction), decided)
         prediction = made_by | predicted_again(recording, found, prediction)
+    older = made_otherwise(recording, settings_of(analysis))
+    if older is not None:
+        console.note(older)
     return ExportSource(recording, analysis, prediction)

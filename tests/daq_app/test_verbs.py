@@ -428,6 +428,7 @@ def test_a_calibration_error_that_was_set_is_taken_by_every_verb_until_another_i
     known = printed(capsys)["bootstrap"]
     for one, other in zip(known["strokes"], assumed["strokes"], strict=True):
         assert one["mu_max"][1] - one["mu_max"][0] < 0.5 * (other["mu_max"][1] - other["mu_max"][0])
+    (small / "analysis.json").write_text("torn")  # what was set is no part of what can be made anew
     run(["analyse", str(small), "--json"])
     assert printed(capsys)["bootstrap"] == known
     assert run(["predict", str(small), "--beside", "none", "--json"]) == 0
@@ -442,6 +443,27 @@ def test_a_calibration_error_that_was_set_is_taken_by_every_verb_until_another_i
     assert visit_of(recording, VisitOptions(plain, gain_error=0.003), {}).calibration == "0.3 % of each axis, set"
 
 
+def test_what_was_set_is_exported_without_an_analysis_and_a_damaged_setting_is_named_not_assumed(small, capsys):
+    run(["analyse", str(small), "--calibration-error", "0.1"])
+    (small / "analysis.json").unlink()
+    assert run(["export", str(small), "--format", "csv", "--out", str(small.parent / "csv")]) == 0
+    exported = json.loads((small.parent / "csv" / "analysis.json").read_text())
+    assert exported["bootstrap"]["settings"]["gain_error"] == 0.001
+    (small / "calibration-error.json").write_text("torn")
+    for verb in ("analyse", "predict", "report"):
+        capsys.readouterr()
+        assert run([verb, str(small)]) == 1
+        assert "set it anew" in capsys.readouterr().err
+    assert run(["analyse", str(small), "--calibration-error", "0.1"]) == 0
+
+
+def test_a_prediction_made_with_another_calibration_error_is_named(small, capsys):
+    run(["predict", str(small), "--beside", "none"])
+    capsys.readouterr()
+    run(["analyse", str(small), "--calibration-error", "0.1"])
+    assert "prediction.json was made with another calibration error" in capsys.readouterr().err
+
+
 def test_a_study_computes_a_session_again_once_another_calibration_error_was_set(small, tmp_path):
     shelf = Shelf(tmp_path / "results", VisitOptions())
     before = shelf.key(small)
@@ -450,7 +472,7 @@ def test_a_study_computes_a_session_again_once_another_calibration_error_was_set
     run(["analyse", str(small), "--calibration-error", "0.1"])
     assert shelf.key(small) != before
     sent = content_of(small)
-    assert json.loads(sent["analysis.json"]) == {"settings": {"gain_error": 0.001}}
+    assert json.loads(sent["calibration-error.json"])["gain_error"] == 0.001
 
 
 @pytest.mark.parametrize("verb", ["analyse", "predict", "report", "study"])
