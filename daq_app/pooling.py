@@ -24,7 +24,7 @@ from sessions.blinding import UNBLINDING
 from sessions.decisions import DECISIONS
 from sessions.gain_error import GAIN_ERROR
 from sessions.pooling.visit import FORM, Visit, VisitOptions, visit_of
-from sessions.recording import Recording
+from sessions.recording import Recording, RecordingError
 from sessions.recording.provenance import software_versions
 from sessions.recording.schema import LIVE_FILE
 from sessions.recording.whole_file import write_whole
@@ -62,16 +62,30 @@ class Shelf:
         return digest.hexdigest()
 
     def found(self, key: str) -> Visit | None:
-        """Return what was kept under a key; None where nothing was, or it is damaged."""
-        with suppress(OSError, ValueError):
-            return Visit.from_dict(json.loads((self._folder / f"{key}.json").read_bytes()))
+        """Return what was kept under a key; None where nothing was, or it is not what was written."""
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            kept = json.loads(self.file(key).read_bytes())
+            if kept["sha256"] == _digest(kept["visit"]):
+                return Visit.from_dict(kept["visit"])
         return None
 
+    def file(self, key: str) -> Path:
+        """Return where a result is kept."""
+        return self._folder / f"{key}.json"
+
     def keep(self, key: str, result: Mapping[str, Any]) -> None:
-        """Keep a result. Raises OSError."""
-        self._folder.mkdir(parents=True, exist_ok=True)
-        text = json.dumps(result, ensure_ascii=False, allow_nan=False)
-        write_whole(self._folder / f"{key}.json", text.encode() + b"\n")
+        """Keep a result. Raises RecordingError where it cannot be written."""
+        text = json.dumps({"sha256": _digest(result), "visit": result}, ensure_ascii=False, allow_nan=False)
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            write_whole(self.file(key), text.encode() + b"\n")
+        except OSError as error:
+            why = f"{self._folder} cannot be written ({error.strerror}): make room on its disk"
+            raise RecordingError(f"{why} and run this again: what is done is kept") from error
+
+
+def _digest(result: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(result, sort_keys=True).encode()).hexdigest()
 
 
 def content_of(session: Path) -> dict[str, bytes]:
@@ -91,12 +105,15 @@ def visits(
     """Return what each session brings, and the name of and the reason for each that brings nothing.
 
     What is on the shelf already is not computed again; what is done stays there whatever comes. Raises SchedulerError,
-    OSError where the shelf cannot be written.
+    RecordingError where the shelf cannot be written.
     """
     keys = {folder: shelf.key(folder) for folder in folders}
     kept = {folder: shelf.found(key) for folder, key in keys.items()}
     done = [visit for visit in kept.values() if visit is not None]
     missing = [folder for folder, visit in kept.items() if visit is None]
+    for folder in missing:
+        if shelf.file(keys[folder]).exists():
+            console.note(f"{folder.name}: {shelf.file(keys[folder])} is damaged; the session is computed anew")
     if done:
         console.note(f"{len(done)} of {len(folders)} sessions were computed before and are taken as they are")
     failed: list[tuple[str, str]] = []

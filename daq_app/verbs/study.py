@@ -25,7 +25,7 @@ from sessions.pooling.visit import VisitOptions
 from sessions.prediction import PredictionOptions
 from sessions.recording import RecordingError
 from sessions.recording.schema import LIVE_FILE
-from sessions.recording.whole_file import write_json
+from sessions.recording.whole_file import json_text
 
 EXAMPLE = "daq-app study recordings --out results"
 PLANTED = "planted.json"
@@ -125,7 +125,7 @@ def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
     swap_in(files["page"], study_page(study, name))
     swap_in(files["table"], trials_csv(study))
     swap_in(files["columns"], columns_csv(study))
-    write_json(files["numbers"], study.to_dict())
+    swap_in(files["numbers"], json_text(study.to_dict()))
     if study.options.paths != "none":
         files["paths"] = out / "paths.csv"
         swap_in(files["paths"], paths_csv(study))

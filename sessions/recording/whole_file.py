@@ -9,14 +9,23 @@ from typing import Any
 
 def write_json(path: Path, document: Mapping[str, Any]) -> None:
     """Write a JSON text of people's size: indented, UTF-8. Raises ValueError for nan and infinities: JSON has none."""
-    path.write_text(json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+    path.write_text(json_text(document), encoding="utf-8")
+
+
+def json_text(document: Mapping[str, Any]) -> str:
+    """Return a JSON text of people's size: indented. Raises ValueError for nan and infinities: JSON has none."""
+    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def write_whole(path: Path, content: bytes) -> None:
     """Put `content` into the file at `path` in place of what it held: a reader sees the old or the new."""
     new = path.with_name(f".{path.name}.part")
-    with new.open("wb") as file:
-        file.write(content)
+    try:
+        with new.open("wb") as file:
+            file.write(content)
+    except OSError:  # a full disk, on which a part of the file would only take room
+        new.unlink(missing_ok=True)
+        raise
     put_in_place(new, path)
 
 

@@ -17,6 +17,7 @@ from daq_app.pooling import Shelf, computed, computed_from, content_of, visits
 from daq_app.synthetic import synthetic_study
 from sessions.pooling.visit import Visit, VisitOptions
 from sessions.prediction import PredictionOptions
+from sessions.recording import RecordingError
 
 STEADY = VisitOptions()
 QUICK = VisitOptions(PredictionOptions(course="steady"))
@@ -78,6 +79,33 @@ def test_what_was_computed_once_is_not_computed_again(pool, study, monkeypatch):
     )
     assert not failed
     assert {visit.session for visit in done} == {visit["session"] for visit in pool["visits"]}
+
+
+@pytest.mark.parametrize("spoilt", [b"", b"{", b"[]", b'{"a": 1}', "digit"])
+def test_what_was_kept_and_is_not_as_it_was_written_is_named_and_computed_anew(pool, study, tmp_path, spoilt, capsys):
+    visit = next(visit for visit in pool["visits"] if visit["session"] == "S01")
+    shelf = Shelf(tmp_path, STEADY)
+    key = shelf.key(study / "S01")
+    shelf.keep(key, visit)
+    whole = shelf.file(key).read_bytes()
+    shelf.file(key).write_bytes(whole.replace(b'"mu": 0.', b'"mu": 9.', 1) if spoilt == "digit" else spoilt)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pooling, "_in_pool", lambda *_: iter([("S01", visit)]))
+        done, _ = visits([study / "S01"], STEADY, shelf, Console(as_json=True))
+    assert done[0].to_dict()["rows"][0]["mu"] == visit["rows"][0]["mu"]
+    assert f"{key}.json is damaged; the session is computed anew" in capsys.readouterr().err
+    assert shelf.file(key).read_bytes() == whole
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full, which is always full")
+def test_a_full_disk_ends_a_study_in_a_sentence_and_leaves_no_part_of_a_file(tmp_path):
+    shelf = Shelf(tmp_path, STEADY)
+    part = tmp_path / ".key.json.part"
+    part.symlink_to("/dev/full")
+    with pytest.raises(RecordingError, match=r"cannot be written \(No space left on device\): make room"):
+        shelf.keep("key", {})
+    assert not part.is_symlink()
+    assert shelf.found("key") is None
 
 
 def test_another_recording_or_other_options_are_another_key(study):
