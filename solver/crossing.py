@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from solver.mesh import Array
 
 Flags = NDArray[np.bool_]
+SQUEEZED = 0.85  # stretch of skin, on one side at least, in which a kink is told of
 
 
 def crosses_itself(outline: Array) -> bool:
@@ -36,11 +37,15 @@ class Pinch(NamedTuple):
     least: float  # ratio of deformed to undeformed length of a half of an element's side
     place: int  # the element that it belongs to
     lowest: float  # stretch, at the ends of elements too: nearer the truth where elements are large
-    kink: float  # largest jump of the tangent, by undeformed length, from one element to the next: a crease has one
+    kink: float  # largest jump of the tangent, by undeformed length, from one element to the next: a crease has one.
+    # Where skin touches or is drawn out at an edge of contact, jumps are the mesh's: open, squeezed skin is asked.
 
 
-def pinched(before: Array, after: Array, loose: Flags) -> Pinch:
-    """Return how far polylines of elements with three nodes each, (2 a + 1, 2), are squeezed where `loose` (a,)."""
+def pinched(before: Array, after: Array, loose: Flags, touching: Flags) -> Pinch:
+    """Return how far polylines of elements with three nodes each, (2 a + 1, 2), are squeezed where `loose` (a,).
+
+    Some of the nodes are `touching` (2 a + 1,).
+    """
     start = [np.diff(points, axis=0)[::2] for points in (before, after)]
     end = [np.diff(points, axis=0)[1::2] for points in (before, after)]
     pieces = np.stack([_long(after) / _long(before) for before, after in (start, end)], axis=1)
@@ -49,7 +54,8 @@ def pinched(before: Array, after: Array, loose: Flags) -> Pinch:
         (3.0 * a - b) / size[:, None] for a, b, size in zip((start[1], end[1]), (end[1], start[1]), sizes, strict=True)
     )
     pieces[~loose] = np.inf
-    joined = loose[1:] & loose[:-1]
+    joined = loose[1:] & loose[:-1] & ~touching[2:-2:2]
+    joined &= np.minimum(_long(first[1:]), _long(last[:-1])) < SQUEEZED
     jumps = _long(first[1:] - last[:-1])[joined]
     lowest = min(float(_long(side)[loose].min(initial=np.inf)) for side in (first, last))
     least, place = float(pieces.min()), int(pieces.min(axis=1).argmin())

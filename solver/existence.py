@@ -37,6 +37,11 @@ def steady(
             return shape
         found.append(shape)
     proof = reach.of_friction(finger.scene, pull, pull.mu, stop)
+    if proof.lost:
+        raise NotConverged(
+            f"At {pull.depth:.3g} mm of indentation settled sliding was followed up to mu = {proof.value:.3g} and lost "
+            f"there; whether there is any at mu = {pull.mu:.3g} is not known"
+        )
     if proof.limited:
         raise _refused(finger, pull, proof.value, stop)
     for shape in found:
@@ -85,7 +90,7 @@ def _refused(finger: FiniteFinger, pull: Pull, largest: float, stop: Callable[[]
     beyond = ""
     with suppress(NotConverged):
         deepest = reach.of_depth(finger.scene, pull, stop)
-        if deepest.limited:
+        if deepest.limited and not deepest.lost:
             depth = deepest.value
             beyond = f", and with this friction up to {depth:.3g} mm"
     return NoSteadyState(

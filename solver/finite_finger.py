@@ -109,7 +109,9 @@ class FiniteFinger:
     def pinch(self, shape: Shape) -> Pinch:
         """Return how far the skin is squeezed, and whether it has a crease."""
         geometry = self.geometry
-        return Pinch(*kernels.pinched(geometry.mesh.nodes, shape.u, geometry.whole, geometry.loose))
+        touching = np.zeros(len(geometry.whole), bool)
+        touching[np.searchsorted(geometry.whole, geometry.mesh.skin)] = shape.touching
+        return Pinch(*kernels.pinched(geometry.mesh.nodes, shape.u, geometry.whole, geometry.loose, touching))
 
     def crosses(self, shape: Shape) -> bool:
         """Return whether the skin crosses itself."""

@@ -24,6 +24,7 @@ MOST = 400  # of them
 TURN = 0.7  # least cosine between the directions of the branch and of a step along it
 SQUEEZE = 0.85  # least ratio of the skin's least stretches at neighbouring points: a leap to a folded branch has less
 CREASE = 0.6  # kink from which skin has a crease: coarse meshes of smooth skin have 0.3, creases 1 and more
+STEEP = 0.1  # part of the value in the branch's direction, from which a limit point is far
 APART = 0.04  # of the skin's least stretches at two points between which the stretch that folds is met
 
 
@@ -34,6 +35,7 @@ class Branch:
     states: tuple[Shape, ...]  # on the way, that at the value asked for or the last one before the limit being last
     value: float  # of the coefficient or the depth [mm] at its end: the largest one met
     limited: bool  # whether the branch ends there, short of what was asked for
+    lost: bool = False  # whether it ends there for want of a next point only, far from a limit point and from a fold
 
     @property
     def last(self) -> Shape:
@@ -64,7 +66,8 @@ def follow(
             raise Cancelled
         step = _further(finger, way[-1], by, direction, rate, length, target, SHORTEST * reach)
         if step is None:
-            break
+            lost = rate > STEEP and way[-1].pinch.least > folds + APART
+            return Branch(tuple(point.shape for point in way[: best + 1]), way[best].value, limited=True, lost=lost)
         point, length = step
         if point.pinch.least < folds:
             last = way[-1]

@@ -35,6 +35,7 @@ class Reach:
 
     value: float  # coefficient of friction, or depth [mm]: the one asked for, or the largest
     limited: bool  # whether it ends there
+    lost: bool  # whether it was lost there, and may go on
     least: float  # least stretch of the skin at its last state [-]
     folds: float  # stretch at which it would fold [-]
     numbers: Array  # (3,) SED of the ending, normal and tangential force at its last state
@@ -119,7 +120,7 @@ def _followed(finger: FiniteFinger, start: Shape, asked: _Question, folds: float
 
 def _told(finger: FiniteFinger, branch: Branch, folds: float) -> Reach:
     least = finger.pinch(branch.last).least
-    return Reach(float(branch.value), branch.limited, least, folds, finger.numbers(branch.last))
+    return Reach(float(branch.value), branch.limited, branch.lost, least, folds, finger.numbers(branch.last))
 
 
 def _squeezed(finger: FiniteFinger, shape: Shape) -> float:

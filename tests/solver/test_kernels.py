@@ -202,9 +202,11 @@ def test_the_compiled_outline_is_squeezed_and_crosses_itself_where_the_plain_one
         nodes = np.stack([np.linspace(0.0, 3.0, 24), np.zeros(24)], axis=1)
         u = spread * draw.normal(size=nodes.shape)
         outline = np.arange(2, 23)
-        loose = draw.random(10) < 0.8
+        loose, touching = draw.random(10) < 0.8, draw.random(21) < 0.3
         before, after = nodes[outline], (nodes + u)[outline]
-        assert kernels.pinched(nodes, u, outline, loose) == pytest.approx(pinched(before, after, loose), rel=1e-12)
+        assert kernels.pinched(nodes, u, outline, loose, touching) == pytest.approx(
+            pinched(before, after, loose, touching), rel=1e-12
+        )
         assert kernels.crosses(nodes, u, outline) == crosses_itself(after)
         seen.add(kernels.crosses(nodes, u, outline))
     assert seen == {True, False}
