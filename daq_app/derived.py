@@ -7,6 +7,7 @@ from typing import Any
 
 from daq_app.cli import WrongValue
 from daq_app.console import Console
+from sessions.afferent import AfferentSettings, firing_document
 from sessions.analysis import Analysis, AnalysisSettings, analyse
 from sessions.analysis.area import AreaLaw
 from sessions.analysis.bootstrap import BootstrapSettings, drawn_from, intervals_of
@@ -75,6 +76,17 @@ def asked_before(recording: Recording) -> PredictionOptions | None:
     return from_table(before["options"], PredictionOptions, PREDICTION) if "options" in before else None
 
 
+def afferent_before(recording: Recording) -> AfferentSettings | None:
+    """Return the parameters of the afferent kept with the prediction before; None where none was kept."""
+    return _afferent_of(_kept(recording, PREDICTION))
+
+
+def _afferent_of(stored: Mapping[str, Any]) -> AfferentSettings | None:
+    """Return the parameters of the afferent in a stored prediction; None where it has none. Raises SettingsError."""
+    held: Mapping[str, Any] | None = stored.get("afferent")
+    return None if held is None else from_table(held.get("settings") or {}, AfferentSettings, PREDICTION)
+
+
 def _kept(recording: Recording, name: str) -> Mapping[str, Any]:
     """Return a document as it was kept before; empty where there is none, or one that is damaged and made anew."""
     try:
@@ -82,23 +94,52 @@ def _kept(recording: Recording, name: str) -> Mapping[str, Any]:
         settings_of(document)
         bootstrap_of(document)
         from_table(document.get("options", {}), PredictionOptions, name)
+        _afferent_of(document)
     except (RecordingError, SettingsError):
         return {}
     return document
 
 
 def predicted(
-    recording: Recording, analysis: Analysis, console: Console, options: PredictionOptions | None = None
+    recording: Recording,
+    analysis: Analysis,
+    console: Console,
+    options: PredictionOptions | None = None,
+    afferent: AfferentSettings | None = None,
 ) -> SessionPrediction:
-    """Return what the model predicts for a session, and keep it in the session's folder. Raises as `predict` does."""
+    """Return what the model predicts for a session, and keep it in the session's folder.
+
+    The firing of an `afferent` is kept with it; where nobody asks for one, with the parameters of the one kept before.
+    What else was kept before and is not asked for again is named. Raises as `predict` does.
+    """
 
     def shown(part: float) -> bool:
         console.progress(part, "predicting")
         return True
 
     prediction = _predicted(analysis, recording.plan, options, shown)
-    _keep(recording, PREDICTION, prediction.to_dict(), console)
+    before = _kept(recording, PREDICTION)
+    document = _with_firing(prediction, afferent or _afferent_of(before))
+    lost = _no_longer(before, prediction.options)
+    if lost:
+        console.note(f"{PREDICTION} held more before, which is not kept: {', '.join(lost)}")
+    _keep(recording, PREDICTION, document, console)
     return prediction
+
+
+def _with_firing(prediction: SessionPrediction, afferent: AfferentSettings | None) -> dict[str, Any]:
+    told = {} if afferent is None else {"afferent": firing_document(prediction, afferent)}
+    return {**prediction.to_dict(), **told}
+
+
+def _no_longer(before: Mapping[str, Any], now: PredictionOptions) -> list[str]:
+    """Name what a stored prediction was asked for and another is not, with the words that ask for it."""
+    stood = from_table(before.get("options", {}), PredictionOptions, PREDICTION)
+    rank = ("none", "small", "both").index
+    lost = ["intervals of the SED (--intervals)"] if stood.intervals and not now.intervals else []
+    if before and rank(stood.beside) > rank(now.beside):
+        lost.append(f"the variants side by side (--beside {stood.beside})")
+    return lost
 
 
 def predicted_again(recording: Recording, analysis: Analysis, stored: Mapping[str, Any]) -> dict[str, Any]:
@@ -109,7 +150,8 @@ def predicted_again(recording: Recording, analysis: Analysis, stored: Mapping[st
     options = from_table(stored.get("options", {}), PredictionOptions, PREDICTION)
     stimuli: list[Mapping[str, Any]] = [row.get("stimulus") or {} for row in stored.get("trials", ())]
     blind = all(stimulus.get("index") is None for stimulus in stimuli)
-    return _predicted(analysis, (recording if blind else revealed(recording)).plan, options, lambda _: True).to_dict()
+    plan = (recording if blind else revealed(recording)).plan
+    return _with_firing(_predicted(analysis, plan, options, lambda _: True), _afferent_of(stored))
 
 
 def _predicted(

@@ -6,7 +6,7 @@ surfaces in the settled state is that of the SED, as long as none lies at a boun
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from sessions.prediction import SessionPrediction
 Array = NDArray[np.float64]
 
 STEP = 1e-3  # [s]
+ABOUT = "an illustration with assumed numbers: no fitted map from SED to the rate of an SA-II afferent is known"
 SHOWN = 10  # every so many steps the rate is told
 
 
@@ -145,6 +146,18 @@ def session_firing(
         spikes = spike_times(time, rate, np.random.default_rng([chosen.seed, number]), chosen)
         found.append(Firing(row.trial, time, rate, float(np.clip(settled, 0.0, chosen.greatest_rate)), spikes))
     return reference, tuple(found)
+
+
+def firing_document(prediction: SessionPrediction, settings: AfferentSettings) -> dict[str, Any]:
+    """Return the firing in each trial as plain data, with what it is and every parameter."""
+    reference, found = session_firing(prediction, settings)
+    return {
+        "about": ABOUT,
+        "reference_sed": reference,
+        "settings": asdict(settings),
+        "parameters": parameters(settings, reference),
+        "trials": [one.to_dict() for one in found],
+    }
 
 
 def parameters(settings: AfferentSettings, reference: float | None = None) -> list[dict[str, Any]]:

@@ -15,7 +15,7 @@ from daq_app.calibration_option import add_calibration, calibration_error
 from daq_app.cli import WrongValue
 from daq_app.console import Console, number, table
 from daq_app.derived import analysed, predicted, visit
-from sessions.afferent import AfferentSettings, parameters, session_firing, settings_with
+from sessions.afferent import AfferentSettings, firing_document, settings_with
 from sessions.alternative import Alternative
 from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction
 from sessions.sealing import SEAL, seal_prediction
@@ -84,7 +84,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     """Predict, keep the result in the session's folder and print it."""
     if options.afferent_seed < 0:
         raise WrongValue(f"--afferent-seed {options.afferent_seed} is not allowed: a whole number from 0 on")
-    _afferent(options)
+    afferent = _afferent(options)
     asked = PredictionOptions(
         tau_reading=options.tau,
         scene=None if options.scene is None else load_toml(options.scene, Scene),
@@ -96,9 +96,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     )
     recording = visit(options.session, options.subject)
     analysis = analysed(recording, console, area_law(options), gain_error=calibration_error(options))
-    prediction = predicted(recording, analysis, console, asked)
+    prediction = predicted(recording, analysis, console, asked, afferent if options.afferent else None)
     seal = {"sealed_sha256": seal_prediction(recording, prediction.to_dict())} if options.seal else {}
-    firing = _firing(prediction, options) if options.afferent else {}
+    firing = {"afferent": firing_document(prediction, afferent)} if options.afferent else {}
     console.result({**prediction.to_dict(), **seal, **firing})
     if recording.simulated_sentence:
         console.say(recording.simulated_sentence)
@@ -224,14 +224,6 @@ def _ends(one: SedInterval | None) -> str:
         return "none"
     star = "*" if one.method == "sampling" else ""
     return f"{number(1e3 * one.low, 4)} to {number(1e3 * one.high, 4)}{star}"
-
-
-def _firing(prediction: SessionPrediction, options: argparse.Namespace) -> dict[str, Any]:
-    settings = _afferent(options)
-    reference, found = session_firing(prediction, settings)
-    about = "an illustration with assumed numbers: no fitted map from SED to the rate of an SA-II afferent is known"
-    told = {"about": about, "reference_sed": reference, "parameters": parameters(settings, reference)}
-    return {"afferent": {**told, "trials": [one.to_dict() for one in found]}}
 
 
 def _afferent(options: argparse.Namespace) -> AfferentSettings:

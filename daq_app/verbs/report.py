@@ -10,7 +10,7 @@ from pathlib import Path
 from daq_app.area_option import add_area, area_law
 from daq_app.calibration_option import add_calibration, calibration_error
 from daq_app.console import Console
-from daq_app.derived import analysed, asked_before, predicted, visit
+from daq_app.derived import afferent_before, analysed, asked_before, predicted, visit
 from sessions.afferent import AfferentSettings, session_firing
 from sessions.blinding import revealed
 from sessions.paths import trial_paths
@@ -48,7 +48,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "with 'both' at finite strain too (about a minute); small, or all that was predicted before",
     )
     parser.add_argument(
-        "--afferent", action="store_true", help="also firing rates of an SA-II afferent: an illustration"
+        "--afferent",
+        action="store_true",
+        help="also firing rates of an SA-II afferent: an illustration (or where it was kept before)",
     )
     parser.add_argument("--figures", type=Path, metavar="DIR", help="also write every picture as SVG, its data as CSV")
     add_area(parser)
@@ -66,11 +68,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
         if one.plan.blinded:
             raise Blinded(f"{one.folder} is blinded: a report tells scores by index; 'daq-app unblind' opens the key")
     analysis = analysed(recording, console, area_law(options), gain_error=calibration_error(options))
-    prediction = predicted(recording, analysis, console, _asked(recording, options))
+    afferent = afferent_before(recording) or (AfferentSettings() if options.afferent else None)
+    prediction = predicted(recording, analysis, console, _asked(recording, options), afferent)
     from sessions.exports import html
     from sessions.report import findings, score_table
 
-    further = _further(recording, prediction, options, console)
+    further = _further(recording, prediction, afferent, options, console)
     report = findings(recording, analysis, prediction, [score_table(one) for one in others], further=further)
     console.progress(0.9, "drawing")
     if options.out is None:  # beside the recording it is one more thing made of it, and listed in its manifest
@@ -94,6 +97,7 @@ def _asked(recording: Recording, options: argparse.Namespace) -> PredictionOptio
 def _further(
     recording: Recording,
     prediction: SessionPrediction,
+    afferent: AfferentSettings | None,
     options: argparse.Namespace,
     console: Console,
 ) -> Further:
@@ -106,9 +110,9 @@ def _further(
 
         return tell
 
-    reference, firing = session_firing(prediction) if options.afferent else (None, ())
+    reference, firing = (None, ()) if afferent is None else session_firing(prediction, afferent)
     paths = None
     if options.paths is not None and recording.plan.forces:
         finite = options.paths == "finite"
         paths = trial_paths(recording, prediction.options, shown("many paths of the analysis"), finite=finite)
-    return Further(firing, afferent_facts(AfferentSettings(), reference), paths)
+    return Further(firing, afferent_facts(afferent or AfferentSettings(), reference), paths)

@@ -35,13 +35,14 @@ def afferent_facts(settings: AfferentSettings, reference: float | None) -> tuple
     facts = [
         Fact(
             told["name"].replace("_", " "),
-            f"{told['value']:g} {told['unit']}".removesuffix(" -"),
+            f"{1e3 * told['value']:.4g} kPa"
+            if told["unit"] == "MPa"
+            else f"{told['value']:g} {told['unit']}".removesuffix(" -"),
             f"{told['standing']}: {told['basis']}",
         )
-        for told in parameters(settings)
+        for told in parameters(settings, reference)
     ]
-    known = "" if reference is None else f"{1e3 * reference:.4g} kPa"
-    return (Fact("SED at which x is 1", known, "median of this session's trials"), *facts) if known else ()
+    return () if reference is None else tuple(facts)
 
 
 def predicted_seds(findings: Sequence[PredictionFinding]) -> dict[tuple[str, int], float]:

@@ -457,6 +457,18 @@ def test_what_was_set_is_exported_without_an_analysis_and_a_damaged_setting_is_n
     assert run(["analyse", str(small), "--calibration-error", "0.1"]) == 0
 
 
+def test_the_afferent_stays_with_the_prediction_and_what_is_not_asked_for_again_is_named(small, capsys):
+    asked = ["--afferent", "--afferent-set", "static_gain=30", "--intervals", "--beside", "none"]
+    assert run(["predict", str(small), *asked, "--json"]) == 0
+    shown = printed(capsys)["afferent"]
+    assert json.loads((small / "prediction.json").read_text())["afferent"] == shown
+    assert run(["verify", str(small)]) == 0
+    capsys.readouterr()
+    run(["predict", str(small), "--beside", "none"])
+    assert "intervals of the SED (--intervals)" in capsys.readouterr().err
+    assert json.loads((small / "prediction.json").read_text())["afferent"] == shown
+
+
 def test_a_prediction_made_with_another_calibration_error_is_named(small, capsys):
     run(["predict", str(small), "--beside", "none"])
     capsys.readouterr()

@@ -16,6 +16,7 @@ from sessions.afferent import (
     settings_with,
     spike_times,
 )
+from sessions.report.predictions import afferent_facts
 
 USUAL = AfferentSettings()
 PLAIN = replace(USUAL, threshold=0.0)  # whose closed forms are short
@@ -92,6 +93,13 @@ def test_a_parameter_that_somebody_set_is_told_as_set_and_the_reference_as_assum
     assert (told["static_gain"]["value"], told["static_gain"]["standing"]) == (30.0, "set")
     assert (told["reference"]["value"], told["reference"]["standing"]) == (0.0086, "assumed")
     assert {one["standing"] for name, one in told.items() if name not in ("static_gain", "seed")} == {"assumed"}
+
+
+def test_a_page_tells_every_parameter_with_its_unit_and_whether_it_is_assumed_or_set():
+    facts = {fact.name: fact for fact in afferent_facts(settings_with({"static_gain": 30.0}), 7.5e-3)}
+    assert (facts["reference"].value, facts["threshold"].value) == ("7.5 kPa", "0.004 kPa")
+    assert facts["static gain"].value == "30 imp/s"
+    assert {name for name, fact in facts.items() if not fact.remark.startswith("assumed: ")} == {"static gain", "seed"}
 
 
 @pytest.mark.parametrize("wrong", [{"loudness": 1.0}, {"variation": 0.0}, {"threshold": -1.0}, {"static_gain": np.nan}])

@@ -70,8 +70,9 @@ def afferent_table(report: Report) -> Table | None:
     groups = grouped(report, report.predictions, lambda p: p.experiment, row)
     caption = (
         "Firing of an SA-II afferent: an illustration. No fitted map from SED to the rate of a human SA-II afferent is "
-        "known; every parameter below is assumed. The order of the settled rates is that of the SED as "
-        "long as no rate lies at a bound and every SED is beyond the threshold."
+        "known; every parameter is told below, assumed unless it says that somebody set it. The order of the settled "
+        "rates is that of the SED as long as no rate lies at a bound, every SED is beyond the threshold and the "
+        "adaptation gain stays below the static gain."
     )
     return Table("table-afferent", caption, columns, groups, notes.listed())
 
