@@ -65,4 +65,5 @@ class FiniteNearby:
                 there = finite_forced.balanced(newton, replace(here, pull=pull), Given(scene.normal_force, None), GOOD)
         except NotConverged:
             return None
-        return None if leapt(self.finger, here, there) else there
+        reaches_out = (there.touching & ~here.touching)[[0, -1]].any()  # then skin may touch that nobody looked at
+        return None if reaches_out or leapt(self.finger, here, there) else there

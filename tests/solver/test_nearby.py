@@ -79,3 +79,11 @@ def test_the_end_of_a_course_that_has_nearly_settled_is_taken_up_as_the_settled_
     assert "stick" in stuck
     ended = replace(prediction, skin=replace(prediction.skin, state=stuck))
     assert taken_up(ended).seds([DRIVEN[name]]) == pytest.approx([prediction.sed_ending], rel=1e-7)
+
+
+@pytest.mark.parametrize("kinematics", ["small", "finite"])
+def test_no_sed_is_told_where_contact_would_reach_beyond_the_skin_that_was_looked_at(kinematics):
+    scene = Scene(friction=Friction(0.3), loading=Loading(0.5), solve=Solve(kinematics))
+    (prediction,) = answers([scene], in_loops=True)
+    seds = taken_up(prediction).seds([replace(scene, loading=Loading(depth)) for depth in (0.52, 1.5)])
+    assert np.isnan(seds).tolist() == [False, True]
