@@ -24,6 +24,7 @@ FINENESS = 7.0  # of the meshes on which limits of depth and force are looked fo
 FINER = 1.6  # times as fine is the mesh on which a limit of depth is looked at once more
 BEYOND = 2.0  # times the largest depth met as a force grew, up to which the largest is looked for
 PATIENCE = 15  # corrections of states that a small step may take
+LEAST = 1e-3  # part of a depth or force below which no limit of it is looked for
 CLOSE = 0.005  # relative step of mu below which a limit is taken as found
 
 
@@ -89,13 +90,15 @@ def limits(scene: Scene, law: FrictionLaw, *, in_loops: bool = False) -> tuple[f
     """
     fingers = Fingers(scene, in_loops=in_loops)
     if scene.normal_force is None:
-        return None, _deepest(fingers, scene, law)
+        return None, _deepest(fingers, scene, law, scene.loading.depth)
     found = _strongest(fingers, scene, scene.normal_force, law)
-    return (None, None) if found is None else (found[0], _deepest(fingers, scene.driven(BEYOND * found[1]), law))
+    if found is None:
+        return None, None
+    return found[0], _deepest(fingers, scene, law, BEYOND * found[1], found[1])
 
 
-def _deepest(fingers: Fingers, scene: Scene, law: FrictionLaw) -> float | None:
-    """Return the largest indentation [mm] below the scene's with settled sliding.
+def _deepest(fingers: Fingers, scene: Scene, law: FrictionLaw, high: float, low: float | None = None) -> float | None:
+    """Return the largest indentation [mm] below `high`, and above `low` where that is known, with settled sliding.
 
     None where there is none, or where a finer mesh puts it elsewhere, as it does at coefficients far beyond the limit.
     """
@@ -104,7 +107,7 @@ def _deepest(fingers: Fingers, scene: Scene, law: FrictionLaw) -> float | None:
     def slides(depth: float) -> bool:
         return followed(fingers.at(depth), law, depth, direction)[0] is not None
 
-    found = _largest(slides, scene.loading.depth)
+    found = _largest(slides, high, low)
     if found is None:
         return None
     finer = fingers.made_for(found, FINER * FINENESS)
@@ -142,12 +145,16 @@ def _rubless(fingers: Fingers, force: float, direction: int, bone: float) -> tup
     return body, sliding_under(body, bare, force, direction, bone)
 
 
-def _largest(exists: Callable[[float], bool], high: float) -> float | None:
-    """Return up to where below `high` there is what `exists`, within 1 %; None where not even a thousandth of it."""
-    low = 1e-3 * high
-    if not exists(low):
-        return None
-    while high > 1.01 * low:
+def _largest(exists: Callable[[float], bool], high: float, low: float | None = None) -> float | None:
+    """Return up to where below `high` there is what `exists`, within 1 %; None where not even a thousandth of it.
+
+    `low` is a value that exists, where one is known.
+    """
+    if low is None:
+        low = LEAST * high
+        if not exists(low):
+            return None
+    while high > 1.02 * low:
         middle = sqrt(low * high)
         low, high = (middle, high) if exists(middle) else (low, middle)
     return sqrt(low * high)
