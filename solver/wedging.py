@@ -107,9 +107,12 @@ def _deepest(fingers: Fingers, scene: Scene, law: FrictionLaw, high: float, low:
     def slides(depth: float) -> bool:
         return followed(fingers.at(depth), law, depth, direction)[0] is not None
 
-    found = _largest(slides, high, low)
-    if found is None:
-        return None
+    least = LEAST * high
+    while low is None:
+        if high < least:
+            return None
+        low, high = (high / 2.0, high) if slides(high / 2.0) else (None, high / 2.0)
+    found = _largest(slides, low, high)
     finer = fingers.made_for(found, FINER * FINENESS)
     ends = [followed(finer, law, part * found, direction)[0] is None for part in (0.97, 1.03)]
     return found if ends == [False, True] else None
@@ -133,8 +136,9 @@ def _strongest(fingers: Fingers, scene: Scene, force: float, law: FrictionLaw) -
             depths.append(depth_of(found))
         return found is not None
 
-    most = _largest(slides, force)
-    return None if most is None else (most, max(depths))
+    if not slides(LEAST * force):
+        return None
+    return _largest(slides, LEAST * force, force), max(depths)
 
 
 def _rubless(fingers: Fingers, force: float, direction: int, bone: float) -> tuple[Touchable, Contact]:
@@ -145,15 +149,8 @@ def _rubless(fingers: Fingers, force: float, direction: int, bone: float) -> tup
     return body, sliding_under(body, bare, force, direction, bone)
 
 
-def _largest(exists: Callable[[float], bool], high: float, low: float | None = None) -> float | None:
-    """Return up to where below `high` there is what `exists`, within 1 %; None where not even a thousandth of it.
-
-    `low` is a value that exists, where one is known.
-    """
-    if low is None:
-        low = LEAST * high
-        if not exists(low):
-            return None
+def _largest(exists: Callable[[float], bool], low: float, high: float) -> float:
+    """Return up to where between `low`, which does, and `high` there is what `exists`, within 1 %."""
     while high > 1.02 * low:
         middle = sqrt(low * high)
         low, high = (middle, high) if exists(middle) else (low, middle)

@@ -81,6 +81,7 @@ def test_a_drag_that_lays_on_far_more_skin_than_the_depth_would_is_refused_with_
     assert told.limit_indentation == pytest.approx(0.0223, rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_slide_that_settles_late_near_the_limit_is_gone_to_its_end():
     found = solve(driven(2.0, 1.25, course="history"))
     assert found.history.bone_x[-1] > 25 * 2.0
