@@ -123,7 +123,8 @@ def value_of(pull: Pull, by: int) -> float:
     return pull.mu if by == BY_FRICTION else pull.depth
 
 
-def _with(pull: Pull, by: int, value: float) -> Pull:
+def with_value(pull: Pull, by: int, value: float) -> Pull:
+    """Return `pull` with another coefficient of friction or depth [mm]."""
     return pull._replace(mu=value) if by == BY_FRICTION else pull._replace(depth=value)
 
 
@@ -163,7 +164,7 @@ def _next(
                 return None
             change = (length - direction @ (gone + to) - rate * (now - value)) / ahead
         step = to + change * along
-        pull = _with(pull, by, now + change)
+        pull = with_value(pull, by, now + change)
         shape, largest, changed = newton.moved(shape, pull, step * root, newton.skin_x)
         gone = gone + step
         if not largest < 10.0:
