@@ -1,17 +1,20 @@
 """How far numbers may be off: estimates from coarser meshes, and which mesh a tolerance asks for.
 
-An estimate is a part of the largest difference between the answer and those of coarser meshes, plus what the mesh alone
-decides: errors fall with fineness squared, and two meshes can agree by chance. At small strain there are two coarser
-meshes of elements twice as long, one of them moved along the skin by half an element, so that the edges of contact fall
-differently between nodes; and under a traction bound the drag is that bound times the length of skin that touches,
-known to a part of an element; forces have one more term, which matters on the coarsest meshes alone, where all three
-can agree by chance. At finite strain lines follow the edges, and one coarser mesh will do, as long as it has fewer
-layers in the fat than the answer's: from 3.6 to 6 they are three, and meshes of 6 agreed with those of 3.6 where both
-were 4 % off. What is left at the edges falls with the power 3/2 of fineness. Where skin slips at the bound up to an
-edge, the mesh before its lines were moved there is one of the others, and `felt` says what a number makes of the bound.
-Near the friction limit of small strain numbers grow without bound, and each mesh has its own limit: there `felt` says
-what they make of the coefficient. The factors were chosen and measured with benchmarks/error_estimate.py and
-finite_error_estimate.py; docs/solver.md and docs/solver-finite-strain.md have the figures.
+An estimate is made of a part of the largest difference between the answer and those of other meshes, and of what the
+mesh alone decides: errors fall with fineness squared, and two meshes can agree by chance. Those are errors of different
+kinds, which seldom are large together, so that the root of the sum of their squares is taken. At small strain there is
+one coarser mesh of elements twice as long, moved along the skin by half of one, so that the edges of contact fall
+differently between nodes (another one that is not moved told nothing more of 110 scenes); and under a traction bound
+the drag is that bound times the length of skin that touches, known to a part of an element; forces have one more term,
+which matters on the coarsest meshes alone, where both can agree by chance. At finite strain lines follow the edges, and
+one coarser mesh will do, as long as it has fewer layers than the answer's: in the fat meshes of 3.6 to 6 have three,
+and those of 6 agreed with those of 3.6 where both were 4 % off; in the skin meshes of 4 to 10 have four, and those of
+10 agreed with those of 6 where both were 0.2 % off, three times as much as those of 11. What is left at the edges falls
+with the power 3/2 of fineness. Where skin slips at the bound up to an edge, the mesh before its lines were moved there
+is one of the others, and `felt` says what a number makes of the bound. Near the friction limit of small strain numbers
+grow without bound, and each mesh has its own limit: there `felt` says what they make of the coefficient. The factors
+were chosen and measured with benchmarks/error_estimate.py and finite_error_estimate.py; docs/solver.md and docs/solver-
+finite-strain.md have the figures.
 """
 
 from math import sqrt
@@ -24,20 +27,24 @@ from solver.mesh import Array
 from solver.mesher import ANYWHERE, EDGE, FINEST, SHORT
 from solver.scene import Scene
 
-FINENESS = {"small": (5, 6, 8, 10, 12, 16, 20, 24), "finite": (7, 10, 14, 20, 24)}  # meshes that can be asked for
-DEFAULT = {"small": 8, "finite": 10}
-FROM_MESHES = {"small": 0.15, "finite": 0.35}
-FROM_NAIL = {"small": 2.0, "finite": 3.5}  # the same where a nail ends: errors fall with the element, or its root
-FROM_FINENESS = {"small": ((0.07, 2.0),), "finite": ((0.15, 2.0), (0.06, 1.5))}  # the largest, by the power given
+FINENESS = {"small": (5, 6, 8, 10, 12, 16, 20, 24), "finite": (7, 11, 14, 20, 24)}  # meshes that can be asked for
+DEFAULT = {"small": 8, "finite": 11}
+FROM_MESHES = {"small": 0.25, "finite": 0.6}
+FROM_NAIL = {"small": 2.5, "finite": 4.0}  # the same where a nail ends: errors fall with the element, or its root
+FROM_FINENESS = {"small": ((0.08, 2.0),), "finite": ((0.15, 2.0), (0.06, 1.5))}  # the largest, by the power given
 FROM_COARSE = 1.0  # of both forces at small strain, by fineness to the fourth power
-FROM_LIMIT, CALM = 1.5, 2.0  # of the mesh's own part, for every relative change by friction's beyond that many
-FROM_BOUND = {"small": 0.2, "finite": 0.08}  # of an element that touches, in the drag under a bound
-FROM_EDGE = 0.06  # the same in all numbers, at finite strain where skin slips at the bound up to an edge of contact
+FROM_LIMIT, CALM = 3.0, 2.0  # of the mesh's own part, for every relative change by friction's beyond that many
+FROM_BOUND = {"small": 0.2, "finite": 0.16}  # of an element that touches, in the drag under a bound
+FROM_EDGE = 0.12  # the same in all numbers, at finite strain where skin slips at the bound up to an edge of contact
 OF_DEPTH = 0.5  # of what the mesh alone decides, in a depth that is found at finite strain
 FROM_WIDTH = {
     "small": 0.12,
     "finite": 0.08,
 }  # of an element at the edge of contact, by which either edge may lie elsewhere
+
+
+APART = 0.75  # of what another mesh changes in the differences between surfaces
+DIFFERENT, NOBODY_MINDS = 0.05, 2e-4  # what differences may be off: of their range, or of the numbers themselves
 
 
 class Errors(NamedTuple):
@@ -49,6 +56,7 @@ class Errors(NamedTuple):
     indentation: float | None
     shift: float | None  # [mm]
     width: float | None  # of the contact
+    beside: tuple[float, float, float] | None = None  # SED and both forces on the coarser mesh, where it has a state
 
 
 DEPTH = slice(3, 4)  # place of the indentation among the numbers
@@ -64,12 +72,17 @@ def errors(scene: Scene, fineness: float, numbers: Array, others: Array, felt: A
     if not len(others):
         return _given_none(scene, UNKNOWN)
     driven = scene.driven(float(numbers[3]))
-    off = _off(driven, fineness, numbers, others, felt, marched=steps is not None)
+    forced = scene.normal_force is not None
+    off = _off(driven, fineness, numbers, others, felt, marched=steps is not None, forced=forced)
     off[5] += 2.0 * FROM_WIDTH[scene.solve.kinematics] * _element(driven, fineness)
     if steps is not None:
-        off += steps.error(numbers)
+        more = steps.error(numbers)
+        off[0] = np.hypot(off[0], more[0])
+        off[1:] += more[1:]  # the drag that a press leaves over suffers from both in the same way
     relative = np.minimum(off / np.maximum(np.abs(numbers), np.finfo(float).tiny), 1.0)
-    return _given_none(scene, Errors(*(float(part) for part in relative))._replace(shift=float(off[4])))
+    sed, normal, tangential, depth, _, width = relative.tolist()
+    beside = abs(float(others[0, 0])), abs(float(others[0, 1])), abs(float(others[0, 2]))
+    return _given_none(scene, Errors(sed, normal, tangential, depth, float(off[4]), width, beside))
 
 
 def _given_none(scene: Scene, found: Errors) -> Errors:
@@ -98,7 +111,16 @@ def estimates(scene: Scene, fineness: float, numbers: Array, others: Array, felt
     return np.minimum(_off(scene, fineness, numbers, others, np.broadcast_to(felt, numbers.shape)) / size, 1.0)
 
 
-def _off(scene: Scene, fineness: float, numbers: Array, others: Array, felt: Array, *, marched: bool = False) -> Array:
+def _off(
+    scene: Scene,
+    fineness: float,
+    numbers: Array,
+    others: Array,
+    felt: Array,
+    *,
+    marched: bool = False,
+    forced: bool = False,
+) -> Array:
     """Return how far numbers may be off (n,): those of `estimates`, and maybe others of `errors` after them."""
     kind = scene.solve.kinematics
     size, largest = np.abs(numbers), np.abs(others - numbers).max(axis=0)
@@ -107,17 +129,31 @@ def _off(scene: Scene, fineness: float, numbers: Array, others: Array, felt: Arr
         part[DEPTH] *= OF_DEPTH
     if kind == "small":
         part[1:] += FROM_COARSE / _resolved(scene, fineness) ** 4
+        if forced:  # what the force would be off by at a depth, the SED is off by under the force
+            part[0] = np.hypot(part[0], part[1])
+        if not marched:
+            part += FROM_LIMIT * _least(scene, fineness) * np.maximum(np.abs(felt) - CALM, 0.0)
+    of_bound, of_edge = np.zeros(len(numbers)), np.zeros(len(numbers))
     if marched:
         contact = 2.0 * _half(scene) * scene.finger.tip_radius
-        part += FROM_BOUND[kind] * _element(scene, fineness) / contact * np.abs(felt)
+        of_bound = FROM_BOUND[kind] * _element(scene, fineness) / contact * np.abs(felt)
     else:
-        part[2] += _of_bound(scene, fineness, float(size[1]), float(size[2]))
-    if kind == "small" and not marched:
-        part += FROM_LIMIT * _least(scene, fineness) * np.maximum(np.abs(felt) - CALM, 0.0)
-    elif not marched and np.any(felt):
-        part += FROM_EDGE * scene.friction.cap * _element(scene, fineness) / size[2] * np.abs(felt)
+        of_bound[2] = _of_bound(scene, fineness, float(size[1]), float(size[2]))
+        if kind == "finite" and np.any(felt):
+            of_edge = FROM_EDGE * scene.friction.cap * _element(scene, fineness) / size[2] * np.abs(felt)
     from_meshes = (FROM_NAIL if scene.finger.nail_length > 0.0 else FROM_MESHES)[kind]
-    return from_meshes * largest + part * size
+    return np.linalg.norm([from_meshes * largest, part * size, of_bound * size, of_edge * size], axis=0)
+
+
+def told_apart(numbers: Array, others: Array) -> bool:
+    """Return whether differences between surfaces are good to 5 % of their range, in SED and both forces.
+
+    `numbers` (s, 3) are those of the surfaces, `others` (s, 3) those of a coarser mesh: what differences are off by is
+    estimated as a part of what they change from one mesh to the other. What is less than 0.02 % of the numbers nobody
+    minds.
+    """
+    off, span = APART * np.ptp(others - numbers, axis=0), np.ptp(numbers, axis=0)
+    return bool((off <= np.maximum(DIFFERENT * span, NOBODY_MINDS * numbers.mean(axis=0))).all())
 
 
 def coarsest_for(scene: Scene, tolerance: float) -> float:

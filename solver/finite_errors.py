@@ -49,7 +49,7 @@ def compared(
         return numbers, np.empty((0, 6)), np.zeros(6), steps
     both = (coarse, way_up.first)
     others = np.array([other.finger.all_numbers(other.shape) for other in both if other is not None])
-    felt = felt_of_bound(coarse) if at.finger.bounded_at_an_edge(at.shape) else np.zeros(6)
+    felt = np.zeros(6) if way_up.first is None else felt_of_bound(coarse)
     return numbers, others, felt, None
 
 

@@ -79,6 +79,7 @@ class Prediction:
     indentation_error: float | None = None  # likewise of indentation; None where that was given
     shift_error: float | None = None  # estimated, of shift [mm]; None where there is none
     contact_width_error: float | None = None  # estimated, of contact_width, relative [-]
+    beside: tuple[float, float, float] | None = None  # the SED and both forces on the estimate's coarser mesh
     warnings: tuple[str, ...] = field(default=())  # one sentence each
 
     @property

@@ -1,10 +1,8 @@
-"""How far the numbers of a scene at small strain may be off: what coarser meshes and fewer load steps make of them."""
-
-from collections.abc import Sequence
+"""How far the numbers of a scene at small strain may be off: what a coarser mesh and fewer load steps make of them."""
 
 import numpy as np
 
-from solver.contact import Contact, ContactLost
+from solver.contact import ContactLost
 from solver.estimate import Errors, errors
 from solver.failures import SolveFailure
 from solver.finger import FingerModel
@@ -44,14 +42,11 @@ def times_on_way(scene: Scene, finger: FingerModel) -> int:
     return steps_asked(scene.pressed_only(), finger).times
 
 
-def error_estimates(
-    scene: Scene, fineness: float, coarse: Sequence[FingerModel], numbers: Array, steps: Steps | None
-) -> Errors:
+def error_estimates(scene: Scene, fineness: float, coarse: FingerModel, numbers: Array, steps: Steps | None) -> Errors:
     """Return how far the `numbers` (6,) of a scene may be off, found on a mesh of `fineness`.
 
-    The same scene is solved on the `coarse` meshes: one with elements twice as long, and that mesh moved along the skin
-    by half an element, so that the edges of contact fall differently between nodes. `steps` are those taken where
-    they depend on their way.
+    The same scene is solved on the `coarse` mesh: elements twice as long, moved along the skin by half of one, so that
+    the edges of contact fall differently between nodes. `steps` are those taken where they depend on their way.
     """
     try:
         if steps is None:
@@ -61,29 +56,18 @@ def error_estimates(
         return errors(scene, fineness, numbers, np.empty((0, 6)), np.zeros(6), steps)
 
 
-def _settled(scene: Scene, fineness: float, coarse: Sequence[FingerModel], numbers: Array) -> Errors:
-    states = [nearest(scene, finger) for finger in coarse]
-    others = np.array([all_numbers(scene, *found) for found in zip(coarse, states, strict=True)])
-    felt = np.zeros(6)
-    if (beside := rubbed_more(scene, coarse[0], states[0])) is not None:
-        felt[:3] = (numbers_on(coarse[0], [beside])[0] / others[0, :3] - 1.0) / NUDGE
-    return errors(scene, fineness, numbers, others, felt, None)
+def _settled(scene: Scene, fineness: float, coarse: FingerModel, numbers: Array) -> Errors:
+    state = nearest(scene, coarse)
+    other, felt = all_numbers(scene, coarse, state), np.zeros(6)
+    if (beside := rubbed_more(scene, coarse, state)) is not None:
+        felt[:3] = (numbers_on(coarse, [beside])[0] / other[:3] - 1.0) / NUDGE
+    return errors(scene, fineness, numbers, other[None], felt, None)
 
 
-def _on_way(scene: Scene, fineness: float, coarse: Sequence[FingerModel], numbers: Array, steps: Steps) -> Errors:
-    first, *more = coarse  # of which the first has told the steps
-    whole = [steps.whole if np.isfinite(steps.whole).all() else all_numbers(scene, first, nearest(scene, first))]
-    whole += [all_numbers(scene, finger, _near(scene, finger)) for finger in more]
-    others = np.array([steps.taken(numbers) for numbers in whole])
+def _on_way(scene: Scene, fineness: float, coarse: FingerModel, numbers: Array, steps: Steps) -> Errors:
+    told = np.isfinite(steps.whole).all()  # when the steps were judged
+    other = steps.taken(steps.whole if told else all_numbers(scene, coarse, nearest(scene, coarse)))
     felt = np.zeros(6)
     if scene.friction.tau_max is not None:
-        felt = felt_of_bound(scene, first, end(scene, first, HALF))
-    return errors(scene, fineness, numbers, others, felt, steps)
-
-
-def _near(scene: Scene, finger: FingerModel) -> Contact:
-    """Return the end of the course, or the slide where the friction limit lies just below the drag asked for."""
-    try:
-        return end(scene, finger)
-    except LOST:
-        return nearest(scene, finger)
+        felt = felt_of_bound(scene, coarse, end(scene, coarse, HALF))
+    return errors(scene, fineness, numbers, other[None], felt, steps)

@@ -64,7 +64,7 @@ class _Shared:
 
     fineness: float
     fine: FingerModel
-    coarse: tuple[FingerModel, ...]
+    coarse: FingerModel
     setup_s: float
     solve_s: float
     estimate_s: float
@@ -79,7 +79,7 @@ def answers(
     watch: Watch | None,
     in_loops: bool,
 ) -> list[Answer]:
-    """Solve all scenes on one mesh, and on two coarser ones for the estimate; look wider where contact reaches out."""
+    """Solve all scenes on one mesh, and on a coarser one for the estimate; look wider where contact reaches out."""
     done: list[Answer | None] = []
     most = max(depth, min(WIDE * depth, scenes[0].finger.pulp_thickness()))  # for drags that lay much skin on
     for margin, deep in ((1.0, depth), (4.0, depth), (WIDE, depth), (WIDE, most)):
@@ -107,10 +107,9 @@ def answers(
     return [lost if answer is None else answer for answer in done]
 
 
-def _coarser(scene: Scene, sizing: Sizing, in_loops: bool) -> tuple[FingerModel, FingerModel]:
-    """Return the two fingers of the estimate: elements twice as long, and those moved along the skin by half of one."""
-    twice = replace(sizing, fineness=sizing.fineness / 2.0)
-    return _meshed(scene, twice, in_loops), _meshed(scene, replace(twice, shift=True), in_loops)
+def _coarser(scene: Scene, sizing: Sizing, in_loops: bool) -> FingerModel:
+    """Return the finger of the estimate: elements twice as long, moved along the skin by half of one."""
+    return _meshed(scene, replace(sizing, fineness=sizing.fineness / 2.0, shift=True), in_loops)
 
 
 def _of_all(progress: Progress | None, number: int, count: int) -> Progress | None:
@@ -181,7 +180,7 @@ def _in_steps(scene: Scene, shared: _Shared) -> tuple[Contact | None, Steps | No
     contact = _direct(scene, shared)
     if contact is None or not depends_on_way(scene, contact):
         return contact, None
-    steps = steps_asked(scene, shared.coarse[0])
+    steps = steps_asked(scene, shared.coarse)
     return (contact if steps.times == 1 else _direct(scene, shared, steps.times)), steps
 
 
@@ -195,7 +194,7 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
     contact, steps = _in_steps(scene, shared)
     if contact is None:
         return None
-    times = times_on_way(scene, shared.coarse[0]) if steps is None else steps.times
+    times = times_on_way(scene, shared.coarse) if steps is None else steps.times
     way: March | None = None
     over_time: Array | None = None
     direct = contact
@@ -245,6 +244,7 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
         indentation_error=off.indentation,
         shift_error=None if shift is None else off.shift,
         contact_width_error=off.width,
+        beside=off.beside,
         dofs=finger.body.dofs,
         newton_iterations=contact.iterations if way is None else way.iterations,
         wall_s=solved - begun + shared.solve_s,

@@ -3,8 +3,10 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from solver import small_solution
-from solver.estimate import DEFAULT, FINENESS, coarsest_for
+from solver.estimate import DEFAULT, FINENESS, coarsest_for, told_apart
 from solver.failures import SolveFailure
 from solver.finger import FingerModel
 from solver.holding import with_held
@@ -141,7 +143,7 @@ def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
 def _solve_group(
     scenes: list[Scene], progress: Progress | None, watch: Watch | None, rough: Rough | None, in_loops: bool
 ) -> list[Answer]:
-    """Refine until every scene's estimate meets its tolerance, or the finest mesh is reached.
+    """Refine until every scene's estimate meets its tolerance and surfaces are told apart, or no mesh is finer.
 
     Scenes that share a mesh are solved again together on the finer one.
     """
@@ -155,22 +157,44 @@ def _solve_group(
     while True:
         found |= zip(todo, _on_mesh([scenes[i] for i in todo], depth, fineness, progress, watch, in_loops), strict=True)
         missed = [_misses(found[i], asked[i]) for i in range(len(scenes))]
+        alike = _not_told_apart([found[i] for i in range(len(scenes))])
         finer = [n for n in FINENESS[kind] if n > fineness]
-        if not finer or not any(missed):
+        if not finer or not (any(missed) or any(alike)):
             break
         for answer in found.values():
             if rough is not None and isinstance(answer, Prediction):
                 rough(answer)
         fineness = finer[0]
         if kind == "finite":
-            again = {scenes[i].pressed for i in todo if missed[i]}
+            again = {scenes[i].pressed for i in todo if missed[i] or alike[i]}
             todo = [i for i in todo if scenes[i].pressed in again]
-    done = [found[i] for i in range(len(scenes))]
-    told = "The finest mesh leaves an error estimate above the tolerance asked for."
-    return [
-        replace(answer, warnings=(*answer.warnings, told)) if misses and isinstance(answer, Prediction) else answer
-        for answer, misses in zip(done, missed, strict=True)
-    ]
+    return [_warned(found[i], misses=missed[i], alike=alike[i]) for i in range(len(scenes))]
+
+
+def _warned(answer: Answer, *, misses: bool, alike: bool) -> Answer:
+    """Return the answer with what the finest mesh has left undone."""
+    told: list[str] = []
+    if misses:
+        told.append("The finest mesh leaves an error estimate above the tolerance asked for.")
+    if alike:
+        told.append("Differences from the surfaces solved with this one may be off by more than 5 % of their range.")
+    return replace(answer, warnings=(*answer.warnings, *told)) if told and isinstance(answer, Prediction) else answer
+
+
+def _not_told_apart(found: Sequence[Answer]) -> list[bool]:
+    """Return which answers belong to surfaces, pressed alike, whose differences a finer mesh should tell better."""
+    sets: dict[object, list[int]] = {}
+    for number, answer in enumerate(found):
+        if isinstance(answer, Prediction) and answer.beside is not None:
+            sets.setdefault(answer.scene.pressed, []).append(number)
+    out = [False] * len(found)
+    for together in sets.values():
+        rows = [one for number in together if isinstance(one := found[number], Prediction)]
+        numbers = np.array([(one.sed_ending, one.normal_force, abs(one.tangential_force)) for one in rows])
+        apart = told_apart(numbers, np.array([one.beside for one in rows]))
+        for number in together:
+            out[number] = not apart
+    return out
 
 
 def _on_mesh(

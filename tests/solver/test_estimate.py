@@ -6,10 +6,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from solver.estimate import DEFAULT, FINENESS, coarsest_for, estimates
+from solver.estimate import DEFAULT, FINENESS, coarsest_for, estimates, told_apart
 from solver.reference import STICKINESS, scene
 from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
-from solver.solution import solve
+from solver.solution import solve, solve_together
 
 # The first twelve scenes of benchmarks/error_estimate.py: depth, mu, bound, slide, contact angle, Young's moduli of
 # epidermis, dermis and fat, and the mean of three solves on far finer meshes: SED of the ending, normal force, drag
@@ -177,9 +177,10 @@ def test_a_drag_below_the_friction_limit_is_known_to_a_part_of_an_element():
     bounded = replace(scene(STICKINESS[0]), friction=Friction(0.5, 0.01))
     numbers = np.array([1.0, 0.2, 0.05])
     free = replace(bounded, friction=Friction(0.5))
-    more = estimates(bounded, 8.0, numbers, numbers[None]) - estimates(free, 8.0, numbers, numbers[None])
+    with_bound, without = (estimates(scene, 8.0, numbers, numbers[None]) for scene in (bounded, free))
     # a fifth of an element of 0.5 x 5 / 8 mm under 0.01 MPa, by the drag, for a drag of half of mu N
-    assert more == pytest.approx([0.0, 0.0, 0.2 * 0.5 * 0.01 * 0.3125 / 0.05])
+    more = 0.2 * 0.5 * 0.01 * 0.3125 / 0.05
+    assert with_bound == pytest.approx([*without[:2], np.hypot(without[2], more)])
 
 
 # Scenes of benchmarks/finite_error_estimate.py and of others with low bounds: depth, mu, bound, slide, contact angle,
@@ -382,3 +383,70 @@ def test_estimates_lie_above_the_errors_of_scenes_that_nothing_was_chosen_on_and
         assert np.all(errors <= estimates)
         close.extend((estimates < 10.0 * np.maximum(errors, 2e-4)).tolist())
     assert np.mean(close) >= 0.75
+
+
+@pytest.mark.parametrize(
+    ("number", "moved", "apart"), [(0, 0.012, True), (0, 0.015, False), (1, 0.015, False), (2, 0.02, False)]
+)
+def test_surfaces_are_told_apart_where_another_mesh_changes_differences_by_less_than_a_15th_of_their_range(
+    number, moved, apart
+):
+    numbers = np.array([[1.0, 2.0, 0.5], [1.1, 2.2, 0.7], [1.2, 2.1, 0.6]])
+    others = numbers + 0.3  # each is 15 to 60 % off, and their differences are not
+    assert told_apart(numbers, others)
+    others[1, number] += moved
+    assert told_apart(numbers, others) == apart
+
+
+@pytest.mark.parametrize(("moved", "apart"), [(2e-4, True), (4e-4, False)])
+def test_nobody_minds_differences_that_are_off_by_less_than_a_50th_of_a_per_cent_of_the_numbers(moved, apart):
+    alike = np.array([[1.0, 2.0, 0.5], [1.0, 2.0, 0.5]])
+    others = alike.copy()
+    others[1, 0] += moved
+    assert told_apart(alike, others) == apart
+
+
+# Three surfaces for one finger, whose normal forces (finite strain) or SED (small) differ by 2 and 0.6 %: indentation,
+# contact angle, moduli, and for each surface mu, bound and the mean of three solves on far finer meshes.
+HARDLY_DIFFERENT = {
+    "finite": (
+        1.9453824434540352,
+        52.768285531663444,
+        (0.12561350965518028, 0.10102004119009433, 0.03731941227568045),
+        (
+            (0.31708494247858965, 0.01876643849318715, (0.00377605525, 0.258807410, 0.0820639326)),
+            (0.3775009024088661, None, (0.00342437463, 0.253646986, 0.0957519661)),
+            (0.17302156508179378, None, (0.0111661969, 0.256314119, 0.0443478701)),
+        ),
+    ),
+    "small": (
+        0.9946963522975397,
+        71.54826541385889,
+        (0.17506644897696486, 0.0989132821156936, 0.03613420814511986),
+        (
+            (0.5566218765428702, 0.012322557398619328, (0.00289504299, 0.0730953659, 0.0406864797)),
+            (0.5975862051326736, 0.007267728220609088, (0.00289523829, 0.0699444578, 0.0273257913)),
+            (0.3909704583472945, None, (0.00291362589, 0.0699464803, 0.0273470074)),
+        ),
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kinematics", HARDLY_DIFFERENT)
+def test_differences_between_surfaces_that_hardly_differ_are_good_to_5_percent_of_their_range_at_any_tolerance(
+    kinematics,
+):
+    depth, angle, moduli, surfaces = HARDLY_DIFFERENT[kinematics]
+    asked = Scene(
+        finger=Finger(contact_angle=angle),
+        materials=Materials(*(Material(modulus, 0.48) for modulus in moduli)),
+        friction=Friction(0.0),
+        loading=Loading(depth, "+x"),
+        solve=Solve(kinematics, tolerance=0.01),  # on the coarsest mesh they were up to 41 % of their range off
+    )
+    together = solve_together([replace(asked, friction=Friction(mu, bound)) for mu, bound, _ in surfaces])
+    found = np.array([(p.sed_ending, p.normal_force, p.tangential_force) for p in together])
+    true = np.array([truth for _, _, truth in surfaces])
+    assert (np.ptp(found - true, axis=0) < 0.05 * np.ptp(true, axis=0)).all()
+    assert solve(together[0].scene).dofs < together[0].dofs

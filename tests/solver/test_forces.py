@@ -106,7 +106,7 @@ def test_a_finger_that_slides_there_and_back_ends_as_if_it_had_slid_back_only(ki
     assert found.audits["course_against_direct"] < 1e-9
     drag = found.history.tangential_force
     other = solve(opposite(kinematics))  # at finite strain on a mesh of its own, whose lines follow its contact
-    off = 1e-9 if kinematics == "small" else other.tangential_force_error
+    off = 1e-9 if kinematics == "small" else found.tangential_force_error + other.tangential_force_error
     assert drag.min() == pytest.approx(-other.tangential_force, rel=off)
     assert (np.diff(found.history.time) > 0.0).all()
     assert np.sign(np.diff(found.history.bone_x[found.history.time > 1.0])).min() == -1.0
