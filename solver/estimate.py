@@ -33,6 +33,7 @@ FROM_MESHES = {"small": 0.25, "finite": 0.6}
 FROM_NAIL = {"small": 2.5, "finite": 4.0}  # the same where a nail ends: errors fall with the element, or its root
 FROM_FINENESS = {"small": ((0.08, 2.0),), "finite": ((0.15, 2.0), (0.06, 1.5))}  # the largest, by the power given
 FROM_COARSE = 1.0  # of both forces at small strain, by fineness to the fourth power
+FROM_FORCE = 10.0  # of the SED under a given force at finite strain, likewise
 FROM_LIMIT, CALM = 3.0, 2.0  # of the mesh's own part, for every relative change by friction's beyond that many
 FROM_BOUND = {"small": 0.2, "finite": 0.16}  # of an element that touches, in the drag under a bound
 FROM_EDGE = 0.12  # the same in all numbers, at finite strain where skin slips at the bound up to an edge of contact
@@ -133,6 +134,8 @@ def _off(
             part[0] = np.hypot(part[0], part[1])
         if not marched:
             part += FROM_LIMIT * _least(scene, fineness) * np.maximum(np.abs(felt) - CALM, 0.0)
+    elif forced:
+        part[0] = np.hypot(part[0], FROM_FORCE / _resolved(scene, fineness) ** 4)
     of_bound, of_edge = np.zeros(len(numbers)), np.zeros(len(numbers))
     if marched:
         contact = 2.0 * _half(scene) * scene.finger.tip_radius

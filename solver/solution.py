@@ -145,7 +145,7 @@ def _solve_group(
 ) -> list[Answer]:
     """Refine until every scene's estimate meets its tolerance and surfaces are told apart, or no mesh is finer.
 
-    Scenes that share a mesh are solved again together on the finer one.
+    Scenes that share a mesh are solved again together on the finer one. Without a tolerance there is one mesh for all.
     """
     asked = [s.solve.tolerance for s in scenes]
     kind = scenes[0].solve.kinematics
@@ -157,7 +157,7 @@ def _solve_group(
     while True:
         found |= zip(todo, _on_mesh([scenes[i] for i in todo], depth, fineness, progress, watch, in_loops), strict=True)
         missed = [_misses(found[i], asked[i]) for i in range(len(scenes))]
-        alike = _not_told_apart([found[i] for i in range(len(scenes))])
+        alike = [strictest is not None and same for same in _not_told_apart([found[i] for i in range(len(scenes))])]
         finer = [n for n in FINENESS[kind] if n > fineness]
         if not finer or not (any(missed) or any(alike)):
             break
