@@ -273,7 +273,9 @@ def _counted(strokes: tuple[Stroke, ...], trial: Trial | None, plan: SessionPlan
         asked = "one" if allowed == 1 else f"up to {allowed}"
         model = next((stroke.number for stroke in _given(strokes, trial, decisions)), None)
         gets = "none, as was decided" if model is None else "the first" if model == 1 else f"the one numbered {model}"
-        sentence = f"{len(strokes)} strokes in a trial that asks for {asked}: the model gets {gets}."
+        turned = any(FlawName.TURNED in stroke.flaws for stroke in strokes)
+        ways = " (each way of a finger that turned without lifting is one)" if turned else ""
+        sentence = f"{len(strokes)} strokes{ways} in a trial that asks for {asked}: the model gets {gets}."
         return [Flaw(FlawName.SECOND_STROKE, sentence, "doubtful")]
     return []
 

@@ -52,7 +52,9 @@ def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: Ana
     peaks, found = signal.find_peaks(padded, prominence=0.0)
     standing = peaks[found["prominences"] >= (1.0 - settings.valley) * padded[peaks]] - 1
     standing = standing[force[standing] >= settings.light_share * force.max(initial=0.0)]
-    valleys = [contact.start + int(a + np.argmin(force[a:b])) for a, b in pairwise(standing)]
+    between = [(a, b, int(a + np.argmin(force[a:b]))) for a, b in pairwise(standing)]
+    # Peaks of exactly the same height stand out of everything but one another.
+    valleys = [contact.start + at for a, b, at in between if force[at] < settings.valley * min(force[a], force[b])]
     if not valleys:
         return (contact,)
     bounds = [contact.start, *valleys, contact.stop]

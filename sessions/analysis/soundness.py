@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _LONG = 1.8  # times the usual step: a reading is missing in between
+_COARSE = 3.0  # coarse: half an axis' changes are no more than so many of its least steps
+_JUMP = 2.0  # times the step that an axis' changes seldom exceed
 _AXIS_NAMES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 
 
@@ -101,7 +103,8 @@ def soundness(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSetti
 
 
 def _frozen(block: ReadingBlock, settings: AnalysisSettings) -> Mask:
-    """Mark every repeat of the same six numbers in a run that noise cannot explain."""
+    """Mark every repeat of the same six numbers in a run that neither noise nor a rest in coarse steps explains."""
+    jumps = _jumps_of_coarse(block.raw)
     same = np.concatenate([[False], (np.diff(block.raw, axis=0) == 0.0).all(axis=1), [False]])
     edges = np.flatnonzero(np.diff(same.astype(np.int8)))
     frozen = np.zeros(len(block), np.bool_)
@@ -110,8 +113,25 @@ def _frozen(block: ReadingBlock, settings: AnalysisSettings) -> Mask:
         if last - start >= settings.frozen_readings and (
             block.time[last] - block.time[start] >= settings.frozen_shortest
         ):
-            frozen[start + 1 : last + 1] = True
+            frozen[start + 1 : last + 1] = not len(jumps) or bool(
+                jumps[max(start - 1, 0) : start].any() or jumps[last : last + 1].any()
+            )
     return frozen
+
+
+def _jumps_of_coarse(raw: Array) -> Mask:
+    """Mark the steps (n - 1,) that no axis in coarse steps makes by itself; empty where the steps are fine.
+
+    Steps are coarse where an axis that changes does so by its least step or little more: at rest such a sensor repeats
+    all six numbers, and leaves them step by step, where a frozen one that lives again jumps.
+    """
+    steps = np.abs(np.diff(raw, axis=0))
+    changes = [column[column > 0.0] for column in steps.T]
+    known = [each for each in changes if len(each)]
+    if not known or any(float(np.median(each)) > _COARSE * float(each.min()) for each in known):
+        return np.zeros(0, np.bool_)
+    large = np.array([_JUMP * float(np.percentile(each, 95)) if len(each) else np.inf for each in changes])
+    return np.asarray((steps > large).any(axis=1), np.bool_)
 
 
 def _saturated(block: ReadingBlock, info: TransducerInfo) -> Mask:

@@ -5,9 +5,23 @@ Three strokes of 4 N with a ratio of 0.68 are planted in closed form; the calibr
 
 from dataclasses import replace
 
+import made_strokes
 import numpy as np
 import pytest
-from made_strokes import CALIBRATION, INFO, SETTINGS, analysed, block, felt, names, times, trapezium, wrench
+from made_strokes import (
+    CALIBRATION,
+    HEIGHT,
+    INFO,
+    SETTINGS,
+    analysed,
+    block,
+    felt,
+    names,
+    times,
+    trapezium,
+    trial,
+    wrench,
+)
 
 from sessions.analysis.stuck import stuck_axes
 from sessions.analysis.wild import wild_readings
@@ -96,6 +110,34 @@ def test_coarse_steps_are_neither_clipped_nor_frozen_nor_wild(step, noise):
     raw = np.round(rough / steps) * steps
     assert stuck_axes(T, raw, np.zeros(len(T), bool), SETTINGS) == ()
     assert not wild_readings(raw, SETTINGS).any()
+
+
+def in_coarse_steps(frozen=None):
+    """Return a slanting stroke from 1.5 to 3.5 s of 5 in steps of 50 mN and 0.5 N mm; at rest nothing ever changes."""
+    t = times(5.0)
+    clean = made_strokes.stroke(t, mu=MU, begin=1.5, end=3.5)
+    clean[:, 1] += 0.1 * clean[:, 0]
+    clean[:, 3] -= HEIGHT * 0.1 * clean[:, 0]
+    clean[:, 5] += 0.5 * clean[:, 0] * np.sin(t)
+    steps = np.array([0.05] * 3 + [0.5] * 3)
+    raw = np.round(felt(clean) / steps) * steps
+    if frozen is not None:
+        first, last = np.searchsorted(t, frozen)
+        raw[first:last] = raw[first]
+    return block(t, raw)
+
+
+def test_a_sensor_of_coarse_steps_at_rest_is_not_frozen_and_its_stroke_is_one():
+    found = analysed(in_coarse_steps(), of=trial())
+    assert found.flaws == ()
+    (one,) = found.strokes
+    assert one.onset == pytest.approx(1.5, abs=0.01)
+    assert one.mu_dynamic == pytest.approx(MU * np.sqrt(1.01), rel=0.025 / (2.0 * MU))  # half a step of T
+
+
+def test_the_same_sensor_frozen_for_a_while_is_named_by_the_jump_with_which_it_lives_again():
+    found = analysed(in_coarse_steps(frozen=(2.0, 2.4)), of=trial())
+    assert "first at 2.0" in told(found, "frozen_sensor")[0].sentence
 
 
 def test_a_sensor_that_never_reads_below_zero_is_not_clipped_where_nothing_presses():
