@@ -11,17 +11,18 @@ from numpy.typing import NDArray
 
 from sessions.toml_file import SettingsError
 from solver.failures import SolveFailure
-from solver.scene import Scene
+from solver.scene import TISSUES, Scene
 from solver.solution import solve
 
 Design = Mapping[str, tuple[float, float]]  # dotted key of the scene file -> least and greatest value
 
-# Least and greatest value as parts of the scene's own. Skin is only thickened and the ending only raised: it must stay
-# within the skin, and the usual one ends at its inner side.
+# Least and greatest value as parts of the scene's own. Skin is only thickened and the ending only raised, since it must
+# stay within the skin and the usual one ends at its inner side; bone is only thinned: some fat must be left below it.
 USUAL: Mapping[str, tuple[float, float]] = {
-    "finger.tip_radius": (0.95, 1.1),
-    "finger.epidermis": (1.0, 1.3),
+    "finger.tip_radius": (0.97, 1.1),
+    "finger.epidermis": (1.0, 1.2),
     "finger.dermis": (1.0, 1.2),
+    "finger.bone_radius": (0.85, 1.0),
     "materials.epidermis.E": (0.7, 1.3),
     "materials.dermis.E": (0.7, 1.3),
     "materials.fat.E": (0.7, 1.3),
@@ -32,6 +33,7 @@ USUAL: Mapping[str, tuple[float, float]] = {
 }
 _NARROW = 0.05  # half an interval of an index that is narrow enough to order by [-]
 ANGLE, ANGLE_SPAN = "finger.contact_angle", 5.0  # [degrees]
+FATS_NU, NU_SPAN, NU_MOST = "materials.fat.nu", 0.0195, 0.4999  # the usual 0.48 may as well be nearly one half
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +72,20 @@ def usual_design(scene: Scene) -> dict[str, tuple[float, float]]:
             design[name] = (low * value, high * value)
     angle = scene.finger.contact_angle
     design[ANGLE] = (max(angle - ANGLE_SPAN, 10.0), min(angle + ANGLE_SPAN, 90.0))
+    nu = scene.materials.fat.nu
+    if nu < NU_MOST:
+        design[FATS_NU] = (max(nu - NU_SPAN, 0.0), min(nu + NU_SPAN, NU_MOST))
     return design
+
+
+def left_as_it_is(scene: Scene, design: Design) -> tuple[str, ...]:
+    """Return the numbers of geometry, stiffness, load and friction that a design does not vary."""
+    bone = scene.finger.bone == "meshed"
+    names = [f"finger.{field.name}" for field in fields(scene.finger)]
+    names += [f"materials.{tissue}.{name}" for tissue in TISSUES if tissue != "bone" or bone for name in ("E", "nu")]
+    names += [f"{table}.{field.name}" for table in ("loading", "friction") for field in fields(getattr(scene, table))]
+    numbers = [name for name in names if _value(scene, name) and name not in ("finger.width", "loading.speed")]
+    return tuple(name for name in [*numbers, "finger.bone_centre", "receptor.depth"] if name not in design)
 
 
 def checked(design: Mapping[str, Any], scene: Scene, where: str) -> dict[str, tuple[float, float]]:
@@ -107,11 +122,12 @@ def sensitivity(
     analyse: Any = importlib.import_module("SALib.analyze.sobol")
     points: NDArray[np.float64] = draw.sample(problem, samples, calc_second_order=False, seed=seed)
     answer = sed or _settled
+    scenes = [with_values(scene, dict(zip(design, point, strict=True))) for point in points.tolist()]
     found = np.empty(len(points))
     failed: list[str] = []
-    for i, point in enumerate(points.tolist()):
+    for i, drawn in enumerate(scenes):
         try:
-            found[i] = answer(with_values(scene, dict(zip(design, point, strict=True))))
+            found[i] = answer(drawn)
         except SolveFailure as failure:
             failed.append(" ".join(str(failure).split()))
         progress((i + 1) / len(points))

@@ -62,9 +62,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.say(table(rows, head=HEAD) if rows else "no stroke")
     for decision in analysis.decisions:
         console.say(f"* {decision.sentence}")
-    if rows:
+    intervals = [stroke_intervals(stroke, at, chosen) for at, stroke in enumerate(analysis.strokes)]
+    if any(end != "–" for found in intervals for end in _row(found)[1:] + _course(found)[1:]):
         console.say(f"\n{chosen.kind}:")
-        intervals = [stroke_intervals(stroke, at, chosen) for at, stroke in enumerate(analysis.strokes)]
         console.say(table([_row(found) for found in intervals], head=INTERVALS))
         console.say("\nof the same repeats; same way: share of them with the direction told:")
         console.say(table([_course(found) for found in intervals], head=COURSES))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from daq_app.cli import WrongValue
 from daq_app.console import Console, number, table
-from daq_app.sensitivity import checked, doubts, sensitivity, usual_design
+from daq_app.sensitivity import checked, doubts, left_as_it_is, sensitivity, usual_design
 from sessions.toml_file import load_toml
 from solver.scene import Scene
 
@@ -59,12 +59,15 @@ def run(options: argparse.Namespace, console: Console) -> int:
     ]
     doubted = doubts(indices, samples)
     told = {"samples": samples, "seed": options.seed, "design_origin": origin, "sed_range": [low, high]}
-    console.result({**told, "indices": [one.to_dict() for one in indices], "doubts": doubted})
+    left = left_as_it_is(scene, design)
+    console.result({**told, "indices": [one.to_dict() for one in indices], "doubts": doubted, "not_varied": left})
     console.say(
         f"SED from {number(1e3 * low, 4)} to {number(1e3 * high, 4)} kPa over {len(seds)} scenes; design {origin}"
     )
     console.say(table(rows, head=["number", "varied", "alone", "with others"]))
     console.say("Shares of the variance of the SED, Sobol indices with half of their 95 % bootstrap intervals.")
+    if left:
+        console.say(f"Not varied, so nothing is said of them: {', '.join(left)}.")
     for sentence in doubted:
         console.say(sentence)
     return 0

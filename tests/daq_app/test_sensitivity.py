@@ -2,11 +2,21 @@
 
 import json
 from dataclasses import replace
+from itertools import product
 
 import pytest
 
 from daq_app.cli import run
-from daq_app.sensitivity import Index, TooFewAnswers, checked, doubts, sensitivity, usual_design, with_values
+from daq_app.sensitivity import (
+    Index,
+    TooFewAnswers,
+    checked,
+    doubts,
+    left_as_it_is,
+    sensitivity,
+    usual_design,
+    with_values,
+)
 from sessions.toml_file import SettingsError
 from solver.failures import NotConverged
 from solver.scene import Friction, Loading, Scene
@@ -56,6 +66,19 @@ def test_a_range_to_one_side_and_an_impossible_share_are_named_with_the_samples_
     indices, _ = sensitivity(SCENE, design, 64, 0, quiet, lambda s: s.friction.mu + (s.loading.indentation or 0.0))
     assert {one.name for one in indices if one.one_sided} == {"friction.mu"}
     assert "friction.mu" in doubts(indices, 64)[0]
+
+
+def test_every_corner_of_the_usual_design_is_a_scene_that_may_be():
+    design = usual_design(SCENE)
+    for corner in product(*design.values()):
+        with_values(SCENE, dict(zip(design, corner, strict=True)))
+
+
+def test_what_a_design_leaves_as_it_is_is_named():
+    usual = set(left_as_it_is(SCENE, usual_design(SCENE)))
+    assert {"finger.bone_centre", "finger.shaft_length", "materials.dermis.nu", "materials.epidermis.nu"} == usual
+    assert "materials.fat.nu" in left_as_it_is(SCENE, DESIGN)
+    assert "friction.mu" not in left_as_it_is(SCENE, DESIGN)
 
 
 def test_values_reach_their_places_and_no_others():
