@@ -362,7 +362,7 @@ def _no_answer(scene: Scene, why: str, limit_mu: float, finger: FingerModel) -> 
     if scene.loading.direction == 0 or limit_mu <= 0.0:
         return NotConverged(f"No settled state was found at {at}, from any first guess: {why}.")
     limit_force = limit_depth = None
-    with suppress(LinAlgError):  # of stiffnesses that a mesh for less depth does not stand
+    with suppress(LinAlgError, ContactLost):  # of stiffnesses that a mesh for less depth does not stand
         limit_force, limit_depth = limits(scene, law_of(scene), in_loops=finger.body.touchable.in_loops)
     known = ((limit_force, "N/mm"), (limit_depth, "mm"))
     others = " and ".join(f"{limit:.3g} {unit}" for limit, unit in known if limit is not None)

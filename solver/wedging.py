@@ -6,6 +6,7 @@ it there is no settled state. The limit is reached by following the state as the
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from math import log2, sqrt
 
@@ -118,35 +119,35 @@ def _deepest(fingers: Fingers, scene: Scene, law: FrictionLaw, high: float, low:
     return found if ends == [False, True] else None
 
 
-def _strongest(fingers: Fingers, scene: Scene, force: float, law: FrictionLaw) -> tuple[float, float] | None:
+def _strongest(fingers: Fingers, scene: Scene, force: float, law: FrictionLaw) -> tuple[float | None, float] | None:
     """Return the largest normal force [N/mm] below `force` with settled sliding, and the largest depth [mm] on the way.
 
-    None where there is none.
+    The force is None where a finer mesh puts it elsewhere; all is None where there is no sliding.
     """
     direction, depths = scene.loading.direction, [0.0]
-    bone = scene.finger.pulp_thickness()
+    bare, bone = FrictionLaw(0.0, np.inf), scene.finger.pulp_thickness()
+
+    def reached(body: Touchable, force: float) -> Contact | None:
+        first = sliding_under(body, bare, force, direction, bone)
+        return followed(forced(body, force), law, 0.0, direction, first)[0]
+
+    def rubless(force: float) -> float:
+        return depth_of(sliding_under(fingers.at(bone / 2.0), bare, force, direction, bone))
 
     def slides(force: float) -> bool:
-        try:
-            body, first = _rubless(fingers, force, direction, bone)
-        except ContactLost:
-            return False
-        found = followed(forced(body, force), law, 0.0, direction, first)[0]
-        if found is not None:
-            depths.append(depth_of(found))
-        return found is not None
+        with suppress(ContactLost):
+            found = reached(fingers.at(rubless(force)), force)
+            if found is not None:
+                depths.append(depth_of(found))
+            return found is not None
+        return False
 
     if not slides(LEAST * force):
         return None
-    return _largest(slides, LEAST * force, force), max(depths)
-
-
-def _rubless(fingers: Fingers, force: float, direction: int, bone: float) -> tuple[Touchable, Contact]:
-    """Return the state under `force` [N/mm] without friction, on a mesh for the depth it has. Raises ContactLost."""
-    bare = FrictionLaw(0.0, np.inf)
-    about = depth_of(sliding_under(fingers.at(bone / 2.0), bare, force, direction, bone))
-    body = fingers.at(about)
-    return body, sliding_under(body, bare, force, direction, bone)
+    most = _largest(slides, LEAST * force, force)
+    finer = fingers.made_for(rubless(most), FINER * FINENESS)
+    ends = [reached(finer, part * most) is None for part in (0.97, 1.03)]
+    return most if ends == [False, True] else None, max(depths)
 
 
 def _largest(exists: Callable[[float], bool], low: float, high: float) -> float:
