@@ -32,7 +32,7 @@ from sessions.sealing import SEAL
 
 LOOK = 0.1  # between two looks whether something is done [s]
 WITHOUT_WORKERS = 30.0  # that a cluster may have no worker before it is given up [s]
-ANSWERS = 10.0  # that a scheduler may take to answer [s]
+ANSWERS = 20.0  # that a scheduler may take to answer [s]
 AGAIN = "run this again once it is there: what is done is kept"
 # All that a visit's numbers come from.
 CONTENT = (LIVE_FILE, f"{LIVE_FILE}-wal", UNBLINDING, SEAL, DECISIONS, GAIN_ERROR)

@@ -165,7 +165,7 @@ def test_killed_at_any_moment_it_leaves_no_process_behind_and_goes_on_where_it_w
 
 
 def _until(true):
-    deadline = time.monotonic() + 120.0
+    deadline = time.monotonic() + 900.0  # however busy the machine is: this only ends what hangs
     while not true():
         assert time.monotonic() < deadline
         time.sleep(0.05)
