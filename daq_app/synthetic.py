@@ -1,7 +1,8 @@
 """A whole study of simulated people: what was planted is known, and so is what was spoilt. In told time, in seconds.
 
 Ten subjects stroke and score the ten surfaces of the paper. Fingers differ in friction, transducers in calibration,
-people in how they use the scale; scores drift within a block and carry over from one trial to the next.
+people in how they use the scale; scores follow the maker's index and the friction that a subject's own finger feels,
+drift within a block and carry over from one trial to the next. Nobody here knows of a model of the finger.
 """
 
 from collections.abc import Mapping
@@ -16,7 +17,7 @@ from daq_app.console import Console
 from daq_app.due_events import DueEvents
 from daq_app.wiring import planted_surface
 from drivers.clock import Clock, ToldClock
-from sessions.plan import Frame, SessionPlan, Trial
+from sessions.plan import Block, Frame, SessionPlan, Trial
 from sessions.pooling.exclusions import EXCLUSIONS
 from sessions.protocols import plan, protocol
 from sessions.recording import RecordingError, Setting
@@ -46,9 +47,15 @@ PROTOCOL = "sensotact-friction"
 SUBJECTS = 10
 PLANTED = "planted.json"
 DAMAGED = "S11"
-GAIN = 0.75  # points of score a point of index, on average over subjects
 PEOPLE = SubjectSettings(
-    gain=GAIN, gain_spread=0.05, offset_spread=3.0, judgement_noise=4.0, drift=0.4, carry_over=0.04, moisture=0.08
+    gain=0.75,
+    gain_spread=0.05,
+    offset_spread=3.0,
+    judgement_noise=4.0,
+    friction_weight=0.3,
+    drift=0.4,
+    carry_over=0.04,
+    moisture=0.08,
 )
 CALIBRATION = 0.01  # standard deviation of each axis' gain about 1 [-]
 LIGHT = 0.15  # peak normal force of a stroke that presses too lightly [N]
@@ -95,7 +102,7 @@ def synthetic_study(out: Path, seed: int, console: Console, subjects: int = SUBJ
         {
             "SIMULATED": "SIMULATED: this is what was planted in a simulated study",
             "seed": seed,
-            "score": {"gain": GAIN, "drift": PEOPLE.drift, "carry_over": PEOPLE.carry_over},
+            "score": planted_slopes(PEOPLE),
             "people": asdict(PEOPLE),
             "calibration_sd": CALIBRATION,
             "spoilt": {
@@ -105,6 +112,13 @@ def synthetic_study(out: Path, seed: int, console: Console, subjects: int = SUBJ
             "strokes": [row for rows in planted for row in rows],
         },
     )
+
+
+def planted_slopes(people: SubjectSettings) -> dict[str, Any]:
+    """Return the slopes of these people's scores on index, µ by descriptor, trials before and index before."""
+    felt = {name: SimulatedSubject(0, people).by_friction(name) for name in ("stickiness", "slipperiness")}
+    by_index = people.gain * (1.0 - people.friction_weight)
+    return {"gain": by_index, "friction": felt, "drift": people.drift, "carry_over": people.carry_over}
 
 
 def _decisions() -> str:
@@ -139,7 +153,10 @@ def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str
         run=RunnerSettings(tick=TICK),
         durable=False,
     )
-    return [_row(subject, trial, stroke) for trial, stroke in zip(people.stroked, bench.planted(), strict=True)]
+    return [
+        {**_row(subject, trial, stroke), **people.meant(trial)}
+        for trial, stroke in zip(people.stroked, bench.planted(), strict=True)
+    ]
 
 
 def _one(number: int) -> frozenset[int]:
@@ -202,17 +219,27 @@ class SyntheticPeople:
         """Return what has been done by now."""
         return self._due.taken()
 
+    def meant(self, trial: Trial) -> dict[str, Any]:
+        """Return a trial's depth, its place, what was stroked before, and the score without noise."""
+        block, place, before = self._order(trial)
+        score = self._subject.meant(self._subject.felt(planted_surface(trial)), place, before)
+        return {"indentation": block.indentation, "place": place, "before": before, "score": score}
+
+    def _order(self, trial: Trial) -> tuple[Block, int, int | None]:
+        """Return a trial's block, its place in it from 0, and the index stroked before it."""
+        block = next(block for block in self._plan.blocks if trial in block.trials)
+        place = block.trials.index(trial)
+        return block, place, block.trials[place - 1].stimulus.known_index if place else None
+
     def _felt(self, trial: Trial) -> Surface:
         surface = self._subject.felt(planted_surface(trial))
         light = LIGHT / surface.peak_normal_force if trial.number == self._spoilt.light else 1.0
         return replace(surface, tau_max=surface.tau_max * light)
 
     def _scored(self, trial: Trial) -> Scored:
-        block = next(block for block in self._plan.blocks if trial in block.trials)
-        place = block.trials.index(trial)
-        before = block.trials[place - 1].stimulus.known_index if place else None
+        _, place, before = self._order(trial)
         at = self._clock.now_ns() * 1e-9 + JUDGING
         if trial.number == self._spoilt.unanswered:
             return Scored(None, (), None, 0, None, "simulated")
-        score = self._subject.score(planted_surface(trial), 1, place, before)
+        score = self._subject.score(self._subject.felt(planted_surface(trial)), 1, place, before)
         return Scored(score, ((at, score),), at, 0, None, "simulated")

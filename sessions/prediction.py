@@ -244,6 +244,28 @@ def sed_by(slide: Nearby, scene: Scene) -> Mapping[str, float]:
     return {"mu": by.mu, "tau_max": by.tau_max, "force": driven}
 
 
+def seds_at(
+    strokes: Sequence[tuple[float, float, float, int, float]], options: PredictionOptions
+) -> tuple[float | None, ...]:
+    """Return the settled SED [MPa] of the options' finger for each mu, tau_max [MPa], depth [mm], direction and speed.
+
+    None where there is no settled state.
+    """
+    base = _template(options)
+    course = Solve(options.kinematics, "steady", base.solve.tolerance)
+    return seds_of(
+        [
+            replace(
+                base,
+                friction=Friction(mu, _bound(tau_max, options)),
+                loading=Loading(depth, SLIDES[direction], speed),
+                solve=course,
+            )
+            for mu, tau_max, depth, direction, speed in strokes
+        ]
+    )
+
+
 def traction_reached(found: Prediction) -> float:
     """Return the greatest friction traction on the skin [MPa]: any tau_max beyond it has the same solution."""
     return float(abs(found.skin.traction).max())

@@ -7,6 +7,8 @@ import numpy as np
 from simulators.stroke import Stroke
 from simulators.surface import Surface
 
+SLIPPERIEST, STICKIEST = 0.24, 0.67  # coefficients of friction, the paper's extremes [-]
+
 
 @dataclass(frozen=True, slots=True)
 class SubjectSettings:
@@ -65,15 +67,23 @@ class SimulatedSubject:
 
         `place` counts the trials of the block before this one, `before` is the index judged last; None: the first.
         """
-        draw = self._draw(surface, repetition, 4)
+        noise = self._draw(surface, repetition, 4).normal(0.0, self.settings.judgement_noise)
+        return round(min(max(self.meant(surface, place, before) + float(noise), 0.0), 100.0), 1)
+
+    def meant(self, surface: Surface, place: int = 0, before: int | None = None) -> float:
+        """Return what `score` would be without the noise of a single judgement and without an end of the line."""
         settings = self.settings
         # Friction between the paper's extremes, as a score: stickier is more, slipperier is less.
-        rubbing = 100.0 * (surface.mu - 0.24) / (0.67 - 0.24)
+        rubbing = 100.0 * (surface.mu - SLIPPERIEST) / (STICKIEST - SLIPPERIEST)
         felt = rubbing if surface.descriptor == "stickiness" else 100.0 - rubbing
         judged = (1.0 - settings.friction_weight) * surface.index + settings.friction_weight * felt
-        marked = 50.0 + self._gain * (judged - 50.0) + self._offset + float(draw.normal(0.0, settings.judgement_noise))
-        marked += settings.drift * place + (0.0 if before is None else settings.carry_over * (before - 50))
-        return round(min(max(marked, 0.0), 100.0), 1)
+        carried = 0.0 if before is None else settings.carry_over * (before - 50)
+        return 50.0 + self._gain * (judged - 50.0) + self._offset + settings.drift * place + carried
+
+    def by_friction(self, descriptor: str) -> float:
+        """Return how many points a score rises with each unit of µ felt, over subjects of these settings."""
+        sense = 1.0 if descriptor == "stickiness" else -1.0
+        return sense * self.settings.gain * self.settings.friction_weight * 100.0 / (STICKIEST - SLIPPERIEST)
 
     def number(self, surface: Surface, repetition: int = 1) -> float:
         """Return the number on the subject's own scale: judgements in equal ratios, above 0, of any size.

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from sessions.exports.report_tables.cells import Cell, Column, Group, Notes, Table
 from sessions.exports.wording import NONE, correlation, digits, significant
-from sessions.pooling.pooled import StudyFindings
+from sessions.pooling.findings import StudyFindings
 from sessions.report.predictions import model_in_short as model_of
 
 

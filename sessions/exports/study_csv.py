@@ -7,7 +7,7 @@ from dataclasses import fields
 
 from sessions.paths import Path
 from sessions.pooling.exclusions import decided
-from sessions.pooling.pooled import StudyFindings
+from sessions.pooling.findings import StudyFindings
 
 SIMULATED = "SIMULATED"
 TRIALS, COLUMNS = "trials.csv", "trials-columns.csv"  # as they lie beside the page

@@ -6,7 +6,7 @@ from sessions.analysis.mixed import INTERCEPT, MixedModel
 from sessions.exports.report_tables.cells import Cell, Table
 from sessions.exports.study_cells import between, p_value, study_table
 from sessions.exports.wording import NONE, digits, plural, significant
-from sessions.pooling.pooled import LEVELS, NOISE, SED, UNITS, StudyFindings
+from sessions.pooling.findings import LEVELS, NOISE, SED, UNITS, StudyFindings
 
 
 def models_table(study: StudyFindings) -> Table:
@@ -14,7 +14,7 @@ def models_table(study: StudyFindings) -> Table:
     models = [
         (f"{one.descriptor}: score on {what}", model)
         for one in study.descriptors
-        for what, model in (("SED", one.on_sed), ("index", one.on_index))
+        for what, model in (("SED", one.on_sed), ("index", one.on_index), ("index and µ", one.on_friction))
     ]
     groups = [(f"{name}, {_fitted(model)}", _terms(model)) for name, model in models if not isinstance(model, str)]
     caption = (
@@ -33,7 +33,7 @@ def missing_models(study: StudyFindings) -> list[str]:
     """Return why there is no correlation of means, and no mixed model: a sentence for each reason."""
     told: defaultdict[str, list[str]] = defaultdict(list)
     for one in study.descriptors:
-        for what, model in (("SED", one.on_sed), ("index", one.on_index)):
+        for what, model in (("SED", one.on_sed), ("index", one.on_index), ("index and µ", one.on_friction)):
             if isinstance(model, str):
                 told[model].append(f"{one.descriptor} on {what}")
     related = [(one.descriptor, one.mean_relation) for one in study.descriptors]
@@ -97,8 +97,12 @@ def planted_table(study: StudyFindings) -> Table:
     )
     columns = ("descriptor", "effect", "unit", "planted", "found", "95 % interval", "inside")
     caption = (
-        "Planted effects on the score, and what the mixed model on the index finds of them; spreads are standard "
-        "deviations. One interval in twenty misses."
+        "What was planted and what was found. Slopes of the score, spreads of levels and slopes, and noise, which are "
+        "standard deviations: by the mixed model on index and µ, both of which the simulated people judged by. "
+        "They know no model of a finger: the planted r, and the planted slope on SED, are those of the planted scores "
+        "(the noise of judgement added by its variance) with the SEDs that the model gives at the planted friction of "
+        "the same trials. One interval in twenty misses; that of r allows for other surfaces too, and these are always "
+        "the same, so it misses less often."
     )
     return study_table("table-planted", caption, columns, [("", rows)])
 

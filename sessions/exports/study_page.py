@@ -10,7 +10,7 @@ from sessions.exports.study_models import missing_models
 from sessions.exports.study_prose import again, command, excluded, modelled, sealed, summary, versions, who
 from sessions.exports.study_tables import study_tables
 from sessions.exports.templates import template
-from sessions.pooling.pooled import StudyFindings
+from sessions.pooling.findings import StudyFindings
 
 QUESTION = (
     "People stroke surfaces and scale what they feel. Does the strain-energy density (SED) that a finger model "

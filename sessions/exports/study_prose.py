@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from sessions.analysis.area import PLANNED_AT
 from sessions.exports.report_tables.paths import paths_sentence
 from sessions.exports.wording import correlation, digits, plural
-from sessions.pooling.pooled import DescriptorFindings, StudyFindings
+from sessions.pooling.findings import DescriptorFindings, StudyFindings
 from sessions.recording.provenance import software_versions
 from sessions.report import Fact
 

@@ -12,7 +12,7 @@ from sessions.exports.study_models import flaws_table, models_table, planted_tab
 from sessions.exports.study_trials import trials_table
 from sessions.exports.wording import NONE, correlation, digits, significant
 from sessions.pooling.averages import Average
-from sessions.pooling.pooled import DescriptorFindings, StudyFindings
+from sessions.pooling.findings import DescriptorFindings, StudyFindings
 from sessions.pooling.visit import Visit
 
 POINTS = "0–100"  # unit of scores

@@ -6,7 +6,7 @@ from sessions.exports.report_tables.cells import Cell, Column, Group, Notes, Tab
 from sessions.exports.study_cells import model_in_short
 from sessions.exports.wording import places, sed, significant, tau
 from sessions.pooling.exclusions import decided
-from sessions.pooling.pooled import StudyFindings
+from sessions.pooling.findings import StudyFindings
 from sessions.pooling.visit import TrialRow, Visit
 
 MOST = 400  # rows on the page; of a larger study they are in the table beside it, and in the page as a file

@@ -2,16 +2,14 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from sessions.analysis.mixed import MixedModel, mixed_model
 from sessions.analysis.scores import (
-    MeanScore,
     Relation,
-    Score,
     ScoreTable,
     mean_scores,
     relation,
@@ -20,10 +18,6 @@ from sessions.analysis.scores import (
 )
 from sessions.analysis.spread import Spread, spreads
 from sessions.analysis.within import (
-    Agreement,
-    Difference,
-    RepeatedCorrelation,
-    WithinMean,
     agreement,
     differences,
     holm,
@@ -31,134 +25,22 @@ from sessions.analysis.within import (
     standardised,
     within_means,
 )
-from sessions.paths import PathFinding, PathTrial, path_findings
-from sessions.pooling.averages import Average, Estimates, average, averages, by_subject, estimates
+from sessions.paths import PathTrial, path_findings
+from sessions.pooling.averages import Average, average, averages, by_subject, estimates
 from sessions.pooling.exclusions import Exclusion, decided
-from sessions.pooling.visit import TrialRow, Visit, VisitOptions
-
-SED = "SED [kPa]"
-INDEX = "index − 50"
-DRIFT = "trials before in the block"
-CARRY_OVER = "index stroked before − 50"
-LEVELS = "spread of subjects' levels"
-SLOPES = "spread of subjects' slopes on the index"
-NOISE = "noise of single scores"
-FINGERS = "spread of log µ between fingers and transducers"
-UNITS = {
-    INDEX: "points per index",
-    SED: "points per kPa",
-    DRIFT: "points per trial",
-    CARRY_OVER: "points per index",
-    LEVELS: "points",
-    SLOPES: "points per index",
-    NOISE: "points",
-    FINGERS: "1",
-}  # of effects on the score, and of the spreads
-
-
-@dataclass(frozen=True, slots=True)
-class Normalised:
-    """What is told of scores when each subject's use of the scale is taken away: own mean 0, own spread 1."""
-
-    means: Mapping[int, Average]  # by index
-    mean_relation: Relation | None
-    repeated: RepeatedCorrelation | None
-
-
-@dataclass(frozen=True, slots=True)
-class SurfaceMean:
-    """Means over subjects of one surface; None where there is no subject's number."""
-
-    index: int
-    subjects: int  # whose stroke gave an SED
-    mu: Average | None
-    sed: Average | None  # [MPa]
-    normal_force: Average | None  # measured [N]
-    model_normal_force: Average | None  # of the model, pressed to its depth [N]
-    matching_depth: Average | None  # at which the model would press as hard as the subject did [mm]
-
-
-@dataclass(frozen=True, slots=True)
-class DescriptorFindings:
-    """All that a study says of one descriptor."""
-
-    descriptor: str
-    indices: tuple[int, ...]
-    scores: tuple[MeanScore, ...]
-    within: tuple[WithinMean, ...]
-    agreement: Agreement | None
-    surfaces: tuple[SurfaceMean, ...]
-    answers: Mapping[str, tuple[float | None, ...]]  # subject -> score of each index
-    points: tuple[tuple[str, int, float, float], ...]  # subject, index, SED [MPa], score: all of its own strokes
-    mean_relation: Relation | None  # mean SED [MPa] against mean score
-    repeated: RepeatedCorrelation | None  # of a subject's scores with the SEDs of its own strokes
-    repeated_holm: float | None  # its p, allowing for as many descriptors as have one
-    without_subject: tuple[tuple[str, float], ...]  # subject left out, r within the others
-    normalised: Normalised
-    differences: tuple[Difference, ...]
-    estimates: Estimates | None
-    on_sed: MixedModel | str  # score on SED [kPa], drift and carry-over; or why there is no model
-    on_index: MixedModel | str  # score on the maker's index, drift and carry-over
-    fingers: Spread | None  # how fingers differ: of the logarithm of mu between subjects, surfaces taken away [-]
-    paths: tuple[PathFinding, ...]  # () where they were not asked for
-
-
-@dataclass(frozen=True, slots=True)
-class Recovered:
-    """One planted effect beside what the study found."""
-
-    descriptor: str
-    effect: str
-    planted: float
-    found: float
-    low: float
-    high: float
-
-    @property
-    def covered(self) -> bool:
-        """Say whether the interval holds what was planted."""
-        return self.low <= self.planted <= self.high
-
-
-@dataclass(frozen=True, slots=True)
-class PlantedFriction:
-    """How friction of all strokes was recovered."""
-
-    strokes: int  # with a planted and a found mu
-    median_error: float  # of mu, relative [-]
-    worst_error: float
-    intervals: int  # of mu that are given
-    covered: int  # of them hold what was planted
-
-
-@dataclass(frozen=True, slots=True)
-class PlantedFlaw:
-    """What was spoilt in one session, and whether the study says so."""
-
-    session: str
-    expected: str  # for people
-    found: bool
-
-
-@dataclass(frozen=True, slots=True)
-class StudyFindings:
-    """The result of a study."""
-
-    simulated: str
-    options: VisitOptions
-    visits: tuple[Visit, ...]  # all that were read, those left out too
-    failed: tuple[tuple[str, str], ...]  # folder, why it could not be read
-    copies: tuple[tuple[str, str], ...]  # session that counts nothing, and the one whose recording it holds again
-    excluded: tuple[Exclusion, ...]
-    reversed: tuple[tuple[str, str, float], ...]  # subject, descriptor, r of score with index: still counted
-    descriptors: tuple[DescriptorFindings, ...]
-    effects: tuple[Recovered, ...]  # planted, where the study is synthetic
-    friction: PlantedFriction | None
-    flaws: tuple[PlantedFlaw, ...] = ()  # planted, where the study is synthetic
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data."""
-        return {**({"simulated": self.simulated} if self.simulated else {}), **asdict(self)}
+from sessions.pooling.findings import (
+    CARRY_OVER,
+    DRIFT,
+    FRICTION,
+    INDEX,
+    SED,
+    DescriptorFindings,
+    Normalised,
+    StudyFindings,
+    SurfaceMean,
+)
+from sessions.pooling.planted import found_flaws, found_friction, recovered
+from sessions.pooling.visit import TrialRow, Visit, VisitOptions, scores_of
 
 
 def pooled(
@@ -177,7 +59,7 @@ def pooled(
     copies = _copies(ordered)
     counted = [visit for visit in ordered if visit.session not in copies]
     kept = [(v, row) for v in counted for row in v.rows if decided(exclusions, v.subject, row.descriptor) is None]
-    tables = [_table(visit, [row for v, row in kept if v is visit]) for visit in counted]
+    tables = [scores_of(visit, [row for v, row in kept if v is visit]) for visit in counted]
     asked = options or VisitOptions()
     found = tuple(
         _descriptor(name, asked, tables, [(v, row) for v, row in kept if row.descriptor == name])
@@ -193,9 +75,9 @@ def pooled(
         excluded=exclusions,
         reversed=reversed_subjects(tables),
         descriptors=found,
-        effects=() if planted is None else _recovered(found, planted),
-        friction=None if planted is None else _friction(ordered, planted["strokes"]),
-        flaws=() if planted is None else _flaws(ordered, dict(failed), planted.get("spoilt", {})),
+        effects=() if planted is None else recovered(found, planted),
+        friction=None if planted is None else found_friction(ordered, planted["strokes"]),
+        flaws=() if planted is None else found_flaws(ordered, dict(failed), planted.get("spoilt", {})),
     )
 
 
@@ -219,11 +101,6 @@ def _simulated(visits: Sequence[Visit]) -> str:
     if not made_up:
         return ""
     return f"SIMULATED: {made_up} of the {len(visits)} sessions of this study are simulated"
-
-
-def _table(visit: Visit, rows: Sequence[TrialRow]) -> ScoreTable:
-    scores = tuple(Score(visit.subject, row.descriptor, row.index, row.score) for row in rows if row.score is not None)
-    return ScoreTable(visit.session, visit.subject, bool(visit.simulated), scores)
 
 
 def _descriptor(
@@ -253,8 +130,9 @@ def _descriptor(
         normalised=_normalised(level, [(p[0], p[1].index, p[2]) for p in points]),
         differences=differences(matrix),
         estimates=estimates(trials),
-        on_sed=_model([p[0] for p in points], [p[1] for p in points], [p[3] for p in points], SED),
-        on_index=_model([p[0] for p in scored], [p[1] for p in scored], [p[2] for p in scored], INDEX),
+        on_sed=_model([(p[0], p[1], p[3]) for p in points], SED),
+        on_index=_model(scored, INDEX),
+        on_friction=_model([one for one in scored if one[1].mu is not None], INDEX, FRICTION),
         fingers=_fingers([(v.subject, row.index, row.mu) for v, row in trials if row.mu is not None]),
         paths=path_findings(
             [PathTrial(v.subject, row.index, row.score, row.rule, row.paths) for v, row in trials],
@@ -266,18 +144,24 @@ def _descriptor(
     )
 
 
-def _model(subjects: Sequence[str], rows: Sequence[TrialRow], scores: Sequence[float], what: str) -> MixedModel | str:
-    """Return the mixed model of scores on SED or index, with drift and carry-over, or why there is none."""
+def _model(trials: Sequence[tuple[str, TrialRow, float]], *what: str) -> MixedModel | str:
+    """Return the mixed model of scores on `what`, drift and carry-over, or why there is none.
+
+    Trials are subject, row and score. Subjects have slopes of their own on the first of `what`.
+    """
+    subjects, rows, scores = [one[0] for one in trials], [one[1] for one in trials], [one[2] for one in trials]
     if len(set(subjects)) < 3:
-        what = "scores and strokes of their own" if what == SED else "scores"
-        return f"it takes three subjects with {what}, and there {_are(len(set(subjects)))}"
-    x = [1e3 * (row.sed or 0.0) if what == SED else row.index - 50.0 for row in rows]
-    order = {
+        own = "scores" if what == (INDEX,) else "scores and strokes of their own"
+        return f"it takes three subjects with {own}, and there {_are(len(set(subjects)))}"
+    columns = {
+        INDEX: [row.index - 50.0 for row in rows],
+        SED: [1e3 * (row.sed or 0.0) for row in rows],
+        FRICTION: [row.mu or 0.0 for row in rows],
         DRIFT: [float(row.place) for row in rows],
         CARRY_OVER: [0.0 if row.before is None else row.before - 50.0 for row in rows],
     }
-    varied = {name: values for name, values in order.items() if np.ptp(values) > 0.0}
-    return mixed_model(subjects, scores, {what: x, **varied}, slopes_differ=True)
+    order = [name for name in (DRIFT, CARRY_OVER) if np.ptp(columns[name]) > 0.0]
+    return mixed_model(subjects, scores, {name: columns[name] for name in (*what, *order)}, slopes_differ=True)
 
 
 def _are(n: int) -> str:
@@ -331,73 +215,3 @@ def _normalised(table: Mapping[str, Mapping[int, float]], points: Sequence[tuple
     both = [(subject, i, sed, table[subject][i]) for subject, i, sed in points if i in table.get(subject, {})]
     within = repeated_correlation([p[0] for p in both], [p[2] for p in both], [p[3] for p in both])
     return Normalised(means, _related(both), within)
-
-
-def _recovered(found: Sequence[DescriptorFindings], planted: Mapping[str, Any]) -> tuple[Recovered, ...]:
-    """Return the planted effects beside what the mixed model on the index, and the spread of friction, find."""
-    score, people = planted["score"], planted.get("people", {})
-    effects = {INDEX: score["gain"], DRIFT: score["drift"], CARRY_OVER: score["carry_over"]}
-    told: list[Recovered] = []
-    for one in found:
-        model = one.on_index
-        for term in () if isinstance(model, str) else model.terms:
-            if term.name in effects:
-                told.append(
-                    Recovered(one.descriptor, term.name, effects[term.name], term.estimate, term.low, term.high)
-                )
-        differ = None if isinstance(model, str) else model.spreads
-        if people and differ is not None:
-            pairs = (
-                (LEVELS, people["offset_spread"], differ.level),
-                (SLOPES, people["gain_spread"], differ.slope),
-                (NOISE, people["judgement_noise"], differ.left),
-            )
-            told += [_spread(one, name, sd, spread) for name, sd, spread in pairs if spread is not None]
-        if people and one.fingers is not None:
-            # A transducer's gains, of drag and of press, differ between visits as fingers do.
-            sd = math.hypot(people["moisture"], math.sqrt(2.0) * planted.get("calibration_sd", 0.0))
-            told.append(_spread(one, FINGERS, sd, one.fingers))
-    return tuple(told)
-
-
-def _spread(one: DescriptorFindings, name: str, planted: float, found: Spread) -> Recovered:
-    return Recovered(one.descriptor, name, planted, found.sd, found.low, found.high)
-
-
-_FLAWS = {"lost": "lost_readings", "frozen": "frozen_sensor", "light": "too_little_force"}
-
-
-def _flaws(
-    visits: Sequence[Visit], failed: Mapping[str, str], spoilt: Mapping[str, Mapping[str, Any]]
-) -> tuple[PlantedFlaw, ...]:
-    """Return for each session that was spoilt whether what it brings, or that it brings nothing, says so."""
-    named = {visit.session: visit for visit in visits}
-    backwards = {subject for subject, _, _ in reversed_subjects([_table(visit, visit.rows) for visit in visits])}
-    found: list[PlantedFlaw] = []
-    for session, told in spoilt.items():
-        visit = named.get(session)
-        if visit is None:
-            found.append(PlantedFlaw(session, told["expected"], session in failed))
-            continue
-        rows = {row.trial: row for row in visit.rows}
-        seen = [flaw in rows[told[name]].flaws for name, flaw in _FLAWS.items() if told.get(name)]
-        seen += [rows[told["unanswered"]].score is None] if told.get("unanswered") else []
-        seen += [rows[told["aborted"]].outcome == "open" and not visit.complete] if told.get("aborted") else []
-        seen += [visit.subject in backwards] if told.get("reversed") else []
-        found.append(PlantedFlaw(session, told["expected"], bool(seen) and all(seen)))
-    return tuple(found)
-
-
-def _friction(visits: Sequence[Visit], strokes: Sequence[Mapping[str, Any]]) -> PlantedFriction | None:
-    truth = {(stroke["subject"], stroke["trial"]): float(stroke["mu"]) for stroke in strokes}
-    found = [
-        (row, truth[visit.subject, row.trial])
-        for visit in visits
-        for row in visit.rows
-        if row.mu is not None and (visit.subject, row.trial) in truth
-    ]
-    if not found:
-        return None
-    errors = [abs((row.mu or 0.0) / mu - 1.0) for row, mu in found]
-    held = [row.mu_low <= mu <= row.mu_high for row, mu in found if row.mu_low is not None and row.mu_high is not None]
-    return PlantedFriction(len(found), float(np.median(errors)), max(errors), len(held), sum(held))

@@ -1,6 +1,6 @@
 """One session's contribution to a study: a row a trial, with scores, friction and prediction side by side."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
@@ -9,6 +9,7 @@ import msgspec
 from sessions.analysis import Analysis, AnalysisSettings, analyse
 from sessions.analysis.area import FIXED, AreaLaw
 from sessions.analysis.bootstrap import drawn_from, stroke_intervals
+from sessions.analysis.scores import Score, ScoreTable
 from sessions.blinding import revealed
 from sessions.gain_error import gain_error_set
 from sessions.paths import Seds, trial_paths
@@ -146,6 +147,12 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
         calibration=drawn_from(analysis.settings).calibration,
         model=tuple((fact.name, fact.value, fact.remark) for fact in modelled(prediction) if fact.name != "audits"),
     )
+
+
+def scores_of(visit: Visit, rows: Sequence[TrialRow]) -> ScoreTable:
+    """Return the scores that some of a visit's rows hold."""
+    scores = tuple(Score(visit.subject, row.descriptor, row.index, row.score) for row in rows if row.score is not None)
+    return ScoreTable(visit.session, visit.subject, bool(visit.simulated), scores)
 
 
 def _sealed(recording: Recording, prediction: SessionPrediction) -> str:

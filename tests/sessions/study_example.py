@@ -16,6 +16,7 @@ INDICES = (0, 20, 50, 80, 100)
 def visit(number, *, gain=0.8, noise=3.0, sed=lambda index: 0.008 + 1e-5 * index, simulated=""):
     rng = np.random.default_rng(number)
     level, order = rng.normal(0.0, 5.0), rng.permutation(INDICES).tolist()
+    friction = np.random.default_rng([number, 1]).normal(0.4, 0.05, len(order)).tolist()
     rows = [
         TrialRow(
             trial=place + 1,
@@ -29,7 +30,7 @@ def visit(number, *, gain=0.8, noise=3.0, sed=lambda index: 0.008 + 1e-5 * index
             before=order[place - 1] if place else None,
             outcome="scored",
             score=50.0 + level + gain * (index - 50) + 0.4 * place + noise * rng.normal(),
-            mu=0.4,
+            mu=friction[place],
             sed=None if sed is None else sed(index) * (1.0 + 0.01 * rng.normal()),
         )
         for place, index in enumerate(order)
@@ -43,7 +44,7 @@ def study():
     visits = [_full(visit(number, simulated=simulated)) for number in range(1, 11)]
     planted = {
         "score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0},
-        "strokes": [{"subject": v.subject, "trial": row.trial, "mu": 0.4} for v in visits for row in v.rows],
+        "strokes": [{"subject": v.subject, "trial": row.trial, "mu": row.mu} for v in visits for row in v.rows],
     }
     out = (Exclusion("S03", "used the scale backwards, and said so afterwards", "E02"),)
     return pooled(visits, [("S11", "session.sqlite is damaged")], out, planted, VisitOptions(paths="small"))
@@ -55,8 +56,8 @@ def _full(made):
         replace(
             row,
             rule="maximum",
-            mu_low=0.38,
-            mu_high=0.42,
+            mu_low=row.mu - 0.02,
+            mu_high=row.mu + 0.02,
             tau_max=0.02,
             tau_max_low=0.0196,
             tau_max_high=0.0204,

@@ -8,7 +8,7 @@ from sessions.exports.figures.scores import score_panel
 from sessions.exports.figures.style import GREEN, GREY, Panel, Plate, look, sheet, svg
 from sessions.exports.study_cells import model_in_short
 from sessions.exports.wording import correlation
-from sessions.pooling.pooled import DescriptorFindings, StudyFindings
+from sessions.pooling.findings import DescriptorFindings, StudyFindings
 from sessions.report import Answers, Experiment
 
 
