@@ -91,6 +91,11 @@ class Decision:
             return f"{head}{self.of} is {'kept' if self.new else 'left out'}: {self.why}"
         return f"{head}{self.what} of {self.of} is {told(self.new)} (it was {told(self.old)}): {self.why}"
 
+    @property
+    def leaves_out(self) -> bool:
+        """Whether it keeps a stroke out of the results."""
+        return self.what == "kept" and not self.new and self.undoes is None
+
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, as its line holds it."""
         document = asdict(self)

@@ -137,11 +137,11 @@ def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
 
 
 def _print(study: StudyFindings, files: dict[str, str], console: Console) -> None:
-    from sessions.exports.study_prose import excluded, summary
+    from sessions.exports.study_prose import excluded, remarks, summary
 
     if study.simulated:
         console.say(study.simulated)
-    for sentence in (*summary(study), *excluded(study)):
+    for sentence in (*summary(study), *excluded(study), *remarks(study)):
         console.say(sentence)
     for one in study.effects:
         inside = "inside" if one.covered else "OUTSIDE"

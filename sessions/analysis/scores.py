@@ -154,7 +154,8 @@ def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> R
     without = tuple((label, _pearson([*x[:i], *x[i + 1 :]], [*y[:i], *y[i + 1 :]])) for i, label in enumerate(labels))
     r = _pearson(x, y)
     if r is None:
-        why = f"{n} points are too few for a correlation" if n < 3 else "one of the two does not vary"
+        few = "1 point is" if n == 1 else f"{n} points are"
+        why = f"{few} too few for a correlation" if n < 3 else "one of the two does not vary"
         return Relation(n, None, None, None, None, None, None, None, None, None, without, why)
     slope, intercept = np.polyfit(x, y, 1)
     low, high = _fisher_interval(x, y)

@@ -1,6 +1,7 @@
 """What a report says in sentences: its question and, in short, its answer."""
 
-from sessions.analysis.scores import Relation
+from sessions.alternative import Variant
+from sessions.analysis.scores import Relation, relation
 from sessions.exports.report_tables.paths import paths_sentence
 from sessions.exports.wording import correlation, digits, plural, spread_share
 from sessions.report import Experiment, Report
@@ -36,6 +37,8 @@ def summary(report: Report) -> tuple[str, ...]:
             sentences.append(_predicted(experiment, min(seds), max(seds), report.model.split(",")[0]))
         if experiment.paths:
             sentences.append(paths_sentence(experiment.name, experiment.paths))
+    if any(p.sed is not None for p in report.predictions):
+        sentences.append(_otherwise(report))
     missing = sum(p.sed is None for p in report.predictions)
     if missing:
         sentences.append(f"{_capital(plural(missing, 'trial'))} got no prediction; the tables say why.")
@@ -50,15 +53,49 @@ def _strokes(report: Report) -> str:
     measured = sum(s.mu_dynamic is not None for s in report.strokes)
     words = f"{_capital(plural(n, 'stroke'))} {'was' if n == 1 else 'were'} found; {measured} gave a dynamic friction"
     values = [s.mu_dynamic for s in report.strokes if s.mu_dynamic is not None]
-    return words + (f", from µ = {digits(min(values), 2)} to {digits(max(values), 2)}." if values else ".")
+    if len(values) < 2:
+        return words + (f", µ = {digits(values[0], 2)}." if values else ".")
+    return words + f", from µ = {digits(min(values), 2)} to {digits(max(values), 2)}."
 
 
 def _predicted(experiment: Experiment, low: float, high: float, strain: str) -> str:
     """Return how prediction and score go together in one experiment."""
-    name, ends = _capital(experiment.name), f"{digits(1e3 * low, 2)} to {digits(1e3 * high, 2)} kPa"
-    words = f"{name}: the SED predicted{f' at {strain}' if strain else ''} runs from {ends}"
-    words += f" (a range of {spread_share(low, high)})"
+    words = f"{_capital(experiment.name)}: the SED predicted{f' at {strain}' if strain else ''}"
+    if high > low:
+        words += f" runs from {digits(1e3 * low, 2)} to {digits(1e3 * high, 2)} kPa"
+        words += f" (a range of {spread_share(low, high)})"
+    else:
+        words += f" is {digits(1e3 * low, 2)} kPa"
     return words + related_words(experiment.score_relation) + "."
+
+
+def _otherwise(report: Report) -> str:
+    """Return what the other strain says of the same scores, or that it was not asked."""
+    other = "finite" if report.model.startswith("small") else "small"
+    told: list[str] = []
+    for experiment in report.experiments:
+        means = {mean.index: mean.mean for mean in experiment.scores}
+        points = [
+            (p.index, means[p.index], one.sed)
+            for p in report.predictions
+            for one in p.alternatives
+            if p.experiment == experiment.name and p.index in means and one.sed is not None
+            and one.variant == Variant(other, "computed", "depth")
+        ]  # fmt: skip
+        asked = any(
+            one.variant.kinematics == other
+            for p in report.predictions
+            if p.experiment == experiment.name
+            for one in p.alternatives
+        )
+        if asked:
+            seds, scores = [point[2] for point in points], [point[1] for point in points]
+            found = relation(seds, scores, [point[0] for point in points])
+            r = found.reason if found.pearson is None else f"r = {correlation(found.pearson)}"
+            told.append(f"{experiment.name} {r}, n = {found.n} {'stimulus' if found.n == 1 else 'stimuli'}")
+    if told:
+        return f"At {other} strain the SED goes with the mean scores thus: {'; '.join(told)}."
+    return f"At {other} strain, which was not tried here, the sign of r may be another."
 
 
 def related_words(related: Relation | None) -> str:

@@ -7,7 +7,7 @@ from sessions.exports.figures.study import study_plates
 from sessions.exports.html import data_address, drawn, text_address
 from sessions.exports.study_csv import columns_csv, trials_csv
 from sessions.exports.study_models import missing_models
-from sessions.exports.study_prose import again, command, excluded, modelled, sealed, summary, versions, who
+from sessions.exports.study_prose import again, command, excluded, modelled, remarks, sealed, summary, versions, who
 from sessions.exports.study_tables import study_tables
 from sessions.exports.templates import template
 from sessions.pooling.findings import StudyFindings
@@ -32,6 +32,7 @@ def study_page(study: StudyFindings, name: str) -> str:
         sealed=sealed(study),
         who=who(study),
         excluded=excluded(study),
+        remarks=remarks(study),
         modelled=modelled(study),
         versions=versions(),
         again=again(study),

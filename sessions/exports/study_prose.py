@@ -3,10 +3,12 @@
 import re
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 
 from sessions.analysis.area import PLANNED_AT
 from sessions.exports.report_tables.paths import paths_sentence
 from sessions.exports.wording import correlation, digits, plural
+from sessions.pooling.exclusions import Exclusion
 from sessions.pooling.findings import DescriptorFindings, StudyFindings
 from sessions.recording.provenance import software_versions
 from sessions.report import Fact
@@ -23,8 +25,6 @@ def summary(study: StudyFindings) -> list[str]:
     for one in study.descriptors:
         said += _related(one, strain)
         said += [paths_sentence(one.descriptor, one.paths)] if one.paths else []
-    if strain == "small" and any(one.repeated is not None for one in study.descriptors):
-        said.append("At finite strain, which is not computed here, the sign may be another: --kinematics finite tells.")
     if study.friction is not None:
         f = study.friction
         said.append(
@@ -38,14 +38,29 @@ def summary(study: StudyFindings) -> list[str]:
 
 def _related(one: DescriptorFindings, strain: str) -> list[str]:
     name = one.descriptor[:1].upper() + one.descriptor[1:]
+    other = "finite" if strain == "small" else "small"
     if one.repeated is None:
         return [f"{name}: too few subjects with scores and strokes of their own for a correlation within subjects."]
     r = one.repeated
     interval = f"95 % interval {correlation(r.low)} to {correlation(r.high)}"
     return [
         f"{name}: within subjects, score and the SED predicted at {strain} strain go together by "
-        f"r = {correlation(r.r)}, {interval}."
+        f"r = {correlation(r.r)}, {interval}; {_otherwise(one, other)}."
     ]
+
+
+def _otherwise(one: DescriptorFindings, other: str) -> str:
+    """Return what the same trials give at the other strain, as far as the many paths went there."""
+    usual = next((found.path for found in one.paths if found.usual), None)
+    there = None if usual is None else replace(usual, kinematics=other)
+    tried = next((found for found in one.paths if found.path == there), None)
+    if tried is None:
+        return f"at {other} strain, which was not tried here, the sign may be another"
+    trials = plural(tried.trials, "trial")
+    if tried.within is None or tried.low is None or tried.high is None:
+        return f"at {other} strain {trials} of {len(one.points)} had an SED, too few for a correlation"
+    interval = f"{correlation(tried.low)} to {correlation(tried.high)}"
+    return f"at {other} strain r = {correlation(tried.within)} ({interval}) of the {trials} that have an SED there"
 
 
 def who(study: StudyFindings) -> list[Fact]:
@@ -61,35 +76,64 @@ def who(study: StudyFindings) -> list[Fact]:
 
 
 def excluded(study: StudyFindings) -> list[str]:
-    """Return a sentence for all that does not count, by whom and why, and for each doubt about what does."""
+    """Return a sentence for all that was kept out of the results, by whom and why."""
     said = [f"Session {folder} could not be read, and nothing of it counts: {why}." for folder, why in study.failed]
     said += [
         f"Session {session} holds the same recording as {first} (their SHA-256 agree), and counts nothing."
         for session, first in study.copies
     ]
-    for one in study.excluded:
-        what = f"trials on {one.descriptor}" if one.descriptor else "every trial"
-        if any(v.subject == one.subject and one.descriptor in ("", r.descriptor) for v in study.visits for r in v.rows):
-            said.append(f"Subject {one.subject}: {what} left out by {one.who}: {_stopped(one.why)}")
-        else:
-            said.append(
-                f"Nothing, by a decision that fits nothing here: {one.who} left out {what} of subject {one.subject} "
-                f"({one.why}), and no session read has such trials; see exclusions.toml."
-            )
-    said += [f"Session {visit.session}: {_stopped(decision)}" for visit in study.visits for decision in visit.decisions]
+    said += [
+        f"Subject {one.subject}: {_whats(one)} left out by {one.who}: {_stopped(one.why)}"
+        for one in study.excluded
+        if _fits(study, one)
+    ]
+    said += [
+        f"Session {visit.session}: {_stopped(decision)}"
+        for visit in study.visits
+        for decision in visit.decisions
+        if " is left out: " in decision
+    ]
+    return [*said, *_missing(study)]
+
+
+def remarks(study: StudyFindings) -> list[str]:
+    """Return what is missing though nobody excluded it, what people decided of what counts, and doubts about it."""
+    said = [
+        f"Session {visit.session}: {_stopped(decision)}"
+        for visit in study.visits
+        for decision in visit.decisions
+        if " is left out: " not in decision
+    ]
     said += [
         f"Session {visit.session} ended before its last trial; what it holds counts."
         for visit in study.visits
         if not visit.complete
     ]
     said += [f"Session {visit.session}: {loss}." for visit in study.visits for loss in visit.losses]
-    said += _missing(study)
+    for outcome, words in (("not answered", "No score, for the subject did not answer"), ("open", "Not done")):
+        places = [f"{v.session} trial {r.trial}" for v in study.visits for r in v.rows if r.outcome == outcome]
+        said += [f"{words}: {_listed(places)}."] if places else []
     said += [
-        f"Nothing, but a doubt: the {descriptor} scores of {subject} fall as the index rises (r = {correlation(r)}); "
-        "the scale may have been used backwards."
+        f"A decision of {one.who} leaves out {_whats(one)} of subject {one.subject} ({one.why}), and no session read "
+        "has such trials; see exclusions.toml."
+        for one in study.excluded
+        if not _fits(study, one)
+    ]
+    said += [
+        f"The {descriptor} scores of {subject} fall as the index rises (r = {correlation(r)}); the scale may have been "
+        "used backwards."
         for subject, descriptor, r in study.reversed
     ]
     return said
+
+
+def _whats(one: Exclusion) -> str:
+    return f"trials on {one.descriptor}" if one.descriptor else "every trial"
+
+
+def _fits(study: StudyFindings, one: Exclusion) -> bool:
+    """Say whether some session has a trial that a decision leaves out."""
+    return any(v.subject == one.subject and one.descriptor in ("", r.descriptor) for v in study.visits for r in v.rows)
 
 
 def _stopped(sentence: str) -> str:
@@ -97,13 +141,12 @@ def _stopped(sentence: str) -> str:
 
 
 def _missing(study: StudyFindings) -> list[str]:
-    """Return which trials have no score or no SED, those that differ in numbers alone together."""
-    silent = [f"{v.session} trial {r.trial}" for v in study.visits for r in v.rows if r.outcome == "not answered"]
-    said = [f"No score, for the subject did not answer: {_listed(silent)}."] if silent else []
+    """Return which trials that were done have no SED, and why, those that differ in numbers alone together."""
+    said: list[str] = []
     alike: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
     for visit in study.visits:
         for row in visit.rows if visit.forces else ():
-            if row.sed is None and row.why:
+            if row.sed is None and row.why and row.outcome != "open":
                 alike[re.sub(r"[\d.]+", "#", row.why)].append((f"{visit.session} trial {row.trial}", row.why))
     for places in alike.values():
         first = "" if len({told for _, told in places}) == 1 else "of the first: "

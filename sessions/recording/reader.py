@@ -40,9 +40,9 @@ LOSS_SENTENCES = {
     "lost": "{} readings never arrived",
     "malformed": "{} records were malformed and left out",
     "stalled": "{} readings came while the device's counter stood still",
-    "restarted": "the device began to count anew {} times",
+    "restarted": "how often the device began to count anew: {}",
     "saturated": "the device called {} readings invalid, as when it is saturated",
-    "off_rate": "the device's rate was found to be another than set, or than before, {} times",
+    "off_rate": "how often the device's rate was found to be another than set, or than before: {}",
 }
 
 
@@ -115,7 +115,7 @@ class Recording:
             if count:
                 trouble.append(sentence.format(count))
         found = [event.data["rate_words"] for event in self.events if "rate_words" in event.data]
-        trouble += [f"of the rate was found: {words}" for words in dict.fromkeys(found)]
+        trouble += [f"the rate that was found: {words}" for words in dict.fromkeys(found)]
         for record in self.trials:
             allowed = self.plan.strokes_allowed(record.trial)
             if record.take and record.take.strokes > allowed:

@@ -76,7 +76,8 @@ def findings(
     tables = joined((score_table(recording), *(scores or ())))
     found = strokes(recording, analysis)
     more = further or Further()
-    predicted = predictions(prediction, more.firing)
+    undone = {record.trial.number for record in recording.trials if record.outcome == "open"}
+    predicted = predictions(prediction, more.firing, undone)
     head = _head(recording, tables)
     return Report(
         title=_title(recording),
@@ -87,6 +88,7 @@ def findings(
         people=facts.people(recording, tables),
         apparatus=facts.apparatus(recording, analysis),
         excluded=facts.excluded(recording, analysis, found, tables),
+        remarks=facts.remarks(recording, analysis, tables),
         flaws=flaws(analysis),
         experiments=experiments(recording.plan, tables, predicted_seds(predicted), more.paths, analysis.settings.area),
         course=course(recording),

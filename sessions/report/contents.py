@@ -184,6 +184,7 @@ class Report:
     people: tuple[Fact, ...]
     apparatus: tuple[Fact, ...]
     excluded: tuple[str, ...]
+    remarks: tuple[str, ...]  # what is missing and nobody excluded, decisions on what counts, doubts about it
     flaws: tuple[Fact, ...]  # name, sentence, where
     experiments: tuple[Experiment, ...]
     course: Course | None

@@ -105,9 +105,9 @@ def _tilt(analysis: Analysis) -> tuple[str, str]:
 def excluded(
     recording: Recording, analysis: Analysis, strokes: Sequence[StrokeFinding], tables: Sequence[ScoreTable]
 ) -> tuple[str, ...]:
-    """Return what does not enter the results, and why, a sentence each."""
-    sentences = [f"Lost: {loss}." for loss in recording.losses]
-    sentences += [f"By {one.sentence}{'' if one.sentence.endswith('.') else '.'}" for one in analysis.decisions]
+    """Return what was kept out of the results, by whom and why, a sentence each."""
+    out = [one for one in analysis.decisions if one.leaves_out]
+    sentences = [f"By {one.sentence}{'' if one.sentence.endswith('.') else '.'}" for one in out]
     sentences += [table.left_out for table in tables if table.left_out]
     for record in recording.trials:
         sentences += _trial(record)
@@ -117,11 +117,25 @@ def excluded(
             sentences.append(
                 f"No {words} is given for stroke {', '.join(without)}: the flaws below and the tables say why."
             )
-    for subject, descriptor, r in reversed_subjects(tables):
-        sentences.append(
-            f"Nothing, but a doubt: the {descriptor} scores of {subject} fall as the index rises (r = {r:+.2f}): the "
-            "scale may have been used backwards; they are kept as given."
-        )
+    return tuple(sentences)
+
+
+def remarks(recording: Recording, analysis: Analysis, tables: Sequence[ScoreTable]) -> tuple[str, ...]:
+    """Return what is missing though nobody excluded it, what people decided of what counts, and doubts about it."""
+    sentences = [f"Lost: {loss}." for loss in recording.losses]
+    kept = [one for one in analysis.decisions if not one.leaves_out]
+    sentences += [f"By {one.sentence}{'' if one.sentence.endswith('.') else '.'}" for one in kept]
+    for record in recording.trials:
+        number = record.trial.number
+        if record.outcome == "not answered":
+            sentences.append(f"Trial {number} has no score: the subject did not answer.")
+        elif record.outcome == "open":
+            sentences.append(f"Trial {number} was not done: the session ended before.")
+    sentences += [
+        f"The {descriptor} scores of {subject} fall as the index rises (r = {r:+.2f}): the scale may have been used "
+        "backwards; they are kept as given."
+        for subject, descriptor, r in reversed_subjects(tables)
+    ]
     return tuple(sentences)
 
 
@@ -134,10 +148,6 @@ def _trial(record: TrialRecord) -> list[str]:
         sentences.append(f"Take {take.number} of trial {number} does not count ({why}); its readings are kept.")
     if record.outcome == "skipped":
         sentences.append(f"Trial {number} was skipped.")
-    elif record.outcome == "not answered":
-        sentences.append(f"Trial {number} has no score: the subject did not answer.")
-    elif record.outcome == "open":
-        sentences.append(f"Trial {number} was not done: the session ended before.")
     return sentences
 
 

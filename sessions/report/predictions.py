@@ -2,7 +2,7 @@
 
 import re
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import asdict, replace
 from typing import Any, cast
 
@@ -22,12 +22,21 @@ _READINGS = {
 _FROM_ROW = {"tau_max": "mu", "error_estimate": "sed", "normal_per_mm": "normal_force", "wall_s": "sed"}
 
 
-def predictions(found: SessionPrediction | None, firing: Sequence[Firing] = ()) -> tuple[PredictionFinding, ...]:
-    """Return a finding for each trial, or for each stroke of a recording without trials."""
+def predictions(
+    found: SessionPrediction | None, firing: Sequence[Firing] = (), undone: Set[int] = frozenset()
+) -> tuple[PredictionFinding, ...]:
+    """Return a finding for each trial, or for each stroke of a recording without trials.
+
+    `undone` are the numbers of trials that the session did not come to.
+    """
     if found is None:
         return ()
     rates = {one.trial: one for one in firing}
-    return tuple(_with_more(finding_of(row), row, rates.get(row.trial)) for row in found.trials)
+    rows = (
+        replace(row, reasons=dict.fromkeys(row.reasons, "The trial was not done.")) if row.trial in undone else row
+        for row in found.trials
+    )
+    return tuple(_with_more(finding_of(row), row, rates.get(row.trial)) for row in rows)
 
 
 def afferent_facts(settings: AfferentSettings, reference: float | None) -> tuple[Fact, ...]:

@@ -257,6 +257,7 @@ def _made():
         "people": (Fact("subjects who scored", "10"),),
         "apparatus": (Fact("height of the face", "0 mm", "default, set by nobody"),),
         "excluded": ("Take 1 of trial 3 was discarded by the experimenter: slipped off.",),
+        "remarks": ("Trial 7 has no score: the subject did not answer.",),
         "flaws": (Fact("speed_not_measurable", "The centre of pressure moves in steps.", "trial 7"),),
         "experiments": tuple(experiment(d, score_tables) for d in TABLES),
         "course": Course(tuple(t.tolist()), tuple(force.tolist()), tuple((0.5 * force).tolist())),

@@ -10,7 +10,8 @@ from study_example import study, visit
 
 from sessions.exports.study_csv import trials_csv
 from sessions.exports.study_page import study_page
-from sessions.exports.study_prose import excluded
+from sessions.exports.study_prose import excluded, remarks, summary
+from sessions.paths import PATHS
 from sessions.pooling.exclusions import Exclusion, exclusions_in
 from sessions.pooling.findings import CARRY_OVER, DRIFT, FRICTION, INDEX, SED, WITHIN
 from sessions.pooling.pooled import pooled
@@ -132,11 +133,11 @@ def test_decisions_are_read_from_their_file_and_a_wrong_one_is_named(tmp_path):
 
 def test_a_decision_that_fits_no_trial_is_told_as_such():
     out = (Exclusion("S99", "ill", "E1"), Exclusion("S01", "bad", "E1", "sticky"), Exclusion("S02", "ill", "E1"))
-    told = excluded(pooled(VISITS[:3], exclusions=out))
-    assert [sentence.split(":")[0] for sentence in told[:3]] == [
-        "Nothing, by a decision that fits nothing here",
-        "Nothing, by a decision that fits nothing here",
-        "Subject S02",
+    found = pooled(VISITS[:3], exclusions=out)
+    assert [sentence.split(":")[0] for sentence in excluded(found)] == ["Subject S02"]
+    assert [sentence.split("(")[0] for sentence in remarks(found)] == [
+        "A decision of E1 leaves out every trial of subject S99 ",
+        "A decision of E1 leaves out trials on sticky of subject S01 ",
     ]
 
 
@@ -207,8 +208,42 @@ def test_a_planted_flaw_that_nobody_names_is_told_as_not_found():
 def test_what_was_excluded_is_told_with_who_and_why_and_trials_alike_together():
     told = " ".join(excluded(study()))
     assert "Subject S03: every trial left out by E02: used the scale backwards" in told
-    assert "Session S04: decision 1 by E02: stroke 1 of trial 2 is kept: it was good." in told
+    kept = "Session S04: decision 1 by E02: stroke 1 of trial 2 is kept: it was good."
+    assert kept in remarks(study())
+    assert kept not in told
     rows = [replace(row, sed=None, why=f"No settled sliding at mu = 0.{row.trial}.") for row in VISITS[0].rows]
     (one,) = excluded(pooled([replace(VISITS[0], rows=tuple(rows))]))
     assert one.startswith("The model gives no SED for 5 trials (S01 trial 1, S01 trial 2,")
     assert one.endswith("of the first: No settled sliding at mu = 0.1.")
+
+
+def test_trials_that_the_session_did_not_come_to_are_not_done_and_nothing_was_excluded():
+    rows = [replace(row, outcome="open", score=None, sed=None, why="The trial was not done.") for row in VISITS[0].rows]
+    found = pooled([replace(VISITS[0], rows=tuple(rows), complete=False), *VISITS[1:]])
+    assert excluded(found) == []
+    told = remarks(found)
+    assert "Session S01 ended before its last trial; what it holds counts." in told
+    assert any(sentence.startswith("Not done: S01 trial 1, S01 trial 2") for sentence in told)
+
+
+SENSE = {"small": 1.0, "finite": -1.0}  # of the SED along a path
+
+
+def test_the_headline_says_whether_the_other_strain_was_tried_and_what_it_gave():
+    (untried,) = summary(pooled(VISITS))[1:]
+    assert "at small strain go together by r = " in untried
+    assert untried.endswith("at finite strain, which was not tried here, the sign may be another.")
+    turned = [
+        replace(
+            v,
+            rows=tuple(
+                replace(row, rule="maximum", paths=tuple(SENSE[p.kinematics] * row.sed for p in PATHS))
+                for row in v.rows
+            ),
+        )
+        for v in VISITS
+    ]
+    (tried, _) = summary(pooled(turned))[1:]
+    found = pooled(VISITS).descriptors[0].repeated
+    assert f"at finite strain r = −{found.r:.2f}" in tried
+    assert "of the 50 trials that have an SED there" in tried

@@ -385,8 +385,8 @@ def test_lost_readings_and_a_rate_not_as_set_are_logged_and_named_as_flaws(tmp_p
     assert words in next(data["sentence"] for data in told if data["off_rate"])
     assert recording.flaws == (
         "7 readings never arrived",
-        "the device's rate was found to be another than set, or than before, 1 times",
-        f"of the rate was found: {words}",
+        "how often the device's rate was found to be another than set, or than before: 1",
+        f"the rate that was found: {words}",
     )
     assert health_of(event for event in recording.events if event.kind == "losses").rate_words == words
     assert not np.isin(np.arange(300, 307), recording.readings().sequence).any()

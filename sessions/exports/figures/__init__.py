@@ -81,6 +81,7 @@ def _fingers(report: Report) -> Plate:
         "lines: skin and the boundaries between epidermis, dermis and fat; outlined: the ending. The close view adds "
         "the traction of the surface on the skin as arrows and, under them, which part of the skin slips. One scale of "
         "colours for all; it ends below the peaks at bone and contact."
+        f"{_model(report)}"
     )
     levels = common_levels(report.fields) if report.fields else ()
     pairs = [finger_panels(field, levels, simulated=report.simulated) for field in report.fields]
@@ -91,7 +92,7 @@ def _responses(report: Report) -> Plate:
     caption = (
         "Predicted response: SED averaged over the ending while the finger is pressed down for 1 s and then slides. "
         "Above the whole course, below the sliding alone on its own scale, which does not begin at 0. Dashed: "
-        "settled, not computed further."
+        f"settled, not computed further.{_model(report)}"
     )
     panels = [
         response_panel([p for p in report.predictions if p.experiment == name], name, simulated=report.simulated)
@@ -106,7 +107,7 @@ def _relations(report: Report) -> Plate:
         "mean score. Upright: estimated error of each SED from its mesh; all share one mesh, so that differences "
         "between them are more accurate than that. Line: least squares. r: Pearson's, with its 95 % interval by "
         "Fisher's z. Range of SED: greatest less least, and its share of their middle. Beside it the same SEDs on an "
-        "axis from 0."
+        f"axis from 0.{_model(report)}"
     )
     panels = [
         relation_panel(e, [p for p in report.predictions if p.experiment == e.name], simulated=report.simulated)
@@ -118,6 +119,10 @@ def _relations(report: Report) -> Plate:
 def _paths(report: Report) -> Plate:
     panels = [paths_panel(e.name, e.paths, simulated=report.simulated) for e in report.experiments if e.paths]
     return Plate("paths", CAPTION, tuple(panel for panel in panels if panel is not None))
+
+
+def _model(report: Report) -> str:
+    return f" Model: {report.model}." if report.model else ""
 
 
 def _grouped(report: Report) -> list[tuple[str, Sequence[StrokeFinding]]]:

@@ -52,7 +52,7 @@ def answer_tables(report: Report) -> tuple[Table, ...]:
         if e.answers:
             notes = Notes()
             rows = tuple(
-                (Cell(a.subject), *(notes.number(s, places(1), "not answered") for s in a.scores)) for a in e.answers
+                (Cell(a.subject), *(notes.number(s, places(1), "no score") for s in a.scores)) for a in e.answers
             )
             columns = (Column("subject"), *(Column(f"index {index}") for index in e.indices))
             caption = f"Every score of {e.descriptor} [0–100]; repeats of one subject averaged."
