@@ -20,7 +20,7 @@ def models_table(study: StudyFindings) -> Table:
     caption = (
         "Mixed models of the score, fitted by restricted maximum likelihood: level and first slope differ between "
         "subjects; drift is the slope on the trials before in the block, carry-over that on the index stroked before. "
-        "The first trial of a block counts as if index 50 had been stroked before. p: not corrected for the terms. "
+        "The first trial of a block counts as if index 50 had been stroked before. Exploratory: p is not corrected, for terms, models or descriptors. "
         "The level is that at the mean of SED or index. t intervals. Standard deviations of the subjects' own levels "
         "and slopes, and of single scores about them: by least squares, the error of each subject's own line taken "
         "away; intervals by modified large sample (Ting et al. 1990), of single scores by chi squared. A singular fit "

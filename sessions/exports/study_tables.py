@@ -113,7 +113,8 @@ def _agreement(study: StudyFindings) -> Table:
     )
     columns = ("descriptor", "subjects", "Kendall's W", "Friedman's p", "Page's p")
     caption = (
-        "Agreement on the order of the surfaces; Friedman: that they differ; Page: that scores rise with the index."
+        "Agreement on the order of the surfaces; Friedman: that they differ; Page: that scores rise with the index. "
+        "Exploratory: neither p is corrected, and neither belongs to a family that is."
     )
     return study_table("table-agreement", caption, columns, [("", rows)])
 
@@ -172,7 +173,8 @@ def _differences(study: StudyFindings) -> Table:
     )
     caption = (
         "How much higher one surface was scored than another, within subjects: mean and t interval of the differences, "
-        "paired t test, and its p corrected for all pairs of the descriptor (Holm 1979)."
+        "paired t test, and its p corrected for all pairs of the descriptor (Holm 1979), a family of its own for each "
+        "descriptor. Exploratory; the intervals are not corrected."
     )
     return study_table("table-differences", caption, columns, _by_descriptor(study, rows))
 
@@ -347,7 +349,9 @@ def _relation(study: StudyFindings) -> Table:
         f"Predicted SED ({model_in_short(study)}) with scores. Means: Pearson's r of means over the subjects who have "
         "both, interval by Fisher's z; Spearman's rho with an interval likewise (Bonett and Wright 2000) and exact p. "
         "Within subjects: repeated-measures correlation of each subject's scores with the SEDs of its own strokes "
-        "(Bakdash and Marusich 2017), and its p corrected for the descriptors that have one (Holm 1979). Last column: "
+        "(Bakdash and Marusich 2017). Confirmatory are these correlations of scores as given alone, one for each "
+        "descriptor: they are the family of p, Holm (Holm 1979). Every other p, of means, of standardised scores and "
+        "of estimates, is exploratory and not corrected; nor are the intervals. Last column: "
         "least and greatest r when one surface, or one subject, is left out, and which."
     )
     groups = [(one.descriptor, rows(one)) for one in study.descriptors]
