@@ -20,7 +20,8 @@ def models_table(study: StudyFindings) -> Table:
     caption = (
         "Mixed models of the score, fitted by restricted maximum likelihood: level and first slope differ between "
         "subjects; drift is the slope on the trials before in the block, carry-over that on the index stroked before. "
-        "The first trial of a block counts as if index 50 had been stroked before. Exploratory: p is not corrected, for terms, models or descriptors. "
+        "The first trial of a block counts as if index 50 had been stroked before. "
+        "Exploratory: p is not corrected, for terms, models or descriptors. "
         "The level is that at the mean of SED or index. t intervals. Standard deviations of the subjects' own levels "
         "and slopes, and of single scores about them: by least squares, the error of each subject's own line taken "
         "away; intervals by modified large sample (Ting et al. 1990), of single scores by chi squared. A singular fit "
@@ -45,6 +46,31 @@ def missing_models(study: StudyFindings) -> list[str]:
         ),
         *(f"No mixed model of {', '.join(names)}: {why}." for why, names in told.items()),
     ]
+
+
+def missing_scores(study: StudyFindings) -> list[str]:
+    """Return why there is no agreement, and no difference of surfaces: a sentence for each reason."""
+    told: list[str] = []
+    for one in study.descriptors:
+        whole = sum(None not in answers for answers in one.answers.values())
+        have = f"{one.descriptor} has {plural(whole, 'such subject')} and {plural(len(one.indices), 'surface')}"
+        if not one.scores:
+            continue
+        if one.agreement is None:
+            told.append(
+                f"No agreement on the order: it takes two subjects who scored each of three surfaces or more, not all "
+                f"alike; {have}."
+            )
+        if not one.within:
+            told.append(
+                f"No intervals within subjects: they take two subjects who scored each of two surfaces; {have}."
+            )
+        if not one.differences:
+            told.append(
+                f"No differences of surfaces of {one.descriptor}: they take three subjects who scored both, "
+                "not all with the same difference."
+            )
+    return told
 
 
 def _fitted(model: MixedModel) -> str:

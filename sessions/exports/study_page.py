@@ -6,7 +6,7 @@ from itertools import chain
 from sessions.exports.figures.study import study_plates
 from sessions.exports.html import data_address, drawn, text_address
 from sessions.exports.study_csv import columns_csv, trials_csv
-from sessions.exports.study_models import missing_models
+from sessions.exports.study_models import missing_models, missing_scores
 from sessions.exports.study_prose import again, command, excluded, modelled, remarks, sealed, summary, versions, who
 from sessions.exports.study_tables import study_tables
 from sessions.exports.templates import template
@@ -41,6 +41,7 @@ def study_page(study: StudyFindings, name: str) -> str:
         trials_file=text_address(trials_csv(study)),
         columns_file=text_address(columns_csv(study)),
         unmodelled=missing_models(study),
+        untold=missing_scores(study),
         figures=figures,
         tables=tables,
         numbers=numbers,

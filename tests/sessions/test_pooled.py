@@ -247,3 +247,12 @@ def test_the_headline_says_whether_the_other_strain_was_tried_and_what_it_gave()
     found = pooled(VISITS).descriptors[0].repeated
     assert f"at finite strain r = −{found.r:.2f}" in tried
     assert "of the 50 trials that have an SED there" in tried
+
+
+def test_a_study_of_one_subject_says_why_tables_are_missing():
+    page = study_page(pooled(VISITS[:1]), "x")
+    assert "No agreement on the order: it takes two subjects" in page
+    assert "stickiness has 1 such subject and 5 surfaces" in page
+    assert "No intervals within subjects: they take two subjects" in page
+    assert "No differences of surfaces of stickiness: they take three subjects" in page
+    assert "No agreement" not in study_page(pooled(VISITS), "x")
