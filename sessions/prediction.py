@@ -253,17 +253,16 @@ def seds_at(
     """
     base = _template(options)
     course = Solve(options.kinematics, "steady", base.solve.tolerance)
-    return seds_of(
-        [
-            replace(
-                base,
-                friction=Friction(mu, _bound(tau_max, options)),
-                loading=Loading(depth, SLIDES[direction], speed),
-                solve=course,
-            )
-            for mu, tau_max, depth, direction, speed in strokes
-        ]
-    )
+    scenes = [
+        replace(
+            base,
+            friction=Friction(mu, _bound(tau_max, options)),
+            loading=Loading(depth, SLIDES[direction], speed),
+            solve=course,
+        )
+        for mu, tau_max, depth, direction, speed in strokes
+    ]
+    return tuple(None if one is None else one.sed_ending for one in settled(scenes))
 
 
 def traction_reached(found: Prediction) -> float:
