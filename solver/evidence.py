@@ -165,7 +165,8 @@ def _finite_strain(finger: FingerModel, displacement: Array) -> dict[str, Any]:
         "estimate": estimate,
         "from": {"largest_strain": float(max(1.0 - small.min(), large.max() - 1.0)), "strain_at_ending": at_ending},
         "how": "change of the ending's SED when these displacements enter the neo-Hookean law; contact and forces "
-        "would change too, so it is no bound",
+        "would change too, so it is no bound: solved at finite strain, six published surfaces changed 0.1 to 2.1 times "
+        "as much",
     }
 
 
