@@ -242,9 +242,15 @@ def _afferent(options: argparse.Namespace) -> AfferentSettings:
 
 
 def _print_firing(firing: dict[str, Any], console: Console) -> None:
-    head = ["trial", "peak rate [imp/s]", "settled rate [imp/s]", "spikes"]
+    head = ["trial", "peak rate [imp/s]", "settled rate [imp/s]", "spikes [number]", "in [s]"]
     rows = [
-        [str(one["trial"] or "–"), number(one["peak_rate"]), number(one["settled_rate"]), str(len(one["spikes"]))]
+        [
+            str(one["trial"] or "–"),
+            number(one["peak_rate"]),
+            number(one["settled_rate"]),
+            str(len(one["spikes"])),
+            number(one["time"][-1] - one["time"][0]),
+        ]
         for one in firing["trials"]
     ]
     console.say(f"\nSA-II afferent, {firing['about']}:")
