@@ -76,5 +76,6 @@ class AnalysisSettings:
         """What an interval of mu is."""
         return (
             f"{100 * self.confidence:g} % t interval of the mean over the steady window from {self.block:g} s means, "
-            "widened by the zero's noise, and its drift where that was seen: not by calibration or choice of window"
+            "neighbours being alike allowed for, widened by the zero's noise, and its drift where that was seen: not "
+            "by calibration or choice of window"
         )
