@@ -32,6 +32,7 @@ DEFAULT = {"small": 8, "finite": 11}
 FROM_MESHES = {"small": 0.25, "finite": 0.6}
 FROM_NAIL = {"small": 2.5, "finite": 4.0}  # the same where a nail ends: errors fall with the element, or its root
 FROM_FINENESS = {"small": ((0.08, 2.0),), "finite": ((0.15, 2.0), (0.06, 1.5))}  # the largest, by the power given
+FROM_ROOT = 0.05  # of both forces at small strain where a nail ends, by fineness
 FROM_COARSE = 1.0  # of both forces at small strain, by fineness to the fourth power
 FROM_FORCE = 10.0  # of the SED under a given force at finite strain, likewise
 FROM_LIMIT, CALM = 3.0, 2.0  # of the mesh's own part, for every relative change by friction's beyond that many
@@ -130,6 +131,8 @@ def _off(
         part[DEPTH] *= OF_DEPTH
     if kind == "small":
         part[1:] += FROM_COARSE / _resolved(scene, fineness) ** 4
+        if scene.finger.nail_length > 0.0:
+            part[1:] += FROM_ROOT / _resolved(scene, fineness)
         if forced:  # what the force would be off by at a depth, the SED is off by under the force
             part[0] = np.hypot(part[0], part[1])
         if not marched:
