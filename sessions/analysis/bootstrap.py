@@ -72,7 +72,7 @@ class BootstrapSettings:
         low, high = (100 * share for share in self.slide_share)
         return {
             "normal_force": "zero and its drift, calibration, choice of window; that the force changes along the "
-            "stroke is no uncertainty of its mean; of tangential_force likewise",
+            "stroke is no uncertainty of its mean; of the tangential force likewise",
             "heading": "noise, zero, choice of window, and gains of the axes that differ; not a transducer that is "
             "turned; with it the share of repeats whose direction is the one told",
             "break_away": "deviations from the fitted climb turned at random (wild bootstrap, the same blocks), zero, "
