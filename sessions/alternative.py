@@ -56,6 +56,7 @@ class Alternative:
     reason: str = ""
     traction: float | None = None  # the greatest friction traction on the skin: below tau_max that bounds nothing [MPa]
     interval: SedInterval | None = None  # of the SED, where it was asked for
+    doubt: str = ""  # why the numbers are not to be believed, where the model was driven beyond its range
 
 
 def variants(beside: Literal["none", "small", "both"]) -> Iterator[Variant]:

@@ -20,6 +20,7 @@ from sessions.prediction import (
     traction_reached,
 )
 from sessions.uncertainty import Drawn, draws_of, intervals_of
+from solver.audits import inside_out
 
 
 def with_alternatives(
@@ -95,6 +96,7 @@ def _alternative(row: TrialPrediction, variant: Variant, tau_max: float | None, 
         found.normal_force * width,
         found.tangential_force * width,
         traction=traction_reached(found),
+        doubt=inside_out(found.audits),
     )
 
 

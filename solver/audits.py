@@ -1,5 +1,7 @@
 """Checks that a result carries with it: what must balance, and what must not be exceeded. Perfect is 0."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from solver.contact import Contact
@@ -43,6 +45,19 @@ def audits(
         "cone_violation": max(float(beyond.max(initial=0.0)), 0.0) / push,
         "smallest_det_F": float(np.prod(model.stretches(displacement), axis=0).min()),
     }
+
+
+def inside_out(checks: Mapping[str, float]) -> str:
+    """Return a sentence where `audits` say that tissue is turned inside out, else "".
+
+    Small strain goes on there as if nothing were, with a stiffness and an energy that no tissue has.
+    """
+    if checks["smallest_det_F"] > 0.0:
+        return ""
+    return (
+        f"Tissue is turned inside out somewhere (a volume of {checks['smallest_det_F']:.2g} of what it was): no finger "
+        "can be pressed or dragged so far, and the numbers are those of a formula beyond its range."
+    )
 
 
 def course_audits(model: FingerModel, way: March) -> dict[str, float]:

@@ -12,7 +12,7 @@ from time import perf_counter
 import numpy as np
 from numpy.linalg import LinAlgError
 
-from solver.audits import audits, course_audits
+from solver.audits import audits, course_audits, inside_out
 from solver.contact import NAMES, SLIP, STICK, Contact, ContactLost
 from solver.evidence import model, warnings
 from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure
@@ -259,6 +259,7 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
         history=history,
         warnings=(
             *warnings(scene, left["left_out"]),
+            *filter(None, [inside_out(checks)]),
             *_doubts(unbalanced, checks["penetration"], yields=gives_way(scene, finger, contact)),
         ),
     )

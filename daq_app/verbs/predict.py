@@ -152,6 +152,9 @@ def _print_beside(prediction: SessionPrediction, console: Console) -> None:
                 missing[one.variant.sentence, one.reason].append(_called(row))
     for (variant, reason), trials in missing.items():
         console.say(f"{', '.join(trials)}: none for {variant}: {reason}")
+    doubt = next((one.doubt for row in rows for one in row.alternatives if one.doubt), "")
+    if doubt:
+        console.say(f"!: {doubt} (the first of those marked)")
 
 
 def _called(row: TrialPrediction) -> str:
@@ -162,7 +165,7 @@ def _cell(one: Alternative) -> str:
     if one.sed is None:
         return "–"
     beside = one.indentation if one.variant.driven == "force" else one.normal_force
-    return f"{number(one.sed * 1e3, 4)} ({number(beside)})"
+    return f"{number(one.sed * 1e3, 4)} ({number(beside)}){'!' if one.doubt else ''}"
 
 
 def _print_beside_intervals(prediction: SessionPrediction, console: Console) -> None:

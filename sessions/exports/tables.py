@@ -340,6 +340,7 @@ _ALTERNATIVE = {
     "normal_force": ("N", "the model's, times the finger's width"),
     "tangential_force": ("N", "likewise"),
     "reason": ("", "why there is no number"),
+    "doubt": ("", "why the numbers are not to be believed: the model was driven beyond its range"),
     "traction": ("MPa", "greatest friction traction on the skin; a tau_max above it bounds nothing"),
     "sed_interval": ("MPa", "95 % interval of sed that the uncertainty of friction, and of a driving force, makes"),
     "sed_interval_by": (

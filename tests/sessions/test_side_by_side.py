@@ -113,3 +113,12 @@ def test_at_finite_strain_a_sticky_surface_has_no_settled_slide_at_its_depth_and
     assert found.sed is None
     assert "settled sliding up to mu" in found.reason
     assert of(row, "as-printed", "depth", "finite").sed > 0
+
+
+def test_a_finger_pressed_until_its_tissue_turns_inside_out_is_doubted_and_no_other(beside):
+    assert all(one.doubt == "" for row in beside.trials for one in row.alternatives)
+    deep = with_alternatives(predict(*given(), PredictionOptions(course="steady", beside="small", indentation=3.0)))
+    doubts = [of(row, "computed", "depth").doubt for row in deep.trials]
+    assert all("turned inside out" in told for told in doubts)
+    assert all(row.prediction.audits["smallest_det_F"] < 0 for row in deep.trials)
+    assert all(told in row.prediction.warnings for told, row in zip(doubts, deep.trials, strict=True))

@@ -89,7 +89,8 @@ def beside_table(report: Report) -> Table | None:
             return notes.number(None, sed, one.reason)
         held = one.indentation if one.variant.driven == "force" else one.normal_force
         unit = "mm" if one.variant.driven == "force" else "N"
-        return Cell(sed(one.sed) if held is None else f"{sed(one.sed)} ({digits(held, 2)} {unit})")
+        text = sed(one.sed) if held is None else f"{sed(one.sed)} ({digits(held, 2)} {unit})"
+        return Cell(text, notes.mark(one.doubt), one.doubt) if one.doubt else Cell(text)
 
     def row(p: PredictionFinding) -> tuple[Cell, ...]:
         return (*_named(p), *(cell(one) for one in p.alternatives))
