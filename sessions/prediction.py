@@ -14,6 +14,7 @@ from sessions.analysis.area import FIXED, AreaLaw
 from sessions.decisions import Decision
 from sessions.plan import DISTAL_TO_PROXIMAL, PROXIMAL_TO_DISTAL, Block, SessionPlan, Stimulus, Trial
 from sessions.sed_interval import SedInterval
+from solver.audits import inside_out
 from solver.failures import Cancelled, SolveFailure
 from solver.fields import Fields, fields_of
 from solver.finger import FingerModel
@@ -268,6 +269,11 @@ def seds_at(
 def traction_reached(found: Prediction) -> float:
     """Return the greatest friction traction on the skin [MPa]: any tau_max beyond it has the same solution."""
     return float(abs(found.skin.traction).max())
+
+
+def doubt_of(found: Prediction) -> str:
+    """Return why numbers are not to be believed where the model was driven beyond its range, else ""."""
+    return inside_out(found.audits)
 
 
 def settled(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | None, ...]:

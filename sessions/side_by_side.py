@@ -14,13 +14,13 @@ from sessions.prediction import (
     Progress,
     SessionPrediction,
     TrialPrediction,
+    doubt_of,
     scene_along,
     solved,
     tau_scale,
     traction_reached,
 )
 from sessions.uncertainty import Drawn, draws_of, intervals_of
-from solver.audits import inside_out
 
 
 def with_alternatives(
@@ -96,7 +96,7 @@ def _alternative(row: TrialPrediction, variant: Variant, tau_max: float | None, 
         found.normal_force * width,
         found.tangential_force * width,
         traction=traction_reached(found),
-        doubt=inside_out(found.audits),
+        doubt=doubt_of(found),
     )
 
 
