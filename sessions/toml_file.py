@@ -1,9 +1,10 @@
-"""A TOML file as frozen dataclasses, or one sentence that says which value is wrong and what is allowed."""
+"""A TOML file as frozen dataclasses, or one sentence that says which value is wrong and what is allowed; and back."""
 
+import json
 import math
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from types import NoneType
@@ -80,6 +81,39 @@ def from_table(table: Mapping[str, Any], cls: type[T], where: str) -> T:
         value: object = getattr(cause, "value", None)
         allowed = str(getattr(cause, "allowed", cause)).rstrip(".")
         raise _Wrong(where, full, f"{full} = {_shown(value)} is not allowed: {allowed}") from error
+
+
+def toml_text(made: Any) -> str:  # noqa: ANN401  any dataclass of texts, numbers, tuples and dataclasses
+    """Return the TOML text from which `from_toml` makes the same dataclass; what is None is left out."""
+    return "\n".join(_lines(msgspec.to_builtins(made), "")) + "\n"
+
+
+def _lines(table: Mapping[str, Any], name: str) -> Iterator[str]:
+    """Yield a table's own values, and then the tables inside it."""
+    inside: dict[str, Mapping[str, Any]] = {key: value for key, value in table.items() if isinstance(value, Mapping)}
+    own = {key: value for key, value in table.items() if value is not None and key not in inside}
+    if name and own:
+        yield f"\n[{name}]"
+    for key, value in own.items():
+        yield f"{key} = {_inline(value)}"
+    for key, value in inside.items():
+        yield from _lines(value, f"{name}.{key}" if name else key)
+
+
+def _inline(value: Any) -> str:  # noqa: ANN401  as above
+    """Return a value as it stands after the equals sign.
+
+    >>> _inline(("a", 1e-05, True)), _inline({"g": 0.2, "tau": None})
+    ('["a", 1e-05, true]', '{g = 0.2}')
+    """
+    if isinstance(value, Mapping):
+        held = cast("Mapping[str, Any]", value)
+        return "{" + ", ".join(f"{key} = {_inline(item)}" for key, item in held.items() if item is not None) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_inline, cast("tuple[Any, ...]", value))) + "]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
 
 
 class _Wrong(SettingsError):

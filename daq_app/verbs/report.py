@@ -115,4 +115,4 @@ def _further(
     if options.paths is not None and recording.plan.forces:
         finite = options.paths == "finite"
         paths = trial_paths(recording, prediction.options, shown("many paths of the analysis"), finite=finite)
-    return Further(firing, afferent_facts(afferent or AfferentSettings(), reference), paths)
+    return Further(firing, afferent_facts(afferent or AfferentSettings(), reference), afferent, paths)

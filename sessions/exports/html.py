@@ -35,6 +35,7 @@ def page(report: Report) -> str:
         figures=figures,
         drawing=drawn,
         data_address=partial(data_address, head=report.head if report.simulated else ""),
+        scene_address="" if report.scene is None else text_address(report.scene.text, "application/toml"),
         numbers=_numbers(figures, tables),
         contents=_contents(report, figures, tables),
         tables=tables,
@@ -102,9 +103,9 @@ def data_address(panel: Panel, head: str) -> str:
     return text_address(panel_csv(panel, head))
 
 
-def text_address(text: str) -> str:
-    """Return an address that holds a CSV file."""
-    return "data:text/csv;charset=utf-8;base64," + base64.b64encode(text.encode()).decode()
+def text_address(text: str, kind: str = "text/csv") -> str:
+    """Return an address that holds a text file, a CSV file unless another media type is given."""
+    return f"data:{kind};charset=utf-8;base64," + base64.b64encode(text.encode()).decode()
 
 
 def panel_csv(panel: Panel, head: str) -> str:

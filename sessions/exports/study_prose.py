@@ -1,17 +1,18 @@
 """What a study's page says in sentences and facts: its answer in short, who, what was excluded, what made it."""
 
 import re
+import shlex
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 
-from sessions.analysis.area import PLANNED_AT
 from sessions.exports.report_tables.paths import paths_sentence
 from sessions.exports.wording import correlation, digits, plural
 from sessions.pooling.exclusions import Exclusion
 from sessions.pooling.findings import DescriptorFindings, StudyFindings
 from sessions.recording.provenance import software_versions
 from sessions.report import Fact
+from sessions.report.commands import area_words, calibration_words, model_words
 
 _FEW = 12  # trials named one by one
 
@@ -210,13 +211,14 @@ def again(study: StudyFindings) -> list[Fact]:
 
 
 def command(study: StudyFindings, name: str) -> str:
-    """Return what to type to get the same numbers."""
+    """Return what to type to get the same numbers, where the study's folder lies or is to be made."""
     options = study.options
-    words = ["daq-app study", name]
-    words += ["--kinematics finite"] if options.prediction.kinematics == "finite" else []
-    words += ["--tau as-printed"] if options.prediction.tau_reading != "computed" else []
-    area = options.area
-    words += [f"--area {area.law}"] if area.law == "hertz" else [f"--area {area.exponent:g}"] if area.exponent else []
-    words += [f"--area-force {area.force:g}"] if area.force != PLANNED_AT else []
-    words += {"none": [], "small": ["--paths"], "finite": ["--paths finite"]}[options.paths]
+    model = options.prediction
+    usual = model.kinematics == "small"  # see 'daq-app study --intervals'
+    words = ["daq-app", "study", shlex.quote(name)]
+    if study.synthetic is not None:
+        words = ["daq-app", "study", "--synthetic", str(study.synthetic), "--out", shlex.quote(name)]
+    words += [*model_words(model), *area_words(options.area), *calibration_words(options.gain_error)]
+    words += [] if model.intervals == usual else ["--intervals" if model.intervals else "--no-intervals"]
+    words += {"none": [], "small": ["--paths"], "finite": ["--paths", "finite"]}[options.paths]
     return " ".join(words)

@@ -137,6 +137,7 @@ class StudyFindings:
     effects: tuple[Recovered, ...]  # planted, where the study is synthetic
     friction: PlantedFriction | None
     flaws: tuple[PlantedFlaw, ...] = ()  # planted, where the study is synthetic
+    synthetic: int | None = None  # the seed, where it is
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""

@@ -78,6 +78,7 @@ def pooled(
         effects=() if planted is None else recovered(found, planted),
         friction=None if planted is None else found_friction(ordered, planted["strokes"]),
         flaws=() if planted is None else found_flaws(ordered, dict(failed), planted.get("spoilt", {})),
+        synthetic=None if planted is None else planted.get("seed"),
     )
 
 

@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
-from sessions.afferent import Firing
+from sessions.afferent import AfferentSettings, Firing
 from sessions.analysis import Analysis
 from sessions.analysis.bootstrap import drawn_from
 from sessions.analysis.scores import MeanScore, Relation, ScoreTable, joined, score_table
@@ -12,6 +13,7 @@ from sessions.prediction import SessionPrediction
 from sessions.recording.provenance import software_versions
 from sessions.recording.reader import Recording
 from sessions.report import facts
+from sessions.report.commands import scene_file, session_commands
 from sessions.report.contents import (
     Answers,
     Course,
@@ -23,6 +25,7 @@ from sessions.report.contents import (
     PredictionFinding,
     Report,
     StrokeFinding,
+    TextFile,
     Trace,
 )
 from sessions.report.experiments import experiments
@@ -44,6 +47,7 @@ __all__ = [
     "Relation",
     "Report",
     "StrokeFinding",
+    "TextFile",
     "Trace",
     "findings",
     "score_table",
@@ -56,6 +60,7 @@ class Further:
 
     firing: Sequence[Firing] = ()  # of each trial with a course
     afferent: tuple[Fact, ...] = ()  # the parameters that `firing` was told with
+    firing_settings: AfferentSettings | None = None  # the same as they are asked for; None: no firing was asked for
     paths: Mapping[int, Seds] | None = None  # trial -> SED along many paths of the analysis
 
 
@@ -101,7 +106,15 @@ def findings(
         modelled=modelled(prediction),
         left_out=left_out(prediction),
         again=facts.again(recording, analysis),
-        commands=facts.commands(recording, predicted=prediction is not None),
+        commands=session_commands(
+            recording,
+            analysis,
+            prediction,
+            more.firing_settings,
+            more.paths,
+            [Path(table.session).name for table in tables[1:]],
+        ),
+        scene=scene_file(recording, prediction),
         width=None if prediction is None else prediction.width,
         interval_kind=drawn_from(analysis.settings).kind,
         interval_kinds=dict(drawn_from(analysis.settings).kinds),

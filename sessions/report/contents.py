@@ -20,6 +20,15 @@ class Fact:
 
 
 @dataclass(frozen=True, slots=True)
+class TextFile:
+    """A file that somebody needs beside the session, whole in the report."""
+
+    name: str
+    text: str
+    sha256: str  # of the text in UTF-8
+
+
+@dataclass(frozen=True, slots=True)
 class Answers:
     """The scores of one subject, one for each index of its experiment; None where it gave none."""
 
@@ -200,6 +209,7 @@ class Report:
     model: str = ""  # which model the SEDs are of, in a few words
     interval_kind: str = ""  # what the intervals in `StrokeFinding.bootstrap` are
     interval_kinds: dict[str, str] = field(default_factory=dict[str, str])  # what else they hold, by a number's name
+    scene: TextFile | None = None  # that the commands name, where another finger than the session's was asked for
     afferent: tuple[Fact, ...] = ()  # every parameter of the afferent, where its rates are told
 
     def to_dict(self) -> dict[str, object]:

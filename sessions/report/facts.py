@@ -179,13 +179,6 @@ def again(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
     return tuple(fact for fact in facts if fact.value)
 
 
-def commands(recording: Recording, *, predicted: bool) -> tuple[str, ...]:
-    """Return what to type, beside the session folder, to get the same numbers."""
-    name = recording.folder.name
-    steps = ("verify", "analyse", "predict") if predicted else ("verify", "analyse")
-    return (*(f"daq-app {step} {name}" for step in steps), f"daq-app report {name} -o report.html")
-
-
 def _settings(settings: AnalysisSettings) -> str:
     """Return every setting with its value; those that differ from the defaults are marked."""
     return "; ".join(_listed(settings, AnalysisSettings()))

@@ -1,8 +1,11 @@
 """The verbs as scripts use them: JSON on stdout, exit codes, and what a session folder holds."""
 
 import hashlib
+import html
 import json
 import os
+import re
+import shlex
 import shutil
 import sqlite3
 import stat
@@ -244,18 +247,28 @@ def test_a_session_is_never_written_over(recorded, capsys):
     assert {path.name: path.read_bytes() for path in recorded.iterdir()} == before
 
 
-def test_a_report_is_one_page_that_says_simulated_listed_in_the_manifest_and_keeps_what_was_asked_before(small, capsys):
-    session = small
-    run(["analyse", str(session), "--area", "hertz", "--calibration-error", "2"])
-    run(["predict", str(session), "--beside", "none", "--indentation", "1.2"])
-    capsys.readouterr()
-    assert run(["report", str(session), "--json"]) == 0
+@pytest.fixture(scope="module")
+def reported(two, tmp_path_factory):
+    """A session analysed and predicted otherwise than usual, and then reported; tests that change it take a copy."""
+    room = tmp_path_factory.mktemp("reported")
+    session = shutil.copytree(two, room / "P01")
+    (room / "mine.toml").write_text(f"{SCENE}\n[finger]\ntip_radius = 5.5\n[materials.fat]\nE = 0.03\nnu = 0.48\n")
+    words = ["--beside", "none", "--indentation", "1.2", "--tau", "as-printed", "--scene", str(room / "mine.toml")]
+    assert run(["analyse", str(session), "--area", "hertz", "--calibration-error", "0.3"]) == 0
+    assert run(["predict", str(session), *words, "--afferent", "--afferent-set", "static_gain=30"]) == 0
+    assert run(["report", str(session)]) == 0
+    return session
+
+
+def test_a_report_is_one_page_that_says_simulated_listed_in_the_manifest_and_keeps_what_was_asked_before(
+    reported, tmp_path, capsys
+):
+    session = shutil.copytree(reported, tmp_path / "P01")
     stored = {name: json.loads((session / f"{name}.json").read_text()) for name in ("analysis", "prediction")}
     assert stored["analysis"]["settings"]["area"]["law"] == stored["prediction"]["area"]["law"] == "hertz"
-    assert stored["analysis"]["bootstrap"]["settings"]["gain_error"] == 0.02
+    assert stored["analysis"]["bootstrap"]["settings"]["gain_error"] == 0.003
     assert [row["indentation"] for row in stored["prediction"]["trials"]] == [1.2, 1.2]
     page = session / "report.html"
-    assert printed(capsys)["page"] == str(page)
     text = page.read_text()
     assert "SIMULATED" in text
     assert "<script" not in text
@@ -266,6 +279,25 @@ def test_a_report_is_one_page_that_says_simulated_listed_in_the_manifest_and_kee
     capsys.readouterr()
     assert run(["verify", str(session), "--json"]) == 3
     assert any("report.html" in problem for problem in printed(capsys)["problems"])
+
+
+def test_the_commands_and_the_scene_at_the_end_of_a_report_give_its_numbers_again(reported, two, tmp_path, monkeypatch):
+    text = (reported / "report.html").read_text()
+    scene, commands = (html.unescape(part) for part in re.findall(r"<pre>(.*?)</pre>", text, re.DOTALL))
+    shutil.copytree(two, tmp_path / "P01")
+    (tmp_path / "P01-scene.toml").write_text(scene)
+    assert hashlib.sha256(scene.encode()).hexdigest() in text
+    monkeypatch.chdir(tmp_path)
+    verify, analysis, prediction, report = commands.splitlines()
+    assert (verify, report) == ("daq-app verify P01", "daq-app report P01 -o report.html")
+    assert "--tau as-printed --indentation 1.2 --scene P01-scene.toml" in prediction
+    for line in (analysis, prediction):
+        assert run(shlex.split(line)[1:]) == 0
+    then, now = (json.loads((folder / "prediction.json").read_bytes()) for folder in (reported, tmp_path / "P01"))
+    assert [row["sed"] for row in now["trials"]] == [row["sed"] for row in then["trials"]]
+    for name in ("area", "gain_error", "scene"):
+        assert now[name] == then[name]
+    assert now["afferent"]["settings"] == then["afferent"]["settings"]
 
 
 def test_solve_prints_what_the_contract_names(tmp_path, capsys):

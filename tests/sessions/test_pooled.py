@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 from study_example import study, visit
 
+from sessions.analysis.area import HERTZ, AreaLaw
 from sessions.exports.study_csv import trials_csv
 from sessions.exports.study_models import missing_scores
 from sessions.exports.study_page import study_page
-from sessions.exports.study_prose import excluded, remarks, summary
+from sessions.exports.study_prose import command, excluded, remarks, summary
 from sessions.paths import PATHS
 from sessions.pooling.exclusions import Exclusion, exclusions_in
 from sessions.pooling.findings import CARRY_OVER, DRIFT, FRICTION, INDEX, SED, WITHIN
 from sessions.pooling.pooled import pooled
-from sessions.pooling.visit import TrialRow, Visit
+from sessions.pooling.visit import TrialRow, Visit, VisitOptions
+from sessions.prediction import PredictionOptions
 from sessions.toml_file import SettingsError
 
 VISITS = [visit(number) for number in range(1, 11)]
@@ -28,6 +30,16 @@ def test_the_order_in_which_visits_come_changes_no_bit():
 
 def test_a_visit_survives_its_way_through_plain_data():
     assert Visit.from_dict(VISITS[0].to_dict()) == VISITS[0]
+
+
+def test_a_study_says_what_to_type_for_its_numbers():
+    model = PredictionOptions("as-printed", course="steady", kinematics="finite", intervals=True)
+    asked = VisitOptions(model, AreaLaw("hertz", HERTZ, 1.234567891), "finite", 0.003)
+    options = "--kinematics finite --tau as-printed --area hertz --area-force 1.234567891 --calibration-error 0.3"
+    named = f"daq-app study 'my study' {options} --intervals --paths finite"
+    assert command(pooled(VISITS, options=asked), "my study") == named
+    planted = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": [], "seed": 21}
+    assert command(pooled(VISITS, planted=planted), "syn") == "daq-app study --synthetic 21 --out syn"
 
 
 def test_planted_gain_drift_and_carry_over_stand_beside_what_is_found():

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sessions.toml_file import NotAllowed, SettingsError, from_table, load_toml
+from sessions.toml_file import NotAllowed, SettingsError, from_table, from_toml, load_toml, toml_text
 from solver.reference import STICKINESS
 from solver.reference import scene as published
-from solver.scene import Scene
+from solver.scene import Finger, Friction, Loading, Material, Materials, Relaxation, Scene
 
 CONTRACT = Path(__file__).resolve().parents[3] / "shared" / "design" / "contract.md"
 
@@ -142,3 +142,21 @@ def test_the_scene_file_that_the_contract_shows_is_read_as_it_stands(tmp_path):
     assert read.finger == published(STICKINESS[4]).finger
     assert (read.friction, read.loading.indentation) == (published(STICKINESS[4]).friction, 2.0)
     assert read.solve.tolerance == 0.01
+
+
+@given(
+    title=st.text(st.characters(exclude_categories=["Cs"])),
+    stiffness=st.floats(0.01, 1.0),
+    prony=st.lists(st.builds(Relaxation, st.floats(0.01, 0.2), st.floats(0.01, 100.0)), max_size=3),
+    slide=st.sampled_from(["+x", "none", ("+x", "-x")]),
+)
+def test_a_scene_written_as_toml_is_the_same_scene_when_it_is_read(title, stiffness, prony, slide):
+    fat = Material(stiffness, 0.48, prony=tuple(prony))
+    scene = Scene(
+        title=title,
+        finger=Finger(bone_centre=(-1.0, 1e-05)),
+        materials=Materials(fat=fat),
+        friction=Friction(0.3),
+        loading=Loading(1.0, slide),
+    )
+    assert from_toml(toml_text(scene), Scene, "text") == scene
