@@ -56,6 +56,10 @@ class RelaxingNewton(Newton):
         gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
         return np.einsum("eq,eqaA,eqiA->eia", body.weight, stress, gradient).reshape(len(body.nodes), 18)
 
+    def excess_energy(self) -> float:
+        """Return the energy [N mm per mm] that the terms hold at the last instant remembered."""
+        return float(self.past.energy() @ self.body.weight.ravel())
+
     def _assembled(self, shape: Shape) -> float:
         least = super()._assembled(shape)
         if least > 0.0:

@@ -15,10 +15,11 @@ from solver import evidence, kernels_numpy
 from solver.climbing import Ascent, Climbed, foot, risen, sized_together
 from solver.existence import doubts
 from solver.failures import Cancelled, NotConverged, SolveFailure
+from solver.finite_audits import audits, course_audits
 from solver.finite_ends import times_on_way
 from solver.finite_errors import error_estimates
 from solver.finite_finger import FiniteFinger
-from solver.finite_relaxing import RelaxingCourse, RelaxingNewton
+from solver.finite_relaxing import RelaxingCourse
 from solver.finite_states import course, presses
 from solver.kernels import CAP, OPEN, SLIP, STICK
 from solver.matching import within_reach
@@ -121,10 +122,12 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
     driven = scene.driven(shape.pull.depth)
     body = finger.newton.body
     newton = finger.newton if relaxing is None else relaxing.newton
-    shape, checks = _balanced(newton, shape, lambda found: _audits(driven, finger, found, newton))
+    shape, checks = _balanced(newton, shape, lambda found: audits(driven, finger, found, newton))
     numbers = finger.all_numbers(shape)
     sed, normal, tangential, depth, shift, width = (float(number) for number in numbers)
     skin = _skin(finger, shape)
+    if way:
+        checks |= course_audits(newton, way)
     if way and (relaxing is None or _sticking(shape) == 0.0):  # stuck and relaxing, the end depends on the way
         checks["course_against_direct"] = abs(finger.sed_ending(at.shape) / sed - 1.0)
     held = scene.loading.dragged and _sticking(shape) > 0.0  # sliding, a finger may have shifted by anything
@@ -225,44 +228,6 @@ def _unbalanced(checks: dict[str, float]) -> float:
 
 def _contradicting(checks: dict[str, float]) -> float:
     return max(checks[name] for name in ("penetration", "tension", "cone_violation"))
-
-
-def _audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: Newton) -> dict[str, float]:
-    """Return the checks of one state. Perfect is 0, save for `smallest_det_F` (of displacement at quadrature points).
-
-    `newton` is the finger's own, or that of its tissues as they relax.
-
-    `equilibrium_x`, `equilibrium_y`: bone reaction plus contact force, by the contact force. `inner_forces`: largest
-    unbalanced force on a node that is neither held nor touching. `penetration`, `tension`, `cone_violation`: as at
-    small strain, the bound on the deformed length.
-    """
-    body, mesh = finger.newton.body, finger.geometry.mesh
-    element_forces = kernels_numpy.forces(body, shape.u)
-    if isinstance(newton, RelaxingNewton):
-        element_forces = element_forces + newton.excess(shape)
-    inner = np.zeros(mesh.nodes.shape)
-    np.add.at(inner, body.nodes, element_forces.reshape(-1, 9, 2))
-    total = max(float(shape.force[1]), np.finfo(float).tiny)
-    bone = inner[mesh.held].sum(axis=0)
-    free = np.ones(len(mesh.nodes), bool)
-    free[mesh.held] = free[mesh.skin] = False
-    height = mesh.nodes[finger.geometry.whole, 1] + shape.u[finger.geometry.whole, 1] - shape.pull.depth
-    normal, tangential = shape.reaction[:, 1], shape.reaction[:, 0]
-    push = max(float(normal.max(initial=0.0)), np.finfo(float).tiny)
-    # Open skin may hang over, its length along the surface negative: no limit of it is meant.
-    length = np.maximum(kernels_numpy.tributary(shape.place(body)[:, 0]), 0.0)
-    limit = scene.friction.mu * np.maximum(normal, 0.0)
-    if scene.friction.tau_max is not None:
-        limit = np.minimum(limit, scene.friction.tau_max * length)
-    return {
-        "equilibrium_x": abs(float(bone[0] + shape.force[0])) / total,
-        "equilibrium_y": abs(float(bone[1] + shape.force[1])) / total,
-        "inner_forces": float(np.abs(inner[free]).max()) / total,
-        "penetration": max(-float(height.min()), 0.0) / scene.loading.depth,
-        "tension": max(-float(normal.min(initial=0.0)), 0.0) / push,
-        "cone_violation": max(float((np.abs(tangential) - limit).max(initial=0.0)), 0.0) / push,
-        "smallest_det_F": float(np.linalg.det(kernels_numpy.deformation(body, shape.u)).min()),
-    }
 
 
 def _history(

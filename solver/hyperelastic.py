@@ -103,6 +103,8 @@ class Ogden:
 def shape(exponent: Array, Q: Array) -> Array:
     """Return W by G/2 (...) of Ogden's exponents, without the term of ln J: 16/a^2 sinh^2(a s/2), Q = 4 sinh^2 s."""
     some = np.where(np.real(Q) > 0.0, Q, 0.0 * Q)
+    if np.all(exponent == PLAIN):
+        return some
     return 16.0 / exponent**2 * np.sinh(exponent / 2.0 * np.arcsinh(np.sqrt(some) / 2.0)) ** 2
 
 

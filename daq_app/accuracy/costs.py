@@ -30,6 +30,7 @@ FILES = {
     "limit": "proof of existence", "audits": "audits and evidence", "evidence": "audits and evidence",
     "kernels_numpy": "audits and evidence", "hooke": "assembly", "in_loops": "factorisation", "rubbing": "contact",
     "contact_in_loops": "contact", "small_states": "contact", "holding": "audits and evidence",
+    "finite_audits": "audits and evidence",
 }  # fmt: skip
 LOOPS = {"energies": "receptor", "displace": "factorisation"}
 ESTIMATE, OTHER = "error estimate", "the rest"

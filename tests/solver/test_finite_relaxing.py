@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from solver import kernels_numpy, overstress
+from solver.finite_audits import course_audits
 from solver.finite_body import FiniteBody
 from solver.finite_relaxing import RelaxingNewton
 from solver.hyperelastic import NeoHooke
@@ -236,6 +237,32 @@ def test_a_pressed_block_is_in_equilibrium_with_what_it_holds_of_the_past():
     assert pushes[1] > pushes[2] > pushes[3]
 
 
+def test_what_a_pressed_block_keeps_and_friction_does_not_take_is_what_its_tissue_loses():
+    """Lost: g G/(2 tau) times the sum of a + 1/a - 2 over the eigenvalues of A B^-1, over the block and in time."""
+    newton, _, _ = relaxing_block(distortion=0.0)
+    body, weight = newton.body, newton.body.weight.ravel()
+    newton.past = Past.at_rest(newton.past.shear, newton.past.tau)
+    shape, way, rates, steps, time = Shape.undeformed(body), [], [0.0], 24, 0.5
+    for number in range(1, steps + 1):
+        newton.ready(time / steps)
+        shape = newton.settle(shape, Pull(0.2 * number / steps, 0.3), 1e-9)
+        newton.took(shape, time / steps)
+        way.append(shape)
+        whole_of = [
+            np.array([_whole(t) for t in tensors]) for tensors in (newton.past.metric[:, 0], newton.past.before)
+        ]
+        eigen = np.linalg.eigvals(whole_of[0] @ np.linalg.inv(whole_of[1])).real
+        rate = newton.past.shear[:, 0] / (2.0 * newton.past.tau[:, 0]) * np.sum(eigen + 1.0 / eigen - 2.0, axis=1)
+        rates.append(float(rate @ weight))
+    lost = float(np.trapezoid(rates, dx=time / steps))
+    found = course_audits(newton, way)
+    push, depth = np.array([0.0, *(s.force[1] for s in way)]), np.array([0.0, *(s.pull.depth for s in way)])
+    work = float(np.trapezoid(push, depth))
+    assert found["course_viscous_work"] == pytest.approx(lost / work, rel=0.02)
+    assert lost > 0.02 * work
+    assert "course_work_balance" not in found
+
+
 def of_layers(*terms):
     usual = Materials()
     return replace(usual, **{name: replace(usual.of(name), prony=terms) for name in ("epidermis", "dermis", "fat")})
@@ -245,6 +272,13 @@ def published(materials, course="history", kinematics="finite", **loading):
     given = scene(SLIPPERINESS[4])
     driven = replace(given.loading, **loading)
     return replace(given, materials=materials, loading=driven, solve=Solve(kinematics, course, 0.5))
+
+
+def bone_work(course):
+    """Work done at the bone [N mm per mm], from what a result tells of its course."""
+    told = (course.normal_force, -course.bone_y, course.tangential_force, course.bone_x)
+    push, depth, drag, travel = (np.concatenate([[0.0], values]) for values in told)
+    return abs(np.trapezoid(push, depth)) + abs(np.trapezoid(drag, travel))
 
 
 @pytest.mark.slow
@@ -257,6 +291,8 @@ def test_pressed_lightly_the_finger_relaxes_as_at_small_strain():
         first, second = getattr(small, name), getattr(finite, name)
         np.testing.assert_allclose(second[11:25] / second[-1], first[12:26] / first[-1], rtol=0.01)
     assert finite.normal_force.max() > 1.2 * finite.normal_force[-1]
+    lost = [f.audits["course_viscous_work"] * bone_work(f.history) for f in found]  # the slides differ in length
+    assert lost[1] == pytest.approx(lost[0], rel=0.01)
 
 
 def test_in_the_end_a_sliding_finger_has_its_relaxed_moduli_and_overshoots_on_the_way():
@@ -264,6 +300,8 @@ def test_in_the_end_a_sliding_finger_has_its_relaxed_moduli_and_overshoots_on_th
     found = solve(published(tissues))
     assert found.audits["course_against_direct"] < 1e-6
     assert found.audits["inner_forces"] < 1e-9
+    assert found.audits["work_balance"] < 1e-9
+    assert 5e-4 < found.audits["course_viscous_work"] < 0.01  # of work that a slide of 300 mm took
     assert found.history.normal_force.max() > 1.2 * found.normal_force
     assert found.history.sed_ending[-1] == pytest.approx(found.sed_ending, rel=1e-6)
 

@@ -9,10 +9,14 @@ import pytest
 from daq_app.accuracy.methods import climbed_twice
 from solver.climbing import ascended
 from solver.failures import NoSteadyState
+from solver.finite_audits import audits
 from solver.finite_finger import FiniteFinger
+from solver.newton import Pull
 from solver.reference import SLIPPERINESS, STICKINESS, scene
 from solver.scene import Friction, Loading, Scene, Solve
+from solver.sliding import settled
 from solver.solution import answers, solve, solve_together
+from tests.solver.finite_examples import published
 
 # Ending-averaged SED [MPa], normal and tangential force [N/mm] of the published finger: means of two independent codes
 # (quadrilaterals with exact contact, up to 36,000 unknowns; high-order triangles with penalty contact, 27,000).
@@ -49,6 +53,17 @@ def test_forces_balance_and_nothing_is_exceeded(four, name):
     audits = dict(four[name].audits)
     assert audits.pop("smallest_det_F") > 0.5
     assert all(value < 1e-8 for value in audits.values()), audits
+
+
+@pytest.mark.parametrize(("wrong", "left"), [((1.01, 1.0), 0.001), ((1.0, 0.99), 0.005)], ids=["drag", "push"])
+def test_a_force_told_one_percent_wrong_does_other_work_than_the_body_stores(wrong, left):
+    asked = finite(STICKINESS[0])
+    finger = published(4)
+    shape = settled(finger.newton, Pull(2.0, float(asked.friction.mu), asked.friction.cap, -1))
+    told = audits(asked, finger, shape, finger.newton)["work_balance"]
+    planted = audits(asked, finger, replace(shape, reaction=np.array(wrong) * shape.reaction), finger.newton)
+    assert told < 1e-9
+    assert left < planted["work_balance"] < 0.01
 
 
 DIFFERENT = 0.05  # part of the range of several surfaces that differences between them may be off
@@ -115,6 +130,9 @@ def test_where_no_settled_sliding_exists_there_is_no_number_but_both_limits(surf
 def test_the_marched_course_ends_in_the_state_found_directly():
     found = solve(finite(SLIPPERINESS[4], course="history"))
     assert found.audits["course_against_direct"] < 1e-9
+    assert found.audits["course_work_balance"] < 1e-6
+    assert found.audits["course_step_work"] < 1e-3
+    assert found.audits["course_least_dissipation"] > -1e-14
     assert found.history.sed_ending[-1] == found.sed_ending
     assert found.history.bone_y[-1] == pytest.approx(-1.5)
     assert found.history.time[39] == pytest.approx(1.0)

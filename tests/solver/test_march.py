@@ -1,9 +1,12 @@
 """The course in time at finite strain."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from solver import kernels_numpy
+from solver.finite_audits import course_audits
 from solver.kernels import SLIP, STICK
 from solver.march import march, press_and_slide
 from solver.newton import Pull
@@ -21,21 +24,43 @@ def test_sliding_far_ends_in_the_state_that_is_solved_directly(depth, mu, tau, d
     assert probes.average(newton.body, last.u)[0] == pytest.approx(probes.average(newton.body, direct.u)[0], rel=1e-10)
 
 
-def test_work_of_the_bone_is_stored_or_lost_to_friction_and_friction_only_takes():
+@pytest.fixture(scope="module")
+def marched():
+    """Courses of one finger in steps, and in steps half as long."""
     newton, _, _ = finger(4)
-    body = newton.body
-    course = press_and_slide(1.0, 0.4, 0.02, 1, press=20, slides=60, distance=2.0)
-    before, work, lost = None, 0.0, 0.0
-    for shape in march(newton, course):
-        if before is not None:
-            push = (shape.reaction + before.reaction) / 2.0
-            work += push[:, 1].sum() * (shape.pull.depth - before.pull.depth)
-            work += push[:, 0].sum() * (shape.pull.travel - before.pull.travel)
-            slid = np.diff([s.place(body)[:, 0] - s.pull.travel for s in (before, shape)], axis=0)[0]
-            assert (shape.reaction[:, 0] * slid).max() < 1e-12
-            lost -= float(push[:, 0] @ slid)
+    courses = [press_and_slide(1.0, 0.4, 0.02, 1, press=8 * n, slides=16 * n, distance=2.0) for n in (1, 2)]
+    return newton, [list(march(newton, course)) for course in courses]
+
+
+def test_work_of_the_bone_is_stored_or_lost_to_friction_and_friction_only_takes(marched):
+    newton, (_, fine) = marched
+    body, before, work, lost = newton.body, fine[0], 0.0, 0.0
+    for shape in fine[1:]:
+        push = (shape.reaction + before.reaction) / 2.0
+        work += push[:, 1].sum() * (shape.pull.depth - before.pull.depth)
+        work += push[:, 0].sum() * (shape.pull.travel - before.pull.travel)
+        slid = np.diff([s.place(body)[:, 0] - s.pull.travel for s in (before, shape)], axis=0)[0]
+        assert (shape.reaction[:, 0] * slid).max() < 1e-12
+        lost -= float(push[:, 0] @ slid)
         before = shape
-    assert work == pytest.approx(kernels_numpy.energy(body, before.u) + lost, rel=3e-3)
+    stored = [kernels_numpy.energy(body, shape.u) for shape in (fine[0], fine[-1])]
+    assert lost > 0.1 * work
+    assert work == pytest.approx(stored[1] - stored[0] + lost, rel=3e-3)
+    assert course_audits(newton, fine)["course_least_dissipation"] > -1e-14
+
+
+def test_shorter_steps_leave_less_of_the_bones_work_over_and_simpsons_rule_next_to_nothing(marched):
+    newton, ways = marched
+    coarse, fine = (course_audits(newton, way) for way in ways)
+    assert fine["course_step_work"] < coarse["course_step_work"] / 2.0 < 0.005
+    assert fine["course_work_balance"] < coarse["course_work_balance"] / 8.0 < 1e-4
+
+
+def test_forces_told_one_percent_too_large_are_out_of_balance_with_what_is_stored(marched):
+    newton, (_, fine) = marched
+    wrong = course_audits(newton, [replace(shape, reaction=1.01 * shape.reaction) for shape in fine])
+    assert wrong["course_step_work"] > 0.005
+    assert wrong["course_work_balance"] > 0.002
 
 
 def test_points_stick_before_they_slip_and_turn_round_with_the_bone():
