@@ -7,6 +7,7 @@ from typing import Any, cast
 
 from sessions.analysis.bootstrap import NUMBERS
 from sessions.exports import ExportSource
+from sessions.exports.given_and_made import MADE_WITH, given, made_with
 from sessions.recording import Recording
 from sessions.recording.log import ANSWERS, OUTCOMES
 
@@ -18,6 +19,7 @@ _OTHERWISE_TOLD = ("solver", "alternatives", "interval", "opposite_interval")
 _PAIRS = {
     "steady": ("start", "stop"),
     "mu_interval": ("low", "high"),
+    "tau_max_interval": ("low", "high"),
     "sed_interval": ("low", "high"),
     "opposite_sed_interval": ("low", "high"),
     "mu_dynamic_interval": ("low", "high"),
@@ -65,7 +67,7 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
         answers(source.recording),
         positions(source.recording),
         _of("strokes", "a row for each stroke", _strokes(analysis), _STROKE),
-        _of("friction", "what the model is given: a row for each trial with a stroke", analysis["friction"], _FRICTION),
+        _of("friction", "what the model is given: a row for each trial with a stroke", given(analysis), _FRICTION),
         _of(
             "flaws", "what is wrong with the recording or with a stroke", [_named(f) for f in analysis["flaws"]], _FLAW
         ),
@@ -77,6 +79,7 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
     rows = [{k: v for k, v in row.items() if k not in _OTHERWISE_TOLD} for row in prediction["trials"]]
     for row, told in zip(rows, prediction["trials"], strict=True):
         row |= _sed_interval("sed", told.get("interval")) | _sed_interval("opposite_sed", told.get("opposite_interval"))
+        row |= made_with(prediction, told)
     predicted = _of("predictions", "what the finite-element finger predicts for each trial", rows, _PREDICTION)
     otherwise = [
         {
@@ -287,8 +290,11 @@ _FRICTION = {
     "trial": ("", "number of the trial"),
     "stroke": ("", "position of the stroke, from 0"),
     "mu": ("", "coefficient of friction the model is given"),
-    "mu_interval": ("", "its confidence interval, where it is a mean"),
+    "mu_interval": ("", "95 % interval of that very number"),
+    "mu_interval_by": ("", "the kind of that interval, and of which number of strokes it is"),
     "tau_max": ("MPa", "traction bound the model is given"),
+    "tau_max_interval": ("MPa", "95 % interval of it; the contact area is taken as given"),
+    "tau_max_interval_by": ("", "the kind of that interval"),
     "contact_area": ("mm2", "that tau_max was told for"),
     "speed": ("mm/s", "of the stroke"),
     "direction": ("", "+1 proximal to distal, -1 back, as measured"),
@@ -379,5 +385,6 @@ _PREDICTION = {
     "matching_depth": ("mm", "indentation at which the model presses as was measured"),
     "opposite_sed": ("MPa", "slid the other way"),
     "wall_s": ("", "time the solve took, in s"),
+    **MADE_WITH,
     "reasons": ("", "for each number left out, why"),
 }

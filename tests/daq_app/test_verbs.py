@@ -1,5 +1,6 @@
 """The verbs as scripts use them: JSON on stdout, exit codes, and what a session folder holds."""
 
+import csv
 import hashlib
 import html
 import json
@@ -298,6 +299,27 @@ def test_the_commands_and_the_scene_at_the_end_of_a_report_give_its_numbers_agai
     for name in ("area", "gain_error", "scene"):
         assert now[name] == then[name]
     assert now["afferent"]["settings"] == then["afferent"]["settings"]
+
+
+def test_an_exported_prediction_tells_its_model_and_friction_the_interval_of_the_number_the_model_got(
+    reported, tmp_path
+):
+    assert run(["export", str(reported), "--format", "csv", "--out", str(tmp_path / "out")]) == 0
+    friction, predictions = (
+        list(csv.DictReader((tmp_path / "out" / f"{name}.csv").read_text().splitlines()[1:]))
+        for name in ("friction", "predictions")
+    )
+    told = json.loads((reported / "analysis.json").read_bytes())["bootstrap"]["strokes"]
+    for row, stroke, number in zip(friction, told, ("mu_max", "mu_dynamic"), strict=True):
+        assert [float(row["mu_interval_low"]), float(row["mu_interval_high"])] == stroke[number]
+        assert row["mu_interval_by"] == f"95 % block bootstrap of {number}"
+        assert float(row["mu_interval_low"]) < float(row["mu"]) < float(row["mu_interval_high"])
+        assert [float(row[f"tau_max_interval_{end}_MPa"]) for end in ("low", "high")] == stroke["tau_max"]
+    model = ("small", "as-printed", "hertz", "set", "assumed")
+    columns = ("kinematics", "tau_reading", "area_law", "indentation_origin", "width_origin")
+    assert [tuple(row[name] for name in columns) for row in predictions] == [model, model]
+    assert all(row["scene_sha256"] in (reported / "report.html").read_text() for row in predictions)
+    assert all(int(row["dofs"]) > 100 for row in predictions)
 
 
 def test_solve_prints_what_the_contract_names(tmp_path, capsys):

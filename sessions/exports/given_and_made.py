@@ -1,0 +1,73 @@
+"""What the model was given with the intervals of those very numbers, and what each prediction was made with."""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from sessions.prediction import Scene
+from sessions.toml_file import from_table, toml_text
+
+Cell = str | int | float | None
+
+# A prediction made otherwise than usual must not look like the usual one.
+MADE_WITH: Mapping[str, tuple[str, str]] = {
+    "kinematics": ("", "strain of the model: small or finite"),
+    "tau_reading": ("", "of tau_max: computed, or as-printed (a hundredth)"),
+    "area_law": ("", "by which the contact area of tau_max follows the normal force: fixed, hertz or power"),
+    "area_exponent": ("", "of that law"),
+    "area_force": ("N", "normal force at which that area is the planned one; none where it is fixed"),
+    "indentation_origin": ("", "of indentation: block (of the trial), or set for all trials"),
+    "width": ("mm", "of the finger: what forces per mm are multiplied by"),
+    "width_origin": ("", "set, or assumed"),
+    "scene_sha256": ("", "of the finger, materials, receptor and solve settings, as the scene file a report holds"),
+    "tolerance": ("", "relative error of sed asked for; none: the solver's own mesh"),
+    "dofs": ("", "unknowns of the mesh that sed and its error_estimate are of"),
+}
+
+
+def given(analysis: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the friction of each trial, with the interval of the number that the model gets, its kind named.
+
+    That of mu is of the mean or of the maximum, as `rule` says: the bootstrap's, where the analysis holds that.
+    """
+    held: Mapping[str, Any] = analysis.get("bootstrap") or {}
+    strokes: Sequence[Mapping[str, Any]] = held.get("strokes") or ()
+    rows: list[dict[str, Any]] = []
+    for row in analysis["friction"]:
+        told = dict(row)
+        if strokes:
+            number = "mu_max" if row["rule"] == "maximum" else "mu_dynamic"
+            found: Mapping[str, Any] = strokes[int(row["stroke"])]
+            kind = f"{100 * held['settings']['confidence']:g} % block bootstrap"
+            for name, of in (("mu", number), ("tau_max", "tau_max")):
+                ends: Any = None if row[name] is None else found[of]
+                told |= {f"{name}_interval": ends, f"{name}_interval_by": None if ends is None else f"{kind} of {of}"}
+        else:
+            told["mu_interval_by"] = None if row["mu_interval"] is None else analysis["interval"]
+        rows.append(told)
+    return rows
+
+
+def made_with(prediction: Mapping[str, Any], row: Mapping[str, Any]) -> dict[str, Cell]:
+    """Return what one trial's prediction was made with, as cells of `MADE_WITH`."""
+    options: Mapping[str, Any] = prediction.get("options") or {}
+    area: Mapping[str, Any] = prediction.get("area") or {}
+    scene: Mapping[str, Any] | None = prediction.get("scene")
+    solver: Mapping[str, Any] = row.get("solver") or {}
+    return {
+        "kinematics": options.get("kinematics"),
+        "tau_reading": options.get("tau_reading"),
+        "area_law": area.get("law"),
+        "area_exponent": area.get("exponent"),
+        "area_force": None if area.get("law") == "fixed" else area.get("force"),
+        "indentation_origin": "block" if options.get("indentation") is None else "set",
+        "width": prediction.get("width"),
+        "width_origin": prediction.get("width_origin"),
+        "scene_sha256": None if scene is None else _sha256(scene),
+        "tolerance": None if scene is None else scene["solve"]["tolerance"],
+        "dofs": solver.get("dofs"),
+    }
+
+
+def _sha256(scene: Mapping[str, Any]) -> str:
+    return hashlib.sha256(toml_text(from_table(scene, Scene, "scene")).encode()).hexdigest()
