@@ -18,8 +18,8 @@ def deformation(body: FiniteBody, u: Array) -> Array:
 
 def _gradient(body: FiniteBody, u: Array) -> Array:
     """Return F - 1 (e, 9, 2, 2) to its own digits, which stiff tissue multiplies."""
-    gradient = np.stack([body.grad_x, body.grad_y], axis=-1)  # (e, q, 9, 2)
-    return np.einsum("eia,eqiA->eqaA", u[body.nodes], gradient)
+    local = u[body.nodes]  # (e, 9, 2)
+    return np.stack([body.grad_x @ local, body.grad_y @ local], axis=-1)
 
 
 def _logarithm(body: FiniteBody, H: Array) -> tuple[Array, Array]:

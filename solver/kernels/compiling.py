@@ -44,7 +44,7 @@ class _Kept(FunctionCache):
 @cache
 def _tell() -> None:
     """Say, once a process, why the first run ever takes so long."""
-    logging.getLogger(__name__).warning("Compiling the solver's loops, once on this machine: up to a minute.")
+    logging.getLogger(__name__).warning("Compiling the loops, once on this machine: a minute, more if it is busy.")
 
 
 def compiled(function: Compiled) -> Compiled:
