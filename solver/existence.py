@@ -43,7 +43,7 @@ def steady(
             f"there; whether there is any at mu = {pull.mu:.3g} is not known"
         )
     if proof.limited:
-        raise _refused(finger, pull, proof.value, stop)
+        raise _refused(finger, pull, proof, stop)
     for shape in found:
         if _proven(finger, shape, proof):
             return shape
@@ -85,8 +85,13 @@ def doubts(finger: FiniteFinger, shape: Shape, stop: Callable[[], bool] = lambda
     )
 
 
-def _refused(finger: FiniteFinger, pull: Pull, largest: float, stop: Callable[[], bool]) -> NoSteadyState:
-    depth = None
+def _refused(finger: FiniteFinger, pull: Pull, proof: Reach, stop: Callable[[], bool]) -> NoSteadyState:
+    largest, depth = proof.value, None
+    ends = (
+        "the skin behind the contact folds"
+        if proof.near or all(tissue.law != "ogden" for tissue in finger.scene.materials.by_region)
+        else f"friction is largest there, with the skin behind the contact squeezed to {100 * proof.least:.0f} %"
+    )
     beyond = ""
     with suppress(NotConverged):
         deepest = reach.of_depth(finger.scene, pull, stop)
@@ -95,8 +100,7 @@ def _refused(finger: FiniteFinger, pull: Pull, largest: float, stop: Callable[[]
             beyond = f", and with this friction up to {depth:.3g} mm"
     return NoSteadyState(
         f"At {pull.depth:.3g} mm of indentation there is settled sliding up to mu = {largest:.3g}{beyond}, but "
-        f"not at mu = {pull.mu:.3g}: the skin behind the contact folds; ask for less depth, less friction or small "
-        "strain.",
+        f"not at mu = {pull.mu:.3g}: {ends}; ask for less depth, less friction or small strain.",
         limit_mu=largest,
         limit_indentation=depth,
     )

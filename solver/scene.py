@@ -140,7 +140,7 @@ class Material:
         if self.stiffening is not None and self.law != "ogden":
             raise SceneError(f"{key}.stiffening", self.stiffening, 'it belongs to law = "ogden"')
         if self.stiffening is not None:
-            _within(f"{key}.stiffening", self.stiffening, 2.0, 20.0)
+            _within(f"{key}.stiffening", self.stiffening, 2.0, 14.0)  # steeper ones contradicted themselves
         for number, term in enumerate(self.prony):
             _within(f"{key}.prony[{number}].g", term.g, 0.0, 0.99)
             _within(f"{key}.prony[{number}].tau", term.tau, 1e-6, 1e6, "s")

@@ -7,7 +7,7 @@ import numpy as np
 
 from solver import small_solution
 from solver.estimate import DEFAULT, FINENESS, coarsest_for, told_apart
-from solver.failures import SolveFailure
+from solver.failures import NotConverged, SolveFailure
 from solver.finger import FingerModel
 from solver.holding import with_held
 from solver.matching import expected_depth
@@ -147,6 +147,7 @@ def _solve_group(
     """Refine until every scene's estimate meets its tolerance and surfaces are told apart, or no mesh is finer.
 
     Scenes that share a mesh are solved again together on the finer one. Without a tolerance there is one mesh for all.
+    A state that a finer mesh does not find is told as the coarser one has it.
     """
     asked = [s.solve.tolerance for s in scenes]
     kind = scenes[0].solve.kinematics
@@ -154,10 +155,16 @@ def _solve_group(
     depth = max(expected_depth(scene, in_loops=in_loops) for scene in scenes)
     fineness = DEFAULT[kind] if strictest is None else coarsest_for(scenes[0].driven(depth), strictest)
     found: dict[int, Answer] = {}
+    unfound: set[int] = set()  # by a finer mesh
     todo = list(range(len(scenes)))
     while True:
-        found |= zip(todo, _on_mesh([scenes[i] for i in todo], depth, fineness, progress, watch, in_loops), strict=True)
-        missed = [_misses(found[i], asked[i]) for i in range(len(scenes))]
+        solved = _on_mesh([scenes[i] for i in todo], depth, fineness, progress, watch, in_loops)
+        for i, answer in zip(todo, solved, strict=True):
+            if isinstance(answer, NotConverged) and isinstance(found.get(i), Prediction):
+                unfound.add(i)
+            else:
+                found[i] = answer
+        missed = [i not in unfound and _misses(found[i], asked[i]) for i in range(len(scenes))]
         alike = [strictest is not None and same for same in _not_told_apart([found[i] for i in range(len(scenes))])]
         finer = [n for n in FINENESS[kind] if n > fineness]
         if not finer or not (any(missed) or any(alike)):
@@ -169,12 +176,14 @@ def _solve_group(
         if kind == "finite":
             again = {scenes[i].pressed for i in todo if missed[i] or alike[i]}
             todo = [i for i in todo if scenes[i].pressed in again]
-    return [_warned(found[i], misses=missed[i], alike=alike[i]) for i in range(len(scenes))]
+    return [_warned(found[i], misses=missed[i], alike=alike[i], unfound=i in unfound) for i in range(len(scenes))]
 
 
-def _warned(answer: Answer, *, misses: bool, alike: bool) -> Answer:
+def _warned(answer: Answer, *, misses: bool, alike: bool, unfound: bool) -> Answer:
     """Return the answer with what the finest mesh has left undone."""
     told: list[str] = []
+    if unfound:
+        told.append("A finer mesh did not find this state; told is the coarser one's, with its own error estimate.")
     if misses:
         told.append("The finest mesh leaves an error estimate above the tolerance asked for.")
     if alike:

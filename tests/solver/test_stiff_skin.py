@@ -1,0 +1,47 @@
+"""Skin that is stiff, or stiffens, carries the drag to the cut: its numbers are told with what is known of them."""
+
+from dataclasses import replace
+
+import pytest
+
+from solver import solution
+from solver.failures import NotConverged
+from solver.scene import Friction, Loading, Materials, Scene, Solve
+from solver.solution import solve
+
+
+def stiffening(mu, tolerance=None):
+    usual = Materials()
+    skin = {name: replace(usual.of(name), law="ogden") for name in ("epidermis", "dermis")}
+    return Scene(
+        materials=replace(usual, **skin),
+        friction=Friction(mu),
+        loading=Loading(2.0, "+x"),
+        solve=Solve("finite", "steady", tolerance, "quick"),
+    )
+
+
+def test_an_answer_that_a_finer_mesh_does_not_find_is_told_as_the_coarser_has_it_with_a_sentence(monkeypatch):
+    whole = solution._on_mesh
+    meshes = []
+
+    def lost(scenes, depth, fineness, *rest):
+        meshes.append(fineness)
+        return whole(scenes, depth, fineness, *rest) if len(meshes) == 1 else [NotConverged("lost")] * len(scenes)
+
+    scene = stiffening(0.3, 0.01)
+    monkeypatch.setattr(solution, "_on_mesh", lost)
+    monkeypatch.setattr(solution, "_misses", lambda answer, asked: not isinstance(answer, NotConverged))
+    found = solve(scene)
+    assert len(meshes) == 2
+    monkeypatch.undo()
+    alone = whole([scene], 2.0, meshes[0], None, None, False)[0]
+    assert (found.sed_ending, found.error_estimate) == (alone.sed_ending, alone.error_estimate)
+    assert any("finer mesh did not find" in told for told in found.warnings)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("mu", "truth"), [(0.35, 3.171e-3), (0.45, 2.3676e-3), (0.48, 2.548e-3)])
+def test_estimates_of_stiffening_skin_cover_what_meshes_of_14_to_28_tend_to(mu, truth):
+    found = solve(stiffening(mu))
+    assert abs(found.sed_ending / truth - 1.0) <= found.error_estimate
