@@ -31,7 +31,7 @@ def test_an_answer_that_a_finer_mesh_does_not_find_is_told_as_the_coarser_has_it
 
     scene = stiffening(0.3, 0.01)
     monkeypatch.setattr(solution, "_on_mesh", lost)
-    monkeypatch.setattr(solution, "_misses", lambda answer, asked: not isinstance(answer, NotConverged))
+    monkeypatch.setattr(solution, "_misses", lambda answer, _: not isinstance(answer, NotConverged))
     found = solve(scene)
     assert len(meshes) == 2
     monkeypatch.undo()
