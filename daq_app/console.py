@@ -8,6 +8,7 @@ from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from typing import Any, TextIO
 
+_MOST_DIGITS = 9  # of a range whose ends read alike with fewer
 PATIENCE = 1.0  # of people, before they want to see that something is going on [s]
 
 
@@ -109,3 +110,14 @@ def number(value: float | None, digits: int = 3) -> str:
     if value is None:
         return "–"
     return f"{value:#.{digits}g}".rstrip(".")
+
+
+def span(low: float, high: float, digits: int = 3) -> str:
+    """Return a range with so many significant digits, and more where its ends would read alike.
+
+    >>> span(1.0, 2.5), span(-178.94, -178.91), span(2.0, 2.0)
+    ('1.00 to 2.50', '-178.94 to -178.91', '2.00 to 2.00')
+    """
+    while low != high and digits < _MOST_DIGITS and number(low, digits) == number(high, digits):
+        digits += 1
+    return f"{number(low, digits)} to {number(high, digits)}"

@@ -11,6 +11,7 @@ from sessions.alternative import Alternative, Variant, variants
 from sessions.analysis import Analysis
 from sessions.prediction import (
     Prediction,
+    PredictionOptions,
     Progress,
     SessionPrediction,
     TrialPrediction,
@@ -39,10 +40,23 @@ def with_alternatives(
         for number, variant in enumerate(asked)
     ]
     trials = tuple(
-        replace(row, alternatives=tuple(found[number] for found in along))
+        _with_depth(replace(row, alternatives=tuple(found[number] for found in along)), options)
         for number, row in enumerate(prediction.trials)
     )
     return replace(prediction, trials=trials)
+
+
+def _with_depth(row: TrialPrediction, options: PredictionOptions) -> TrialPrediction:
+    """Return a row whose matching depth is that of its own solve under the measured force, where there is one.
+
+    The depth of `predict` is of a rough mesh; one question has one answer.
+    """
+    driven = Variant(options.kinematics, options.tau_reading, "force")
+    found = next((one for one in row.alternatives if one.variant == driven and one.sed is not None), None)
+    if found is None:
+        return row
+    reasons = {name: why for name, why in row.reasons.items() if name != "matching_depth"}
+    return replace(row, matching_depth=found.indentation, reasons=reasons)
 
 
 def _along(

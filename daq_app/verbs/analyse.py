@@ -10,7 +10,7 @@ from pathlib import Path
 from daq_app.area_option import add_area, area_law
 from daq_app.calibration_option import add_calibration, calibration_error
 from daq_app.cli import WrongValue
-from daq_app.console import Console, number, table
+from daq_app.console import Console, number, span, table
 from daq_app.derived import analysed, analysis_document, made_otherwise
 from sessions.analysis.bootstrap import StrokeIntervals, drawn_from, stroke_intervals
 from sessions.analysis.tilt import Tilt
@@ -104,4 +104,4 @@ def _course(found: StrokeIntervals) -> list[str]:
 
 
 def _ends(pair: tuple[float, float] | None, figures: int = 3) -> str:
-    return "–" if pair is None else f"{number(pair[0], figures)} to {number(pair[1], figures)}"
+    return "–" if pair is None else span(*pair, figures)

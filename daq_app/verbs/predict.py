@@ -13,7 +13,7 @@ from typing import Any
 from daq_app.area_option import add_area, area_law
 from daq_app.calibration_option import add_calibration, calibration_error
 from daq_app.cli import WrongValue
-from daq_app.console import Console, number, table
+from daq_app.console import Console, number, span, table
 from daq_app.derived import analysed, predicted, visit
 from sessions.afferent import AfferentSettings, firing_document, settings_with
 from sessions.alternative import Alternative
@@ -226,7 +226,7 @@ def _ends(one: SedInterval | None) -> str:
     if one is None or one.low is None or one.high is None:
         return "none"
     star = "*" if one.method == "sampling" else ""
-    return f"{number(1e3 * one.low, 4)} to {number(1e3 * one.high, 4)}{star}"
+    return f"{span(1e3 * one.low, 1e3 * one.high, 4)}{star}"
 
 
 def _afferent(options: argparse.Namespace) -> AfferentSettings:

@@ -38,6 +38,20 @@ def with_error(value: float, error: float | None, least: int) -> str:
     return f"{digits(value, decimals)} ± {digits(error, decimals)}"
 
 
+def between(low: float, high: float, told: Callable[[float], str], unit: float = 1.0) -> str:
+    """Return a range as `told` shows its ends, with more decimals where they would read alike.
+
+    `unit` is what `told` multiplies a number by before it shows it.
+
+    >>> between(0.5, 1.25, places(1)), between(-178.12, -178.09, places(0)), between(2.0, 2.0, places(1))
+    ('0.5 to 1.2', '−178.12 to −178.09', '2.0 to 2.0')
+    """
+    if told(low) == told(high) and low != high:
+        decimals = max(0, -math.floor(math.log10(unit * abs(high - low))))
+        return f"{digits(unit * low, decimals)} to {digits(unit * high, decimals)}"
+    return f"{told(low)} to {told(high)}"
+
+
 def places(n: int) -> Callable[[float], str]:
     """Return what shows a number with n decimals.
 

@@ -19,6 +19,20 @@ _READINGS = {
     "computed": "greatest tangential force over the contact area",
     "as-printed": "a hundredth of that, as the paper's tables are headed",
 }
+_NUMBER = re.compile(r"\d+(\.\d+)?(e[-+]?\d+)?")
+_AUDITS = {  # 0 is perfect, but for the volume
+    "equilibrium_x": "forces along the surface out of balance by, of the contact force",
+    "equilibrium_y": "forces across the surface out of balance by, of the contact force",
+    "inner_forces": "largest unbalanced force inside the tissue, of the contact force",
+    "work_balance": "work of the contact forces against stored energy",
+    "penetration": "skin too low by, of the indentation",
+    "tension": "largest pull on a touching point, of the largest push",
+    "cone_violation": "friction beyond its law by, of the largest force on a node",
+    "smallest_det_F": "smallest volume, of what it was",
+    "course_work_balance": "over the course, work of the bone less stored and lost energy, of that work",
+    "course_step_work": "over the course, work of points that touch or let go within a step, of the bone's work",
+    "course_least_dissipation": "least energy that friction takes in a step of the course, of the bone's work",
+}
 _FROM_ROW = {"tau_max": "mu", "error_estimate": "sed", "normal_per_mm": "normal_force", "wall_s": "sed"}
 
 
@@ -97,10 +111,11 @@ def modelled(found: SessionPrediction | None) -> tuple[Fact, ...]:
     facts.append(Fact("finger's width", f"{found.width:g} mm", found.width_origin))
     facts.append(Fact("τ max", _READINGS[found.options.tau_reading]))
     facts.append(Fact("unknowns", f"{first.dofs} displacements", "one mesh for all trials"))
-    audits = ", ".join(
-        f"{name.replace('_', ' ')} {_worst(name, [p.audits for p in solved]):.1e}" for name in first.audits
+    audits = "; ".join(
+        f"{_AUDITS.get(name, name.replace('_', ' '))}: {_worst(name, [p.audits for p in solved]):.2g}"
+        for name in first.audits
     )
-    return (*facts, Fact("audits", audits, "the worst over all trials"))
+    return (*facts, Fact("audits", audits, "the worst over all trials; 0 is perfect, of a volume 1"))
 
 
 def left_out(found: SessionPrediction | None) -> tuple[Fact, ...]:
@@ -114,7 +129,7 @@ def left_out(found: SessionPrediction | None) -> tuple[Fact, ...]:
     warned: dict[str, list[str]] = defaultdict(list)  # sentences that differ in their numbers only stand together
     for prediction in solved:
         for sentence in prediction.warnings:
-            warned[re.sub(r"\d+", "#", sentence)].append(sentence)
+            warned[_NUMBER.sub("#", sentence)].append(sentence)
     return (
         *facts,
         *(Fact("warning", same[0], f"the first of {len(same)} trials warned so") for same in warned.values()),

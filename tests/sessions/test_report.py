@@ -1,6 +1,7 @@
 import dataclasses
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -188,6 +189,11 @@ def test_the_page_says_what_was_left_out_and_how_much_it_may_matter(predicted):
     left_out = {fact.name: fact for fact in report.left_out}
     assert {"finite strain", "viscosity", "bone compliance", "inertia"} <= set(left_out)
     assert "% of the SED" in left_out["viscosity"].value
+    warned = [fact.value for fact in report.left_out if fact.name == "warning"]
+    assert len({re.sub(r"[\d.]+", "#", sentence) for sentence in warned}) == len(warned)
+    (checks,) = [fact.value for fact in report.modelled if fact.name == "audits"]
+    assert "smallest volume, of what it was: 0." in checks
+    assert "det F" not in checks
     text = page(report)
     assert "What was modelled, and what was left out" in text
     json.dumps(report.to_dict(), allow_nan=False)

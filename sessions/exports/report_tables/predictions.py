@@ -2,7 +2,7 @@
 
 from sessions.alternative import Alternative
 from sessions.exports.report_tables.cells import Cell, Column, Notes, Table, grouped
-from sessions.exports.wording import digits, direction, places, sed, significant, tau
+from sessions.exports.wording import between, digits, direction, places, sed, significant, tau
 from sessions.report import PredictionFinding, Report
 from sessions.sed_interval import SedInterval
 
@@ -53,7 +53,7 @@ def _interval(p: PredictionFinding, notes: Notes) -> Cell:
     if p.sed_interval is None:
         return notes.number(None, sed, p.reasons.get("sed_interval") or p.reasons.get("sed") or "not computed")
     low, high = p.sed_interval
-    return Cell(f"{sed(low)} to {sed(high)}{'*' if p.interval_by == 'sampling' else ''}")
+    return Cell(f"{between(low, high, sed, 1e3)}{'*' if p.interval_by == 'sampling' else ''}")
 
 
 def afferent_table(report: Report) -> Table | None:
@@ -129,7 +129,7 @@ def _ends(interval: SedInterval | None, notes: Notes, why: str | None) -> Cell:
     if interval is None or interval.low is None or interval.high is None:
         told = "" if interval is None else interval.reason
         return notes.number(None, sed, told or why or "not computed")
-    return Cell(f"{sed(interval.low)} to {sed(interval.high)}{'*' if interval.method == 'sampling' else ''}")
+    return Cell(f"{between(interval.low, interval.high, sed, 1e3)}{'*' if interval.method == 'sampling' else ''}")
 
 
 def force_table(report: Report) -> Table | None:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from sessions.exports.report_tables.cells import Cell, Column, Notes, Table, grouped
-from sessions.exports.wording import NONE, places, signed, tau, with_error
+from sessions.exports.wording import NONE, between, places, signed, tau, with_error
 from sessions.report import Planted, Report, StrokeFinding
 
 _TOO_SHORT = "the stroke has too few readings for an interval"
@@ -112,7 +112,9 @@ def _intervals(report: Report, name: str, caption: str, shown: Shown, *, agreein
             interval = stroke.bootstrap.get(name)
             why = stroke.reasons.get(name) or _WITHOUT.get(name, _TOO_SHORT)
             cells.append(
-                notes.number(None, told, why) if interval is None else Cell(" to ".join(told(end) for end in interval))
+                notes.number(None, told, why)
+                if interval is None
+                else Cell(between(*interval, told, 1e3 if name == "tau_max" else 1.0))
             )
         if agreeing:
             cells.append(
