@@ -43,9 +43,12 @@ FROM_WIDTH = {
     "small": 0.12,
     "finite": 0.08,
 }  # of an element at the edge of contact, by which either edge may lie elsewhere
+FROM_LIGHT = 0.025  # of the smallest element by half the contact, squared, in the SED
+FROM_SHORT = 0.25  # of the smallest element, in the width of a contact that is no longer
 
 
 APART = 0.75  # of what another mesh changes in the differences between surfaces
+SEDS_APART = 0.6  # the same where no tolerance is asked for, and SEDs alone are told apart
 DIFFERENT, NOBODY_MINDS = 0.05, 2e-4  # what differences may be off: of their range, or of the numbers themselves
 
 
@@ -77,6 +80,10 @@ def errors(scene: Scene, fineness: float, numbers: Array, others: Array, felt: A
     forced = scene.normal_force is not None
     off = _off(driven, fineness, numbers, others, felt, marched=steps is not None, forced=forced)
     off[5] += 2.0 * FROM_WIDTH[scene.solve.kinematics] * _element(driven, fineness)
+    of_light, of_width = _of_light(scene, float(numbers[5]))
+    off[0] = np.hypot(off[0], of_light * abs(numbers[0]))
+    off[1:4] = np.hypot(off[1:4], of_light / 2.0 * np.abs(numbers[1:4]))  # the SED goes with the force squared
+    off[5] += of_width
     if steps is not None:
         more = steps.error(numbers)
         off[0] = np.hypot(off[0], more[0])
@@ -151,21 +158,31 @@ def _off(
     return np.linalg.norm([from_meshes * largest, part * size, of_bound * size, of_edge * size], axis=0)
 
 
-def told_apart(numbers: Array, others: Array) -> bool:
+def told_apart(numbers: Array, others: Array, part: float = APART) -> bool:
     """Return whether differences between surfaces are good to 5 % of their range, in SED and both forces.
 
-    `numbers` (s, 3) are those of the surfaces, `others` (s, 3) those of a coarser mesh: what differences are off by is
-    estimated as a part of what they change from one mesh to the other. What is less than 0.02 % of the numbers nobody
+    `numbers` (s, n) are those of the surfaces, `others` (s, n) those of a coarser mesh: what differences are off by is
+    estimated as a `part` of what they change from one mesh to the other. What is less than 0.02 % of the numbers nobody
     minds.
     """
-    off, span = APART * np.ptp(others - numbers, axis=0), np.ptp(numbers, axis=0)
+    off, span = part * np.ptp(others - numbers, axis=0), np.ptp(numbers, axis=0)
     return bool((off <= np.maximum(DIFFERENT * span, NOBODY_MINDS * numbers.mean(axis=0))).all())
 
 
 def coarsest_for(scene: Scene, tolerance: float) -> float:
-    """Return the fineness of the coarsest mesh whose estimate can meet the tolerance, the finest where none can."""
-    every = FINENESS[scene.solve.kinematics]
-    return next((n for n in every if _least(scene, n) <= 0.9 * tolerance), every[-1])
+    """Return the fineness of the coarsest mesh whose estimate can meet the tolerance, the finest where none can.
+
+    In a light touch that is one beyond which the smallest elements, along the skin, are as small as they get.
+    """
+    kind = scene.solve.kinematics
+    meets = (n for n in FINENESS[kind] if _least(scene, n) <= 0.9 * tolerance)
+    return next(meets, next(n for n in FINENESS[kind] if n >= DEFAULT[kind] and not finer_than(scene, n)))
+
+
+def finer_than(scene: Scene, fineness: float) -> list[int]:
+    """Return the finer meshes, coarsest first; none where the contact is so light that they are none where it lies."""
+    least = _least(scene, fineness)
+    return [n for n in FINENESS[scene.solve.kinematics] if n > fineness and _least(scene, n) < least]
 
 
 def _least(scene: Scene, fineness: float) -> float:
@@ -187,7 +204,18 @@ def _half(scene: Scene) -> float:
 def _element(scene: Scene, fineness: float) -> float:
     """Return the length of an element at an edge of contact [mm]."""
     long, short = (ANYWHERE, SHORT[0]) if scene.solve.kinematics == "small" else (EDGE, SHORT[1])
-    return long * scene.finger.tip_radius / fineness * min(1.0, _half(scene) / short)
+    return scene.finger.tip_radius * max(long / fineness * min(1.0, _half(scene) / short), FINEST)
+
+
+def _of_light(scene: Scene, width: float) -> tuple[float, float]:
+    """Return what the SED, relative, and the contact `width` [mm] may be off by for a contact shorter than elements.
+
+    The smallest element does not get smaller with the contact. Both vanish where it is much shorter: at 0.01 mm of
+    indentation the first is 4e-5. Held against Hertz (docs/solver.md).
+    """
+    smallest = FINEST * scene.finger.tip_radius
+    shorter = 2.0 * smallest / max(width, smallest / 2.0)
+    return FROM_LIGHT * shorter**2, FROM_SHORT * smallest * min(1.0, shorter**2)
 
 
 def _of_bound(scene: Scene, fineness: float, normal: float, drag: float) -> float:

@@ -14,6 +14,7 @@ from numpy.linalg import LinAlgError
 
 from solver.audits import audits, course_audits, inside_out
 from solver.contact import NAMES, SLIP, STICK, Contact, ContactLost
+from solver.estimate import SEDS_APART, finer_than, told_apart
 from solver.evidence import model, warnings
 from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure
 from solver.finger import FingerModel
@@ -105,6 +106,40 @@ def answers(
             break
     lost = NotConverged("The skin touched the surface beyond every part of it where contact was looked for.")
     return [lost if answer is None else answer for answer in done]
+
+
+def telling_apart(scenes: Sequence[Scene], depth: float, fineness: float, in_loops: bool) -> float:
+    """Return the coarsest mesh of at least `fineness` that tells the SEDs of scenes pressed alike apart, or the finest.
+
+    Judged on their settled states alone: that costs next to nothing, and no course is marched or told twice. And by two
+    coarser meshes, the second not moved: one alone agreed by chance in 5 of 69 sets of three (docs/solver.md).
+    """
+    alike = [[s for s in scenes if s.pressed == pressed] for pressed in dict.fromkeys(s.pressed for s in scenes)]
+    alike = [together for together in alike if len(together) > 1]
+    finer = finer_than(scenes[0].driven(depth), fineness)
+    while finer and alike:
+        sizing = Sizing(fineness, depth)
+        with suppress(NotConverged):
+            fine, moved = _meshed(scenes[0], sizing, in_loops), _coarser(scenes[0], sizing, in_loops)
+            plain = _meshed(scenes[0], replace(sizing, fineness=fineness / 2.0), in_loops)
+            alike = [together for together in alike if not _told_apart(together, fine, (moved, plain))]
+        if not alike:
+            break
+        fineness = finer.pop(0)
+    return fineness
+
+
+def _told_apart(scenes: Sequence[Scene], fine: FingerModel, others: Sequence[FingerModel]) -> bool:
+    """Return whether the other meshes agree on the differences between the SEDs of those scenes that settle."""
+    seds: list[list[float]] = []
+    for scene in dict.fromkeys(scenes):
+        with suppress(ContactLost, SolveFailure):
+            here = settled(scene, fine)
+            if not _folded(fine, here):
+                there = [float(other.sed_endings([settled(scene, other)])[0]) for other in others]
+                seds.append([float(fine.sed_endings([here])[0]), *there])
+    found = np.array(seds or [[0.0] * (1 + len(others))])
+    return all(told_apart(found[:, :1], found[:, [n]], SEDS_APART) for n in range(1, 1 + len(others)))
 
 
 def _coarser(scene: Scene, sizing: Sizing, in_loops: bool) -> FingerModel:

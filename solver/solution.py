@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver import small_solution
-from solver.estimate import DEFAULT, FINENESS, coarsest_for, told_apart
+from solver.estimate import DEFAULT, SEDS_APART, coarsest_for, finer_than, told_apart
 from solver.failures import NotConverged, SolveFailure
 from solver.finger import FingerModel
 from solver.holding import with_held
@@ -43,7 +43,8 @@ def solve_together(
     Scenes with the same finger, materials and receptor share one mesh, fine enough for the strictest tolerance among
     them, so that differences between them are more accurate than each of them; at finite strain those do that are
     pressed alike, its lines moved to the edges of contact of each. Where a tolerance is asked for it is also so fine
-    that differences between those pressed alike are good to 5 % of their range, as estimated. Raises as `solve` does.
+    that differences between those pressed alike are good to 5 % of their range, as estimated; at small strain without
+    one those of their SEDs. Raises as `solve` does.
     """
     done: list[Prediction] = []
     for answer in answers(scenes, progress, rough=rough, in_loops=in_loops):
@@ -146,7 +147,8 @@ def _solve_group(
 ) -> list[Answer]:
     """Refine until every scene's estimate meets its tolerance and surfaces are told apart, or no mesh is finer.
 
-    Scenes that share a mesh are solved again together on the finer one. Without a tolerance there is one mesh for all.
+    Scenes that share a mesh are solved again together on the finer one. Without a tolerance there is one mesh for all,
+    on which at small strain their SEDs are told apart; lines that follow the edges of contact tell them apart anyway.
     A state that a finer mesh does not find is told as the coarser one has it.
     """
     asked = [s.solve.tolerance for s in scenes]
@@ -154,6 +156,8 @@ def _solve_group(
     strictest = min((a for a in asked if a is not None), default=None)
     depth = max(expected_depth(scene, in_loops=in_loops) for scene in scenes)
     fineness = DEFAULT[kind] if strictest is None else coarsest_for(scenes[0].driven(depth), strictest)
+    if strictest is None and kind == "small":
+        fineness = small_solution.telling_apart(scenes, depth, fineness, in_loops)
     found: dict[int, Answer] = {}
     unfound: set[int] = set()  # by a finer mesh
     todo = list(range(len(scenes)))
@@ -165,8 +169,8 @@ def _solve_group(
             else:
                 found[i] = answer
         missed = [i not in unfound and _misses(found[i], asked[i]) for i in range(len(scenes))]
-        alike = [strictest is not None and same for same in _not_told_apart([found[i] for i in range(len(scenes))])]
-        finer = [n for n in FINENESS[kind] if n > fineness]
+        alike = _not_told_apart([found[i] for i in range(len(scenes))], strictest)
+        finer = [] if strictest is None else finer_than(scenes[0].driven(depth), fineness)
         if not finer or not (any(missed) or any(alike)):
             break
         for answer in found.values():
@@ -191,8 +195,11 @@ def _warned(answer: Answer, *, misses: bool, alike: bool, unfound: bool) -> Answ
     return replace(answer, warnings=(*answer.warnings, *told)) if told and isinstance(answer, Prediction) else answer
 
 
-def _not_told_apart(found: Sequence[Answer]) -> list[bool]:
-    """Return which answers belong to surfaces, pressed alike, whose differences a finer mesh should tell better."""
+def _not_told_apart(found: Sequence[Answer], strictest: float | None) -> list[bool]:
+    """Return which answers belong to surfaces, pressed alike, whose differences a finer mesh should tell better.
+
+    Without a tolerance those of their SEDs at small strain, and none at finite strain.
+    """
     sets: dict[object, list[int]] = {}
     for number, answer in enumerate(found):
         if isinstance(answer, Prediction) and answer.beside is not None:
@@ -201,7 +208,12 @@ def _not_told_apart(found: Sequence[Answer]) -> list[bool]:
     for together in sets.values():
         rows = [one for number in together if isinstance(one := found[number], Prediction)]
         numbers = np.array([(one.sed_ending, one.normal_force, abs(one.tangential_force)) for one in rows])
-        apart = told_apart(numbers, np.array([one.beside for one in rows]))
+        others = np.array([one.beside for one in rows])
+        if strictest is not None:
+            apart = told_apart(numbers, others)
+        else:
+            seds = rows[0].scene.solve.kinematics == "small"
+            apart = not seds or told_apart(numbers[:, :1], others[:, :1], SEDS_APART)
         for number in together:
             out[number] = not apart
     return out

@@ -9,7 +9,7 @@ import pytest
 from solver.estimate import DEFAULT, FINENESS, coarsest_for, estimates, told_apart
 from solver.reference import STICKINESS, scene
 from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
-from solver.solution import solve, solve_together
+from solver.solution import answers, solve, solve_together
 
 # The first twelve scenes of benchmarks/error_estimate.py: depth, mu, bound, slide, contact angle, Young's moduli of
 # epidermis, dermis and fat, and the mean of three solves on far finer meshes: SED of the ending, normal force, drag
@@ -432,21 +432,39 @@ HARDLY_DIFFERENT = {
 }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kinematics", HARDLY_DIFFERENT)
-def test_differences_between_surfaces_that_hardly_differ_are_good_to_5_percent_of_their_range_at_any_tolerance(
-    kinematics,
-):
+def hardly_different(kinematics, tolerance, course="steady"):
+    """Return the surfaces, and the truth (3, 3) of them."""
     depth, angle, moduli, surfaces = HARDLY_DIFFERENT[kinematics]
     asked = Scene(
         finger=Finger(contact_angle=angle),
         materials=Materials(*(Material(modulus, 0.48) for modulus in moduli)),
         friction=Friction(0.0),
         loading=Loading(depth, "+x"),
-        solve=Solve(kinematics, tolerance=0.01),  # on the coarsest mesh they were up to 41 % of their range off
+        solve=Solve(kinematics, course, tolerance=tolerance),
     )
-    together = solve_together([replace(asked, friction=Friction(mu, bound)) for mu, bound, _ in surfaces])
+    return [replace(asked, friction=Friction(mu, bound)) for mu, bound, _ in surfaces], np.array(
+        [truth for _, _, truth in surfaces]
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kinematics", HARDLY_DIFFERENT)
+def test_differences_between_surfaces_that_hardly_differ_are_good_to_5_percent_of_their_range_at_any_tolerance(
+    kinematics,
+):
+    asked, true = hardly_different(kinematics, 0.01)  # on the coarsest mesh they were up to 41 % of their range off
+    together = solve_together(asked)
     found = np.array([(p.sed_ending, p.normal_force, p.tangential_force) for p in together])
-    true = np.array([truth for _, _, truth in surfaces])
     assert (np.ptp(found - true, axis=0) < 0.05 * np.ptp(true, axis=0)).all()
     assert solve(together[0].scene).dofs < together[0].dofs
+
+
+@pytest.mark.slow
+def test_courses_of_surfaces_that_hardly_differ_are_marched_and_told_once_on_a_mesh_that_tells_their_seds_apart():
+    asked, true = hardly_different("small", None, "history")
+    told = []
+    together = answers(asked, watch=lambda number, *_: told.append(number), in_loops=True)
+    assert told == [0, 1, 2]
+    found = np.array([p.sed_ending for p in together])
+    assert np.ptp(found - true[:, 0]) < 0.05 * np.ptp(true[:, 0])
+    assert solve(asked[0], in_loops=True).dofs < together[0].dofs

@@ -8,6 +8,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from daq_app.accuracy.hard_cases import cases, judged
+from daq_app.accuracy.hard_cases.light import of_light_touch
 from daq_app.accuracy.hard_cases.outcome import of_scene
 from daq_app.accuracy.hard_cases.suite import TELLING, Case
 from solver.failures import SolveFailure
@@ -59,6 +60,11 @@ def test_a_case_that_fails_is_told_as_one():
     one, other = SUITE["small", "mu 0"].run(), SUITE["small", "mu 0.44"]
     apart = Case("small", "apart", "answer", other.run, "mu 0", 1e-3)
     assert judged(apart, one).flaw.endswith("from mu 0, not 0.001")
+
+
+def test_a_touch_that_is_not_hertz_s_is_told_as_one():
+    deep = Scene(friction=Friction(0.3), loading=Loading(0.1, "+x"))  # its contact is as wide as the epidermis is thick
+    assert "from Hertz's" in of_light_touch(deep).flaw
 
 
 young = st.floats(-2.5, 0.5).map(lambda power: 10**power)

@@ -29,7 +29,11 @@ class Outcome:
 
 def of_scene(asked: Scene) -> Outcome:
     """Solve a scene of the finger through the solver's front door."""
-    (found,) = answers([asked], in_loops=True)
+    return of_answer(answers([asked], in_loops=True)[0])
+
+
+def of_answer(found: Prediction | SolveFailure) -> Outcome:
+    """Return how a solve ended."""
     return _refused(found) if isinstance(found, SolveFailure) else _answered(found)
 
 

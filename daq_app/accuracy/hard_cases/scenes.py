@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from daq_app.accuracy.hard_cases.light import KNOWN
 from daq_app.accuracy.methods import Kinematics
 from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
 
@@ -21,6 +22,7 @@ class HardScene:
     same_as: str = ""  # a case whose SED this one's must be
     within: float = 0.0  # relative
     slow: bool = False  # seconds rather than tenths
+    light: bool = False  # a touch so light that it must be Hertz's
 
 
 def hard_scenes(kinematics: Kinematics) -> list[HardScene]:
@@ -120,12 +122,15 @@ def _beyond_finite(make: _Maker) -> list[HardScene]:
 
 def _depths(make: _Maker) -> list[HardScene]:
     small = make.kinematics == "small"
-    shallow = (1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.1, 1.0)
+    shallow = (1e-6, 3e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.1, 1.0)
     return [
-        *(HardScene(f"depth {d:g} mm", make(depth=d), ANSWER) for d in shallow),
+        *(HardScene(f"depth {d:g} mm", make(depth=d), ANSWER, light=d < KNOWN) for d in shallow),
         HardScene("depth 2 mm", make(depth=2.0), ANSWER if small else EITHER),
         HardScene("depth 3 mm", make(depth=3.0), EITHER, slow=not small),
-        *(HardScene(f"depth {d:g} mm without friction", make(0.0, depth=d), ANSWER) for d in (1e-6, 1e-3, 0.1, 2.0)),
+        *(
+            HardScene(f"depth {d:g} mm without friction", make(0.0, depth=d), ANSWER, light=d < KNOWN)
+            for d in (1e-6, 1e-3, 0.1, 2.0)
+        ),
         HardScene("depth 3 mm without friction", make(0.0, depth=3.0), ANSWER if small else EITHER, slow=not small),
     ]
 

@@ -7,6 +7,7 @@ from types import ModuleType
 
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, within
 from daq_app.accuracy.hard_cases import finite, small
+from daq_app.accuracy.hard_cases.light import of_light_touch
 from daq_app.accuracy.hard_cases.outcome import Outcome, of_scene
 from daq_app.accuracy.hard_cases.scenes import ANSWER, Must, hard_scenes
 from daq_app.accuracy.methods import Kinematics
@@ -59,7 +60,15 @@ def cases(kinematics: Kinematics) -> tuple[Case, ...]:
         "elements of aspect 50": module.aspect,
     }
     scenes = (
-        Case(kinematics, s.name, s.must, partial(of_scene, s.scene), s.same_as, s.within, s.slow)
+        Case(
+            kinematics,
+            s.name,
+            s.must,
+            partial(of_light_touch if s.light else of_scene, s.scene),
+            s.same_as,
+            s.within,
+            s.slow,
+        )
         for s in hard_scenes(kinematics)
     )
     slow = {"steps over four decades"}
