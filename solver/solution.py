@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver import small_solution
-from solver.estimate import DEFAULT, SEDS_APART, coarsest_for, finer_than, told_apart
+from solver.estimate import DEFAULT, FINENESS, SEDS_APART, coarsest_for, finer_than, told_apart
 from solver.failures import NotConverged, SolveFailure
 from solver.finger import FingerModel
 from solver.holding import with_held
@@ -158,6 +158,7 @@ def _solve_group(
     fineness = DEFAULT[kind] if strictest is None else coarsest_for(scenes[0].driven(depth), strictest)
     if strictest is None and kind == "small":
         fineness = small_solution.telling_apart(scenes, depth, fineness, in_loops)
+    first = fineness
     found: dict[int, Answer] = {}
     unfound: set[int] = set()  # by a finer mesh
     todo = list(range(len(scenes)))
@@ -180,7 +181,26 @@ def _solve_group(
         if kind == "finite":
             again = {scenes[i].pressed for i in todo if missed[i] or alike[i]}
             todo = [i for i in todo if scenes[i].pressed in again]
+    unfound |= _fallen_back(scenes, found, depth, first, progress)
     return [_warned(found[i], misses=missed[i], alike=alike[i], unfound=i in unfound) for i in range(len(scenes))]
+
+
+def _fallen_back(
+    scenes: list[Scene], found: dict[int, Answer], depth: float, first: float, progress: Progress | None
+) -> set[int]:
+    """Put answers of coarser meshes in place of what even the `first` mesh did not find, and return which ones.
+
+    At finite strain alone, where a fine mesh may lose its way.
+    """
+    back: set[int] = set()
+    for i, scene in enumerate(scenes):
+        coarser = [n for n in FINENESS["finite"] if n < first and scene.solve.kinematics == "finite"]
+        while coarser and isinstance(found[i], NotConverged):
+            answer = _on_mesh([scene], depth, coarser.pop(), progress, None, in_loops=True)[0]
+            if isinstance(answer, Prediction):
+                found[i] = answer
+                back.add(i)
+    return back
 
 
 def _warned(answer: Answer, *, misses: bool, alike: bool, unfound: bool) -> Answer:

@@ -40,6 +40,18 @@ def test_an_answer_that_a_finer_mesh_does_not_find_is_told_as_the_coarser_has_it
     assert any("finer mesh did not find" in told for told in found.warnings)
 
 
+def test_a_tolerance_so_strict_that_its_first_mesh_finds_nothing_does_not_lose_the_answer_of_a_coarser_one(monkeypatch):
+    whole = solution._on_mesh
+
+    def lost(scenes, depth, fineness, *rest, **more):
+        return whole(scenes, depth, fineness, *rest, **more) if fineness <= 7 else [NotConverged("lost")] * len(scenes)
+
+    monkeypatch.setattr(solution, "_on_mesh", lost)
+    found = solve(stiffening(0.3, 0.001))
+    assert found.error_estimate > 0.001
+    assert any("finer mesh did not find" in told for told in found.warnings)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("mu", "truth"), [(0.35, 3.171e-3), (0.45, 2.3676e-3), (0.48, 2.548e-3)])
 def test_estimates_of_stiffening_skin_cover_what_meshes_of_14_to_28_tend_to(mu, truth):
