@@ -97,9 +97,9 @@ def _refused(finger: FiniteFinger, pull: Pull, proof: Reach, stop: Callable[[], 
         deepest = reach.of_depth(finger.scene, pull, stop)
         if deepest.limited and not deepest.lost:
             depth = deepest.value
-            beyond = f", and with this friction up to {depth:.3g} mm"
+            beyond = f", and with this friction up to {depth:.4g} mm"
     return NoSteadyState(
-        f"At {pull.depth:.3g} mm of indentation there is settled sliding up to mu = {largest:.3g}{beyond}, but "
+        f"At {pull.depth:.4g} mm of indentation there is settled sliding up to mu = {largest:.3g}{beyond}, but "
         f"not at mu = {pull.mu:.3g}: {ends}; ask for less depth, less friction or small strain.",
         limit_mu=largest,
         limit_indentation=depth,

@@ -116,7 +116,7 @@ def telling_apart(scenes: Sequence[Scene], depth: float, fineness: float, in_loo
     """
     alike = [[s for s in scenes if s.pressed == pressed] for pressed in dict.fromkeys(s.pressed for s in scenes)]
     alike = [together for together in alike if len(together) > 1]
-    finer = finer_than(scenes[0].driven(depth), fineness)
+    finer = finer_than(scenes[0].driven(depth), fineness) if alike else []
     while finer and alike:
         sizing = Sizing(fineness, depth)
         with suppress(NotConverged):

@@ -148,7 +148,8 @@ def _solve_group(
     """Refine until every scene's estimate meets its tolerance and surfaces are told apart, or no mesh is finer.
 
     Scenes that share a mesh are solved again together on the finer one. Without a tolerance there is one mesh for all,
-    on which at small strain their SEDs are told apart; lines that follow the edges of contact tell them apart anyway.
+    on which at small strain their SEDs are told apart, save those asked for with quick evidence, which are variants of
+    one surface rather than surfaces; lines that follow the edges of contact tell them apart anyway.
     A state that a finer mesh does not find is told as the coarser one has it.
     """
     asked = [s.solve.tolerance for s in scenes]
@@ -157,7 +158,8 @@ def _solve_group(
     depth = max(expected_depth(scene, in_loops=in_loops) for scene in scenes)
     fineness = DEFAULT[kind] if strictest is None else coarsest_for(scenes[0].driven(depth), strictest)
     if strictest is None and kind == "small":
-        fineness = small_solution.telling_apart(scenes, depth, fineness, in_loops)
+        surfaces = [s for s in scenes if s.solve.evidence != "quick"]
+        fineness = small_solution.telling_apart(surfaces, depth, fineness, in_loops)
     first = fineness
     found: dict[int, Answer] = {}
     unfound: set[int] = set()  # by a finer mesh
