@@ -497,6 +497,7 @@ def test_a_calibration_error_that_was_set_is_taken_by_every_verb_until_another_i
     assert visit_of(recording, VisitOptions(plain, gain_error=0.003), {}).calibration == "0.3 % of each axis, set"
 
 
+@pytest.mark.slow
 def test_what_was_set_is_exported_without_an_analysis_and_a_damaged_setting_is_named_not_assumed(small, capsys):
     run(["analyse", str(small), "--calibration-error", "0.1"])
     (small / "analysis.json").unlink()
