@@ -92,7 +92,10 @@ def test_at_small_strain_they_are_the_differences_of_solves_within_one_set_of_st
     here = SMALL[name]
     contact = settled(here, small)
     assert ("at the bound" in name) == (contact.state == CAP).any()
-    numbers = lambda one: small_numbers(small, one, contact.state)  # noqa: E731
+
+    def numbers(one):
+        return small_numbers(small, one, contact.state)
+
     steps = (2e-5, 2e-7 if here.friction.tau_max else 0.0, 2e-5)
     assert_alike(told(of_contact(small, here, contact)), differences(numbers, here, steps), numbers(here))
 
@@ -142,7 +145,10 @@ def test_one_point_on_springs_answers_as_its_formula_says():
 def test_at_a_kink_each_side_has_the_slope_of_its_own_states(small):
     # A depth at which one more point comes to touch, found by halving.
     here = SMALL["without a bound"]
-    at = lambda depth: settled(moved(here, "press", depth - 1.2), small)  # noqa: E731
+
+    def at(depth):
+        return settled(moved(here, "press", depth - 1.2), small)
+
     low, high = 1.2, 1.3
     assert at(low).touching.sum() < at(high).touching.sum()
     while high - low > 1e-11:
@@ -207,7 +213,10 @@ def test_at_finite_strain_they_are_the_differences_of_solves_within_one_set_of_s
     here = FINITE[name]
     shape = slid(finite, here)
     assert ("at the bound" in name) == (shape.state == CAP).any()
-    numbers = lambda one: finite_numbers(finite, one, shape)  # noqa: E731
+
+    def numbers(one):
+        return finite_numbers(finite, one, shape)
+
     steps = (1e-5, 1e-7 if here.friction.tau_max else 0.0, 1e-5)
     found = told(of_shape(finite, here, shape))
     assert_alike(found, differences(numbers, here, steps), numbers(here))
