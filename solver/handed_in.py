@@ -62,6 +62,30 @@ def check_body(mesh: Mesh, materials: Sequence[Stiff]) -> None:
                 "0.4999999, since nu = 0.5 leaves no energy of volume change"
             )
     jacobians(mesh, Q2P1.points)
+    _check_skin(mesh)
+
+
+def _check_skin(mesh: Mesh) -> None:
+    """Raise BodyError unless the skin is one chain of free sides of elements, with the body to the left of it.
+
+    The body then lies above skin that runs from left to right, where the surface can meet it.
+    """
+    if not mesh.skin.size:
+        return
+    named = "name one chain of them from left to right, from corner by middle to corner, and so on"
+    if len(mesh.skin) < 3 or len(mesh.skin) % 2 == 0:
+        raise BodyError(f"mesh.skin has {len(mesh.skin)} nodes, which make no whole sides of elements; {named}")
+    sides = np.stack([mesh.skin[:-2:2], mesh.skin[1::2], mesh.skin[2::2]], axis=1)
+    corner = np.arange(4)
+    around = mesh.elements[:, np.stack([corner, corner + 4, (corner + 1) % 4], axis=1)].reshape(-1, 3)
+    middles, first, shared = np.unique(around[:, 1], return_index=True, return_counts=True)
+    at = np.minimum(np.searchsorted(middles, sides[:, 1]), len(middles) - 1)
+    wrong = (around[first[at]] != sides).any(axis=1) | (shared[at] > 1)
+    if wrong.any():
+        nodes = ", ".join(str(node) for node in sides[int(np.argmax(wrong))])
+        raise BodyError(f"nodes {nodes} of mesh.skin are no free side of an element with the body above it; {named}")
+    if len(np.unique(mesh.skin)) < len(mesh.skin):
+        raise BodyError(f"mesh.skin names a node twice; {named}")
 
 
 def check_loads(mesh: Mesh, loads: Array | None, prescribed: Array | None) -> None:

@@ -130,7 +130,7 @@ def quarter(radial=5, around=20):
     order = inside[np.argsort(-mesh.nodes[inside, 0])]
     around_it = np.flatnonzero(np.isclose(np.hypot(*mesh.nodes.T), OUTER))
     outside = around_it[np.argsort(mesh.nodes[around_it, 0])]
-    mesh = replace(mesh, skin=outside[2:5], held_x=at(mesh, 0, 0.0), held_y=at(mesh, 1, 0.0))
+    mesh = replace(mesh, skin=outside[4:1:-1], held_x=at(mesh, 0, 0.0), held_y=at(mesh, 1, 0.0))
     return mesh, order
 
 
