@@ -1,15 +1,17 @@
-"""How the loops are compiled and kept on disk, and the words they share."""
+"""How the loops are compiled, once on a machine, and the words they share."""
 
-import logging
-from collections.abc import Callable
-from functools import cache
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterator
+from functools import cache, update_wrapper
+from importlib import import_module
+from pathlib import Path
+from threading import RLock
+from types import FunctionType
+from typing import Any, TypeVar, cast
 
-import numba
 import numpy as np
-from numba.core.caching import FunctionCache
-from numba.core.runtime.nrt import rtsys
 from numpy.typing import NDArray
+
+from solver.kernels import keeping
 
 Array = NDArray[np.float64]
 Narrow = NDArray[np.int32]
@@ -21,38 +23,101 @@ Compiled = TypeVar("Compiled", bound=Callable[..., Any])
 HELD_X, HELD_Y = 1, 2  # of a node of the skin that is held; both: their sum
 OPEN, STICK, SLIP, CAP = 0, 1, 2, 3  # states of a node of the skin
 _FAST = {"contract", "reassoc", "arcp", "nsz"}  # nan and infinity keep their meaning
+_ONE_BY_ONE = RLock()  # neither numba's compiler nor LLVM's linker likes company
 
 
-class _Kept(FunctionCache):
-    """Machine code on disk, read without what numba knows of Python's and NumPy's functions.
+def compiled(function: Compiled) -> Compiled:
+    """Return `function` as a compiled loop: numba compiles it where its machine code is not kept on disk.
 
-    Numba loads all of that first, SciPy's linear algebra with it, which takes longer than a solve. Only compiling needs
-    it, and loads it itself.
+    What a loop calls is compiled into it. Else each loop's code would hold a copy of what it calls, optimised once
+    more, the copy a process loads first would serve all, and last bits would fall by what was called first.
     """
+    return cast("Compiled", Loop(cast("FunctionType", function)))
 
-    def load_overload(self, sig: Any, target_context: Any) -> Any:  # noqa: ANN401 - numba declares no types
-        """Return the code for argument types `sig`; None where it is not on disk."""
-        # what loops need while they run: the memory of arrays
-        rtsys.initialize(target_context)  # pyright: ignore[reportUnknownMemberType]
-        with self._guard_against_spurious_io_errors():
-            kept = super()._load_overload(sig, target_context)  # pyright: ignore
-        if kept is None:
-            _tell()
-        return kept  # pyright: ignore
+
+class Loop:
+    """A compiled loop. What is kept on disk is called without numba, whose import takes longer than a solve."""
+
+    def __init__(self, function: FunctionType) -> None:
+        """Compile nothing yet."""
+        self.function = function
+        self._entries: dict[tuple[object, ...], Callable[..., Any]] = {}
+        update_wrapper(self, function)
+
+    def __call__(self, *given: object) -> Any:  # noqa: ANN401 - each returns what its function says
+        """Call the code for arguments of these types; it believes what it is told of them, so all are looked at."""
+        kinds = tuple(
+            [(a.dtype.num, a.ndim, a.flags.c_contiguous) if type(a) is np.ndarray else type(a) for a in given]
+        )
+        entry = self._entries.get(kinds)
+        if entry is None:
+            with _ONE_BY_ONE:
+                entry = self._entries[kinds] = self._entry(given)
+        return entry(*given)
+
+    def _entry(self, given: tuple[object, ...]) -> Callable[..., Any]:
+        types = tuple(_type_name(a) for a in given)
+        name = f"{Path(self.function.__code__.co_filename).stem}.{self.function.__name__}"
+        place = keeping.Place(name, types, self.sources())
+        kept = keeping.linked(place)
+        if kept is not None:
+            return kept
+        _tell()
+        entry, made = self._made(types)
+        keeping.keep(place, *made)
+        return entry
+
+    def _made(self, types: tuple[str, ...]) -> tuple[Callable[..., Any], tuple[bytes, str, str, list[str]]]:
+        """Compile for arguments of these `types`; return the code to call, and what `keeping.keep` asks for."""
+        signature: Any = import_module("numba.core.sigutils").normalize_signature(f"({', '.join(types)},)")[0]
+        dispatcher = self.dispatcher()
+        dispatcher.compile(signature)
+        made: Any = dispatcher.overloads[signature]
+        code, module = made.library.serialize_using_object_code()[2]
+        assert not made.environment.consts, "a loop may not return a new array: it would need numba to run"
+        functions: Any = import_module("llvmlite.binding").parse_bitcode(module).functions
+        declared = [str(one.name) for one in functions if one.is_declaration]
+        outside = [name for name in declared if not name.startswith("llvm.")]
+        return made.entry_point, (code, made.fndesc.llvm_cpython_wrapper_name, made.fndesc.env_name, outside)
+
+    @cache  # noqa: B019 - loops live as long as the process
+    def dispatcher(self) -> Any:  # noqa: ANN401 - numba declares no types
+        """Return numba's own view of this loop, and of the loops that it calls."""
+        numba: Any = import_module("numba")
+        others: dict[str, Any] = {loop.function.__name__: loop.dispatcher() for loop in self._called()}
+        known: dict[str, Any] = self.function.__globals__ | others
+        twin = FunctionType(self.function.__code__, known, self.function.__name__)
+        return numba.njit(fastmath=_FAST, forceinline=True)(twin)
+
+    def sources(self) -> frozenset[str]:
+        """Return the files that this loop is made of: its own, this one, and those of the loops it calls."""
+        return frozenset({__file__, self.function.__code__.co_filename}).union(*(c.sources() for c in self._called()))
+
+    def _called(self) -> Iterator["Loop"]:
+        named = (self.function.__globals__.get(name) for name in self.function.__code__.co_names)
+        return (one for one in named if isinstance(one, Loop))
+
+
+def _type_name(argument: object) -> str:
+    """Return what numba calls the type of an argument.
+
+    >>> _type_name(np.zeros((2, 3))), _type_name(np.zeros(4, np.int32)[::2]), _type_name(np.float64(0.5))
+    ('float64[:, ::1]', 'int32[:]', 'float64')
+    """
+    if isinstance(argument, np.ndarray):
+        array = cast("NDArray[Any]", argument)
+        last = "::1" if array.flags.c_contiguous else ":"
+        return f"{_scalar_name(array.dtype)}[{', '.join([':'] * (array.ndim - 1) + [last])}]"
+    return _scalar_name(np.dtype(type(argument)))
+
+
+def _scalar_name(dtype: "np.dtype[Any]") -> str:
+    return {"b": "boolean", "i": f"int{8 * dtype.itemsize}", "f": f"float{8 * dtype.itemsize}"}[dtype.kind]
 
 
 @cache
 def _tell() -> None:
     """Say, once a process, why the first run ever takes so long."""
+    import logging
+
     logging.getLogger(__name__).warning("Compiling the loops, once on this machine: a minute, more if it is busy.")
-
-
-def compiled(function: Compiled) -> Compiled:
-    """Return `function` compiled when first called, kept on disk; numba itself declares no types.
-
-    What a loop calls is compiled into it. Else each loop's code would hold a copy of what it calls, optimised once
-    more, the copy a process loads first would serve all, and last bits would fall by what was called first.
-    """
-    loop: Any = numba.njit(fastmath=_FAST, forceinline=True)(function)  # pyright: ignore
-    loop._cache = _Kept(function)  # noqa: SLF001 - what njit(cache=True) does, with its own class
-    return loop

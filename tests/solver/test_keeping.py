@@ -1,0 +1,87 @@
+"""Machine code of the loops is kept, linked without numba, and never where anything about it is in doubt."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver import kernels
+from solver.kernels import keeping
+from solver.kernels.keeping import Place
+
+
+@pytest.fixture
+def kept(tmp_path, monkeypatch):
+    """The place, folder and contents of some kept code whose sources nobody else has."""
+    x, at, out = np.linspace(0.0, 1.0, 3), np.array([0, 1, 0], np.int32), np.zeros(3)
+    kernels.tributary(x, at, out)
+    loop, types = kernels.tributary, ("float64[::1]", "int32[::1]", "float64[::1]")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    own = Place("skin.tributary", types, loop.sources())
+    found = [folder / own.file for folder in own.folders() if (folder / own.file).exists()]
+    source = tmp_path / "skin.py"
+    source.write_text("another source", encoding="utf-8")
+    other = Place("skin.tributary", types, frozenset({str(source)}))
+    return other, tmp_path, found[0].read_bytes()
+
+
+def test_a_process_that_finds_kept_code_does_without_numba():
+    code = """
+import sys
+import numpy as np
+from solver import kernels
+out = np.zeros(3)
+kernels.tributary(np.linspace(0.0, 3.0, 3), np.array([0, 1, 0], np.int32), out)
+print("numba" in sys.modules, *out)
+"""
+    for _ in range(2):  # the first may compile
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "0.5", "2.0", "0.5"]
+
+
+def test_code_of_one_layout_is_not_called_with_another():
+    x, at = np.repeat(np.linspace(0.0, 3.0, 3), 2), np.array([0, 1, 0], np.int32)
+    out = np.zeros(3)
+    kernels.tributary(x[::2], at, out)
+    np.testing.assert_allclose(out, [0.5, 2.0, 0.5], rtol=1e-15)  # Simpson's rule
+    with pytest.raises(KeyError):
+        kernels.tributary(x[::2], at, "no array")
+
+
+def test_what_is_kept_is_found_again_until_its_sources_change(kept):
+    place, folder, data = kept
+    assert keeping.linked(place) is None
+    (folder / place.file).write_bytes(data)
+    again = keeping.linked(place)
+    assert again is not None
+    out = np.zeros(3)
+    again(np.linspace(0.0, 3.0, 3), np.array([0, 1, 0], np.int32), out)
+    np.testing.assert_allclose(out, [0.5, 2.0, 0.5], rtol=1e-15)
+    changed = folder / "changed.py"
+    changed.write_text("other sources", encoding="utf-8")
+    assert keeping.linked(Place(place.name, place.types, frozenset({str(changed)}))) is None
+
+
+def test_damaged_code_and_code_that_asks_for_what_is_not_there_is_not_linked(kept):
+    place, folder, data = kept
+    file = folder / place.file
+    file.write_bytes(data[:-1] + bytes([data[-1] ^ 1]))
+    assert keeping.linked(place) is None
+    file.write_bytes(data[: len(data) // 2])
+    assert keeping.linked(place) is None
+    file.write_bytes(data.replace(b'"outside": [', b'"outside": ["no_such_helper", ', 1))
+    assert keeping.linked(place) is None
+
+
+def test_new_code_takes_the_place_of_that_of_earlier_sources(kept):
+    place, folder, _ = kept
+    keeping.keep(place, b"early", "wrapper", "environment", [])
+    early = place.file
+    later = folder / "later.py"
+    later.write_text("later", encoding="utf-8")
+    after = Place(place.name, place.types, frozenset({str(later)}))
+    keeping.keep(after, b"late", "wrapper", "environment", [])
+    assert [file.name for file in folder.glob("*.loop")] == [after.file] != [early]
+    assert not Path(folder / early).exists()
