@@ -47,11 +47,6 @@ FROM_LIGHT = 0.025  # of the smallest element by half the contact, squared, in t
 FROM_SHORT = 0.25  # of the smallest element, in the width of a contact that is no longer
 
 
-APART = 0.75  # of what another mesh changes in the differences between surfaces
-SEDS_APART = 0.6  # the same where no tolerance is asked for, and SEDs alone are told apart
-DIFFERENT, NOBODY_MINDS = 0.05, 2e-4  # what differences may be off: of their range, or of the numbers themselves
-
-
 class Errors(NamedTuple):
     """How far numbers may be off: relative, but for the shift. None for what was given, or is not there."""
 
@@ -61,7 +56,6 @@ class Errors(NamedTuple):
     indentation: float | None
     shift: float | None  # [mm]
     width: float | None  # of the contact
-    beside: tuple[float, float, float] | None = None  # SED and both forces on the coarser mesh, where it has a state
 
 
 DEPTH = slice(3, 4)  # place of the indentation among the numbers
@@ -90,8 +84,7 @@ def errors(scene: Scene, fineness: float, numbers: Array, others: Array, felt: A
         off[1:] += more[1:]  # the drag that a press leaves over suffers from both in the same way
     relative = np.minimum(off / np.maximum(np.abs(numbers), np.finfo(float).tiny), 1.0)
     sed, normal, tangential, depth, _, width = relative.tolist()
-    beside = abs(float(others[0, 0])), abs(float(others[0, 1])), abs(float(others[0, 2]))
-    return _given_none(scene, Errors(sed, normal, tangential, depth, float(off[4]), width, beside))
+    return _given_none(scene, Errors(sed, normal, tangential, depth, float(off[4]), width))
 
 
 def _given_none(scene: Scene, found: Errors) -> Errors:
@@ -156,17 +149,6 @@ def _off(
             of_edge = FROM_EDGE * scene.friction.cap * _element(scene, fineness) / size[2] * np.abs(felt)
     from_meshes = (FROM_NAIL if scene.finger.nail_length > 0.0 else FROM_MESHES)[kind]
     return np.linalg.norm([from_meshes * largest, part * size, of_bound * size, of_edge * size], axis=0)
-
-
-def told_apart(numbers: Array, others: Array, part: float = APART) -> bool:
-    """Return whether differences between surfaces are good to 5 % of their range, in SED and both forces.
-
-    `numbers` (s, n) are those of the surfaces, `others` (s, n) those of a coarser mesh: what differences are off by is
-    estimated as a `part` of what they change from one mesh to the other. What is less than 0.02 % of the numbers nobody
-    minds.
-    """
-    off, span = part * np.ptp(others - numbers, axis=0), np.ptp(numbers, axis=0)
-    return bool((off <= np.maximum(DIFFERENT * span, NOBODY_MINDS * numbers.mean(axis=0))).all())
 
 
 def coarsest_for(scene: Scene, tolerance: float) -> float:

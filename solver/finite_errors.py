@@ -22,12 +22,16 @@ OF_CORNER = np.array([8.0, 4.5, 4.5, 4.5, 4.5, 4.5])  # added to differences the
 OF_STIFF = 15.0  # the same of the SED where skin is stiff, and does not only stiffen
 
 
-def error_estimates(scene: Scene, fineness: float, way_up: Ascent, numbers: Array, stop: Callable[[], bool]) -> Errors:
+def error_estimates(
+    scene: Scene, fineness: float, way_up: Ascent, numbers: Array, stop: Callable[[], bool]
+) -> tuple[Errors, Array]:
     """Return how far the `numbers` (6,) (`finger.all_numbers`) of a scene may be off that was solved by `way_up`.
 
-    The same scene is solved on a coarser mesh with lines at the same edges of contact.
+    The same scene is solved on a coarser mesh with lines at the same edges of contact. Beside the errors: its numbers
+    there (1, 6), or none where it has no state.
     """
-    return errors(scene, fineness, *compared(scene, fineness, way_up, numbers, stop))
+    found = compared(scene, fineness, way_up, numbers, stop)
+    return errors(scene, fineness, *found), found[1][:1]
 
 
 def compared(

@@ -11,7 +11,7 @@ from time import perf_counter
 
 import numpy as np
 
-from solver import evidence, kernels_numpy
+from solver import differences, evidence, kernels_numpy
 from solver.climbing import Ascent, Climbed, foot, risen, sized_together
 from solver.existence import doubts
 from solver.failures import Cancelled, NotConverged, SolveFailure
@@ -132,7 +132,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         checks["course_against_direct"] = abs(finger.sed_ending(at.shape) / sed - 1.0)
     held = scene.loading.dragged and _sticking(shape) > 0.0  # sliding, a finger may have shifted by anything
     solved = perf_counter()
-    errors = error_estimates(scene, fineness, way_up, numbers, stop)
+    errors, others = error_estimates(scene, fineness, way_up, numbers, stop)
     estimated = perf_counter()
     model = evidence.finite_model(
         driven, force=shape.force, width=width, sticking=_sticking(shape), slide=_slide(finger, shape)
@@ -152,7 +152,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         indentation_error=errors.indentation,
         shift_error=errors.shift if held else None,
         contact_width_error=errors.width,
-        beside=errors.beside,
+        beside=differences.those_of(others),
         dofs=body.dofs,
         newton_iterations=shape.iterations,
         wall_s=solved - begun - setup,

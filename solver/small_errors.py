@@ -42,32 +42,43 @@ def times_on_way(scene: Scene, finger: FingerModel) -> int:
     return steps_asked(scene.pressed_only(), finger).times
 
 
-def error_estimates(scene: Scene, fineness: float, coarse: FingerModel, numbers: Array, steps: Steps | None) -> Errors:
+def error_estimates(
+    scene: Scene, fineness: float, coarse: FingerModel, numbers: Array, steps: Steps | None
+) -> tuple[Errors, Array]:
     """Return how far the `numbers` (6,) of a scene may be off, found on a mesh of `fineness`.
 
     The same scene is solved on the `coarse` mesh: elements twice as long, moved along the skin by half of one, so that
-    the edges of contact fall differently between nodes. `steps` are those taken where they depend on their way.
+    the edges of contact fall differently between nodes. `steps` are those taken where they depend on their way. Beside
+    the errors: its numbers there (1, 6), or none where it has no state.
     """
     try:
-        if steps is None:
-            return _settled(scene, fineness, coarse, numbers)
-        return _on_way(scene, fineness, coarse, numbers, steps)
+        others, felt = _settled(scene, coarse) if steps is None else _on_way(scene, coarse, steps)
     except LOST:
-        return errors(scene, fineness, numbers, np.empty((0, 6)), np.zeros(6), steps)
+        others, felt = np.empty((0, 6)), np.zeros(6)
+    return errors(scene, fineness, numbers, others, felt, steps), others
 
 
-def _settled(scene: Scene, fineness: float, coarse: FingerModel, numbers: Array) -> Errors:
+def others_on(scene: Scene, mesh: FingerModel, steps: Steps | None) -> Array:
+    """Return the numbers of a scene on one more mesh (1, 6), or none where it has no state; `steps` as above."""
+    try:
+        numbers = all_numbers(scene, mesh, nearest(scene, mesh) if steps is None else end(scene, mesh))
+    except LOST:
+        return np.empty((0, 6))
+    return (numbers if steps is None else steps.taken(numbers))[None]
+
+
+def _settled(scene: Scene, coarse: FingerModel) -> tuple[Array, Array]:
     state = nearest(scene, coarse)
     other, felt = all_numbers(scene, coarse, state), np.zeros(6)
     if (beside := rubbed_more(scene, coarse, state)) is not None:
         felt[:3] = (numbers_on(coarse, [beside])[0] / other[:3] - 1.0) / NUDGE
-    return errors(scene, fineness, numbers, other[None], felt, None)
+    return other[None], felt
 
 
-def _on_way(scene: Scene, fineness: float, coarse: FingerModel, numbers: Array, steps: Steps) -> Errors:
+def _on_way(scene: Scene, coarse: FingerModel, steps: Steps) -> tuple[Array, Array]:
     told = np.isfinite(steps.whole).all()  # when the steps were judged
     other = steps.taken(steps.whole if told else all_numbers(scene, coarse, nearest(scene, coarse)))
     felt = np.zeros(6)
     if scene.friction.tau_max is not None:
         felt = felt_of_bound(scene, coarse, end(scene, coarse, HALF))
-    return errors(scene, fineness, numbers, other[None], felt, steps)
+    return other[None], felt

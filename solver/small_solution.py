@@ -14,7 +14,7 @@ from numpy.linalg import LinAlgError
 
 from solver.audits import audits, course_audits, inside_out
 from solver.contact import NAMES, SLIP, STICK, Contact, ContactLost
-from solver.estimate import SEDS_APART, finer_than, told_apart
+from solver.differences import those_of, together
 from solver.evidence import model, warnings
 from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure
 from solver.finger import FingerModel
@@ -26,7 +26,7 @@ from solver.mesher import Sizing
 from solver.prediction import History, Prediction, Row, Skin
 from solver.receptor import ROW
 from solver.scene import Scene, SceneError
-from solver.small_errors import error_estimates, steps_asked, times_on_way
+from solver.small_errors import error_estimates, others_on, steps_asked, times_on_way
 from solver.small_states import (
     all_numbers,
     depends_on_way,
@@ -66,6 +66,7 @@ class _Shared:
     fineness: float
     fine: FingerModel
     coarse: FingerModel
+    plain: FingerModel | None  # as coarse and not moved, where surfaces are to be told apart
     setup_s: float
     solve_s: float
     estimate_s: float
@@ -80,7 +81,11 @@ def answers(
     watch: Watch | None,
     in_loops: bool,
 ) -> list[Answer]:
-    """Solve all scenes on one mesh, and on a coarser one for the estimate; look wider where contact reaches out."""
+    """Solve all scenes on one mesh, and on a coarser one for the estimate; look wider where contact reaches out.
+
+    Surfaces that are told apart are solved on a second coarse mesh.
+    """
+    surfaces = {number for numbers in together(scenes) for number in numbers}
     done: list[Answer | None] = []
     most = max(depth, min(WIDE * depth, scenes[0].finger.pulp_thickness()))  # for drags that lay much skin on
     for margin, deep in ((1.0, depth), (4.0, depth), (WIDE, depth), (WIDE, most)):
@@ -90,14 +95,20 @@ def answers(
             fine = _meshed(scenes[0], sizing, in_loops)
             setup = perf_counter() - begun - fine.solve_s
             begun = perf_counter()
-            coarse = _coarser(scenes[0], sizing, in_loops)
+            half = replace(sizing, fineness=fineness / 2.0)
+            coarse = _meshed(scenes[0], replace(half, shift=True), in_loops)
+            plain = _meshed(scenes[0], half, in_loops) if surfaces else None
         except NotConverged as failure:
             return [failure] * len(scenes)
         estimate = (perf_counter() - begun) / len(scenes)
-        shared = _Shared(fineness, fine, coarse, setup, fine.solve_s / len(scenes), estimate, widest=margin == WIDE)
+        alone = _Shared(
+            fineness, fine, coarse, None, setup, fine.solve_s / len(scenes), estimate, widest=margin == WIDE
+        )
+        beside = replace(alone, plain=plain)
         done = []
         for number, scene in enumerate(scenes):
             _report(progress, number / len(scenes))
+            shared = beside if number in surfaces else alone
             answer, way = _answer(scene, shared, _of_all(progress, number, len(scenes)))
             if watch is not None and answer is not None:
                 watch(number, answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer, fine, way)
@@ -106,45 +117,6 @@ def answers(
             break
     lost = NotConverged("The skin touched the surface beyond every part of it where contact was looked for.")
     return [lost if answer is None else answer for answer in done]
-
-
-def telling_apart(scenes: Sequence[Scene], depth: float, fineness: float, in_loops: bool) -> float:
-    """Return the coarsest mesh of at least `fineness` that tells the SEDs of scenes pressed alike apart, or the finest.
-
-    Judged on their settled states alone: that costs next to nothing, and no course is marched or told twice. And by two
-    coarser meshes, the second not moved: one alone agreed by chance in 5 of 69 sets of three (docs/solver.md).
-    """
-    alike = [[s for s in scenes if s.pressed == pressed] for pressed in dict.fromkeys(s.pressed for s in scenes)]
-    alike = [together for together in alike if len(together) > 1]
-    finer = finer_than(scenes[0].driven(depth), fineness) if alike else []
-    while finer and alike:
-        sizing = Sizing(fineness, depth)
-        with suppress(NotConverged):
-            fine, moved = _meshed(scenes[0], sizing, in_loops), _coarser(scenes[0], sizing, in_loops)
-            plain = _meshed(scenes[0], replace(sizing, fineness=fineness / 2.0), in_loops)
-            alike = [together for together in alike if not _told_apart(together, fine, (moved, plain))]
-        if not alike:
-            break
-        fineness = finer.pop(0)
-    return fineness
-
-
-def _told_apart(scenes: Sequence[Scene], fine: FingerModel, others: Sequence[FingerModel]) -> bool:
-    """Return whether the other meshes agree on the differences between the SEDs of those scenes that settle."""
-    seds: list[list[float]] = []
-    for scene in dict.fromkeys(scenes):
-        with suppress(ContactLost, SolveFailure):
-            here = settled(scene, fine)
-            if not _folded(fine, here):
-                there = [float(other.sed_endings([settled(scene, other)])[0]) for other in others]
-                seds.append([float(fine.sed_endings([here])[0]), *there])
-    found = np.array(seds or [[0.0] * (1 + len(others))])
-    return all(told_apart(found[:, :1], found[:, [n]], SEDS_APART) for n in range(1, 1 + len(others)))
-
-
-def _coarser(scene: Scene, sizing: Sizing, in_loops: bool) -> FingerModel:
-    """Return the finger of the estimate: elements twice as long, moved along the skin by half of one."""
-    return _meshed(scene, replace(sizing, fineness=sizing.fineness / 2.0, shift=True), in_loops)
 
 
 def _of_all(progress: Progress | None, number: int, count: int) -> Progress | None:
@@ -263,7 +235,9 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
     solved = perf_counter()
     numbers, shift = all_numbers(scene, finger, contact), shift_of(scene, contact)
     numbers[0] = sed
-    off = error_estimates(scene, shared.fineness, shared.coarse, numbers, steps)
+    off, others = error_estimates(scene, shared.fineness, shared.coarse, numbers, steps)
+    if shared.plain is not None:
+        others = np.vstack([others, others_on(scene, shared.plain, steps)])
     found = Prediction(
         scene=scene,
         sed_ending=sed,
@@ -279,7 +253,7 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
         indentation_error=off.indentation,
         shift_error=None if shift is None else off.shift,
         contact_width_error=off.width,
-        beside=off.beside,
+        beside=those_of(others),
         dofs=finger.body.dofs,
         newton_iterations=contact.iterations if way is None else way.iterations,
         wall_s=solved - begun + shared.solve_s,

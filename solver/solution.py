@@ -3,10 +3,9 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from solver import small_solution
-from solver.estimate import DEFAULT, FINENESS, SEDS_APART, coarsest_for, finer_than, told_apart
+from solver import differences, small_solution
+from solver.differences import TOLD, Off
+from solver.estimate import DEFAULT, FINENESS, coarsest_for, finer_than
 from solver.failures import NotConverged, SolveFailure
 from solver.finger import FingerModel
 from solver.holding import with_held
@@ -42,9 +41,9 @@ def solve_together(
 
     Scenes with the same finger, materials and receptor share one mesh, fine enough for the strictest tolerance among
     them, so that differences between them are more accurate than each of them; at finite strain those do that are
-    pressed alike, its lines moved to the edges of contact of each. Where a tolerance is asked for it is also so fine
-    that differences between those pressed alike are good to 5 % of their range, as estimated; at small strain without
-    one those of their SEDs. Raises as `solve` does.
+    pressed alike, its lines moved to the edges of contact of each. It is also so fine that differences between those
+    pressed alike are good to 5 % of their range, as estimated, in SED, forces and depth, but for variants, asked for
+    with quick evidence; where the finest is not, a warning says by how much. Raises as `solve` does.
     """
     done: list[Prediction] = []
     for answer in answers(scenes, progress, rough=rough, in_loops=in_loops):
@@ -147,19 +146,15 @@ def _solve_group(
 ) -> list[Answer]:
     """Refine until every scene's estimate meets its tolerance and surfaces are told apart, or no mesh is finer.
 
-    Scenes that share a mesh are solved again together on the finer one. Without a tolerance there is one mesh for all,
-    on which at small strain their SEDs are told apart, save those asked for with quick evidence, which are variants of
-    one surface rather than surfaces; lines that follow the edges of contact tell them apart anyway.
-    A state that a finer mesh does not find is told as the coarser one has it.
+    Scenes that share a mesh are solved again together on the finer one. A state that a finer mesh does not find is told
+    as the coarser one has it.
     """
     asked = [s.solve.tolerance for s in scenes]
     kind = scenes[0].solve.kinematics
     strictest = min((a for a in asked if a is not None), default=None)
     depth = max(expected_depth(scene, in_loops=in_loops) for scene in scenes)
     fineness = DEFAULT[kind] if strictest is None else coarsest_for(scenes[0].driven(depth), strictest)
-    if strictest is None and kind == "small":
-        surfaces = [s for s in scenes if s.solve.evidence != "quick"]
-        fineness = small_solution.telling_apart(surfaces, depth, fineness, in_loops)
+    surfaces = differences.together(scenes)
     first = fineness
     found: dict[int, Answer] = {}
     unfound: set[int] = set()  # by a finer mesh
@@ -172,19 +167,23 @@ def _solve_group(
             else:
                 found[i] = answer
         missed = [i not in unfound and _misses(found[i], asked[i]) for i in range(len(scenes))]
-        alike = _not_told_apart([found[i] for i in range(len(scenes))], strictest)
-        finer = [] if strictest is None else finer_than(scenes[0].driven(depth), fineness)
-        if not finer or not (any(missed) or any(alike)):
+        apart = [
+            differences.off([one for i in together if isinstance(one := found[i], Prediction)]) for together in surfaces
+        ]
+        alike = {i for together, off in zip(surfaces, apart, strict=True) if off.share > TOLD for i in together}
+        finer = finer_than(scenes[0].driven(depth), fineness) if any(missed) or alike else []
+        if not finer:
             break
         for answer in found.values():
             if rough is not None and isinstance(answer, Prediction):
                 rough(answer)
-        fineness = finer[0]
+        fineness = differences.finer(finer, fineness, max((off.share for off in apart), default=0.0))
         if kind == "finite":
-            again = {scenes[i].pressed for i in todo if missed[i] or alike[i]}
+            again = {scenes[i].pressed for i in todo if missed[i] or i in alike}
             todo = [i for i in todo if scenes[i].pressed in again]
     unfound |= _fallen_back(scenes, found, depth, first, progress)
-    return [_warned(found[i], misses=missed[i], alike=alike[i], unfound=i in unfound) for i in range(len(scenes))]
+    of = {i: off for together, off in zip(surfaces, apart, strict=True) for i in together}
+    return [_warned(found[i], of.get(i), misses=missed[i], unfound=i in unfound) for i in range(len(scenes))]
 
 
 def _fallen_back(
@@ -205,40 +204,16 @@ def _fallen_back(
     return back
 
 
-def _warned(answer: Answer, *, misses: bool, alike: bool, unfound: bool) -> Answer:
+def _warned(answer: Answer, off: Off | None, *, misses: bool, unfound: bool) -> Answer:
     """Return the answer with what the finest mesh has left undone."""
     told: list[str] = []
     if unfound:
         told.append("A finer mesh did not find this state; told is the coarser one's, with its own error estimate.")
     if misses:
         told.append("The finest mesh leaves an error estimate above the tolerance asked for.")
-    if alike:
-        told.append("Differences from the surfaces solved with this one may be off by more than 5 % of their range.")
+    if off is not None and off.share > TOLD:
+        told.append(off.in_a_sentence())
     return replace(answer, warnings=(*answer.warnings, *told)) if told and isinstance(answer, Prediction) else answer
-
-
-def _not_told_apart(found: Sequence[Answer], strictest: float | None) -> list[bool]:
-    """Return which answers belong to surfaces, pressed alike, whose differences a finer mesh should tell better.
-
-    Without a tolerance those of their SEDs at small strain, and none at finite strain.
-    """
-    sets: dict[object, list[int]] = {}
-    for number, answer in enumerate(found):
-        if isinstance(answer, Prediction) and answer.beside is not None:
-            sets.setdefault(answer.scene.pressed, []).append(number)
-    out = [False] * len(found)
-    for together in sets.values():
-        rows = [one for number in together if isinstance(one := found[number], Prediction)]
-        numbers = np.array([(one.sed_ending, one.normal_force, abs(one.tangential_force)) for one in rows])
-        others = np.array([one.beside for one in rows])
-        if strictest is not None:
-            apart = told_apart(numbers, others)
-        else:
-            seds = rows[0].scene.solve.kinematics == "small"
-            apart = not seds or told_apart(numbers[:, :1], others[:, :1], SEDS_APART)
-        for number in together:
-            out[number] = not apart
-    return out
 
 
 def _on_mesh(

@@ -178,13 +178,13 @@ def test_any_forces_lead_to_a_state_that_has_them_or_to_a_sentence(drawn):
 
 @pytest.mark.slow
 def test_at_finite_strain_a_force_is_met_up_to_the_largest_depth_and_refused_without_a_limit_of_friction_beyond():
-    pressed = Scene(friction=Friction(0.3), loading=Loading(normal_force=0.35), solve=Solve("finite", tolerance=COARSE))
-    found = solve(pressed)  # a step of the search goes beyond the depth at which the skin folds, and 0.35 lies before
-    assert found.normal_force == pytest.approx(0.35, rel=1e-8)
-    with pytest.raises(NoSteadyState, match=r"under a normal force of 0\.35") as refused:
+    pressed = Scene(friction=Friction(0.3), loading=Loading(normal_force=0.33), solve=Solve("finite", tolerance=COARSE))
+    found = solve(pressed)  # a step of the search goes beyond the depth at which the skin folds, and 0.33 lies before
+    assert found.normal_force == pytest.approx(0.33, rel=1e-8)
+    with pytest.raises(NoSteadyState, match=r"under a normal force of 0\.33") as refused:
         solve(replace(pressed, friction=Friction(0.4)))
     assert refused.value.limit_mu is None  # that of the depth at which the search ended would be none of this scene
-    assert refused.value.limit_indentation < 2.2
+    assert refused.value.limit_indentation < 2.0
 
 
 def test_a_finger_pressed_to_its_bone_is_refused_with_the_force_that_its_tissue_carries():
