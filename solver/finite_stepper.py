@@ -1,8 +1,8 @@
 """The warm stepper at finite strain: a measured force in, the state of the finger and its response out.
 
 The depth and the sideways travel of the surface are unknown and follow from the two forces: Newton on a bordered
-system, with as many iterations per reading as it is given, usually one. Between readings nothing is lost: what one
-iteration leaves over, the next reading's takes up.
+system, with as many iterations per reading as it is given, usually one, and more where a reading moves it far, as those
+of a finger do that lifts. Between readings nothing is lost: what one iteration leaves over, the next takes up.
 """
 
 from dataclasses import replace
@@ -23,6 +23,7 @@ MET = 0.02  # part of the normal force by which a state may miss the forces and 
 EASED = 0.7  # of the normal force at which the state was lost: from there it is sought again [-]
 STAIRS, LEADING = 12, 3  # that lead a finger from nothing to forces it bears already, and iterations on each
 FOLDING = 0.65  # least stretch of the skin that is told of: it folds from 0.544 on, and a coarse mesh squeezes it less
+FAR, HURRIED = 0.15, 3  # displacement in one iteration from which on there is another [mm], and how many at most
 FURTHEST = 5.0  # displacement in one iteration beyond which the state is lost [mm]
 
 
@@ -94,11 +95,13 @@ class FiniteStepper:
         pull_back = float(np.clip(tangential, -most, most))
         shape = self._ready(normal, pull_back)
         origin, before = shape.place(newton.body)[:, 0], shape.pull.travel
-        for _ in range(iterations):
+        for number in range(1, max(iterations, HURRIED) + 1):
             done = corrected(newton, shape, Given(normal, pull_back), origin, before)
             if done is None or done[1] > FURTHEST or done[0].state[0] != OPEN or done[0].state[-1] != OPEN:
                 return self._lose(normal)
             shape = done[0]
+            if number >= iterations and done[1] < FAR:
+                break
         pinch = self._finger.pinch(shape)
         if pinch.least < FOLDING:
             return self._lose(normal)

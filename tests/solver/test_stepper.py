@@ -10,6 +10,9 @@ import pytest
 from solver.contact import CAP, STICK, Course, forced, untouched
 from solver.finger import FingerModel
 from solver.finite_finger import FiniteFinger
+from solver.finite_forced import Given
+from solver.finite_forced import march as forced_march
+from solver.finite_forced import untouched as at_rest
 from solver.finite_stepper import FiniteStepper
 from solver.friction import FrictionLaw
 from solver.march import march, press_and_slide
@@ -133,6 +136,21 @@ def test_a_state_that_has_not_caught_up_with_its_forces_is_not_told_of():
     assert np.isfinite(told[-1])
     for sed in told:
         assert np.isnan(sed) or sed == pytest.approx(told[-1], rel=0.05)
+
+
+@pytest.mark.parametrize("readings_of_lift", [4, 8])  # 20 and 40 ms at 200 Hz
+def test_a_finger_that_lifts_quickly_is_told_of_as_it_is(readings_of_lift):
+    finger, mu = meshed("finite", 5), 0.4
+    follows = made("finite", mu)
+    part = np.linspace(0.0, 1.0, readings_of_lift + 1)[1:-1]
+    lift = 1.0 - part**2 * (3.0 - 2.0 * part)
+    course = [Given(0.1 * p, 0.0) for p in np.linspace(0.05, 1.0, 30)]
+    course += [Given(0.1, -0.0399 * p) for p in np.linspace(0.05, 1.0, 30)]
+    course += [Given(0.1 * p, -0.0399 * p) for p in lift.tolist()]
+    balanced = forced_march(finger.newton, at_rest(finger.newton, mu, np.inf), Given(0.0, 0.0), course)
+    truth = np.array([finger.sed_ending(shape) for shape in balanced])
+    told = np.array([follows.step(given.normal, given.tangential) for given in course])
+    assert np.abs(told - truth).max() < 0.02 * truth.max()
 
 
 def test_forces_held_still_are_met_exactly_at_finite_strain():
