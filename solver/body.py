@@ -9,7 +9,7 @@ from numpy.linalg import LinAlgError
 
 from solver.contact import Touchable
 from solver.dissection import Reduced, Tree, places
-from solver.elements import line
+from solver.elements import GAUSS_4, line
 from solver.handed_in import check_body, check_held, check_loads, loose
 from solver.mesh import Array, Indices, Mesh
 from solver.stiffness import Elastic, Isotropic
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from solver.in_loops import ReducedInLoops
 
 Motion = Literal["x", "y", "turn"]
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+_POINTS, _WEIGHTS = GAUSS_4
 _VALUES, _SLOPES = line(_POINTS)  # (q, 3)
 RIGID = 1e-12  # compliance of the skin where it is held along the surface, by the largest elsewhere [-]
 UNHELD = 1e14  # stiffness by its inverse, largest numbers, from which a body is taken to move freely [-]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.linalg import LinAlgError
 
 from solver.lapack import dposv, dpotrs
-from solver.mesh import Array, Indices
+from solver.mesh import Array, Indices, distinct
 
 LEAF = 12  # elements in a part that is not halved any more: fewer means more Python, more means more arithmetic
 
@@ -66,7 +66,7 @@ class Tree:
         for (low, high), below in zip(ranges, children, strict=True):
             mine = elements[order[low:high]]
             met = mine.ravel() if not below else np.concatenate([parts[c].border for c in below])
-            met = np.unique(met)
+            met = distinct(met)
             met = met[free[met]]
             complete = (first[met] >= low) & (last[met] < high)
             inner, border = met[complete], met[~complete]
@@ -132,7 +132,7 @@ def places(elements: Indices) -> Array:
             near = beside[edge]
             new = (near >= 0) & np.isnan(out[near, 0])
             out[near[new]] = (out[edge][:, None] + ways)[new]
-            edge = np.unique(near[new])
+            edge = distinct(near[new])
     return out
 
 

@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_GAUSS_3 = np.array([-(0.6**0.5), 0.0, 0.6**0.5]), np.array([5.0, 8.0, 5.0]) / 9.0
+# Gauss's points and weights on a line from -1 to 1, in closed form: NumPy's polynomials take longer to import
+GAUSS_3 = np.array([-(0.6**0.5), 0.0, 0.6**0.5]), np.array([5.0, 8.0, 5.0]) / 9.0
+_FAR, _NEAR = (3.0 / 7.0 + 2.0 / 7.0 * 1.2**0.5) ** 0.5, (3.0 / 7.0 - 2.0 / 7.0 * 1.2**0.5) ** 0.5
+GAUSS_4 = np.array([-_FAR, -_NEAR, _NEAR, _FAR]), 0.5 + np.array([-1.0, 1.0, 1.0, -1.0]) * 30.0**0.5 / 36.0
 _ACROSS = np.array([0, 2, 2, 0, 1, 2, 1, 0, 1])  # position of each node among -1, 0, +1 along xi
 _UP = np.array([0, 0, 2, 2, 0, 1, 2, 1, 1])  # and along eta
 
@@ -33,8 +36,8 @@ class Q2P1:
     order = 2  # of the displacements
     corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     positions = np.stack([_ACROSS - 1.0, _UP - 1.0], axis=-1)  # (9, 2) of the nodes
-    points = np.stack([np.tile(_GAUSS_3[0], 3), np.repeat(_GAUSS_3[0], 3)], axis=-1)  # (9, 2) quadrature
-    weights = np.tile(_GAUSS_3[1], 3) * np.repeat(_GAUSS_3[1], 3)  # (9,)
+    points = np.stack([np.tile(GAUSS_3[0], 3), np.repeat(GAUSS_3[0], 3)], axis=-1)  # (9, 2) quadrature
+    weights = np.tile(GAUSS_3[1], 3) * np.repeat(GAUSS_3[1], 3)  # (9,)
 
     @staticmethod
     def shape(at: Array) -> tuple[Array, Array]:

@@ -122,6 +122,8 @@ class FingerModel:
         """Return whether skin outside the part that may touch would, so that the part must be made larger."""
         whole = self.geometry.whole
         below = self.geometry.mesh.nodes[whole, 1] + displacement[whole, 1] < indentation * (1.0 - 1e-9)
-        may = np.isin(whole, self.geometry.mesh.skin)
+        may = np.zeros(len(displacement), bool)
+        may[self.geometry.mesh.skin] = True
+        may = may[whole]
         ends = bool(contact.touching[0] and may[0] == 0) or bool(contact.touching[-1] and may[-1] == 0)
         return ends or bool((below & ~may).any())

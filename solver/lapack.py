@@ -2,11 +2,9 @@
 
 import sys
 from importlib.machinery import PathFinder
-from importlib.util import module_from_spec
+from importlib.util import find_spec, module_from_spec
 from pathlib import Path
 from types import ModuleType
-
-import scipy
 
 _NAME = "scipy.linalg._flapack"
 
@@ -15,14 +13,18 @@ def _loaded() -> ModuleType:
     """Return the wrappers: SciPy's own module, under its own name, whoever imports it first."""
     if _NAME in sys.modules:
         return sys.modules[_NAME]
-    folder = Path(scipy.__file__).parent / "linalg"
+    package = find_spec("scipy")
+    folder = Path(package.origin).parent / "linalg" if package is not None and package.origin else Path()
     spec = PathFinder.find_spec(_NAME, [str(folder)])
-    if spec is None or spec.loader is None:  # a SciPy that is laid out otherwise
+    try:
+        if spec is None or spec.loader is None:
+            raise ImportError(f"{_NAME} is not in {folder}")
+        module = module_from_spec(spec)
+        spec.loader.exec_module(module)
+    except ImportError:  # a SciPy that is laid out otherwise, or whose libraries it must find first
         from scipy.linalg import lapack
 
         return lapack
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
     sys.modules[_NAME] = module
     return module
 

@@ -1,6 +1,7 @@
 """Mesh: nodes, nine-node quadrilaterals, regions, the skin that may touch and the nodes that are driven."""
 
 from dataclasses import dataclass, field, fields
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +9,21 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
+Numbers = TypeVar("Numbers", bound=np.generic)
 _NONE: Indices = np.empty(0, np.int64)
+
+
+def distinct(numbers: NDArray[Numbers]) -> NDArray[Numbers]:
+    """Return the different numbers among these, in order.
+
+    >>> distinct(np.array([3, 1, 3]))
+    array([1, 3])
+    """
+    # for a few numbers several times as fast as np.unique, which imports masked arrays
+    ordered = np.sort(numbers, axis=None)
+    new = np.ones(len(ordered), bool)
+    new[1:] = ordered[1:] != ordered[:-1]
+    return ordered[new]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +56,7 @@ class Mesh:
     def fixed(self) -> Indices:
         """Return the numbers of the unknowns that are held, in order: x of node n is 2 n, y is 2 n + 1."""
         both = np.concatenate([self.held, self.held_x]), np.concatenate([self.held, self.held_y])
-        return np.unique(np.concatenate([2 * both[0], 2 * both[1] + 1]))
+        return distinct(np.concatenate([2 * both[0], 2 * both[1] + 1]))
 
     @property
     def driven(self) -> Flags:

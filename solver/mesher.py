@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.grid import grid_mesh
-from solver.mesh import Array, Indices, Mesh
+from solver.mesh import Array, Indices, Mesh, distinct
 from solver.outline import Outline
 from solver.scene import Finger, Receptor
 
@@ -113,7 +113,7 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
         held.append(number[nail, -1])
         high = min(high, int(nail[0]) // 2 - 1)
         loose &= _far(arcs, outline.dorsal, outline.nail_end, finger)
-    mesh = grid_mesh(points, layers, slice(2 * low, 2 * high + 1), np.unique(np.concatenate(held)))
+    mesh = grid_mesh(points, layers, slice(2 * low, 2 * high + 1), distinct(np.concatenate(held)))
     return FingerMesh(mesh, outline, arcs, lines, below, number[:, -1].copy(), loose)
 
 
@@ -205,7 +205,7 @@ class _Row:
         if sizing.fold is not None:
             near = sizing.fold + np.linspace(-1.0, 1.0, 2001) * outline.finger.tip_radius
             arc = np.concatenate([arc, near[(near > outline.palmar_cut) & (near < outline.dorsal_cut)]])
-        arc = np.unique(arc)
+        arc = distinct(arc)
         asked = fine + scale * (AWAY[0] * np.maximum(low - arc, 0.0) + AWAY[1] * np.maximum(arc - high, 0.0))
         if sizing.edges is not None:
             inside = np.maximum(np.minimum(arc - low, high - arc), 0.0)
@@ -309,7 +309,7 @@ def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: 
     skin = finger.epidermis + finger.dermis
     thick = finger.pulp_thickness() - skin
     depth = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 1000)]) * (skin + thick)
-    depth = np.union1d(depth, np.linspace(0.0, skin + thick, 1000))
+    depth = distinct(np.concatenate([depth, np.linspace(0.0, skin + thick, 1000)]))
     of_bone = AT_BONE + FROM_BONE * (skin + thick - depth) / finger.tip_radius
     of_ending = ENDING + FROM_ENDING * np.abs(depth - receptor.depth) / finger.tip_radius
     asked = np.minimum(size * np.minimum(BULK, np.minimum(of_bone, of_ending)), TALL * (fine + GROWTH * depth))

@@ -4,13 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.mesh import Array, Indices, Mesh
+from solver.elements import GAUSS_3
+from solver.mesh import Array, Indices, Mesh, distinct
 from solver.mesher import FingerMesh
 from solver.scene import Receptor
 from solver.stiffness import Centred, Elastic, Probes, local_coordinates
 
 ROW: Array = 0.25 * np.arange(-32.0, 25.0)  # arc positions of the row of receptors [mm]
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+_POINTS, _WEIGHTS = GAUSS_3
 _ASIDE = 1e-7  # [mm]: a point on a line between elements is probed on both sides
 
 
@@ -33,7 +34,7 @@ class Endings:
 
     def nodes(self, mesh: Mesh) -> Indices:
         """Return the numbers of the nodes that the probes need."""
-        return np.unique(mesh.elements[np.unique(self.probes.element)])
+        return distinct(mesh.elements[distinct(self.probes.element)])
 
 
 def endings(finger: FingerMesh, elements: Centred, receptor: Receptor, arcs: Array) -> Endings:
@@ -43,7 +44,7 @@ def endings(finger: FingerMesh, elements: Centred, receptor: Receptor, arcs: Arr
     """
     across, along = receptor.ending
     outline = finger.outline
-    depth_lines = np.unique(np.concatenate([finger.depths, [receptor.depth - across / 2, receptor.depth + across / 2]]))
+    depth_lines = distinct(np.concatenate([finger.depths, [receptor.depth - across / 2, receptor.depth + across / 2]]))
     inside = np.abs(depth_lines - receptor.depth) <= across / 2 * (1 + 1e-12)
     depth_lines = depth_lines[inside]
     low, high = (outline.along(arcs, receptor.depth, side * along / 2) for side in (-1.0, 1.0))

@@ -21,7 +21,7 @@ from solver.finger import FingerModel
 from solver.friction import FrictionLaw
 from solver.grid import MeshError
 from solver.load_steps import Steps
-from solver.mesh import Array
+from solver.mesh import Array, distinct
 from solver.mesher import Sizing
 from solver.prediction import History, Prediction, Row, Skin
 from solver.receptor import ROW
@@ -328,7 +328,7 @@ def _over_time(finger: FingerModel, contacts: Sequence[Contact]) -> Array:
     """Return the SED of ending and point (m, 2) [MPa] of elastic states, unfolded together where the ending is."""
     mesh, elastic = finger.geometry.mesh, finger.body.elastic
     forces = np.stack([np.concatenate([c.normal, c.tangential]) for c in contacts], axis=1)
-    nodes = np.union1d(finger.ending.nodes(mesh), finger.point.nodes(mesh))
+    nodes = distinct(np.concatenate([finger.ending.nodes(mesh), finger.point.nodes(mesh)]))
     displacement = finger.body.displacement(finger.body.skin_displacement(forces), only=nodes)
     return np.stack([patch.average(mesh, elastic, displacement)[0] for patch in (finger.ending, finger.point)], axis=1)
 

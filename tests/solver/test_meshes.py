@@ -3,11 +3,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solver.elements import ELEMENTS, Q2P1
+from solver.elements import ELEMENTS, GAUSS_3, GAUSS_4, Q2P1
 from solver.grid import MeshError, grid_mesh, quality
 from solver.mesher import DERMIS, EPIDERMIS, FAT, Sizing, finger_mesh, sharing
 from solver.outline import Outline
 from solver.scene import Finger, Receptor
+
+
+def test_gauss_rules_are_those_of_numpy():
+    for points, weights in (GAUSS_3, GAUSS_4):
+        asked = np.polynomial.legendre.leggauss(len(points))
+        np.testing.assert_allclose([points, weights], asked, rtol=0, atol=5e-16)
 
 
 @pytest.mark.parametrize("element", ELEMENTS)
