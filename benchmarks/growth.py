@@ -2,8 +2,9 @@
 
 Run it single-threaded: OPENBLAS_NUM_THREADS=1 python -m benchmarks.growth
 Times are processor time of the one thread: of one assembly, elimination and solve (`finite`), and of one assembly and
-elimination down to the skin's compliance (`small`). Memory is the peak above what the process held before its first
-solve on that mesh: mesh, plan and tables included. The exponent is that of the line through the logarithms.
+elimination down to the skin's compliance (`small`); new memory is given before. Memory is the peak above what the
+process held before its first solve on that mesh: mesh, plan and tables included. Exponents are those of lines through
+the logarithms.
 """
 
 import os
@@ -86,9 +87,9 @@ def main() -> None:
             rows.append((dofs, ms))
             print(f"{dofs:6.0f} {ms:8.2f} {held:8.1f}", flush=True)
         size, span = np.log(np.array(rows)).T
-        print(
-            f"exponent {np.polyfit(size, span, 1)[0]:.2f}; of the upper half {np.polyfit(size[4:], span[4:], 1)[0]:.2f}"
-        )
+        powers = np.diff(span) / np.diff(size)
+        whole, upper = np.polyfit(size, span, 1)[0], np.polyfit(size[4:], span[4:], 1)[0]
+        print(f"exponent {whole:.2f}; upper half {upper:.2f}; mesh to mesh {powers.min():.2f} to {powers.max():.2f}")
 
 
 if __name__ == "__main__":

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
+from math import log
 from statistics import median
 
 from daq_app.accuracy.asked import Asked, Found, LeftOut
@@ -34,17 +36,23 @@ def measure(asked: Asked, found: Found) -> Iterator[Growth | LeftOut]:
         for fineness in asked.pick(MESHES, QUICK):
             if last is not None and not asked.quick:
                 larger = last.dofs * (fineness / last.fineness) ** 1.6
-                awaited = (last.setup_s + 2.0 * last.floor_s) * (larger / last.dofs) ** 2.2
+                awaited = (last.setup_s + 5.0 * last.floor_s) * (larger / last.dofs) ** 2.2
                 if awaited > SHARE * asked.left:
                     yield LeftOut(
                         f"Growth at {method.kinematics} strain was not followed beyond {last.dofs} unknowns: no time."
                     )
                     break
             mesh = method.meshed(scene, fineness, False)
-            repeats = 5 if mesh.dofs < 20000 else 1
-            floor = median(mesh.floor() for _ in range(repeats))
+            mesh.floor()  # the first is given new memory, which takes as long as the work, and longer on large meshes
+            floor = median(mesh.floor() for _ in range(5 if mesh.dofs < 20000 else 3))
             last = Growth(method.kinematics, fineness, mesh.dofs, mesh.setup_s, floor)
             yield last
+
+
+def between(rows: list[Growth]) -> list[float]:
+    """Return the same power between each of the larger meshes and the next."""
+    large = [row for row in rows if row.dofs >= FEWEST]
+    return [log(b.floor_s / a.floor_s) / log(b.dofs / a.dofs) for a, b in pairwise(large)]
 
 
 def exponent(rows: list[Growth]) -> float | None:

@@ -11,7 +11,7 @@ from statistics import median
 
 from daq_app.accuracy.asked import Asked, Found
 from daq_app.accuracy.estimates import Guaranteed
-from daq_app.accuracy.growth import Growth, exponent
+from daq_app.accuracy.growth import Growth, between, exponent
 from daq_app.accuracy.histories import Marched
 from daq_app.accuracy.methods import MAIN, Kinematics
 from daq_app.accuracy.processes import Cold, Memory
@@ -80,7 +80,7 @@ def measure(asked: Asked, found: Found) -> Iterator[Target]:
     for kinematics in ("small", "finite"):
         rows = [row for row in found.of(Growth) if row.kinematics == kinematics]
         power = exponent(rows)
-        how = "" if power is None else f"up to {max(r.dofs for r in rows):,} unknowns"
+        how = "" if power is None else f"up to {max(r.dofs for r in rows):,} unknowns; {_between(rows)}"
         yield Target(
             f"growth of the floor with unknowns, {kinematics} strain", "", "power", 1.5, None, power, None, how
         )
@@ -151,6 +151,11 @@ def _guaranteed(row: Guaranteed) -> Target:
     how = f"{row.dofs} unknowns, estimate {_percent(row.worst_estimate)}{error}"
     work = f"guaranteed tolerance, {row.kinematics} strain, {row.surfaces} surfaces, mesh to evidence included"
     return Target(work, _percent(row.tolerance), "ms", None, None, 1e3 * row.took_s, None, how)
+
+
+def _between(rows: list[Growth]) -> str:
+    powers = between(rows)
+    return f"from mesh to mesh {min(powers):.2f} to {max(powers):.2f}"
 
 
 def _part(measured: int, asked: int, what: str) -> str:
