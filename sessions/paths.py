@@ -1,9 +1,8 @@
 """One recording along many paths: every reasonable choice of the analysis crossed with every other (a multiverse).
 
 What a study concludes should not hang on a choice that somebody else would have made differently (Steegen, Tuerlinckx,
-Gelman and Vanpaemel 2016, Perspect. Psychol. Sci. 11:702). Friction is found along each path, and every friction that
-is met is solved: nothing is interpolated. Two paths share a solve where they come to the same friction, or differ only
-in traction bounds that the skin nowhere reaches.
+Gelman and Vanpaemel 2016, Perspect. Psychol. Sci. 11:702). Friction is found along each path, and contact is solved
+at every friction that is met: nothing is interpolated.
 """
 
 import math
@@ -21,7 +20,7 @@ from sessions.analysis.friction import Rule
 from sessions.analysis.scores import relation
 from sessions.analysis.settings import AnalysisSettings, WindowRule
 from sessions.analysis.within import repeated_correlation
-from sessions.prediction import PredictionOptions, Progress, Scene, scenes_of, settled
+from sessions.prediction import Friction, PredictionOptions, Progress, Scene, scenes_of, settled, slides
 from sessions.recording import Recording
 
 Kinematics = Literal["small", "finite"]
@@ -155,31 +154,29 @@ def _sed(found: Mapping[Scene, tuple[float, float] | None], scene: Scene | None,
 def _solved(scenes: Sequence[Scene], progress: Progress | None) -> Mapping[Scene, tuple[float, float] | None]:
     """Return SED over the ending and at its middle [MPa] of each scene, None where it has no settled state.
 
-    Of scenes that differ in tau_max alone the one with the greatest is solved first. Where the traction it finds stays
-    below another's tau_max, that one has the same solution.
+    Of scenes that differ in friction alone the one with the least is solved, and the others are found beside it, on its
+    mesh; where that fails they are solved themselves.
     """
     alike: defaultdict[Scene, list[Scene]] = defaultdict(list)
-    for scene in scenes:
-        alike[replace(scene, friction=replace(scene.friction, tau_max=None))].append(scene)
-    greatest = [max(group, key=_bound) for group in alike.values()]
+    for scene in sorted(scenes, key=_friction):
+        alike[replace(scene, friction=Friction(0.0))].append(scene)
     found: dict[Scene, tuple[float, float] | None] = {}
-    rest: list[Scene] = []
-    for first, group, answer in zip(
-        greatest, alike.values(), settled(greatest, _part(progress, 0.0, 0.6)), strict=True
-    ):
-        reached = np.inf if answer is None else float(np.abs(answer.skin.traction).max())
-        for scene in group:
-            if scene == first or _bound(scene) > reached:
-                found[scene] = None if answer is None else (answer.sed_ending, answer.sed_point)
-            else:
-                rest.append(scene)
-    for scene, answer in zip(rest, settled(rest, _part(progress, 0.6, 1.0)), strict=True):
+    first = settled([group[0] for group in alike.values()], _part(progress, 0.0, 0.5))
+    held = [(answer, group) for answer, group in zip(first, alike.values(), strict=True) if answer is not None]
+    taken_up = slides([answer for answer, _ in held], _part(progress, 0.5, 0.7))
+    for (answer, (scene, *others)), slide in zip(held, taken_up, strict=True):
+        found[scene] = answer.sed_ending, answer.sed_point
+        if slide is not None and others:
+            beside = zip(others, slide.seds(others).tolist(), strict=True)
+            found |= {other: (ending, point) for other, (ending, point) in beside if not np.isnan(ending)}
+    rest = [scene for scene in scenes if scene not in found]
+    for scene, answer in zip(rest, settled(rest, _part(progress, 0.7, 1.0)), strict=True):
         found[scene] = None if answer is None else (answer.sed_ending, answer.sed_point)
     return found
 
 
-def _bound(scene: Scene) -> float:
-    return np.inf if scene.friction.tau_max is None else scene.friction.tau_max
+def _friction(scene: Scene) -> tuple[float, float]:
+    return scene.friction.mu, np.inf if scene.friction.tau_max is None else scene.friction.tau_max
 
 
 def _part(progress: Progress | None, low: float, high: float) -> Progress | None:

@@ -118,8 +118,8 @@ def _interval(found: Prediction, slide: Nearby | None, drawn: Drawn, scale: floa
 
     def solved(which: Indices) -> Array:
         scenes = [with_loads(found.scene, dict(zip(names, draw, strict=True))) for draw in draws[which].tolist()]
-        here, *there = slide.seds([found.scene, *scenes])
-        return found.sed_ending + (np.array(there) - here)
+        seds = slide.seds([found.scene, *scenes])[:, 0]
+        return found.sed_ending + (seds[1:] - seds[0])
 
     tried = _extremes(carried, draws)
     missed = np.abs(solved(tried) - carried[tried])  # nan, and so no less, where one has no settled state

@@ -11,7 +11,7 @@ from solver.body import Body, planned
 from solver.contact import Contact
 from solver.edges import width
 from solver.elements import Q2P1
-from solver.mesh import Array
+from solver.mesh import Array, distinct
 from solver.mesher import FingerMesh, Sizing, finger_mesh
 from solver.receptor import ROW, Endings, endings, middle
 from solver.scene import Receptor, Scene
@@ -93,6 +93,14 @@ class FingerModel:
         forces = np.array([(*c.normal, *c.tangential) for c in contacts]).T
         displacement = self.body.displacement(self.body.skin_displacement(forces), only=self.ending.nodes(mesh))
         return self.ending.average(mesh, self.body.elastic, displacement)[0]
+
+    def seds(self, contacts: Sequence[Contact]) -> Array:
+        """Return the SED of the reference ending and in its middle (c, 2) [MPa] of several states."""
+        mesh, elastic = self.geometry.mesh, self.body.elastic
+        forces = np.array([(*c.normal, *c.tangential) for c in contacts]).T
+        nodes = distinct(np.concatenate([self.ending.nodes(mesh), self.point.nodes(mesh)]))
+        displacement = self.body.displacement(self.body.skin_displacement(forces), only=nodes)
+        return np.stack([patch.average(mesh, elastic, displacement)[0] for patch in (self.ending, self.point)], axis=1)
 
     def sed_point(self, displacement: Array) -> float:
         """Return the SED in the middle of the reference ending [MPa]."""

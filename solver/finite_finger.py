@@ -68,6 +68,10 @@ class FiniteFinger:
         """Return the SED averaged over the reference ending [MPa]."""
         return float(self.ending.average(self.newton.body, shape.u)[0])
 
+    def seds(self, shape: Shape) -> tuple[float, float]:
+        """Return the SED averaged over the reference ending and that in its middle [MPa]."""
+        return self.sed_ending(shape), float(self.point.average(self.newton.body, shape.u)[0])
+
     def numbers(self, shape: Shape) -> Array:
         """Return what errors are estimated of: SED of the ending, normal and tangential force along +x (3,)."""
         return np.array([self.sed_ending(shape), shape.force[1], shape.force[0]])

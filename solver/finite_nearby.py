@@ -51,9 +51,9 @@ class FiniteNearby:
         return of_shape(self.finger, self.scene, self.here)
 
     def seds(self, scenes: Sequence[Scene]) -> Array:
-        """Return the ending's SED (n,) [MPa] of scenes beside this one, nan where there is no settled slide."""
+        """Return the SED of ending and its middle (n, 2) [MPa] of scenes beside this one, nan where none settles."""
         found = [self._beside(scene) for scene in scenes]
-        return np.array([np.nan if shape is None else self.finger.sed_ending(shape) for shape in found])
+        return np.array([(np.nan, np.nan) if shape is None else self.finger.seds(shape) for shape in found])
 
     def _beside(self, scene: Scene) -> Shape | None:
         newton, here = self.finger.newton, self.here

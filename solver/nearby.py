@@ -28,9 +28,9 @@ class Nearby(Protocol):
         ...
 
     def seds(self, scenes: Sequence[Scene]) -> Array:
-        """Return the ending's SED (n,) [MPa] of scenes that differ from its own in friction, depth or force alone.
+        """Return the SED (n, 2) [MPa] of scenes that differ from its own in friction, depth or force alone.
 
-        nan where no settled slide is found beside this one; how far there would be one is not looked for.
+        First that averaged over the ending, then that in its middle. nan where no settled slide is found beside this one; how far there would be one is not looked for.
         """
         ...
 
@@ -72,7 +72,7 @@ class _SmallNearby:
         return of_contact(self.finger, self.scene, self.here)
 
     def seds(self, scenes: Sequence[Scene]) -> Array:
-        out = np.full(len(scenes), np.nan)
+        out = np.full((len(scenes), 2), np.nan)
         held: list[tuple[int, Contact]] = []
         for number, scene in enumerate(scenes):
             try:
@@ -82,7 +82,7 @@ class _SmallNearby:
             if not (contact.touching & ~self.here.touching)[[0, -1]].any():  # else skin may touch that nobody looked at
                 held.append((number, contact))
         if held:
-            out[[number for number, _ in held]] = self.finger.sed_endings([contact for _, contact in held])
+            out[[number for number, _ in held]] = self.finger.seds([contact for _, contact in held])
         return out
 
 

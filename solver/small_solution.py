@@ -21,7 +21,7 @@ from solver.finger import FingerModel
 from solver.friction import FrictionLaw
 from solver.grid import MeshError
 from solver.load_steps import Steps
-from solver.mesh import Array, distinct
+from solver.mesh import Array
 from solver.mesher import Sizing
 from solver.prediction import History, Prediction, Row, Skin
 from solver.receptor import ROW
@@ -324,19 +324,10 @@ def skin_of(finger: FingerModel, contact: Contact, skin: Array) -> Skin:
     )
 
 
-def _over_time(finger: FingerModel, contacts: Sequence[Contact]) -> Array:
-    """Return the SED of ending and point (m, 2) [MPa] of elastic states, unfolded together where the ending is."""
-    mesh, elastic = finger.geometry.mesh, finger.body.elastic
-    forces = np.stack([np.concatenate([c.normal, c.tangential]) for c in contacts], axis=1)
-    nodes = distinct(np.concatenate([finger.ending.nodes(mesh), finger.point.nodes(mesh)]))
-    displacement = finger.body.displacement(finger.body.skin_displacement(forces), only=nodes)
-    return np.stack([patch.average(mesh, elastic, displacement)[0] for patch in (finger.ending, finger.point)], axis=1)
-
-
 def _history(scene: Scene, finger: FingerModel, way: March, over_time: Array | None) -> History:
     """Return the course as arrays."""
     contacts = [instant.contact for instant in way.instants]
-    sed = _over_time(finger, contacts) if over_time is None else over_time
+    sed = finger.seds(contacts) if over_time is None else over_time
     touching = np.array([c.touching.sum() for c in contacts])
     slipping = np.array([(c.state >= SLIP).sum() for c in contacts])
     return History(

@@ -101,7 +101,7 @@ class Made:
 
     def seds(self, scenes):
         off = [(one.friction.mu - self.row.mu, one.friction.tau_max - self.row.tau_max) for one in scenes]
-        return np.array([np.nan if abs(mu) > 0.03 else self.formula(mu, tau) for mu, tau in off])
+        return np.array([[np.nan if abs(mu) > 0.03 else self.formula(mu, tau)] * 2 for mu, tau in off])
 
 
 def interval_of(analysis, prediction, monkeypatch, formula, by_mu=0.0, gain_error=0.004):
