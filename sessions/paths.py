@@ -17,7 +17,7 @@ import numpy as np
 from sessions.analysis import Analysis, FrictionParameters, analyse
 from sessions.analysis.area import FIXED, HERTZ, AreaLaw
 from sessions.analysis.friction import Rule
-from sessions.analysis.scores import relation
+from sessions.analysis.scores import pearson
 from sessions.analysis.settings import AnalysisSettings, WindowRule
 from sessions.analysis.within import repeated_correlation
 from sessions.prediction import Friction, PredictionOptions, Progress, Scene, scenes_of, settled, slides
@@ -246,14 +246,13 @@ def _finding(
             pairs.append((trial.subject, sed, trial.score))
     seds = {index: float(np.mean([np.mean(all_of) for all_of in own[index].values()])) for index in sorted(own)}
     both = [index for index in seds if index in means]
-    related = relation([seds[i] for i in both], [means[i] for i in both], both) if both else None
     inner = repeated_correlation(*zip(*pairs, strict=True)) if within and pairs else None
     return PathFinding(
         path=path,
         usual=usual,
         surfaces=len(seds),
         trials=count,
-        r=None if related is None else related.pearson,
+        r=pearson([seds[i] for i in both], [means[i] for i in both]),
         within=None if inner is None else inner.r,
         low=None if inner is None else inner.low,
         high=None if inner is None else inner.high,

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from sessions.analysis.onset import Baseline, ContactDetector, Lift, Onset
 from sessions.analysis.settings import AnalysisSettings
+from sessions.analysis.signals import peaks
 
 Array = NDArray[np.float64]
 
@@ -45,12 +46,10 @@ def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: Ana
 
     `normal` (n,) [N] is zeroed and filtered, of all readings; nan counts as no force.
     """
-    from scipy import signal  # slow to load, and a recorder has no need of it
-
     force = np.maximum(np.nan_to_num(normal[contact.start : contact.stop]), 0.0)
     padded = np.concatenate([[0.0], force, [0.0]])
-    peaks, found = signal.find_peaks(padded, prominence=0.0)
-    standing = peaks[found["prominences"] >= (1.0 - settings.valley) * padded[peaks]] - 1
+    places, prominences = peaks(padded)
+    standing = places[prominences >= (1.0 - settings.valley) * padded[places]] - 1
     standing = standing[force[standing] >= settings.light_share * force.max(initial=0.0)]
     between = [(a, b, int(a + np.argmin(force[a:b]))) for a, b in pairwise(standing)]
     # Peaks of exactly the same height stand out of everything but one another.

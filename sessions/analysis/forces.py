@@ -1,11 +1,11 @@
 """Forces at the stimulus's face: the wrench in the face frame, its zero-phase filter, ratio and centre of pressure."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sessions.analysis.signals import low_passed
 from sessions.plan import Frame
 
 Array = NDArray[np.float64]
@@ -32,30 +32,19 @@ class Filter:
 
     def applied(self, values: Array, rate: float, segments: list[slice]) -> Array:
         """Return values (n, k) filtered within each segment [positions]; nan outside them and in the shortest ones."""
-        from scipy import signal  # slow to load, and a recorder has no need of it
-
         filtered = np.full_like(values, np.nan)
-        sections = _sections(self.cut_off, rate)
+        # The bilinear transform bends frequencies as the tangent does: the factor belongs to the bent ones.
+        design = rate / np.pi * np.arctan(_TWO_PASSES * np.tan(np.pi * self.cut_off / rate))
         for segment in segments:
             length = segment.stop - segment.start
             if length >= _SHORTEST_SEGMENT:
                 padding = min(length - 1, int(np.ceil(3.0 * rate / self.cut_off)))
-                filtered[segment] = signal.sosfiltfilt(sections, values[segment], axis=0, padlen=padding)
+                filtered[segment] = low_passed(values[segment], design, rate, padding)
         return filtered
 
     def fits(self, rate: float) -> bool:
         """Say whether readings at `rate` [Hz] are dense enough for it to do anything."""
         return rate >= 2.5 * self.cut_off * _TWO_PASSES
-
-
-@lru_cache
-def _sections(cut_off: float, rate: float) -> Array:
-    """Return one pass of the filter as second-order sections; every stroke of a recording asks for the same."""
-    from scipy import signal
-
-    # The bilinear transform bends frequencies as the tangent does: the factor belongs to the bent ones.
-    design = rate / np.pi * np.arctan(_TWO_PASSES * np.tan(np.pi * cut_off / rate))
-    return signal.butter(2, design, fs=rate, output="sos")
 
 
 def in_face_frame(wrench: Array, frame: Frame) -> Array:

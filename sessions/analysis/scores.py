@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording
@@ -151,18 +152,16 @@ def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> R
     exact p up to seven points; the least-squares line of y on x.
     """
     n = len(x)
-    without = tuple((label, _pearson([*x[:i], *x[i + 1 :]], [*y[:i], *y[i + 1 :]])) for i, label in enumerate(labels))
-    r = _pearson(x, y)
+    without = tuple((label, pearson([*x[:i], *x[i + 1 :]], [*y[:i], *y[i + 1 :]])) for i, label in enumerate(labels))
+    r = pearson(x, y)
     if r is None:
         few = "1 point is" if n == 1 else f"{n} points are"
         why = f"{few} too few for a correlation" if n < 3 else "one of the two does not vary"
         return Relation(n, None, None, None, None, None, None, None, None, None, without, why)
     slope, intercept = np.polyfit(x, y, 1)
-    low, high = _fisher_interval(x, y)
+    low, high = _fisher_interval(r, n)
     why = None if low is not None else f"no interval of r from {n} points" if n < 4 else "no interval of a perfect r"
-    from scipy import stats  # slow to load, and a window that opens waits for it
-
-    rho = float(stats.spearmanr(x, y).statistic)
+    rho = float(np.corrcoef(_ranks(x), _ranks(y))[0, 1])
     ends = _rank_interval(rho, n)
     return Relation(n, r, low, high, rho, *ends, _exact_p(x, y, rho), float(slope), float(intercept), without, why)
 
@@ -175,7 +174,7 @@ def reversed_subjects(tables: Iterable[ScoreTable]) -> tuple[tuple[str, str, flo
     points: defaultdict[tuple[str, str], list[tuple[float, float]]] = defaultdict(list)
     for score in subject_scores(tables):
         points[score.subject, score.descriptor].append((score.index, score.score))
-    rs = {key: _pearson([i for i, _ in pairs], [s for _, s in pairs]) for key, pairs in points.items()}
+    rs = {key: pearson([i for i, _ in pairs], [s for _, s in pairs]) for key, pairs in points.items()}
     return tuple((subject, descriptor, r) for (subject, descriptor), r in rs.items() if r is not None and r < 0)
 
 
@@ -192,10 +191,10 @@ def _mean(descriptor: str, index: int, values: Sequence[float]) -> MeanScore:
     n, mean = len(values), float(np.mean(values))
     if n < 2:
         return MeanScore(descriptor, index, n, mean, None, None, None, None, "one subject alone has no interval")
-    from scipy import stats
+    from scipy.special import stdtrit  # slow to load, and a window that opens waits for it
 
     sd = float(np.std(values, ddof=1))
-    half = float(stats.t.ppf((1 + CONFIDENCE) / 2, n - 1)) * sd / math.sqrt(n)
+    half = float(stdtrit(n - 1, (1 + CONFIDENCE) / 2)) * sd / math.sqrt(n)
     low, high = mean - half, mean + half
     bootstrap = _bootstrap(values) if low < SCALE[0] or high > SCALE[1] else None
     return MeanScore(descriptor, index, n, mean, sd, low, high, bootstrap, None)
@@ -213,37 +212,39 @@ def _varies(values: Sequence[float]) -> bool:
     return float(np.ptp(values)) > 1e-12 * float(np.max(np.abs(values)))
 
 
-def _pearson(x: Sequence[float], y: Sequence[float]) -> float | None:
+def pearson(x: Sequence[float], y: Sequence[float]) -> float | None:
     """Return Pearson's r, None for fewer than three points or where one of the two does not vary."""
     if len(x) < 3 or not _varies(x) or not _varies(y):
         return None
-    from scipy import stats
-
-    return float(stats.pearsonr(x, y).statistic)
+    return float(np.clip(np.corrcoef(x, y)[0, 1], -1.0, 1.0))
 
 
-def _fisher_interval(x: Sequence[float], y: Sequence[float]) -> tuple[float | None, float | None]:
-    """Return the 95 % interval of Pearson's r by Fisher's z; None where it has none."""
-    from scipy import stats
+def _fisher_interval(r: float, n: int, inflated: float = 1.0) -> tuple[float | None, float | None]:
+    """Return the 95 % interval of a correlation by Fisher's z, its variance `inflated`.
 
-    result = stats.pearsonr(x, y)
-    if len(x) < 4 or abs(float(result.statistic)) > 1 - 1e-12:
+    None for fewer than four points, or where all points agree wholly or are each other's reverse.
+    """
+    if n < 4 or abs(r) > 1 - 1e-12:
         return None, None
-    interval = result.confidence_interval(CONFIDENCE)
-    return float(interval.low), float(interval.high)
+    from scipy.special import ndtri
+
+    half = float(ndtri((1 + CONFIDENCE) / 2)) * math.sqrt(inflated / (n - 3))
+    return math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)
 
 
 def _rank_interval(rho: float, n: int) -> tuple[float | None, float | None]:
-    """Return the 95 % interval of Spearman's rho (Bonett & Wright 2000, Psychometrika 65:23, equation 4).
+    """Return the 95 % interval of Spearman's rho (Bonett & Wright 2000, Psychometrika 65:23, equation 4)."""
+    return _fisher_interval(rho, n, 1 + rho * rho / 2)
 
-    None for fewer than four points, or where both orders agree wholly or are each other's reverse.
+
+def _ranks(values: Sequence[float]) -> NDArray[np.float64]:
+    """Return the ranks from 1 on, the same for equal values: the middle of those they share.
+
+    >>> _ranks([3.0, 1.0, 3.0])
+    array([2.5, 1. , 2.5])
     """
-    if n < 4 or abs(rho) > 1 - 1e-12:
-        return None, None
-    from scipy import stats
-
-    half = float(stats.norm.ppf((1 + CONFIDENCE) / 2)) * math.sqrt((1 + rho * rho / 2) / (n - 3))
-    return math.tanh(math.atanh(rho) - half), math.tanh(math.atanh(rho) + half)
+    _, at, counts = np.unique(np.asarray(values), return_inverse=True, return_counts=True)
+    return (np.cumsum(counts) - (counts - 1) / 2)[at]
 
 
 def _exact_p(x: Sequence[float], y: Sequence[float], rho: float) -> float | None:
@@ -251,9 +252,7 @@ def _exact_p(x: Sequence[float], y: Sequence[float], rho: float) -> float | None
     n = len(x)
     if n > _EXACT_UP_TO:
         return None
-    from scipy import stats
-
-    rank_x, rank_y = stats.rankdata(x) - (n + 1) / 2, stats.rankdata(y) - (n + 1) / 2
+    rank_x, rank_y = _ranks(x) - (n + 1) / 2, _ranks(y) - (n + 1) / 2
     orders = rank_y[np.array(list(itertools.permutations(range(n))))]  # (n!, n)
     rhos = orders @ rank_x / math.sqrt(float(rank_x @ rank_x) * float(rank_y @ rank_y))
     return float(np.mean(np.abs(rhos) >= abs(rho) - 1e-12))

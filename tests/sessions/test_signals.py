@@ -1,0 +1,40 @@
+"""The filter and the peaks are SciPy's, whether its compiled loops are found where they are sought or not."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from sessions.analysis import signals
+
+
+@pytest.fixture(params=["compiled", "by the front door"])
+def either(request, monkeypatch):
+    if request.param == "by the front door":
+        monkeypatch.setattr(signals, "_compiled", lambda *_: None)
+
+
+@pytest.mark.parametrize(("n", "cut_off", "rate", "padding"), [(300, 24.9, 200.0, 30), (12, 24.9, 62.5, 11)])
+def test_the_filter_is_scipys_butterworth_run_forwards_and_backwards(either, n, cut_off, rate, padding):
+    values = np.random.default_rng(1).normal(size=(n, 6)).cumsum(axis=0) + 5.0
+    sections = signal.butter(2, cut_off, fs=rate, output="sos")
+    expected = signal.sosfiltfilt(sections, values, axis=0, padlen=padding)
+    assert signals.low_passed(values, cut_off, rate, padding) == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+def test_peaks_and_how_far_they_stand_out_are_scipys_flat_tops_included(either):
+    values = np.maximum(np.round(np.random.default_rng(2).normal(size=200).cumsum(), 0), 0.0)
+    places, found = signal.find_peaks(values, prominence=0.0)
+    assert [one.tolist() for one in signals.peaks(values)] == [places.tolist(), found["prominences"].tolist()]
+
+
+def test_a_session_is_analysed_without_waiting_for_the_whole_of_scipys_signals():
+    use = "import sys, numpy as np; from sessions.analysis.signals import low_passed, peaks; "
+    use += "low_passed(np.ones((20, 1)), 20.0, 200.0, 3); peaks(np.ones(3)); "
+    done = subprocess.run(
+        [sys.executable, "-c", use + "print('scipy.signal' in sys.modules, 'scipy.stats' in sys.modules)"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.split() == ["False", "False"]
