@@ -30,7 +30,8 @@ class Nearby(Protocol):
     def seds(self, scenes: Sequence[Scene]) -> Array:
         """Return the SED (n, 2) [MPa] of scenes that differ from its own in friction, depth or force alone.
 
-        First that averaged over the ending, then that in its middle. nan where no settled slide is found beside this one; how far there would be one is not looked for.
+        First that averaged over the ending, then that in its middle. nan where no settled slide is found beside
+        this one; how far there would be one is not looked for.
         """
         ...
 

@@ -4,7 +4,7 @@ Settled sliding is found directly and refused where it does not exist (`solver.w
 where tissues relax, in time (`solver.relaxing`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from time import perf_counter

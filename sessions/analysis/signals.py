@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 def low_passed(values: Array, cut_off: float, rate: float, padding: int) -> Array:
     """Return values (n, k) through a second-order Butterworth low-pass, forwards and then backwards.
 
-    One pass is 3 dB down at `cut_off` [Hz], by the bilinear transform for readings at `rate` [Hz]. Both ends are carried
-    on by `padding` < n readings, turned about the end; the filter begins settled on the first of them.
+    One pass is 3 dB down at `cut_off` [Hz], by the bilinear transform for readings at `rate` [Hz]. Both ends are
+    carried on by `padding` < n readings, turned about the end; the filter begins settled on the first of them.
     """
     bent = float(np.tan(np.pi * cut_off / rate))
     whole = 1.0 + np.sqrt(2.0) * bent + bent * bent

@@ -16,15 +16,17 @@ def either(request, monkeypatch):
         monkeypatch.setattr(signals, "_compiled", lambda *_: None)
 
 
+@pytest.mark.usefixtures("either")
 @pytest.mark.parametrize(("n", "cut_off", "rate", "padding"), [(300, 24.9, 200.0, 30), (12, 24.9, 62.5, 11)])
-def test_the_filter_is_scipys_butterworth_run_forwards_and_backwards(either, n, cut_off, rate, padding):
+def test_the_filter_is_scipys_butterworth_run_forwards_and_backwards(n, cut_off, rate, padding):
     values = np.random.default_rng(1).normal(size=(n, 6)).cumsum(axis=0) + 5.0
     sections = signal.butter(2, cut_off, fs=rate, output="sos")
     expected = signal.sosfiltfilt(sections, values, axis=0, padlen=padding)
     assert signals.low_passed(values, cut_off, rate, padding) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
-def test_peaks_and_how_far_they_stand_out_are_scipys_flat_tops_included(either):
+@pytest.mark.usefixtures("either")
+def test_peaks_and_how_far_they_stand_out_are_scipys_flat_tops_included():
     values = np.maximum(np.round(np.random.default_rng(2).normal(size=200).cumsum(), 0), 0.0)
     places, found = signal.find_peaks(values, prominence=0.0)
     assert [one.tolist() for one in signals.peaks(values)] == [places.tolist(), found["prominences"].tolist()]

@@ -37,7 +37,7 @@ def spread(wanted: Sequence[float], gap: float, low: float, high: float) -> list
     order = np.argsort(wanted, kind="stable")
     steps = gap * np.arange(n)
     # Without the steps, labels at least `gap` apart are numbers that do not fall.
-    rising = _rising(np.asarray(wanted)[order] - steps)
+    rising = _rising(np.asarray(wanted, np.float64)[order] - steps)
     places = np.empty(n)
     places[order] = np.clip(rising, low, max(low, high - steps[-1])) + steps
     return [float(place) for place in places]
