@@ -64,8 +64,8 @@ class Bench:
         self.seed = seed
         self._lock = threading.Lock()
         self._mounted: Surface | None = None
-        # Beginning [s], course and surface of each stroke; in order, never overlapping. Replaced, never changed.
-        self._strokes: tuple[tuple[float, Course, Surface], ...] = ()
+        # Beginning [s], course and truth of each stroke; in order, never overlapping. Replaced, never changed.
+        self._strokes: tuple[tuple[float, Course, PlantedStroke], ...] = ()
         self._rotation = _rotation(*self.settings.tilt)
         draw = np.random.default_rng([seed, 1])
         limits = np.repeat([self.settings.drift_force, self.settings.drift_torque], 3)
@@ -90,12 +90,13 @@ class Bench:
             if self._strokes and at < self._strokes[-1][0] + self._strokes[-1][1].lift:
                 raise ValueError(f"a stroke cannot begin at {at} s: the one before has not ended")
             course = Course(stroke, surface.mu, surface.holds)
-            self._strokes = (*self._strokes, (at, course, surface))
-        return self._planted(at, course, surface)
+            planted = self._planted(at, course, surface)
+            self._strokes = (*self._strokes, (at, course, planted))
+        return planted
 
     def planted(self) -> tuple[PlantedStroke, ...]:
         """Return the truth of every stroke begun so far, in order."""
-        return tuple(self._planted(*stroke) for stroke in self._strokes)
+        return tuple(planted for _, _, planted in self._strokes)
 
     def exerted(self, times: Array) -> Array:
         """Return the wrench (n, 6) [N, N mm] that the finger truly exerts at `times` (n,) [s], without any error."""

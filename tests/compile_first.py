@@ -1,5 +1,7 @@
-"""Has the compiled loops made once, so that test workers that start together do not each make them."""
+"""Has compiled loops and bytecode made once, so that test workers that start together do not each make them."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 from solver.reference import SLIPPERINESS, scene
@@ -13,3 +15,5 @@ if __name__ == "__main__":
         solve(asked, in_loops=True)
         solve(replace(asked, solve=replace(asked.solve, course="history")), in_loops=True)
         stepper(asked).step(0.05, 0.01)
+    # pytest keeps bytecode of its own of every test.
+    subprocess.run([sys.executable, "-m", "pytest", "-q", "--collect-only"], stdout=subprocess.DEVNULL, check=False)

@@ -32,6 +32,7 @@ def main() -> int:
     """Run the checks, all of them even when one fails, and return the exit code."""
     checks = LONG if "--long" in sys.argv[1:] else [*STATIC, *QUICK]
     environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # without bytecode each process takes seconds to begin
     # Beside the static checks, which leave a core to it.
     compiling = subprocess.Popen([sys.executable, "-m", "tests.compile_first"], cwd=ROOT, env=environment)
     failed = 0

@@ -52,15 +52,16 @@ def run(options: argparse.Namespace, console: Console) -> int:
     analysis = analysed(recording, console)
     prediction = predicted(recording, analysis, console)
     # Imported here: drawing is slow to load, and the session is on the disk by now.
-    from sessions.exports.html import write_figures, write_report
+    from sessions.exports.html import plates, write_figures, write_report
     from sessions.report import findings, score_table
 
     console.progress(0.9, "writing the report")
     scores = [score_table(Recording.open(folder)) for folder in study.scored]
     report = findings(recording, analysis, prediction, scores, study.planted)
     page, pictures = out / "report.html", out / "pictures"
-    write_report(report, page)
-    write_figures(report, pictures)
+    drawings = plates(report)
+    write_report(report, page, drawings)
+    write_figures(report, pictures, drawings)
 
     rows = _rows(study, analysis, prediction, {(m.descriptor, m.index): m.mean for m in mean_scores(scores)})
     summary = {

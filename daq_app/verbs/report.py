@@ -76,12 +76,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
     further = _further(recording, prediction, afferent, options, console)
     report = findings(recording, analysis, prediction, [score_table(one) for one in others], further=further)
     console.progress(0.9, "drawing")
+    drawings = html.plates(report)
     if options.out is None:  # beside the recording it is one more thing made of it, and listed in its manifest
-        page = store_page(recording.folder, PAGE, html.page(report))
+        page = store_page(recording.folder, PAGE, html.page(report, drawings))
     else:
         page = options.out
-        html.write_report(report, page)
-    pictures = html.write_figures(report, options.figures) if options.figures else ()
+        html.write_report(report, page, drawings)
+    pictures = html.write_figures(report, options.figures, drawings) if options.figures else ()
     console.result({"page": str(page), "pictures": [str(path) for path in pictures], "flaws": len(report.flaws)})
     console.say(f"{page}{' (SIMULATED)' if report.simulated else ''}")
     return 3 if analysis.flaws else 0

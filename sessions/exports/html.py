@@ -4,6 +4,7 @@ import base64
 import csv
 import io
 import os
+from collections.abc import Sequence
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -24,9 +25,12 @@ class ReportError(Exception):
     """A report that could not be written: where, why, what to do."""
 
 
-def page(report: Report) -> str:
-    """Return the page: no script, nothing asked of any network; the same report gives the same bytes."""
-    figures = {plate.name: plate for plate in plates(report)}
+def page(report: Report, drawings: Sequence[Plate] | None = None) -> str:
+    """Return the page: no script, nothing asked of any network; the same report gives the same bytes.
+
+    `drawings` are its `plates`, where they were drawn already.
+    """
+    figures = {plate.name: plate for plate in (plates(report) if drawings is None else drawings)}
     tables = report_tables.tables(report)
     return template("report.html.jinja").render(
         report=report,
@@ -42,20 +46,20 @@ def page(report: Report) -> str:
     )
 
 
-def write_report(report: Report, path: Path) -> None:
+def write_report(report: Report, path: Path, drawings: Sequence[Plate] | None = None) -> None:
     """Write the page to `path`: a new file, then swapped in, so that readers see the old page or the new one.
 
     Raises ReportError when that cannot be done, or when `path` holds something that is no page.
     """
     if path.exists() and not _is_page(path):
         raise ReportError(f"{path} holds something that is no report, so it is left alone: choose another file")
-    swap_in(path, page(report))
+    swap_in(path, page(report, drawings))
 
 
-def write_figures(report: Report, folder: Path) -> tuple[Path, ...]:
+def write_figures(report: Report, folder: Path, drawings: Sequence[Plate] | None = None) -> tuple[Path, ...]:
     """Write every picture of the report to `folder` as SVG, each with its numbers as CSV; return the files."""
     written: list[Path] = []
-    for plate in plates(report):
+    for plate in plates(report) if drawings is None else drawings:
         for panel in plate.panels:
             for ending, text in (
                 (".svg", panel.svg),

@@ -7,12 +7,39 @@ import pytest
 from daq_app.cli import run
 from sessions.recording import Recording
 
+FOUR = """
+name = "four"
+title = "Four surfaces"
+label_seed = 1
+contact_angle = 45.0
+
+[[blocks]]
+name = "stickiness"
+descriptor = "stickiness"
+direction = "proximal to distal"
+indentation = 2.0
+indices = [0, 100]
+instruction = "Push your finger once away from you."
+scale_ends = ["not sticky at all", "as sticky as can be"]
+
+[[blocks]]
+name = "slipperiness"
+descriptor = "slipperiness"
+direction = "distal to proximal"
+indentation = 1.5
+indices = [0, 100]
+instruction = "Pull your finger once towards you."
+scale_ends = ["not slippery at all", "as slippery as can be"]
+"""
+
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     """A blinded study of two subjects: both score, one strokes as well."""
     folder = tmp_path_factory.mktemp("studies") / "friction"
-    assert run(["enrol", str(folder), "--protocol", "sensotact-friction", "--blind", "--seed", "5"]) == 0
+    protocol = folder.with_name("four.toml")
+    protocol.write_text(FOUR)
+    assert run(["enrol", str(folder), "--protocol", str(protocol), "--blind", "--seed", "5"]) == 0
     own = ["--finger", "tip_radius=5.5", "contact_angle=40", "--depth", "stickiness=1.8"]
     assert run(["enrol", str(folder), "--subject", "P01", *own]) == 0
     assert run(["enrol", str(folder), "--subject", "P02"]) == 0

@@ -154,7 +154,7 @@ def test_killed_at_any_moment_it_leaves_no_process_behind_and_goes_on_where_it_w
     command = [sys.executable, "-m", "daq_app", "study", str(study), "--out", str(tmp_path), "--workers", "1"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as running:
         results = tmp_path / "results"
-        _until(lambda: results.is_dir() and any(results.iterdir()))
+        _until(lambda: any(results.glob("[!.]*.json")))  # not one that is half written
         children = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
         running.send_signal(signal.SIGKILL)
     assert children

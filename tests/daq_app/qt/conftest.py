@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QApplication
 from daq_app.qt.start import opened
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Stop
+from daq_app.window.live_model_process import LiveModel
 from daq_app.window.messages import Dismissed, NewSession
 
 PACE = 20.0  # told seconds in a real one
@@ -85,8 +86,13 @@ def application(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def one_window(application):
-    """One window for all tests of a file: a session that is over leaves it as it was."""
-    window = opened(application, lambda: Recorder.start(pace=PACE))
+    """One window for all tests of a file: a session that is over leaves it as it was.
+
+    Its live model does not start by itself, for with time running so fast it would keep a core busy all along.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(LiveModel, "prepare", lambda _: None)
+        window = opened(application, lambda: Recorder.start(pace=PACE))
     window.resize(1440, 900)
     window.show()
     yield window

@@ -129,6 +129,14 @@ def test_a_key_chooses_the_kinematics_of_the_live_model_and_the_choice_is_rememb
         assert again.bar.finite.isChecked() == (kinematics == "finite")
 
 
+def test_what_the_live_model_says_of_the_readings_stands_in_the_window(driver):
+    model, finger = driver.window.bridge.model, driver.window.live.finger
+    model.prepare()
+    driver.until(lambda: finger.accessibleName().endswith("Model at small strain: nothing touches."), "the model")
+    assert len(model.said.row) > 0
+    model.close()
+
+
 @pytest.mark.parametrize("locale", ["de_DE", "ja_JP", "tr_TR"])
 def test_numbers_have_a_point_in_every_country(driver, locale):
     before = QLocale()
