@@ -92,6 +92,9 @@ def foot(
         if sound(low.finger, low.shape):
             return low
         depth = low.shape.pull.depth
+    except NoSteadyState:
+        if scene.normal_force is not None and not scene.loading.dragged:
+            raise  # told on a mesh of its own, whatever this one is
     except SolveFailure:
         pass
     try:

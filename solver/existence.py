@@ -9,7 +9,7 @@ import numpy as np
 from solver import reach
 from solver.failures import NoSteadyState, NotConverged
 from solver.finite_finger import FiniteFinger
-from solver.kernels import CAP, OPEN
+from solver.kernels import CAP, OPEN, STEEP
 from solver.limit import CREASE, follow
 from solver.newton import BY_FRICTION, Newton, Pull, Shape
 from solver.reach import Reach, sound
@@ -62,13 +62,18 @@ def steady(
 def _tried(
     newton: Newton, pull: Pull, tolerance: float, start: Shape | None, stop: Callable[[], bool]
 ) -> Iterator[Shape]:
-    """Yield the states found directly: from `start`, from undeformed, and from all skin slipping at the bound."""
-    for begin in dict.fromkeys((start, None)):
-        with suppress(NotConverged):
-            yield settled(newton, pull, begin, tolerance, stop)
+    """Yield the states found directly: from `start`, from undeformed, and from all skin slipping at the bound.
+
+    The last comes before undeformed where friction is steep, so that nearly all skin slips at the bound.
+    """
+    ways: list[Callable[[], Shape]] = [lambda: settled(newton, pull, None, tolerance, stop)]
     if pull.tau < np.inf:
+        ways.insert(0 if pull.mu > STEEP else 1, lambda: all_at_the_bound(newton, pull, tolerance, stop))
+    if start is not None:
+        ways.insert(0, lambda: settled(newton, pull, start, tolerance, stop))
+    for way in ways:
         with suppress(NotConverged):
-            yield _all_at_the_bound(newton, pull, tolerance, stop)
+            yield way()
 
 
 def doubts(finger: FiniteFinger, shape: Shape, stop: Callable[[], bool] = lambda: False) -> tuple[str, ...]:
@@ -113,12 +118,12 @@ def _proven(finger: FiniteFinger, shape: Shape, proof: Reach) -> bool:
     return bool(np.all(np.abs(finger.numbers(shape) - proof.numbers) <= ALIKE * np.abs(proof.numbers)))
 
 
-def _all_at_the_bound(newton: Newton, pull: Pull, tolerance: float, stop: Callable[[], bool]) -> Shape:
-    """Return the settled state begun where nothing rubs, all that touches there first thought to slip at the bound.
+def all_at_the_bound(newton: Newton, pull: Pull, tolerance: float, stop: Callable[[], bool]) -> Shape:
+    """Return the settled state begun where nothing rubs, all that touches there slipping at a bound that grows.
 
     A low bound with a large coefficient of friction is felt where hardly anything presses: there slip is a bad guess.
     Raises NotConverged.
     """
     bare = settled(newton, pull._replace(mu=0.0), None, tolerance, stop)
     state = np.where(bare.touching, CAP, OPEN).astype(bare.state.dtype)
-    return settled(newton, pull, replace(bare, state=state, pull=pull), tolerance, stop)
+    return settled(newton, pull, replace(bare, state=state, pull=pull._replace(tau=0.0)), tolerance, stop)

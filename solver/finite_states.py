@@ -1,25 +1,27 @@
 """Settled states and courses of a scene at finite strain, on one mesh: driven by depth, or under given forces."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
-from solver import finite_forced, sliding
-from solver.existence import steady
+from solver import finite_forced, reach, sliding
+from solver.existence import all_at_the_bound, steady
 from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.finite_finger import FiniteFinger
-from solver.finite_forced import Given
-from solver.kernels import STICK
+from solver.finite_forced import Given, balanced
+from solver.kernels import STEEP, STICK
 from solver.march import march
-from solver.newton import Pull, Shape
+from solver.newton import BY_DEPTH, Newton, Pull, Shape
 from solver.scene import Scene
 
 LEADING = 1e-3  # tolerance of states that only lead to others [mm]
 GOOD, CLOSE = 1e-7, 1e-7  # tolerance of the states of a course [mm], and by the indentation where that is less
 PRESSES = 40  # steps of the pre-indentation, and of a drag that grows
-BEFORE_LIMIT = 0.99  # of the largest depth, at which a force is still looked for
-SEARCHES = 60  # steps of a search for the depth at which a force is met
+BEYOND = 1.5  # times the depth at which a force did not grow any more, up to which the largest is looked for
+SEARCHES = 20  # steps of a search for the depth at which a force is met
+FURTHEST = 0.25  # of the depth, by which it may change in one
 MET = 1e-9  # relative difference within which it is
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
 STRIDE = 0.1  # of the bone while it slides, by the indentation [-]
@@ -108,53 +110,65 @@ def _sliding_under(
     """Return settled sliding under the normal force of a scene, from `start` or reached as the force grows."""
     newton = finger.newton
     sense = -(scene.loading.direction or 1)
+    pull = Pull(0.0, float(scene.friction.mu), scene.friction.cap, sense)
+    capped = pull.mu > STEEP and pull.tau < np.inf  # nearly all of the skin slips at the bound
     if start is not None:
-        try:
-            pull = start.pull._replace(mu=float(scene.friction.mu), tau=scene.friction.cap, sense=sense)
-            near = replace(start, pull=pull)
-            shape = finite_forced.balanced(newton, near, Given(force, None))
-            return steady(finger, shape.pull, start=shape, stop=stop)
-        except NotConverged:
-            pass
-    begin = finite_forced.untouched(newton, float(scene.friction.mu), scene.friction.cap)
-    shape = begin = replace(begin, pull=begin.pull._replace(sense=sense))
-    grows = [Given(force * part, None) for part in (0.02, 0.1, 0.25, 0.5, 0.75, 1.0)]
+        near = replace(start, pull=pull._replace(depth=start.pull.depth, travel=start.pull.travel))
+        with suppress(NotConverged):
+            found = _at_force(newton, near, force, stop) if capped else balanced(newton, near, Given(force, None))
+            return steady(finger, found.pull, start=found, stop=stop)
+    if capped:
+        with suppress(NotConverged):
+            *_, bare = _grown(newton, pull._replace(mu=0.0), force, stop)
+            begin = all_at_the_bound(newton, pull._replace(depth=bare.pull.depth), LEADING, stop)
+            found = _at_force(newton, begin, force, stop)
+            return steady(finger, found.pull, start=found, stop=stop)
+    shape: Shape | None = None
     try:
-        for reached in finite_forced.march(newton, begin, Given(0.0, None), grows, stop):
+        for reached in _grown(newton, pull, force, stop):
             shape = reached
     except NotConverged:
+        if shape is None:
+            raise
         return _deeper(finger, shape, force, stop)
+    assert shape is not None
     return steady(finger, shape.pull, start=shape, stop=stop)
 
 
-def _deeper(finger: FiniteFinger, shape: Shape, force: float, stop: Callable[[], bool]) -> Shape:
-    """Return settled sliding under `force` [N/mm], looked for by depth from `shape` on. Raises as `settled`."""
-    step = 0.1 * max(shape.pull.depth, 0.1)
-    low = shape
-    for _ in range(SEARCHES):  # deeper until it presses as hard
-        begin = low if low.touching.any() else None
-        try:
-            high = steady(finger, low.pull._replace(depth=low.pull.depth + step), start=begin, stop=stop)
-        except NoSteadyState as failure:  # but shortly before that it may press as hard
-            last = BEFORE_LIMIT * (failure.limit_indentation or 0.0)
-            if last <= low.pull.depth:
-                raise
-            high = steady(finger, low.pull._replace(depth=last), start=begin, stop=stop)
-            if high.force[1] < force:
-                raise
-        if high.force[1] >= force:
+def _grown(newton: Newton, pull: Pull, force: float, stop: Callable[[], bool]) -> Iterator[Shape]:
+    """Yield slides with the friction of `pull` as the normal force grows to `force`. Raises NotConverged."""
+    begin = finite_forced.untouched(newton, pull.mu, pull.tau)
+    begin = replace(begin, pull=begin.pull._replace(sense=pull.sense))
+    grows = [Given(force * part, None) for part in (0.02, 0.1, 0.25, 0.5, 0.75, 1.0)]
+    return finite_forced.march(newton, begin, Given(0.0, None), grows, stop)
+
+
+def _at_force(newton: Newton, start: Shape, force: float, stop: Callable[[], bool]) -> Shape:
+    """Return the slide that presses with `force` [N/mm], its depth sought from `start` on. Raises NotConverged."""
+    shape, depth = start, start.pull.depth
+    for _ in range(SEARCHES):
+        shape = sliding.settled(newton, shape.pull._replace(depth=depth), shape, stop=stop)
+        if abs(shape.force[1] / force - 1.0) < MET:
+            return shape
+        if not newton.linearise(shape, shape.pull, newton.skin_x):
             break
-        low, step = high, 1.5 * step
-    else:
-        raise NotConverged(f"No depth was found at which the finger presses with {force:.4g} N/mm.")
-    for _ in range(SEARCHES):  # regula falsi, held inside by bisection
-        part = (force - low.force[1]) / (high.force[1] - low.force[1])
-        depth = low.pull.depth + float(np.clip(part, 0.05, 0.95)) * (high.pull.depth - low.pull.depth)
-        found = steady(finger, low.pull._replace(depth=depth), start=high, stop=stop)
-        if abs(found.force[1] / force - 1.0) < MET or high.pull.depth - low.pull.depth < 1e-12:
-            return found
-        low, high = (low, found) if found.force[1] > force else (found, high)
+        stiffness = float(newton.reaction(newton.steps[:, BY_DEPTH], still=True)[:, 1].sum())
+        if not stiffness > 0.0:
+            break
+        depth += float(np.clip((force - shape.force[1]) / stiffness, -FURTHEST * depth, FURTHEST * depth))
     raise NotConverged(f"No depth was found at which the finger presses with {force:.4g} N/mm.")
+
+
+def _deeper(finger: FiniteFinger, shape: Shape, force: float, stop: Callable[[], bool]) -> Shape:
+    """Return settled sliding under `force` [N/mm] deeper than `shape`, from where it did not grow on.
+
+    How deep sliding goes, and how hard it presses there, is told by `solver.reach`. Raises as `settled`.
+    """
+    proof = reach.of_depth(finger.scene, shape.pull._replace(depth=BEYOND * shape.pull.depth), stop)
+    if proof.limited and not proof.lost and proof.numbers[1] < force:
+        raise NoSteadyState("There is no settled sliding so deep.", limit_indentation=proof.value)
+    found = _at_force(finger.newton, shape, force, stop)
+    return steady(finger, found.pull, start=found, stop=stop)
 
 
 def _pull_sliding(scene: Scene) -> Pull:

@@ -10,7 +10,7 @@ from solver.kernels.elements import advance, assemble, energies, forces
 from solver.kernels.fronts import condense, eliminate, unfold
 from solver.kernels.outline import crosses, pinched
 from solver.kernels.overstress import add_overstress
-from solver.kernels.skin import impose, restate, settle, solve, tributary
+from solver.kernels.skin import STEEP, impose, restate, settle, solve, tributary
 
 __all__ = [
     "CAP",
@@ -18,6 +18,7 @@ __all__ = [
     "HELD_Y",
     "OPEN",
     "SLIP",
+    "STEEP",
     "STICK",
     "add_overstress",
     "advance",

@@ -9,6 +9,9 @@ from solver.kernels.compiling import CAP, HELD_X, HELD_Y, OPEN, SLIP, STICK, Arr
 _LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
 
 
+STEEP = 1.0  # coefficient of friction from which skin that comes to touch is first thought to slip at the bound
+
+
 @compiled
 def tributary(x: Array, at: Narrow, out: Array) -> None:
     """Fill `out` (k,) with the length of skin each node stands for, `x` (k,) being positions along the surface.
@@ -172,7 +175,8 @@ def restate(
 
     `reaction` (k, 2) forces on the skin, `above` (k,) heights over the surface, `slid` (k,) how far each node went
     along +x relative to the surface since the last step. With `direction` -1 or +1 every touching node slips, the
-    friction force pointing there; with 0 nodes stick, slip and turn round.
+    friction force pointing there; with 0 nodes stick, slip and turn round. Where friction is steep, slip is a bad guess
+    of a node that comes to touch: its own drag may lift it off by more than it is pressed, and open it goes through.
     """
     changed = 0
     size = state.shape[0]
@@ -187,6 +191,8 @@ def restate(
         if was == OPEN:
             if above[i] < -small:
                 now = STICK if direction == 0 and mu > 0.0 and tau > 0.0 else SLIP
+                if direction != 0 and mu > STEEP and tau < np.inf:
+                    now = CAP
                 turned = direction if direction != 0 else turned
         elif reaction[i, 1] < -slack:
             now = OPEN
@@ -236,11 +242,15 @@ def settle(
 
     That is the contact of the linearised body, exact where the rounds suffice. `x` (k,) are positions along the
     surface, `anchor` (k,) those where nodes stick; filled beside `steps`: `reaction` (k, 2). For the rest see
-    `impose` and `restate`. False where a system cannot be solved.
+    `impose` and `restate`. A node that comes to touch at the bound again and again slips every other time. False where
+    a system cannot be solved.
     """
     size = state.shape[0]
+    entered = np.zeros(size, np.int32)  # how often each node came to touch
+    before = np.empty_like(state)
     tributary(x, at, length)
     for turn in range(rounds + 1):
+        before[:] = state
         count = impose(
             stiffness, force, held, at, state, sense, mu, tau, above, x - anchor, length, free, matrix, right, steps
         )
@@ -263,6 +273,10 @@ def settle(
             == 0
         ):
             break
+        for i in range(size):
+            if before[i] == OPEN and state[i] == CAP:
+                entered[i] += 1
+                state[i] = CAP if entered[i] % 2 == 1 else SLIP
     return True
 
 
