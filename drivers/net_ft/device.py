@@ -20,7 +20,7 @@ from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, Transd
 # All in real seconds, since networks know no other.
 _TICK = 0.05  # longest wait for a datagram, and so for a stop
 _ASK_EVERY = 0.1  # between two start requests while nothing comes
-_PATIENCE = 1.0  # until a box that never sent anything is given up
+_PATIENCE = 3.0  # until a box that never sent anything is given up: the computer may be busy just then
 _SILENCE = 3.0  # until a box that has fallen silent is given up
 _QUIET = 0.3  # silence after which the box is asked to start again
 _THEFTS = 3  # so many returns within _THEFT_SPAN mean that somebody else keeps taking the stream

@@ -5,13 +5,18 @@ import threading
 import pytest
 
 from drivers.clock import PacedClock
+from drivers.net_ft import device
 from simulators.bench import Bench
 from simulators.net_ft_box import NetFtBox
 
 
 @pytest.fixture
-def box():
-    """Return a function that starts a networked box, by default told that time runs ten times as fast."""
+def box(monkeypatch):
+    """Return a function that starts a networked box, by default told that time runs ten times as fast.
+
+    However busy this machine is, its first reading is waited for.
+    """
+    monkeypatch.setattr(device, "_PATIENCE", 120.0)
     boxes, before = [], set(threading.enumerate())
 
     def started(bench=None, *, clock=None, **settings):
