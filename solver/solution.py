@@ -6,7 +6,7 @@ from dataclasses import replace
 from solver import differences, small_solution
 from solver.differences import TOLD, Off
 from solver.estimate import DEFAULT, FINENESS, coarsest_for, finer_than
-from solver.failures import NotConverged, SolveFailure
+from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.finger import FingerModel
 from solver.holding import with_held
 from solver.matching import expected_depth
@@ -16,6 +16,7 @@ from solver.scene import Scene
 from solver.small_solution import Answer, Progress, Watch
 from solver.stepping import March
 
+STILL = "A coarser mesh still has a settled state here, so that this lies within what is known of that limit."
 Rough = Callable[[Prediction], None]  # told an answer before more is made of it: what there is, should work be stopped
 
 
@@ -147,7 +148,8 @@ def _solve_group(
     """Refine until every scene's estimate meets its tolerance and surfaces are told apart, or no mesh is finer.
 
     Scenes that share a mesh are solved again together on the finer one. A state that a finer mesh does not find is told
-    as the coarser one has it.
+    as the coarser one has it; one that the finer mesh puts beyond a limit is refused, with a sentence that the coarser
+    does not.
     """
     asked = [s.solve.tolerance for s in scenes]
     kind = scenes[0].solve.kinematics
@@ -162,8 +164,11 @@ def _solve_group(
     while True:
         solved = _on_mesh([scenes[i] for i in todo], depth, fineness, progress, watch, in_loops)
         for i, answer in zip(todo, solved, strict=True):
-            if isinstance(answer, NotConverged) and isinstance(found.get(i), Prediction):
+            coarser = found.get(i)
+            if isinstance(answer, NotConverged) and isinstance(coarser, Prediction):
                 unfound.add(i)
+            elif isinstance(answer, NoSteadyState) and isinstance(coarser, Prediction):
+                found[i] = answer.doubted(STILL)
             else:
                 found[i] = answer
         missed = [i not in unfound and _misses(found[i], asked[i]) for i in range(len(scenes))]

@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from solver import solution
-from solver.failures import NotConverged
+from solver.failures import NoSteadyState, NotConverged
+from solver.prediction import Prediction
 from solver.scene import Friction, Loading, Materials, Scene, Solve
 from solver.solution import solve
 
@@ -50,6 +51,20 @@ def test_a_tolerance_so_strict_that_its_first_mesh_finds_nothing_does_not_lose_t
     found = solve(stiffening(0.3, 0.001))
     assert found.error_estimate > 0.001
     assert any("finer mesh did not find" in told for told in found.warnings)
+
+
+def test_a_state_that_a_finer_mesh_puts_beyond_its_limit_is_refused_and_the_refusal_names_the_doubt(monkeypatch):
+    whole = solution._on_mesh
+
+    def refused(scenes, depth, fineness, *rest, **more):
+        beyond = NoSteadyState("beyond", limit_mu=0.299)
+        return whole(scenes, depth, fineness, *rest, **more) if fineness <= 7 else [beyond] * len(scenes)
+
+    monkeypatch.setattr(solution, "_on_mesh", refused)
+    monkeypatch.setattr(solution, "_misses", lambda answer, _: isinstance(answer, Prediction))
+    with pytest.raises(NoSteadyState, match=r"^Beyond\. A coarser mesh still has a settled state") as told:
+        solve(stiffening(0.3, 0.01))
+    assert told.value.limit_mu == 0.299
 
 
 @pytest.mark.slow
