@@ -73,37 +73,57 @@ class _Shared:
     widest: bool  # whether contact was looked for wherever it can be
 
 
+class Fingers:
+    """Makes the fingers of one group of scenes, each mesh once; those of the last fineness asked for are kept."""
+
+    def __init__(self, scene: Scene, *, in_loops: bool) -> None:
+        """Make none yet; `in_loops` as in `Body.of`."""
+        self._scene, self._in_loops = scene, in_loops
+        self._fineness = 0.0
+        self._made: dict[Sizing, tuple[FingerModel, float]] = {}
+
+    def begin(self, fineness: float) -> None:
+        """Forget those of another fineness."""
+        if fineness != self._fineness:
+            self._made.clear()
+        self._fineness = fineness
+
+    def of(self, sizing: Sizing) -> tuple[FingerModel, float]:
+        """Return the finger, and what it took to make [s]. Raises SceneError, NotConverged."""
+        if sizing not in self._made:
+            begun = perf_counter()
+            finger = _meshed(self._scene, sizing, self._in_loops)
+            self._made[sizing] = finger, perf_counter() - begun
+        return self._made[sizing]
+
+
 def answers(
     scenes: list[Scene],
     depth: float,
     fineness: float,
     progress: Progress | None,
     watch: Watch | None,
-    in_loops: bool,
+    fingers: Fingers,
 ) -> list[Answer]:
     """Solve all scenes on one mesh, and on a coarser one for the estimate; look wider where contact reaches out.
 
     Surfaces that are told apart are solved on a second coarse mesh.
     """
+    fingers.begin(fineness)
     surfaces = {number for numbers in together(scenes) for number in numbers}
     done: list[Answer | None] = []
     most = max(depth, min(WIDE * depth, scenes[0].finger.pulp_thickness()))  # for drags that lay much skin on
     for margin, deep in ((1.0, depth), (4.0, depth), (WIDE, depth), (WIDE, most)):
         sizing = Sizing(fineness, deep, margin=margin)
+        half = replace(sizing, fineness=fineness / 2.0)
         try:
-            begun = perf_counter()
-            fine = _meshed(scenes[0], sizing, in_loops)
-            setup = perf_counter() - begun - fine.solve_s
-            begun = perf_counter()
-            half = replace(sizing, fineness=fineness / 2.0)
-            coarse = _meshed(scenes[0], replace(half, shift=True), in_loops)
-            plain = _meshed(scenes[0], half, in_loops) if surfaces else None
+            fine, took = fingers.of(sizing)
+            coarse, more = fingers.of(replace(half, shift=True))
+            plain, again = fingers.of(half) if surfaces else (None, 0.0)
         except NotConverged as failure:
             return [failure] * len(scenes)
-        estimate = (perf_counter() - begun) / len(scenes)
-        alone = _Shared(
-            fineness, fine, coarse, None, setup, fine.solve_s / len(scenes), estimate, widest=margin == WIDE
-        )
+        solve, estimate = fine.solve_s / len(scenes), (more + again) / len(scenes)
+        alone = _Shared(fineness, fine, coarse, None, took - fine.solve_s, solve, estimate, widest=margin == WIDE)
         beside = replace(alone, plain=plain)
         done = []
         for number, scene in enumerate(scenes):

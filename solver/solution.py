@@ -1,7 +1,7 @@
 """From scenes to predictions: one mesh for all that share a finger, and an error estimate with every answer."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from solver import differences, small_solution
 from solver.differences import TOLD, Off
@@ -13,7 +13,7 @@ from solver.matching import expected_depth
 from solver.measured import COARSE, Answers, measured
 from solver.prediction import Prediction
 from solver.scene import Scene
-from solver.small_solution import Answer, Progress, Watch
+from solver.small_solution import Answer, Fingers, Progress, Watch
 from solver.stepping import March
 
 STILL = "A coarser mesh still has a settled state here, so that this lies within what is known of that limit."
@@ -145,24 +145,38 @@ def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
 def _solve_group(
     scenes: list[Scene], progress: Progress | None, watch: Watch | None, rough: Rough | None, in_loops: bool
 ) -> list[Answer]:
+    """Solve scenes that share a mesh on the coarsest that does.
+
+    Where courses are marched, that is looked for on their settled ends: each is marched, and told, once.
+    """
+    asked = [s.solve.tolerance for s in scenes if s.solve.tolerance is not None]
+    kind = scenes[0].solve.kinematics
+    depth = max(expected_depth(scene, in_loops=in_loops) for scene in scenes)
+    fineness: float = coarsest_for(scenes[0].driven(depth), min(asked)) if asked else DEFAULT[kind]
+    on_mesh = _Meshing(depth, progress, Fingers(scenes[0], in_loops=in_loops))
+    marched = kind == "small" and any(scene.solve.course == "history" for scene in scenes)
+    if marched and (asked or differences.together(scenes)):
+        ends = [replace(scene, solve=replace(scene.solve, course="steady")) for scene in scenes]
+        _, fineness = _refined(ends, fineness, on_mesh, None, None)
+    return _refined(scenes, fineness, on_mesh, watch, rough)[0]
+
+
+def _refined(
+    scenes: list[Scene], fineness: float, on_mesh: "_Meshing", watch: Watch | None, rough: Rough | None
+) -> tuple[list[Answer], float]:
     """Refine until every scene's estimate meets its tolerance and surfaces are told apart, or no mesh is finer.
 
     Scenes that share a mesh are solved again together on the finer one. A state that a finer mesh does not find is told
     as the coarser one has it; one that the finer mesh puts beyond a limit is refused, with a sentence that the coarser
-    does not.
+    does not. Returns the answers, and the fineness at last.
     """
-    asked = [s.solve.tolerance for s in scenes]
-    kind = scenes[0].solve.kinematics
-    strictest = min((a for a in asked if a is not None), default=None)
-    depth = max(expected_depth(scene, in_loops=in_loops) for scene in scenes)
-    fineness = DEFAULT[kind] if strictest is None else coarsest_for(scenes[0].driven(depth), strictest)
     surfaces = differences.together(scenes)
-    first = fineness
+    first, kind = fineness, scenes[0].solve.kinematics
     found: dict[int, Answer] = {}
     unfound: set[int] = set()  # by a finer mesh
     todo = list(range(len(scenes)))
     while True:
-        solved = _on_mesh([scenes[i] for i in todo], depth, fineness, progress, watch, in_loops)
+        solved = on_mesh([scenes[i] for i in todo], fineness, watch)
         for i, answer in zip(todo, solved, strict=True):
             coarser = found.get(i)
             if isinstance(answer, NotConverged) and isinstance(coarser, Prediction):
@@ -171,12 +185,12 @@ def _solve_group(
                 found[i] = answer.doubted(STILL)
             else:
                 found[i] = answer
-        missed = [i not in unfound and _misses(found[i], asked[i]) for i in range(len(scenes))]
+        missed = [i not in unfound and _misses(found[i]) for i in range(len(scenes))]
         apart = [
             differences.off([one for i in together if isinstance(one := found[i], Prediction)]) for together in surfaces
         ]
         alike = {i for together, off in zip(surfaces, apart, strict=True) if off.share > TOLD for i in together}
-        finer = finer_than(scenes[0].driven(depth), fineness) if any(missed) or alike else []
+        finer = finer_than(scenes[0].driven(on_mesh.depth), fineness) if any(missed) or alike else []
         if not finer:
             break
         for answer in found.values():
@@ -186,14 +200,13 @@ def _solve_group(
         if kind == "finite":
             again = {scenes[i].pressed for i in todo if missed[i] or i in alike}
             todo = [i for i in todo if scenes[i].pressed in again]
-    unfound |= _fallen_back(scenes, found, depth, first, progress)
+    unfound |= _fallen_back(scenes, found, first, on_mesh)
     of = {i: off for together, off in zip(surfaces, apart, strict=True) for i in together}
-    return [_warned(found[i], of.get(i), misses=missed[i], unfound=i in unfound) for i in range(len(scenes))]
+    told = [_warned(found[i], of.get(i), misses=missed[i], unfound=i in unfound) for i in range(len(scenes))]
+    return told, fineness
 
 
-def _fallen_back(
-    scenes: list[Scene], found: dict[int, Answer], depth: float, first: float, progress: Progress | None
-) -> set[int]:
+def _fallen_back(scenes: list[Scene], found: dict[int, Answer], first: float, on_mesh: "_Meshing") -> set[int]:
     """Put answers of coarser meshes in place of what even the `first` mesh did not find, and return which ones.
 
     At finite strain alone, where a fine mesh may lose its way.
@@ -202,7 +215,7 @@ def _fallen_back(
     for i, scene in enumerate(scenes):
         coarser = [n for n in FINENESS["finite"] if n < first and scene.solve.kinematics == "finite"]
         while coarser and isinstance(found[i], NotConverged):
-            answer = _on_mesh([scene], depth, coarser.pop(), progress, None, in_loops=True)[0]
+            answer = on_mesh([scene], coarser.pop(), None)[0]
             if isinstance(answer, Prediction):
                 found[i] = answer
                 back.add(i)
@@ -221,21 +234,26 @@ def _warned(answer: Answer, off: Off | None, *, misses: bool, unfound: bool) -> 
     return replace(answer, warnings=(*answer.warnings, *told)) if told and isinstance(answer, Prediction) else answer
 
 
-def _on_mesh(
-    scenes: list[Scene],
-    depth: float,
-    fineness: float,
-    progress: Progress | None,
-    watch: Watch | None,
-    in_loops: bool,
-) -> list[Answer]:
-    if scenes[0].solve.kinematics == "finite":
-        # Imported here: small strain, the default, need not wait for the compiled loops to be loaded.
-        from solver.finite_solution import answers as finite_answers
+@dataclass(frozen=True, slots=True)
+class _Meshing:
+    """Solves scenes of one finger on meshes made for it."""
 
-        return finite_answers(scenes, depth, fineness, progress)
-    return small_solution.answers(scenes, depth, fineness, progress, watch, in_loops)
+    depth: float  # that they reach, or about [mm]
+    progress: Progress | None
+    fingers: Fingers
+
+    def __call__(self, scenes: list[Scene], fineness: float, watch: Watch | None) -> list[Answer]:
+        """Return the answers on meshes of that fineness."""
+        if scenes[0].solve.kinematics == "finite":
+            # Imported here: small strain, the default, need not wait for the compiled loops to be loaded.
+            from solver.finite_solution import answers as finite_answers
+
+            return finite_answers(scenes, self.depth, fineness, self.progress)
+        return small_solution.answers(scenes, self.depth, fineness, self.progress, watch, self.fingers)
 
 
-def _misses(answer: Answer, tolerance: float | None) -> bool:
-    return isinstance(answer, Prediction) and tolerance is not None and answer.error_estimate > tolerance
+def _misses(answer: Answer) -> bool:
+    """Return whether an answer has not met the tolerance of its scene."""
+    if not isinstance(answer, Prediction) or answer.scene.solve.tolerance is None:
+        return False
+    return answer.error_estimate > answer.scene.solve.tolerance

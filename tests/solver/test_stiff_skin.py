@@ -22,46 +22,40 @@ def stiffening(mu, tolerance=None):
     )
 
 
+def meshing(monkeypatch, finer, *, missed=None):
+    """Let all meshes but the coarsest end as `finer`; return the finenesses asked for, and what solves indeed."""
+    whole, asked = solution._Meshing.__call__, []
+
+    def solved(self, scenes, fineness, watch):
+        asked.append(fineness)
+        return whole(self, scenes, fineness, watch) if fineness <= 7 else [finer] * len(scenes)
+
+    monkeypatch.setattr(solution._Meshing, "__call__", solved)
+    if missed is not None:
+        monkeypatch.setattr(solution, "_misses", missed)
+    return asked
+
+
 def test_an_answer_that_a_finer_mesh_does_not_find_is_told_as_the_coarser_has_it_with_a_sentence(monkeypatch):
-    whole = solution._on_mesh
-    meshes = []
-
-    def lost(scenes, depth, fineness, *rest):
-        meshes.append(fineness)
-        return whole(scenes, depth, fineness, *rest) if len(meshes) == 1 else [NotConverged("lost")] * len(scenes)
-
     scene = stiffening(0.3, 0.01)
-    monkeypatch.setattr(solution, "_on_mesh", lost)
-    monkeypatch.setattr(solution, "_misses", lambda answer, _: not isinstance(answer, NotConverged))
+    alone = solve(replace(scene, solve=replace(scene.solve, tolerance=0.5)))
+    asked = meshing(monkeypatch, NotConverged("lost"), missed=lambda answer: not isinstance(answer, NotConverged))
     found = solve(scene)
-    assert len(meshes) == 2
-    monkeypatch.undo()
-    alone = whole([scene], 2.0, meshes[0], None, None, False)[0]
+    assert len(asked) == 2
     assert (found.sed_ending, found.error_estimate) == (alone.sed_ending, alone.error_estimate)
     assert any("finer mesh did not find" in told for told in found.warnings)
 
 
 def test_a_tolerance_so_strict_that_its_first_mesh_finds_nothing_does_not_lose_the_answer_of_a_coarser_one(monkeypatch):
-    whole = solution._on_mesh
-
-    def lost(scenes, depth, fineness, *rest, **more):
-        return whole(scenes, depth, fineness, *rest, **more) if fineness <= 7 else [NotConverged("lost")] * len(scenes)
-
-    monkeypatch.setattr(solution, "_on_mesh", lost)
+    meshing(monkeypatch, NotConverged("lost"))
     found = solve(stiffening(0.3, 0.001))
     assert found.error_estimate > 0.001
     assert any("finer mesh did not find" in told for told in found.warnings)
 
 
 def test_a_state_that_a_finer_mesh_puts_beyond_its_limit_is_refused_and_the_refusal_names_the_doubt(monkeypatch):
-    whole = solution._on_mesh
-
-    def refused(scenes, depth, fineness, *rest, **more):
-        beyond = NoSteadyState("beyond", limit_mu=0.299)
-        return whole(scenes, depth, fineness, *rest, **more) if fineness <= 7 else [beyond] * len(scenes)
-
-    monkeypatch.setattr(solution, "_on_mesh", refused)
-    monkeypatch.setattr(solution, "_misses", lambda answer, _: isinstance(answer, Prediction))
+    beyond = NoSteadyState("beyond", limit_mu=0.299)
+    meshing(monkeypatch, beyond, missed=lambda answer: isinstance(answer, Prediction))
     with pytest.raises(NoSteadyState, match=r"^Beyond\. A coarser mesh still has a settled state") as told:
         solve(stiffening(0.3, 0.01))
     assert told.value.limit_mu == 0.299
