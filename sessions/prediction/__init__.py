@@ -1,0 +1,49 @@
+"""From the friction of a session's strokes to what the model predicts: the only door to the solver.
+
+Each trial becomes a scene: its measured friction, its block's indentation, its direction and speed, and one finger.
+"""
+
+from sessions.prediction.options import PredictionOptions, tau_scale, with_own_finger
+from sessions.prediction.predicting import Way, predict
+from sessions.prediction.scenes import DEFAULT_SPEED, SLIDES, scene_along, scenes_of, with_loads
+from sessions.prediction.solving import (
+    Progress,
+    doubt_of,
+    sed_by,
+    seds_at,
+    settled,
+    slides,
+    solved,
+    traction_reached,
+)
+from sessions.prediction.stored import SessionPrediction, TrialPrediction
+from solver.nearby import Nearby
+from solver.prediction import Prediction
+from solver.scene import Friction, Scene
+
+__all__ = [
+    "DEFAULT_SPEED",
+    "SLIDES",
+    "Friction",
+    "Nearby",
+    "Prediction",
+    "PredictionOptions",
+    "Progress",
+    "Scene",
+    "SessionPrediction",
+    "TrialPrediction",
+    "Way",
+    "doubt_of",
+    "predict",
+    "scene_along",
+    "scenes_of",
+    "sed_by",
+    "seds_at",
+    "settled",
+    "slides",
+    "solved",
+    "tau_scale",
+    "traction_reached",
+    "with_loads",
+    "with_own_finger",
+]

@@ -1,0 +1,141 @@
+"""The prediction of a session: all its scenes solved together on one mesh, so that differences are accurate."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from sessions.analysis import Analysis
+from sessions.plan import SessionPlan
+from sessions.prediction.options import PredictionOptions, template, with_own_finger
+from sessions.prediction.scenes import Prepared, opposite, prepared_cases
+from sessions.prediction.solving import Progress, quick
+from sessions.prediction.stored import SessionPrediction, TrialPrediction
+from solver.failures import SolveFailure
+from solver.finger import FingerModel
+from solver.matching import matching_depths
+from solver.prediction import Prediction
+from solver.scene import Finger, Scene
+from solver.solution import answers
+from solver.stepping import March
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Way:
+    """How the model came to its answer for one trial, for pictures of it."""
+
+    scene: Scene
+    finger: FingerModel
+    march: March | None  # None where it has none that can be drawn
+
+
+Watch = Callable[[int, TrialPrediction, Way | None], None]  # position of the row, the row, how it was found
+
+
+def predict(
+    analysis: Analysis,
+    plan: SessionPlan,
+    options: PredictionOptions | None = None,
+    progress: Progress | None = None,
+    watch: Watch | None = None,
+    first: int | None = None,
+) -> SessionPrediction:
+    """Return what the model predicts for every trial of `plan`, or for every stroke where it plans none.
+
+    The finger is the one asked for, or else the published one with what the plan knows of the subject's own. A trial
+    without friction, without depth or without a settled state keeps its row, with the reason. The row at position
+    `first` is solved before the others; `watch` is told each row as soon as it is known. Raises SceneError where the
+    options make no scene, Cancelled where `progress` (told the part done) returns False.
+    """
+    asked = with_own_finger(options or PredictionOptions(), plan)
+    prepared = prepared_cases(analysis, plan, asked)
+    rows = [one.row for one in prepared]
+    told = watch or _unseen
+    for number, one in enumerate(prepared):
+        if one.scene is None:
+            told(number, one.row, None)
+    solved = sorted((n for n, one in enumerate(prepared) if one.scene is not None), key=lambda n: (n != first, n))
+    scenes = [scene for n in solved if (scene := prepared[n].scene) is not None]
+    # A depth is matched on the small-strain finger, whose answer at finite strain would be another one.
+    matches = asked.kinematics == "small"
+    forces = [_force_per_mm(prepared[n]) if matches else None for n in solved]
+    wanted = [(scene, force) for scene, force in zip(scenes, forces, strict=True) if force is not None]
+    matched = iter(matching_depths([scene for scene, _ in wanted], [force for _, force in wanted], in_loops=True))
+    depths = [None if force is None else next(matched) for force in forces]
+    ways: dict[int, Way] = {}
+    found: dict[int, Prediction | SolveFailure] = {}
+
+    def known(at: int) -> TrialPrediction:
+        return _filled(prepared[solved[at]], found[2 * at], found[2 * at + 1], depths[at])
+
+    def seen(number: int, answer: Prediction | SolveFailure, finger: FingerModel, march: March | None) -> None:
+        found[number] = answer
+        at, back = divmod(number, 2)
+        if not back:
+            ways[at] = Way(scenes[at], finger, march)
+        elif 2 * at in found:
+            told(solved[at], known(at), ways.get(at))
+
+    both = [one for scene in scenes for one in (scene, quick(opposite(scene)))]
+    found |= dict(enumerate(answers(both, progress, seen if watch else None, in_loops=True)))
+    for at, number in enumerate(solved):
+        rows[number] = known(at)
+    base = asked.scene
+    return SessionPrediction(
+        simulated=analysis.simulated,
+        trials=tuple(rows),
+        width=template(asked).finger.width,
+        width_origin="assumed" if base is None or base.finger.width == Finger().width else "set",
+        options=asked,
+        decisions=analysis.decisions,
+        area=analysis.settings.area,
+        gain_error=analysis.settings.gain_error,
+    )
+
+
+def _unseen(_number: int, _row: TrialPrediction, _way: Way | None) -> None:
+    """Tell nobody."""
+
+
+def _force_per_mm(prepared: Prepared) -> float | None:
+    measured = prepared.row.measured_normal
+    return None if measured is None or prepared.scene is None else measured / prepared.scene.finger.width
+
+
+def _filled(
+    prepared: Prepared,
+    found: Prediction | SolveFailure,
+    back: Prediction | SolveFailure,
+    depth: float | None,
+) -> TrialPrediction:
+    """Return the row with what the solver found, or with the reason for what it did not."""
+    row, scene = prepared.row, prepared.scene
+    assert scene is not None  # the caller solved it
+    reasons: dict[str, str] = {}
+    if depth is None:
+        if scene.solve.kinematics == "finite":
+            reasons["matching_depth"] = "The depth that matches is found at small strain only."
+        elif row.measured_normal is None:
+            reasons["matching_depth"] = "The stroke gives no steady normal force."
+        else:
+            reasons["matching_depth"] = (
+                "The model would have to be pressed nearly to its bone, or has no settled state there."
+            )
+    if isinstance(back, SolveFailure):
+        reasons["opposite_sed"] = str(back)
+    else:
+        row = replace(row, opposite_sed=back.sed_ending, opposite=back)
+    row = replace(row, matching_depth=depth)
+    if isinstance(found, SolveFailure):
+        reasons |= dict.fromkeys(("sed", "normal_force", "tangential_force"), str(found))
+        return replace(row, reasons=reasons)
+    return replace(
+        row,
+        sed=found.sed_ending,
+        error_estimate=found.error_estimate,
+        normal_per_mm=found.normal_force,
+        tangential_per_mm=found.tangential_force,
+        normal_force=found.normal_force * scene.finger.width,
+        tangential_force=found.tangential_force * scene.finger.width,
+        wall_s=found.wall_s,
+        prediction=found,
+        reasons=reasons,
+    )

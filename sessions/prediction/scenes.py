@@ -1,0 +1,175 @@
+"""From strokes to scenes: what the model gets of each trial, of its variants, and of slides beside it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from sessions.alternative import Variant
+from sessions.analysis import Analysis, FrictionParameters, Stroke
+from sessions.plan import DISTAL_TO_PROXIMAL, PROXIMAL_TO_DISTAL, Block, SessionPlan, Trial
+from sessions.prediction.options import PredictionOptions, bound, template, with_own_finger
+from sessions.prediction.stored import TrialPrediction
+from solver.reference import SCALE
+from solver.scene import Friction, Loading, Scene, SceneError, Slide, Solve
+
+SLIDES: dict[int, Slide] = {PROXIMAL_TO_DISTAL: "+x", DISTAL_TO_PROXIMAL: "-x"}
+DEFAULT_SPEED = 20.0  # where none was measured [mm/s]; rescales the time of a course and nothing else
+
+
+@dataclass(frozen=True, slots=True)
+class _Case:
+    """One thing to predict: a planned trial, or a stroke of a recording without a plan."""
+
+    trial: Trial | None
+    block: Block | None
+    friction: FrictionParameters | None
+    number: int | None  # of its stroke
+    stroke: Stroke | None
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """What the model gets of one case."""
+
+    row: TrialPrediction  # as far as it is known before solving
+    scene: Scene | None  # None where there is nothing to solve
+
+
+def scenes_of(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> Mapping[int, Scene]:
+    """Return the scene of each trial that `predict` would solve, by the trial's number."""
+    prepared = prepared_cases(analysis, plan, with_own_finger(options, plan))
+    return {one.row.trial: one.scene for one in prepared if one.scene is not None and one.row.trial is not None}
+
+
+def prepared_cases(analysis: Analysis, plan: SessionPlan, options: PredictionOptions) -> list[Prepared]:
+    """Return what the model gets of every planned trial, or of every stroke where there is no plan."""
+    return [_prepared(case, options) for case in _cases(analysis, plan)]
+
+
+def _cases(analysis: Analysis, plan: SessionPlan) -> Iterator[_Case]:
+    if not plan.blocks:
+        given = {friction.stroke: friction for friction in analysis.friction}
+        for number, stroke in enumerate(analysis.strokes):
+            yield _Case(None, None, given.get(number), number, stroke)
+        return
+    if not plan.forces:
+        return
+    of_trial = {friction.trial: friction for friction in analysis.friction}
+    first: dict[int | None, int] = {}
+    for number, stroke in enumerate(analysis.strokes):
+        first.setdefault(stroke.trial, number)
+    for block in plan.blocks:
+        for trial in block.trials if block.phase == "main" else ():
+            friction = of_trial.get(trial.number)
+            number = first.get(trial.number) if friction is None else friction.stroke
+            stroke = None if number is None else analysis.strokes[number]
+            yield _Case(trial, block, friction, number, stroke)
+
+
+def _prepared(case: _Case, options: PredictionOptions) -> Prepared:
+    """Return what the model gets of one case, with the reason for every number that is missing."""
+    friction, stroke, trial = case.friction, case.stroke, case.trial
+    direction = friction.direction if friction is not None else None
+    if direction is None and trial is not None:
+        direction = trial.direction
+    planned = None if case.block is None else case.block.indentation
+    row = TrialPrediction(
+        trial=None if trial is None else trial.number,
+        stroke=case.number,
+        block=None if case.block is None else case.block.name,
+        stimulus=None if trial is None else trial.stimulus,
+        mu=None if friction is None else friction.mu,
+        mu_rule="" if friction is None else friction.rule,
+        tau_max=None if friction is None else bound(friction.tau_max, options),
+        indentation=planned if options.indentation is None else options.indentation,
+        direction=direction,
+        speed=None if friction is None else friction.speed,
+        sed=None,
+        error_estimate=None,
+        normal_per_mm=None,
+        tangential_per_mm=None,
+        normal_force=None,
+        tangential_force=None,
+        measured_normal=None if stroke is None else stroke.normal_force,
+        measured_tangential=None if stroke is None else stroke.tangential_force,
+        matching_depth=None,
+        opposite_sed=None,
+        wall_s=None,
+        prediction=None,
+        reasons={},
+    )
+    why = _missing(row, stroke)
+    if why is not None:
+        names = ("sed", "normal_force", "tangential_force", "matching_depth", "opposite_sed")
+        return Prepared(replace(row, reasons=dict.fromkeys(names, why)), None)
+    return Prepared(row, _scene(row, options))
+
+
+def _missing(row: TrialPrediction, stroke: Stroke | None) -> str | None:
+    """Return why there is nothing to solve; None where all is there."""
+    if stroke is None:
+        return "No stroke was found in this trial."
+    if not stroke.kept:
+        return f"The stroke was left out: {stroke.decided['kept']}."
+    if row.mu is None or row.tau_max is None:
+        what = "coefficient of friction" if row.mu is None else "traction bound"
+        flaws = ", ".join(stroke.flaws) or "no steady sliding"
+        return f"The stroke gives no {what} ({flaws})."
+    if row.direction is None:
+        return "Neither the stroke nor a plan tells the direction."
+    if row.indentation is None:
+        return "No plan tells how deep the model is to press: give an indentation."
+    return None
+
+
+def _scene(row: TrialPrediction, options: PredictionOptions) -> Scene:
+    assert row.mu is not None  # `_missing` said so, and the same of the next two
+    assert row.indentation is not None
+    assert row.direction is not None
+    base = template(options)
+    surface = "" if row.stimulus is None else row.stimulus.called
+    return replace(
+        base,
+        title=f"trial {row.trial}: {surface}" if surface else f"stroke {row.stroke}",
+        friction=Friction(max(row.mu, 0.0), row.tau_max),
+        loading=Loading(row.indentation, SLIDES[row.direction], row.speed or DEFAULT_SPEED),
+        solve=Solve(options.kinematics, options.course, base.solve.tolerance),
+    )
+
+
+def opposite(scene: Scene) -> Scene:
+    """Return the same press, slid the other way, its settled state alone."""
+    slide = SLIDES[-scene.loading.direction]
+    return replace(scene, loading=replace(scene.loading, slide=slide), solve=replace(scene.solve, course="steady"))
+
+
+def scene_along(row: TrialPrediction, variant: Variant, options: PredictionOptions) -> Scene | str:
+    """Return the settled scene of a predicted trial in a variant, or why there is none."""
+    if row.mu is None or row.tau_max is None or row.direction is None or row.indentation is None:
+        return row.reasons.get("sed", "The trial gives no scene.")
+    if variant.driven == "force" and (row.measured_normal is None or row.measured_normal <= 0.0):
+        return "The stroke gives no steady normal force."
+    try:
+        scene = _scene(row, replace(options, kinematics=variant.kinematics, course="steady"))
+    except SceneError as unfit:  # a finger whose tissues have no law at that strain
+        return str(unfit)
+    tau_max = row.tau_max / SCALE[options.tau_reading] * SCALE[variant.tau_reading]
+    scene = replace(scene, friction=replace(scene.friction, tau_max=tau_max))
+    if variant.driven == "other way":
+        return opposite(scene)
+    if variant.driven == "force":
+        slide, speed = scene.loading.slide, scene.loading.speed
+        force = Loading(slide=slide, speed=speed, normal_force=row.measured_normal, force_unit="N")
+        return replace(scene, loading=force)
+    return scene
+
+
+def with_loads(scene: Scene, loads: Mapping[str, float]) -> Scene:
+    """Return a scene with another "mu" [-], "tau_max" [MPa] as the model gets it, or driving "force" [N]."""
+    friction, loading = scene.friction, scene.loading
+    mu, tau_max = loads.get("mu", friction.mu), loads.get("tau_max", friction.tau_max)
+    force = loads.get("force", loading.normal_force)
+    return replace(
+        scene,
+        friction=replace(friction, mu=mu, tau_max=tau_max),
+        loading=loading if force == loading.normal_force else replace(loading, normal_force=force),
+    )

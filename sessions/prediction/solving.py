@@ -1,0 +1,83 @@
+"""Settled SEDs of scenes, and those beside a prediction: what intervals, variants and many paths ask of the solver."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from sessions.prediction.options import PredictionOptions, bound, template
+from sessions.prediction.scenes import SLIDES
+from solver.audits import inside_out
+from solver.failures import Cancelled, SolveFailure
+from solver.nearby import Nearby, nearby
+from solver.prediction import Prediction
+from solver.scene import Friction, Loading, Scene, Solve
+from solver.solution import answers
+
+Progress = Callable[[float], bool]
+
+
+def settled(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | None, ...]:
+    """Return what the solver finds of each scene, None where it finds no settled state. Raises Cancelled."""
+    return tuple(None if isinstance(one, SolveFailure) else one for one in _answers(scenes, progress))
+
+
+def solved(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | str, ...]:
+    """Return what the solver finds of each scene, or why it finds no settled state. Raises Cancelled."""
+    return tuple(str(one) if isinstance(one, SolveFailure) else one for one in _answers(scenes, progress))
+
+
+def _answers(scenes: Sequence[Scene], progress: Progress | None) -> tuple[Prediction | SolveFailure, ...]:
+    return answers([quick(scene) for scene in scenes], progress, in_loops=True)
+
+
+def quick(scene: Scene) -> Scene:
+    """Return a scene whose evidence nobody will read: to march it takes as long as the answer."""
+    return replace(scene, solve=replace(scene.solve, evidence="quick"))
+
+
+def seds_at(
+    strokes: Sequence[tuple[float, float, float, int, float]], options: PredictionOptions
+) -> tuple[float | None, ...]:
+    """Return the settled SED [MPa] of the options' finger for each mu, tau_max [MPa], depth [mm], direction and speed.
+
+    None where there is no settled state.
+    """
+    base = template(options)
+    course = Solve(options.kinematics, "steady", base.solve.tolerance)
+    scenes = [
+        replace(
+            base,
+            friction=Friction(mu, bound(tau_max, options)),
+            loading=Loading(depth, SLIDES[direction], speed),
+            solve=course,
+        )
+        for mu, tau_max, depth, direction, speed in strokes
+    ]
+    return tuple(None if one is None else one.sed_ending for one in settled(scenes))
+
+
+def slides(predictions: Sequence[Prediction], progress: Progress | None = None) -> Iterator[Nearby | None]:
+    """Yield the slide of each prediction, from which others and derivatives are a few small systems away.
+
+    None where there is none that does not depend on the way to it. Raises Cancelled.
+    """
+    for number, slide in enumerate(nearby(predictions, in_loops=True)):
+        if progress is not None and not progress(number / len(predictions)):
+            raise Cancelled
+        yield slide
+
+
+def sed_by(slide: Nearby, scene: Scene) -> Mapping[str, float]:
+    """Return the derivatives of the SED by each load that `with_loads` knows, at the slide of a scene."""
+    by, force = slide.derivatives().sed, scene.loading.normal_force
+    driven = 0.0 if by.normal_force is None or force is None else by.normal_force * (scene.normal_force or 0.0) / force
+    return {"mu": by.mu, "tau_max": by.tau_max, "force": driven}
+
+
+def traction_reached(found: Prediction) -> float:
+    """Return the greatest friction traction on the skin [MPa]: any tau_max beyond it has the same solution."""
+    return float(abs(found.skin.traction).max())
+
+
+def doubt_of(found: Prediction) -> str:
+    """Return why numbers are not to be believed where the model was driven beyond its range, else ""."""
+    return inside_out(found.audits)

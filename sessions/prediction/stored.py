@@ -1,0 +1,105 @@
+"""What the model says of each trial and of a session, and how that is told as plain data."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+from sessions.alternative import Alternative
+from sessions.analysis.area import FIXED, AreaLaw
+from sessions.decisions import Decision
+from sessions.plan import Stimulus
+from sessions.prediction.options import PredictionOptions, template
+from sessions.sed_interval import SedInterval
+from solver.fields import Fields, fields_of
+from solver.prediction import History, Prediction, Skin
+
+_NOT_TOLD = ("prediction", "opposite")  # of a row as plain data: all that the solver found
+_TOLD_OTHERWISE = ("stimulus", "alternatives", "interval", "opposite_interval")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrialPrediction:
+    """What the model says of one trial, or of one stroke of a recording without trials.
+
+    A number is None where `reasons` says why, under the number's name.
+    """
+
+    trial: int | None
+    stroke: int | None  # position in `Analysis.strokes`; None where the trial has none
+    block: str | None
+    stimulus: Stimulus | None
+    mu: float | None  # that the model got [-]
+    mu_rule: str  # which mu that is
+    tau_max: float | None  # that the model got [MPa]
+    indentation: float | None  # [mm]
+    direction: int | None  # +1 proximal to distal, -1 back; as measured, or else as planned
+    speed: float | None  # [mm/s]
+    sed: float | None  # averaged over the ending [MPa]
+    error_estimate: float | None  # relative, of sed
+    normal_per_mm: float | None  # [N/mm]
+    tangential_per_mm: float | None  # [N/mm]
+    normal_force: float | None  # normal_per_mm times the finger's width [N]
+    tangential_force: float | None  # [N]
+    measured_normal: float | None  # mean over the steady window [N]
+    measured_tangential: float | None  # [N]
+    matching_depth: float | None  # indentation at which the model's normal force is the measured one [mm]
+    opposite_sed: float | None  # at the same depth, slid the other way [MPa]
+    wall_s: float | None  # the solve [s]
+    prediction: Prediction | None  # all that the solver found
+    reasons: Mapping[str, str]
+    opposite: Prediction | None = None  # that slid the other way
+    alternatives: tuple[Alternative, ...] = ()  # the same trial predicted otherwise, where that was asked for
+    interval: SedInterval | None = None  # of `sed`, where it was asked for
+    opposite_interval: SedInterval | None = None  # of `opposite_sed`
+
+    @property
+    def history(self) -> History | None:
+        """Return the course in time, where it was asked for."""
+        return None if self.prediction is None else self.prediction.history
+
+    def picture(self) -> tuple[Fields, Skin] | None:
+        """Return the deformed finger with its SED, and the skin's pressures; None where there is no prediction."""
+        return None if self.prediction is None else (fields_of(self.prediction), self.prediction.skin)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        row = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in (*_NOT_TOLD, *_TOLD_OTHERWISE)}
+        row["stimulus"] = None if self.stimulus is None else asdict(self.stimulus)
+        row["reasons"] = dict(self.reasons)
+        row["alternatives"] = [asdict(one) for one in self.alternatives]
+        told = {"interval": self.interval, "opposite_interval": self.opposite_interval}
+        row |= {name: asdict(one) for name, one in told.items() if one is not None}
+        row["solver"] = None if self.prediction is None else self.prediction.to_dict()
+        return row
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SessionPrediction:
+    """What the model says of a session."""
+
+    simulated: bool
+    trials: tuple[TrialPrediction, ...]
+    width: float  # of the finger [mm]
+    width_origin: str  # "set" or "assumed"
+    options: PredictionOptions
+    decisions: tuple[Decision, ...] = ()  # of people about the strokes, in force
+    area: AreaLaw = FIXED  # by which tau_max was told
+    gain_error: float | None = None  # of each axis, which the intervals hold [-]; None: the assumed one
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data, None where honesty allows no number."""
+        return {
+            **({"simulated": "SIMULATED"} if self.simulated else {}),
+            "trials": [trial.to_dict() for trial in self.trials],
+            "decisions": [decision.to_dict() for decision in self.decisions],
+            "area": asdict(self.area),
+            "gain_error": self.gain_error,
+            "width": self.width,
+            "width_origin": self.width_origin,
+            "options": asdict(self.options),
+            "options_origin": {
+                field.name: "default" if getattr(self.options, field.name) == field.default else "set"
+                for field in fields(self.options)
+            },
+            "scene": asdict(template(self.options)),  # finger, materials and settings as used, defaults filled in
+        }
