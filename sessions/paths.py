@@ -20,7 +20,16 @@ from sessions.analysis.friction import Rule
 from sessions.analysis.scores import pearson
 from sessions.analysis.settings import AnalysisSettings, WindowRule
 from sessions.analysis.within import repeated_correlation
-from sessions.prediction import Friction, PredictionOptions, Progress, Scene, scenes_of, settled, slides
+from sessions.prediction import (
+    Friction,
+    Prediction,
+    Progress,
+    Scene,
+    SessionPrediction,
+    scenes_of,
+    settled,
+    slides,
+)
 from sessions.recording import Recording
 
 Kinematics = Literal["small", "finite"]
@@ -87,18 +96,19 @@ PATHS = _paths()
 
 def trial_paths(
     recording: Recording,
-    options: PredictionOptions | None = None,
+    prediction: SessionPrediction,
     progress: Progress | None = None,
     *,
     finite: bool = False,
 ) -> Mapping[int, Seds]:
-    """Return the settled SED of each predicted trial along each of `PATHS`; None where a path gives none.
+    """Return the settled SED of each trial along each of `PATHS`; None where a path gives none.
 
-    Without `finite` only those at small strain, which come first. Direction and speed are those of the usual path:
-    neither is a matter of choice. Raises as `predict` does.
+    `prediction` is that of the session: what it found is where its paths begin, on its mesh. Without `finite` only
+    paths at small strain, which come first. Direction and speed are those of the usual path: neither is a matter of
+    choice. Raises as `predict` does.
     """
     paths = [path for path in PATHS if finite or path.kinematics == "small"]
-    asked = replace(options or PredictionOptions(), course="steady")
+    asked = replace(prediction.options, course="steady")
     analyses = _analyses(recording)
     usual = {one.trial: one for one in next(iter(analyses.values())).friction}
     scenes: dict[tuple[str, ...], Mapping[int, Scene]] = {}
@@ -108,7 +118,9 @@ def trial_paths(
             kind = replace(asked, kinematics=path.kinematics)
             scenes[_without_receptor(path)] = scenes_of(varied, recording.plan, kind)
     wanted = dict.fromkeys(scene for of_path in scenes.values() for scene in of_path.values())
-    found = _solved(tuple(wanted), progress)
+    found = _solved(
+        tuple(wanted), [row.prediction for row in prediction.trials if row.prediction is not None], progress
+    )
     trials = sorted({trial for of_path in scenes.values() for trial in of_path})
     return {trial: tuple(_sed(found, scenes[_without_receptor(p)].get(trial), p) for p in paths) for trial in trials}
 
@@ -151,28 +163,36 @@ def _sed(found: Mapping[Scene, tuple[float, float] | None], scene: Scene | None,
     return None if answer is None else answer[RECEPTORS.index(path.receptor)]
 
 
-def _solved(scenes: Sequence[Scene], progress: Progress | None) -> Mapping[Scene, tuple[float, float] | None]:
+def _solved(
+    scenes: Sequence[Scene], known: Sequence[Prediction], progress: Progress | None
+) -> Mapping[Scene, tuple[float, float] | None]:
     """Return SED over the ending and at its middle [MPa] of each scene, None where it has no settled state.
 
-    Of scenes that differ in friction alone the one with the least is solved, and the others are found beside it, on its
-    mesh; where that fails they are solved themselves.
+    Scenes that differ in friction alone are found beside one that is known, on its mesh, or else beside that of least
+    friction, which is solved; where that fails they are solved themselves.
     """
     alike: defaultdict[Scene, list[Scene]] = defaultdict(list)
     for scene in sorted(scenes, key=_friction):
-        alike[replace(scene, friction=Friction(0.0))].append(scene)
+        alike[_kind(scene)].append(scene)
+    first = {kind: group[0] for kind, group in alike.items()}
+    held = {kind: one for one in known if (kind := _kind(one.scene)) in first}
+    new = [kind for kind in first if kind not in held]
+    answers = settled([first[kind] for kind in new], _part(progress, 0.0, 0.5))
+    held |= {kind: answer for kind, answer in zip(new, answers, strict=True) if answer is not None}
     found: dict[Scene, tuple[float, float] | None] = {}
-    first = settled([group[0] for group in alike.values()], _part(progress, 0.0, 0.5))
-    held = [(answer, group) for answer, group in zip(first, alike.values(), strict=True) if answer is not None]
-    taken_up = slides([answer for answer, _ in held], _part(progress, 0.5, 0.7))
-    for (answer, (scene, *others)), slide in zip(held, taken_up, strict=True):
-        found[scene] = answer.sed_ending, answer.sed_point
-        if slide is not None and others:
-            beside = zip(others, slide.seds(others).tolist(), strict=True)
-            found |= {other: (ending, point) for other, (ending, point) in beside if not np.isnan(ending)}
+    for kind, slide in zip(held, slides(list(held.values()), _part(progress, 0.5, 0.7)), strict=True):
+        if slide is not None:
+            beside = zip(alike[kind], slide.seds(alike[kind]).tolist(), strict=True)
+            found |= {scene: (ending, point) for scene, (ending, point) in beside if not np.isnan(ending)}
     rest = [scene for scene in scenes if scene not in found]
     for scene, answer in zip(rest, settled(rest, _part(progress, 0.7, 1.0)), strict=True):
         found[scene] = None if answer is None else (answer.sed_ending, answer.sed_point)
     return found
+
+
+def _kind(scene: Scene) -> Scene:
+    """Return a scene settled and without friction: the same of all that differ in that alone."""
+    return replace(scene, friction=Friction(0.0), solve=replace(scene.solve, course="steady"))
 
 
 def _friction(scene: Scene) -> tuple[float, float]:

@@ -115,5 +115,5 @@ def _further(
     paths = None
     if options.paths is not None and recording.plan.forces:
         finite = options.paths == "finite"
-        paths = trial_paths(recording, prediction.options, shown("many paths of the analysis"), finite=finite)
+        paths = trial_paths(recording, prediction, shown("many paths of the analysis"), finite=finite)
     return Further(firing, afferent_facts(afferent or AfferentSettings(), reference), afferent, paths)

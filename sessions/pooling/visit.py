@@ -121,8 +121,8 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
     if known.plan.forces:
         prediction = with_intervals(analysis, predict(analysis, known.plan, options.prediction), both_ways=False)
     along: Mapping[int, Seds] = {}
-    if options.paths != "none" and known.plan.forces:
-        along = trial_paths(known, options.prediction, finite=options.paths == "finite")
+    if options.paths != "none" and prediction is not None:
+        along = trial_paths(known, prediction, finite=options.paths == "finite")
     records = {record.trial.number: record for record in known.trials}
     rows = tuple(
         replace(_row(block, place, records[trial.number], analysis, prediction), paths=along.get(trial.number, ()))

@@ -36,12 +36,17 @@ def analysis(recording):
 
 
 @pytest.fixture(scope="module")
-def along(recording):
-    return trial_paths(recording, STEADY)
+def predicted(recording, analysis):
+    return predict(analysis, recording.plan, STEADY)
 
 
-def test_the_usual_path_comes_to_what_is_predicted_without_any_others(recording, analysis, along):
-    for row in predict(analysis, recording.plan, STEADY).trials:
+@pytest.fixture(scope="module")
+def along(recording, predicted):
+    return trial_paths(recording, predicted)
+
+
+def test_the_usual_path_comes_to_what_is_predicted_without_any_others(predicted, along):
+    for row in predicted.trials:
         (usual,) = [n for n, path in enumerate(SMALL) if path.usual(row.mu_rule, "small")]
         assert along[row.trial][usual] == pytest.approx(row.sed, rel=1e-9)
 
