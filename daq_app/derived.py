@@ -38,7 +38,7 @@ def analysed(
 ) -> Analysis:
     """Return the analysis of a session, tau_max told by a law of the area, and keep it in the session's folder.
 
-    `seed` is that of the intervals kept with it; `gain_error` is how uncertain each axis' gain is [-]. Where nobody
+    `seed` is that of its intervals; `gain_error` is how uncertain each axis' gain is [-]. Where nobody
     says, area and seed are as in the analysis that was kept before, and the gain's error as it was last set: what
     somebody set is not lost by a verb that says nothing of it. Raises RecordingError where the last is damaged.
     """
@@ -50,21 +50,24 @@ def analysed(
             set_gain_error(recording.folder, gain_error)
         except RecordingError as error:
             console.note(f"not kept: {error}")
-    settings = AnalysisSettings(area=area or settings_of(before).area, gain_error=gain_error)
-    analysis = analyse(recording, settings)
-    drawn = drawn_from(settings, bootstrap_of(before).seed if seed is None else seed)
-    _keep(recording, ANALYSIS, analysis_document(analysis, drawn), console)
+    stood = settings_of(before)
+    drawn = stood.bootstrap_seed if seed is None else seed
+    analysis = analyse(
+        recording, AnalysisSettings(area=area or stood.area, gain_error=gain_error, bootstrap_seed=drawn)
+    )
+    _keep(recording, ANALYSIS, analysis_document(analysis), console)
     return analysis
 
 
 def made_otherwise(recording: Recording, now: AnalysisSettings) -> str | None:
-    """Say that the kept prediction has another law of the area or calibration error; None where it has not."""
+    """Say that the kept prediction has another law of the area, calibration error or seed; None where it has not."""
     before = _kept(recording, PREDICTION)
     if not before:
         return None
     stood = settings_of(before)
     other = ["another law of the contact area"] if stood.area != now.area else []
     other += ["another calibration error"] if stood.gain_error != now.gain_error else []
+    other += ["another seed of the intervals"] if stood.bootstrap_seed != now.bootstrap_seed else []
     if not other:
         return None
     return f"{PREDICTION} was made with {' and '.join(other)}: 'daq-app predict' makes it anew"
@@ -193,12 +196,16 @@ def bootstrap_of(stored: Mapping[str, Any]) -> BootstrapSettings:
 def settings_of(stored: Mapping[str, Any]) -> AnalysisSettings:
     """Return the settings with which a stored analysis, or that under a stored prediction, is made once more.
 
-    The law of the contact area and the calibration's error are all that can be asked for; the rest is the program's.
+    The law of the contact area, the calibration's error and the seed of the intervals are all that can be asked for;
+    the rest is the program's.
     Raises SettingsError.
     """
     held: Mapping[str, Any] = stored.get("settings") or stored
     area = from_table(held.get("area") or {}, AreaLaw, "area")
-    return AnalysisSettings(area=area, gain_error=checked_gain_error(held.get("gain_error")))
+    seed = held.get("bootstrap_seed", 0)
+    if not isinstance(seed, int) or seed < 0:
+        raise SettingsError(f"bootstrap_seed = {seed!r} is not allowed: a whole number from 0 on")
+    return AnalysisSettings(area=area, gain_error=checked_gain_error(held.get("gain_error")), bootstrap_seed=seed)
 
 
 def made_under(stored: Mapping[str, Any], decisions: Decisions) -> bool:

@@ -25,6 +25,15 @@ def gain_error_set(folder: Path) -> float | None:
         ) from damaged
 
 
+def gain_error_content(folder: Path) -> bytes:
+    """Return the bytes of the file, none where there is no file. Raises RecordingError where it cannot be read."""
+    path = folder / GAIN_ERROR
+    try:
+        return path.read_bytes() if path.is_file() else b""
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read ({error.strerror}); permit reading, or copy the folder") from error
+
+
 def set_gain_error(folder: Path, gain_error: float) -> None:
     """Keep the standard uncertainty of each axis' gain [-] for the session in a folder. Raises RecordingError."""
     store_derived(folder, GAIN_ERROR, {"gain_error": gain_error})

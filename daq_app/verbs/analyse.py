@@ -27,21 +27,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the session folder."""
     parser.add_argument("session", type=Path, metavar="SESSION", help="a session folder")
     add_calibration(parser)
-    parser.add_argument("--bootstrap-seed", type=int, default=0, metavar="SEED", help="of the intervals (0)")
+    parser.add_argument("--bootstrap-seed", type=int, metavar="SEED", help="of the intervals (as before, or 0)")
     add_area(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Analyse the session, keep the result in its folder and print it."""
     given = calibration_error(options)
-    if options.bootstrap_seed < 0:
+    if options.bootstrap_seed is not None and options.bootstrap_seed < 0:
         raise WrongValue(f"--bootstrap-seed {options.bootstrap_seed} is not allowed: a whole number from 0 on")
     recording = Recording.open(options.session)
     analysis = analysed(recording, console, area_law(options), seed=options.bootstrap_seed, gain_error=given)
     older = made_otherwise(recording, analysis.settings)
     if older is not None:
         console.note(older)
-    chosen = drawn_from(analysis.settings, options.bootstrap_seed)
+    chosen = drawn_from(analysis.settings)
     console.result(analysis_document(analysis, chosen))
     if recording.simulated_sentence:
         console.say(recording.simulated_sentence)

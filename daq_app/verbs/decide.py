@@ -11,10 +11,11 @@ from pathlib import Path
 
 from daq_app.cli import DONE, FLAWED, WrongValue
 from daq_app.console import Console, number
-from daq_app.derived import ANALYSIS, PREDICTION, analysed, bootstrap_of, settings_of
+from daq_app.derived import ANALYSIS, PREDICTION, analysed, settings_of
 from sessions.analysis import Analysis, Stroke, analyse
 from sessions.analysis.decided import tried, with_old
 from sessions.decisions import Decision, DecisionError, Decisions, append, read
+from sessions.gain_error import gain_error_set
 from sessions.recording import Recording
 from sessions.recording.derived import load_derived
 from sessions.study import check_code
@@ -65,13 +66,14 @@ def run(options: argparse.Namespace, console: Console) -> int:
         raise WrongValue("a decision says who decides and why: give --by CODE and --why REASON")
     check_code("--by", options.by)
     stored = load_derived(recording.folder, ANALYSIS)
+    gain_error_set(recording.folder)  # where it is damaged nothing is recorded that could not be analysed then
     analysis = analyse(recording, settings_of(stored or {}), before)
     asked = _asked(options) if options.tilt is None else _tilt(options, analysis)
     decision = with_old(analysis, asked)
     after = tried(recording, decision, before, analysis)
     made = append(recording, decision)
     if stored is not None:
-        analysed(recording, console, settings_of(stored).area, seed=bootstrap_of(stored).seed)
+        analysed(recording, console)
     older = (recording.folder / PREDICTION).is_file()
     changed = _changes(analysis, after)
     console.result({"decision": made.to_dict(), "changes": changed, "prediction_is_older": older})

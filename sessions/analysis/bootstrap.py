@@ -82,11 +82,11 @@ class BootstrapSettings:
         }
 
 
-def drawn_from(settings: AnalysisSettings, seed: int = 0) -> BootstrapSettings:
+def drawn_from(settings: AnalysisSettings) -> BootstrapSettings:
     """Return what the intervals of an analysis are drawn from: the calibration's error that was set, or the assumed."""
     if settings.gain_error is None:
-        return BootstrapSettings(seed=seed)
-    return BootstrapSettings(seed=seed, gain_error=settings.gain_error, gain_error_origin="set")
+        return BootstrapSettings(seed=settings.bootstrap_seed)
+    return BootstrapSettings(seed=settings.bootstrap_seed, gain_error=settings.gain_error, gain_error_origin="set")
 
 
 @dataclass(frozen=True, slots=True)

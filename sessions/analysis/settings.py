@@ -68,6 +68,7 @@ class AnalysisSettings:
     press_ratio: float = 0.2  # ... and whose T/N stays below this is a press, and tells how the face leans [-]
     area: AreaLaw = FIXED  # by which tau_max is told
     gain_error: float | None = None  # standard uncertainty of each axis' gain that somebody set [-]; None: assumed
+    bootstrap_seed: int = 0  # of the intervals drawn
     tilt: tuple[float, float] = (0.0, 0.0)  # lean of the face's normal to +x and +y that is levelled [degrees]
     slow_onset: float = 0.5  # from onset to a fifth of the peak; a finger takes a tenth of it [s]
 

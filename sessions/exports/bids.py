@@ -22,6 +22,7 @@ from sessions.decisions import DECISIONS, content_of
 from sessions.exports import ExportSource, Progress
 from sessions.exports.readings_text import MISSING, columns, read_rows, rows, write_rows
 from sessions.exports.tables import Column, Table, tables
+from sessions.gain_error import GAIN_ERROR, gain_error_content
 from sessions.recording import LoggedEvent, Recording
 from sessions.recording.description import description
 from sessions.recording.exported import ExportedSession, head_of
@@ -53,10 +54,11 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     _write_table(beh / f"{names.stem}_events", _events(recording), recording, told | whole)
     if recording.info is not None:
         _write_readings(recording, beh, names, progress)
-    decided = content_of(recording.folder)
-    if decided:
-        (folder / SOURCE).mkdir()
-        (folder / SOURCE / DECISIONS).write_bytes(decided)
+    set_by_people = {DECISIONS: content_of(recording.folder), GAIN_ERROR: gain_error_content(recording.folder)}
+    for name, content in set_by_people.items():
+        if content:
+            (folder / SOURCE).mkdir(exist_ok=True)
+            (folder / SOURCE / name).write_bytes(content)
     derived = folder / "derivatives" / PIPELINE
     made = derived / names.subject / "beh"
     made.mkdir(parents=True)
@@ -78,9 +80,8 @@ def read(path: Path) -> ExportedSession:
     places = {name: place for place, name in enumerate(header.split("\t"))}
     events = tuple(_event(line.split("\t"), places) for line in lines)
     parts = sorted(events_file.parent.glob("*_physio.tsv.gz"), key=lambda part: _start(part))
-    return ExportedSession(
-        "bids", path, head_of(told["DaqAppSession"]), events, lambda: _blocks(parts), content_of(path / SOURCE)
-    )
+    beside = content_of(path / SOURCE), gain_error_content(path / SOURCE)
+    return ExportedSession("bids", path, head_of(told["DaqAppSession"]), events, lambda: _blocks(parts), *beside)
 
 
 class _Names:

@@ -12,6 +12,7 @@ from sessions.decisions import DECISIONS, content_of
 from sessions.exports import ExportSource, Progress
 from sessions.exports.readings_text import columns, read_rows, rows, write_rows
 from sessions.exports.tables import Column, Table, tables
+from sessions.gain_error import GAIN_ERROR, gain_error_content
 from sessions.recording import LoggedEvent, Recording
 from sessions.recording.description import description
 from sessions.recording.exported import ExportedSession, head_of
@@ -43,6 +44,9 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     decided = content_of(recording.folder)
     if decided:
         (folder / DECISIONS).write_bytes(decided)
+    uncertain = gain_error_content(recording.folder)
+    if uncertain:
+        (folder / GAIN_ERROR).write_bytes(uncertain)
     (folder / README).write_text(_readme(recording, told), encoding="utf-8")
 
 
@@ -50,9 +54,8 @@ def read(path: Path) -> ExportedSession:
     """Return the session that `write` put into the folder `path`. Raises OSError, ValueError."""
     told = json.loads((path / DESCRIPTION_FILE).read_text(encoding="utf-8"))
     events = tuple(_event(row) for row in _rows_of(path / EVENTS))
-    return ExportedSession(
-        "csv", path, head_of(told), events, lambda: _read_readings(path / READINGS), content_of(path)
-    )
+    beside = content_of(path), gain_error_content(path)
+    return ExportedSession("csv", path, head_of(told), events, lambda: _read_readings(path / READINGS), *beside)
 
 
 def _events(recording: Recording) -> Table:

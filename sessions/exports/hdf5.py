@@ -18,13 +18,14 @@ from drivers.readings import ReadingBlock
 from sessions.decisions import content_of
 from sessions.exports import ExportSource, Progress
 from sessions.exports.tables import Column, tables
+from sessions.gain_error import gain_error_content
 from sessions.recording import LoggedEvent
 from sessions.recording.exported import ExportedSession, Head
 from sessions.recording.schema import COLUMNS, FORMAT, FORMAT_VERSION, SEALED_FILE
 from sessions.recording.sealed_copy import DataSet, texts, write_copy
 
 PART = 65_536  # readings at once
-DECIDED = "derived/decisions"
+DECIDED, UNCERTAIN = "derived/decisions", "derived/calibration_error"
 IN_THE_COPY = "trials"  # the table that the sealed copy holds itself
 
 
@@ -38,6 +39,9 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     decided = content_of(source.recording.folder).decode(errors="replace")
     if decided:
         more.append(DataSet(DECIDED, texts([decided]), "", "decisions.jsonl, what people decided about strokes"))
+    uncertain = gain_error_content(source.recording.folder).decode(errors="replace")
+    if uncertain:
+        more.append(DataSet(UNCERTAIN, texts([uncertain]), "", "calibration-error.json, as somebody set it"))
     write_copy(source.recording, folder / SEALED_FILE, more, progress)
 
 
@@ -54,13 +58,13 @@ def read(path: Path) -> ExportedSession:
             digest=None,  # the file's own check sums guard it
         )
         columns = [file[f"events/{name}"][...].tolist() for name in ("number", "time_ns", "trial", "readings")]
-        decided = _text(file[DECIDED][0]).encode() if DECIDED in file else b""
+        beside = [_text(file[name][0]).encode() if name in file else b"" for name in (DECIDED, UNCERTAIN)]
         kinds, data = (list(map(_text, file[f"events/{name}"][...])) for name in ("kind", "data"))
     events = tuple(
         LoggedEvent(number, time_ns, kind, trial or None, readings, json.loads(text))
         for number, time_ns, trial, readings, kind, text in zip(*columns, kinds, data, strict=True)
     )
-    return ExportedSession("hdf5", path, head, events, lambda: _blocks(path), decided)
+    return ExportedSession("hdf5", path, head, events, lambda: _blocks(path), *beside)
 
 
 def _blocks(path: Path) -> Iterator[ReadingBlock]:

@@ -88,6 +88,7 @@ def predict(
         decisions=analysis.decisions,
         area=analysis.settings.area,
         gain_error=analysis.settings.gain_error,
+        bootstrap_seed=analysis.settings.bootstrap_seed,
     )
 
 

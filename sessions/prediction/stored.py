@@ -85,6 +85,7 @@ class SessionPrediction:
     decisions: tuple[Decision, ...] = ()  # of people about the strokes, in force
     area: AreaLaw = FIXED  # by which tau_max was told
     gain_error: float | None = None  # of each axis, which the intervals hold [-]; None: the assumed one
+    bootstrap_seed: int = 0  # of the intervals
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, None where honesty allows no number."""
@@ -94,6 +95,7 @@ class SessionPrediction:
             "decisions": [decision.to_dict() for decision in self.decisions],
             "area": asdict(self.area),
             "gain_error": self.gain_error,
+            "bootstrap_seed": self.bootstrap_seed,
             "width": self.width,
             "width_origin": self.width_origin,
             "options": asdict(self.options),

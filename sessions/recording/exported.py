@@ -8,6 +8,7 @@ from typing import Any, cast
 
 from drivers.readings import ReadingBlock
 from sessions.decisions import DECISIONS
+from sessions.gain_error import GAIN_ERROR
 from sessions.recording.digests import Digest, different, digest_of
 from sessions.recording.head import info_from_dict, plan_from_dict
 from sessions.recording.log import LoggedEvent
@@ -40,6 +41,7 @@ class ExportedSession:
     events: tuple[LoggedEvent, ...]
     blocks: Callable[[], Iterator[ReadingBlock]]  # the readings in their order, read when asked for
     decisions: bytes = b""  # what people decided, as the file holds it
+    gain_error: bytes = b""  # how uncertain the calibration is, as somebody set it: the file
 
 
 def head_of(description: Mapping[str, Any]) -> Head:
@@ -98,6 +100,8 @@ def restore(exported: ExportedSession, folder: Path) -> tuple[str, ...]:
         writer.close()
     if exported.decisions:
         write_whole(folder / DECISIONS, exported.decisions)
+    if exported.gain_error:
+        write_whole(folder / GAIN_ERROR, exported.gain_error)
     return tuple(found)
 
 

@@ -26,7 +26,9 @@ def session_commands(
     """Return the commands, to be typed where the session folders lie; `scores` are the names of further visits."""
     name = shlex.quote(recording.folder.name)
     settings = (*area_words(analysis.settings.area), *calibration_words(analysis.settings.gain_error))
-    lines = [["verify", name], ["analyse", name, *settings]]
+    seed = analysis.settings.bootstrap_seed
+    seeded = ["--bootstrap-seed", str(seed)] if seed else []  # the later verbs take it from what the first has kept
+    lines = [["verify", name], ["analyse", name, *settings, *seeded]]
     report = ["report", name, "-o", "report.html"]
     if prediction is not None:
         file = scene_file(recording, prediction)

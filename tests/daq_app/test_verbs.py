@@ -255,7 +255,8 @@ def reported(two, tmp_path_factory):
     session = shutil.copytree(two, room / "P01")
     (room / "mine.toml").write_text(f"{SCENE}\n[finger]\ntip_radius = 5.5\n[materials.fat]\nE = 0.03\nnu = 0.48\n")
     words = ["--beside", "none", "--indentation", "1.2", "--tau", "as-printed", "--scene", str(room / "mine.toml")]
-    assert run(["analyse", str(session), "--area", "hertz", "--calibration-error", "0.3"]) == 0
+    seeded = ["--bootstrap-seed", "7"]
+    assert run(["analyse", str(session), "--area", "hertz", "--calibration-error", "0.3", *seeded]) == 0
     assert run(["predict", str(session), *words, "--afferent", "--afferent-set", "static_gain=30"]) == 0
     assert run(["report", str(session)]) == 0
     return session
@@ -296,9 +297,13 @@ def test_the_commands_and_the_scene_at_the_end_of_a_report_give_its_numbers_agai
         assert run(shlex.split(line)[1:]) == 0
     then, now = (json.loads((folder / "prediction.json").read_bytes()) for folder in (reported, tmp_path / "P01"))
     assert [row["sed"] for row in now["trials"]] == [row["sed"] for row in then["trials"]]
-    for name in ("area", "gain_error", "scene"):
+    for name in ("area", "gain_error", "scene", "bootstrap_seed"):
         assert now[name] == then[name]
     assert now["afferent"]["settings"] == then["afferent"]["settings"]
+    before, after = (json.loads((folder / "analysis.json").read_bytes()) for folder in (reported, tmp_path / "P01"))
+    assert after["bootstrap"] == before["bootstrap"]
+    assert after["bootstrap"]["settings"]["seed"] == now["bootstrap_seed"] == 7
+    assert "seed 7" in text
 
 
 def test_an_exported_prediction_tells_its_model_and_friction_the_interval_of_the_number_the_model_got(
@@ -460,6 +465,14 @@ def test_a_decision_that_cannot_be_is_refused_in_one_sentence(two, capsys, words
     assert run(["decide", str(two), *words]) == code
     assert sentence in capsys.readouterr().err
     assert not (two / "decisions.jsonl").exists()
+
+
+def test_a_decision_is_not_recorded_where_a_damaged_setting_would_keep_it_from_being_followed(small, capsys):
+    (small / "calibration-error.json").write_text("torn")
+    words = ["decide", str(small), "--trial", "1", "--drop", "--by", "E02"]
+    assert run([*words, "--why", "pulled away"]) == 1
+    assert "set it anew" in capsys.readouterr().err
+    assert not (small / "decisions.jsonl").exists()
 
 
 def test_a_law_of_the_contact_area_is_recorded_and_verify_goes_by_it(small, capsys):

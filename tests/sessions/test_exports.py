@@ -23,6 +23,7 @@ from sessions.analysis import analyse
 from sessions.decisions import Decision, append, content_of
 from sessions.exports import FORMATS, ExportError, ExportSource, export
 from sessions.exports.tables import tables
+from sessions.gain_error import gain_error_set, set_gain_error
 from sessions.import_csv import ImportRefused, import_csv
 from sessions.import_session import exported, import_session
 from sessions.recording import Recording, RecordingError
@@ -85,6 +86,7 @@ def sources(tmp_path_factory):
         recording = Recording.open(room / name)
         if name == "whole":
             append(recording, Decision("E02", "seen", "kept", 1, 1, None, new=True))
+            set_gain_error(recording.folder, 0.003)
         analysis = {"made_by": software_versions(), **analyse(recording).to_dict()}
         prediction = {"trials": [{"trial": 1, "sed": 0.009, "stimulus": {"index": 80}, "solver": {"dofs": 9}}]}
         found[name] = ExportSource(recording, analysis, prediction if name == "whole" else None)
@@ -158,6 +160,7 @@ def test_an_exported_session_comes_back_whole(sources, exports, tmp_path, form, 
     assert set(recorded.losses) <= set(again.losses)
     assert made.readings == len(recorded.readings())
     assert content_of(again.folder) == content_of(recorded.folder)
+    assert gain_error_set(again.folder) == gain_error_set(recorded.folder)
     assert [analyse(again).to_dict()[part] for part in ("strokes", "friction")] == [
         analyse(recorded).to_dict()[part] for part in ("strokes", "friction")
     ]
