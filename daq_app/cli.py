@@ -45,7 +45,7 @@ _WRONG = (
     "solver.scene.SceneError",
 )
 _FAILED = (
-    "daq_app.pooling.SchedulerError",
+    "daq_app.cluster.SchedulerError",
     "daq_app.sensitivity.TooFewAnswers",
     "drivers.transducer.DeviceFault",
     "drivers.transducer.LinkLost",

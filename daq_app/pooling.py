@@ -1,14 +1,10 @@
 """Many sessions computed at once, on this computer's cores or a Dask cluster, each kept as soon as it is done."""
 
-import asyncio
 import hashlib
-import importlib
 import json
-import logging
 import multiprocessing
 import os
 import signal
-import tempfile
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,29 +15,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from daq_app.cluster import by_cluster
+from daq_app.computing import Answer, computed, content_of
 from daq_app.console import Console
-from sessions.blinding import UNBLINDING
-from sessions.decisions import DECISIONS
-from sessions.gain_error import GAIN_ERROR
-from sessions.pooling.visit import FORM, Visit, VisitOptions, visit_of
-from sessions.recording import Recording, RecordingError
+from sessions.pooling.visit import FORM, Visit, VisitOptions
+from sessions.recording import RecordingError
 from sessions.recording.provenance import software_versions
-from sessions.recording.schema import LIVE_FILE
 from sessions.recording.whole_file import write_whole
-from sessions.sealing import SEAL
 
 LOOK = 0.1  # between two looks whether something is done [s]
-WITHOUT_WORKERS = 30.0  # that a cluster may have no worker before it is given up [s]
-ANSWERS = 20.0  # that a scheduler may take to answer [s]
-AGAIN = "run this again once it is there: what is done is kept"
-# All that a visit's numbers come from.
-CONTENT = (LIVE_FILE, f"{LIVE_FILE}-wal", UNBLINDING, SEAL, DECISIONS, GAIN_ERROR)
-
-Answer = tuple[str, dict[str, Any] | str]  # session, and what it brings or why it brings nothing
-
-
-class SchedulerError(Exception):
-    """The cluster cannot be used: why, and what to do."""
 
 
 class Shelf:
@@ -88,11 +70,6 @@ def _digest(result: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(result, sort_keys=True).encode()).hexdigest()
 
 
-def content_of(session: Path) -> dict[str, bytes]:
-    """Return the files of a session that its numbers come from. Raises OSError."""
-    return {name: (session / name).read_bytes() for name in CONTENT if (session / name).is_file()}
-
-
 def visits(
     folders: Sequence[Path],
     options: VisitOptions,
@@ -122,7 +99,7 @@ def visits(
     if missing:
         console.progress(0.0, f"0 of {len(missing)} sessions")
     here = scheduler is None or not missing
-    answers = _local(missing, options, workers) if here else _dask(missing, options, scheduler or "")
+    answers = _local(missing, options, workers) if here else by_cluster(missing, options, scheduler or "")
     try:
         for count, (name, answer) in enumerate(answers, 1):
             if isinstance(answer, str):
@@ -137,25 +114,6 @@ def visits(
         console.note(f"{len(done)} of {len(folders)} sessions are computed and kept; the next run goes on from there")
         raise
     return done, failed
-
-
-def computed(folder: Path, options: VisitOptions) -> Answer:
-    """Return what the session in a folder brings; for a worker: nothing is raised."""
-    try:
-        return folder.name, visit_of(Recording.open(folder), options, software_versions()).to_dict()
-    except Exception as error:  # noqa: BLE001  one bad session must not stop the rest
-        sentence = " ".join(str(error).split()) or type(error).__name__
-        return folder.name, sentence.replace(str(folder), folder.name)  # the same wherever it was computed
-
-
-def computed_from(name: str, content: Mapping[str, bytes], options: VisitOptions) -> Answer:
-    """Return what a session brings whose files were sent: a worker needs no disk in common with us."""
-    with tempfile.TemporaryDirectory() as room:
-        folder = Path(room) / name
-        folder.mkdir()
-        for file, data in content.items():
-            (folder / file).write_bytes(data)
-        return computed(folder, options)
 
 
 def _local(folders: Sequence[Path], options: VisitOptions, workers: int | None) -> Iterator[Answer]:
@@ -209,78 +167,3 @@ def _end_with_parent() -> None:
     if parent is not None:
         parent.join()
         os._exit(1)  # nobody is left to hand anything to
-
-
-def _dask(folders: Sequence[Path], options: VisitOptions, address: str) -> Iterator[Answer]:
-    """Yield answers as they come, from the workers of a cluster. Raises SchedulerError."""
-    try:
-        library: Any = importlib.import_module("distributed")
-    except ImportError as error:
-        raise SchedulerError("a cluster needs the package distributed: pip install 'daq-app[cluster]'") from error
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it logs as errors is told in a sentence below
-    kind = asyncio.run(_identity(library, address))
-    if kind != "Scheduler":
-        raise SchedulerError(f"{address} is the address of a Dask {kind.lower()}: give that of its scheduler")
-    client: Any = library.Client(address, timeout=ANSWERS, set_as_default=False)
-    try:
-        yield from _by_client(client, library.as_completed(loop=client.loop), folders, options, address)
-    except OSError as error:
-        raise SchedulerError(f"{address}: the scheduler is gone ({error}); {AGAIN}") from error
-    finally:
-        with suppress(OSError, TimeoutError):  # it may be gone
-            client.close()
-
-
-async def _identity(library: Any, address: str) -> str:  # noqa: ANN401 - distributed declares no types
-    """Return what answers at an address. Raises SchedulerError: a client alone waits for ever for what keeps silent."""
-    try:
-        async with asyncio.timeout(ANSWERS), library.rpc(address, timeout=ANSWERS) as there:
-            return str((await there.identity())["type"])
-    except Exception as error:  # any program may listen there and answer anything
-        why = " ".join(str(error).split()) or f"nothing within {ANSWERS:.0f} s"
-        raise SchedulerError(
-            f"{address}: no Dask scheduler answers there ({why}); start one, or give no address"
-        ) from error
-
-
-def _by_client(
-    client: Any,  # noqa: ANN401
-    answers: Any,  # noqa: ANN401
-    folders: Sequence[Path],
-    options: VisitOptions,
-    address: str,
-) -> Iterator[Answer]:
-    """Yield answers as they come to a client of the cluster."""
-    names: dict[Any, str] = {}
-    waiting = list(reversed(folders))
-    under_way: dict[str, Any] = {}
-    seen = time.monotonic()  # when a worker was last there
-    try:
-        while waiting or under_way:
-            threads = sum(client.nthreads().values())
-            seen = time.monotonic() if threads else seen
-            if time.monotonic() - seen > WITHOUT_WORKERS:
-                raise SchedulerError(
-                    f"{address}: the scheduler has had no worker for {WITHOUT_WORKERS:.0f} s; start some and run this "
-                    "again: what is done is kept"
-                )
-            # Files are read and sent as workers come free: never those of a thousand sessions at once.
-            while waiting and threads and len(under_way) < 2 * threads:
-                folder = waiting.pop()
-                future = client.submit(computed_from, folder.name, content_of(folder), options, pure=False, retries=1)
-                names[future.key], under_way[future.key] = folder.name, future
-                answers.add(future)
-            if not answers.has_ready():
-                time.sleep(LOOK)
-                continue
-            future = next(answers)
-            if future.cancelled():  # nobody cancels but a client that has lost its scheduler
-                raise ConnectionError("the connection was lost")
-            del under_way[future.key]
-            if future.status == "finished":
-                yield future.result()
-            else:
-                yield names[future.key], f"no worker could compute it ({future.exception()})"
-    finally:
-        with suppress(OSError, TimeoutError):  # the scheduler may be gone
-            client.cancel(list(under_way.values()))

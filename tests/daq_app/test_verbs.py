@@ -21,7 +21,8 @@ import pytest
 from report_session import record
 
 from daq_app.cli import run
-from daq_app.pooling import Shelf, content_of
+from daq_app.computing import content_of
+from daq_app.pooling import Shelf
 from sessions.analysis import AnalysisSettings, analyse, forces
 from sessions.gain_error import gain_error_set
 from sessions.pooling.visit import VisitOptions, visit_of

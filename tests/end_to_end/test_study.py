@@ -10,14 +10,16 @@ from pathlib import Path
 
 import pytest
 
-from daq_app import pooling
+from daq_app import cluster, pooling
 from daq_app.cli import run
+from daq_app.computing import computed, computed_from, content_of
 from daq_app.console import Console
-from daq_app.pooling import Shelf, computed, computed_from, content_of, visits
+from daq_app.pooling import Shelf, visits
 from daq_app.synthetic import synthetic_study
 from sessions.pooling.visit import Visit, VisitOptions
 from sessions.prediction import PredictionOptions
 from sessions.recording import RecordingError
+from sessions.recording.provenance import software_versions
 
 STEADY = VisitOptions()
 QUICK = VisitOptions(PredictionOptions(course="steady"))
@@ -191,13 +193,13 @@ def test_a_study_is_refused_in_a_sentence_where_there_is_none(tmp_path, capsys):
 def test_a_dask_cluster_gives_the_same_bits_as_this_computer(study, tmp_path):
     import distributed
 
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as workers:
         far, _ = visits(
             [study / "S01", study / "S02"],
             STEADY,
             Shelf(tmp_path, STEADY),
             Console(as_json=True),
-            scheduler=cluster.scheduler_address,
+            scheduler=workers.scheduler_address,
         )
     here = [Visit.from_dict(json.loads(json.dumps(computed(study / name, STEADY)[1]))) for name in ("S01", "S02")]
     assert sorted(far, key=lambda visit: visit.session) == here
@@ -207,19 +209,19 @@ def test_a_dask_cluster_gives_the_same_bits_as_this_computer(study, tmp_path):
 def test_a_cluster_without_workers_is_given_up_in_a_sentence(study, tmp_path, monkeypatch):
     import distributed
 
-    monkeypatch.setattr(pooling, "WITHOUT_WORKERS", 0.5)
+    monkeypatch.setattr(cluster, "WITHOUT_WORKERS", 0.5)
     asked = ([study / "S01"], STEADY, Shelf(tmp_path, STEADY), Console(as_json=True))
     with (
-        distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster,
-        pytest.raises(pooling.SchedulerError, match="no worker"),
+        distributed.LocalCluster(n_workers=0, dashboard_address=None) as workers,
+        pytest.raises(cluster.SchedulerError, match="no worker"),
     ):
-        visits(*asked, scheduler=cluster.scheduler_address)
+        visits(*asked, scheduler=workers.scheduler_address)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:{silent}", "tcp://127.0.0.1:9", "http://127.0.0.1:{silent}"])
 def test_an_address_where_no_scheduler_answers_is_told_in_a_sentence(study, tmp_path, monkeypatch, capsys, address):
-    monkeypatch.setattr(pooling, "ANSWERS", 0.5)
+    monkeypatch.setattr(cluster, "ANSWERS", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         given = address.format(silent=silent.getsockname()[1])
         assert run(["study", str(study), "--out", str(tmp_path), "--scheduler", given, "--json"]) == 1
@@ -230,9 +232,9 @@ def test_an_address_where_no_scheduler_answers_is_told_in_a_sentence(study, tmp_
 
 @pytest.mark.slow
 def test_a_scheduler_that_is_killed_ends_a_study_in_a_sentence(study, tmp_path, monkeypatch):
-    monkeypatch.setattr(pooling, "ANSWERS", 5.0)
-    monkeypatch.setattr(pooling, "WITHOUT_WORKERS", 300.0)
-    whole = pooling._by_client
+    monkeypatch.setattr(cluster, "ANSWERS", 5.0)
+    monkeypatch.setattr(cluster, "WITHOUT_WORKERS", 300.0)
+    whole = cluster._by_client
 
     def killed(*words):
         scheduler.kill()
@@ -246,11 +248,19 @@ def test_a_scheduler_that_is_killed_ends_a_study_in_a_sentence(study, tmp_path, 
         try:
             _until(lambda: told.is_file() and told.read_text().endswith("}"))
             address = json.loads(told.read_text())["address"]
-            monkeypatch.setattr(pooling, "_by_client", killed)
-            with pytest.raises(pooling.SchedulerError, match="the scheduler is gone"):
+            monkeypatch.setattr(cluster, "_by_client", killed)
+            with pytest.raises(cluster.SchedulerError, match="the scheduler is gone"):
                 visits([study / "S01"], STEADY, Shelf(tmp_path, STEADY), Console(as_json=True), scheduler=address)
         finally:
             scheduler.kill()
+
+
+def test_what_another_version_computed_is_refused_in_a_sentence_and_not_mixed_in():
+    here = software_versions()
+    cluster.refuse_other_versions(("S01", {"made_by": here | {"blas": "that of another processor"}}), "tcp://host:1")
+    cluster.refuse_other_versions(("S01", "it is damaged"), "tcp://host:1")
+    with pytest.raises(cluster.SchedulerError, match=r"daq-app 0\.0\.9 \(here .*versions that are here"):
+        cluster.refuse_other_versions(("S01", {"made_by": here | {"daq-app": "0.0.9"}}), "tcp://host:1")
 
 
 @pytest.mark.usefixtures("pool")
