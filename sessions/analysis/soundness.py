@@ -19,6 +19,7 @@ Mask = NDArray[np.bool_]
 _LONG = 1.8  # times the usual step: a reading is missing in between
 _COARSE = 3.0  # coarse: half an axis' changes are no more than so many of its least steps
 _JUMP = 2.0  # times the step that an axis' changes seldom exceed
+_OFF = 0.1  # share of an axis' range: so far from every rest before, a sensor that repeats itself to the end is frozen
 _AXIS_NAMES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 
 
@@ -108,15 +109,22 @@ def _frozen(block: ReadingBlock, settings: AnalysisSettings) -> Mask:
     same = np.concatenate([[False], (np.diff(block.raw, axis=0) == 0.0).all(axis=1), [False]])
     edges = np.flatnonzero(np.diff(same.astype(np.int8)))
     frozen = np.zeros(len(block), np.bool_)
-    for start, stop in edges.reshape(-1, 2):  # repeats of the reading at `start`
-        last = stop
+    rests: list[int] = []
+    for start, last in edges.reshape(-1, 2).tolist():  # repeats of the reading at `start`
         if last - start >= settings.frozen_readings and (
             block.time[last] - block.time[start] >= settings.frozen_shortest
         ):
-            frozen[start + 1 : last + 1] = not len(jumps) or bool(
-                jumps[max(start - 1, 0) : start].any() or jumps[last : last + 1].any()
-            )
+            jumped = not len(jumps) or bool(jumps[max(start - 1, 0) : start].any() or jumps[last : last + 1].any())
+            ends = last == len(block) - 1
+            frozen[start + 1 : last + 1] = jumped or (ends and _off_every_rest(block.raw, start, rests))
+            rests += [] if frozen[last] else [start]
     return frozen
+
+
+def _off_every_rest(raw: Array, at: int, rests: list[int]) -> bool:
+    """Say whether some axis of a reading lies far from where it lay in each rest before: it is pressed, or was."""
+    off = np.abs(raw[rests] - raw[at]) > _OFF * np.ptp(raw, axis=0)
+    return bool(rests) and bool(off.any(axis=1).all())
 
 
 def _jumps_of_coarse(raw: Array) -> Mask:

@@ -18,6 +18,7 @@ from study_example import study
 from sessions.exports.figures import plates
 from sessions.exports.figures.labels import spread
 from sessions.exports.html import ReportError, page, write_figures, write_report
+from sessions.exports.report_tables import tables
 from sessions.exports.study_page import study_page
 
 PDFTOTEXT = shutil.which("pdftotext")
@@ -187,6 +188,12 @@ def test_a_report_without_plan_scores_or_predictions_shows_what_it_has():
 
 def test_a_report_with_nothing_in_it_is_still_a_page():
     assert "No subject, trial, take or stroke was excluded." in Words(page(bare())).words
+
+
+def test_every_table_that_tells_an_sed_names_the_model_it_is_of(report):
+    told = [table for of in tables(report).values() for table in of if any("SED" in c.name for c in table.columns)]
+    assert "table-afferent" in {table.name for table in told}
+    assert [table.name for table in told if report.model not in table.caption] == []
 
 
 def test_planted_and_recovered_friction_stand_side_by_side(made):

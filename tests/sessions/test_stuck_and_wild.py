@@ -140,6 +140,12 @@ def test_the_same_sensor_frozen_for_a_while_is_named_by_the_jump_with_which_it_l
     assert "first at 2.0" in told(found, "frozen_sensor")[0].sentence
 
 
+def test_the_same_sensor_frozen_under_the_finger_until_the_recording_ends_is_named_and_gives_no_steady_stretch():
+    found = analysed(in_coarse_steps(frozen=(2.5, 5.1)), of=trial())
+    assert "first at 2.5" in told(found, "frozen_sensor")[0].sentence
+    assert all(one.steady is None or one.steady[1] < 2.52 for one in found.strokes)
+
+
 def test_a_sensor_that_never_reads_below_zero_is_not_clipped_where_nothing_presses():
     found = of(with_axis(FZ, lambda column: np.minimum(np.round(column, 2), 0.0)))
     assert not names(found) & {"saturated", "frozen_sensor"}

@@ -72,7 +72,7 @@ def afferent_table(report: Report) -> Table | None:
         "Firing of an SA-II afferent: an illustration. No fitted map from SED to the rate of a human SA-II afferent is "
         "known; every parameter is told below, assumed unless it says that somebody set it. The order of the settled "
         "rates is that of the SED as long as no rate lies at a bound, every SED is beyond the threshold and the "
-        "adaptation gain stays below the static gain."
+        f"adaptation gain stays below the static gain. Model of the SED: {report.model}."
     )
     return Table("table-afferent", caption, columns, groups, notes.listed())
 
