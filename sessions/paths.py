@@ -213,7 +213,7 @@ class PathFinding:
     trials: int
     r: float | None  # Pearson's, of the mean SED of each surface against its mean score
     within: float | None  # repeated-measures correlation of each subject's own scores and SEDs
-    low: float | None  # 95 % interval of `within`
+    low: float | None  # 95 % interval of `within`, for other people on the same surfaces
     high: float | None
 
 
@@ -267,6 +267,7 @@ def _finding(
     seds = {index: float(np.mean([np.mean(all_of) for all_of in own[index].values()])) for index in sorted(own)}
     both = [index for index in seds if index in means]
     inner = repeated_correlation(*zip(*pairs, strict=True)) if within and pairs else None
+    low, high = (None, None) if inner is None or inner.people is None else inner.people
     return PathFinding(
         path=path,
         usual=usual,
@@ -274,8 +275,8 @@ def _finding(
         trials=count,
         r=pearson([seds[i] for i in both], [means[i] for i in both]),
         within=None if inner is None else inner.r,
-        low=None if inner is None else inner.low,
-        high=None if inner is None else inner.high,
+        low=low,
+        high=high,
     )
 
 

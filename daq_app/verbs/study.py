@@ -17,7 +17,6 @@ from daq_app.area_option import add_area, area_law
 from daq_app.calibration_option import add_calibration, calibration_error
 from daq_app.cli import WrongValue
 from daq_app.console import Console
-from daq_app.planted_seds import with_seds
 from daq_app.pooling import Shelf, visits
 from sessions.analysis.area import FIXED
 from sessions.pooling.exclusions import exclusions_in
@@ -89,7 +88,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     planted = folder / PLANTED
     truth: dict[str, Any] | None = json.loads(planted.read_bytes()) if planted.is_file() else None
     if truth is not None:
-        truth["strokes"] = with_seds(truth["strokes"], asked.prediction, asked.area)
+        from daq_app.planted_seds import planted_relations  # simulators are loaded only where they are asked for
+
+        truth["relation"] = planted_relations(truth["people"], asked.prediction, asked.area)
     study = pooled(done, failed, exclusions_in(folder), truth, asked)
     console.progress(0.97, "writing the page")
     files = _write(study, folder.resolve().name, out)

@@ -30,10 +30,11 @@ class RepeatedCorrelation:
     """How y goes with x within subjects, the same slope for all (Bakdash & Marusich 2017)."""
 
     r: float
-    low: float  # 95 % interval by Fisher's z, for `dof` degrees of freedom
+    low: float  # 95 % interval by Fisher's z, for `dof` degrees of freedom: for pairs that are all drawn anew
     high: float
     p: float  # two-sided
     dof: int  # N - k - 1 for N pairs from k subjects
+    people: tuple[float, float] | None  # 95 % interval for other subjects who meet the same stimuli; None of two
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +81,10 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
     """Return the repeated-measures correlation of pairs (N), each with its subject; None where nothing can be said.
 
     It is the correlation of what is left of x and y when each subject's own means are taken away, tested with
-    N - k - 1 degrees of freedom (Bland & Altman 1995; Bakdash & Marusich 2017, Front. Psychol. 8:456).
+    N - k - 1 degrees of freedom (Bland & Altman 1995; Bakdash & Marusich 2017, Front. Psychol. 8:456). Their interval
+    takes every pair for a draw of its own. Subjects who all meet the same stimuli share how y bends against x there,
+    and that is no chance: `people` leaves out each subject in turn (Tukey's jackknife of Fisher's z, t with k - 1
+    degrees of freedom: Miller 1974, Biometrika 61:1). Neither is for other stimuli, where these are few and shared.
     """
     codes = np.unique(np.array(subjects), return_inverse=True)[1]
     dof = len(codes) - (int(codes.max()) + 1 if len(codes) else 0) - 1
@@ -92,14 +96,30 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
         return None
     r = float(np.clip(left_x @ left_y / size, -1.0, 1.0))
     if 1.0 - abs(r) < 1e-12:
-        return RepeatedCorrelation(r, r, r, 0.0, dof)
+        return RepeatedCorrelation(r, r, r, 0.0, dof, (r, r))
     t = r * math.sqrt(dof / (1.0 - r * r))
     from scipy import stats
 
     half = float(stats.norm.ppf((1 + CONFIDENCE) / 2)) / math.sqrt(dof - 1)
     z = math.atanh(r)
     p = 2.0 * float(stats.t.sf(abs(t), dof))
-    return RepeatedCorrelation(r, math.tanh(z - half), math.tanh(z + half), p, dof)
+    xy, xx, yy = (np.bincount(codes, of).astype(np.float64) for of in (left_x * left_y, left_x**2, left_y**2))
+    people = _jackknifed(xy, xx, yy)
+    return RepeatedCorrelation(r, math.tanh(z - half), math.tanh(z + half), p, dof, people)
+
+
+def _jackknifed(xy: Array, xx: Array, yy: Array) -> tuple[float, float] | None:
+    """Return the jackknife's interval of r from each subject's sums (k); None for two, or where r is ±1 without one."""
+    k = len(xy)
+    others_xy, size = xy.sum() - xy, np.sqrt((xx.sum() - xx) * (yy.sum() - yy))
+    if k < 3 or not (np.abs(others_xy) < (1.0 - 1e-12) * size).all():
+        return None
+    z = math.atanh(float(xy.sum()) / math.sqrt(float(xx.sum()) * float(yy.sum())))
+    pseudo = k * z - (k - 1) * np.arctanh(others_xy / size)
+    from scipy import stats
+
+    half = float(stats.t.ppf((1 + CONFIDENCE) / 2, k - 1)) * float(pseudo.std(ddof=1)) / math.sqrt(k)
+    return math.tanh(float(pseudo.mean()) - half), math.tanh(float(pseudo.mean()) + half)
 
 
 def agreement(table: Table) -> Agreement | None:

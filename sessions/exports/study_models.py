@@ -22,9 +22,10 @@ def models_table(study: StudyFindings) -> Table:
         "subjects; drift is the slope on the trials before in the block, carry-over that on the index stroked before. "
         "The first trial of a block counts as if index 50 had been stroked before. "
         "Exploratory: p is not corrected, for terms, models or descriptors. "
-        "The level is that at the mean of SED or index. t intervals. Standard deviations of the subjects' own levels "
-        "and slopes, and of single scores about them: by least squares, the error of each subject's own line taken "
-        "away; intervals by modified large sample (Ting et al. 1990), of single scores by chi squared. A singular fit "
+        "The level is that at the mean of SED or index. t intervals, for other people on these surfaces. "
+        "Standard deviations of the subjects' own levels and slopes, and of single scores about them: by least "
+        "squares, the error of each subject's own line taken away; intervals by modified large sample (Ting et al. "
+        "1990), of single scores by chi squared. A singular fit "
         "finds that subjects differ in fewer ways than it allows."
     )
     return study_table("table-models", caption, ("term", "unit", "estimate", "95 % interval", "p"), groups)
@@ -125,10 +126,10 @@ def planted_table(study: StudyFindings) -> Table:
     caption = (
         "What was planted and what was found. Slopes of the score, spreads of levels and slopes, and noise, which are "
         "standard deviations: by the mixed model on index and µ, both of which the simulated people judged by. "
-        "They know no model of a finger: the planted r, and the planted slope on SED, are those of the planted scores "
-        "(the noise of judgement added by its variance) with the SEDs that the model gives at the planted friction of "
-        "the same trials. One interval in twenty misses; that of r allows for other surfaces too, and these are always "
-        "the same, so it misses less often."
+        "They know no model of a finger: the planted r, and the planted slope on SED, are those of 2000 more such "
+        "people, each with a finger of its own, on the same surfaces, with the SEDs that the model gives at their "
+        "friction (the noise of judgement is added by its variance). Every interval is for other people on these "
+        "surfaces; one in twenty misses."
     )
     return study_table("table-planted", caption, columns, [("", rows)])
 

@@ -43,7 +43,10 @@ def _related(one: DescriptorFindings, strain: str) -> list[str]:
     if one.repeated is None:
         return [f"{name}: too few subjects with scores and strokes of their own for a correlation within subjects."]
     r = one.repeated
-    interval = f"95 % interval {correlation(r.low)} to {correlation(r.high)}"
+    interval = "no interval from two subjects"
+    if r.people is not None:
+        low, high = r.people
+        interval = f"95 % interval for other people on these surfaces {correlation(low)} to {correlation(high)}"
     return [
         f"{name}: within subjects, score and the SED predicted at {strain} strain go together by "
         f"r = {correlation(r.r)}, {interval}; {_otherwise(one, other)}."

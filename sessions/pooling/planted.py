@@ -79,35 +79,14 @@ def _spread(one: DescriptorFindings, name: str, planted: float, found: Spread) -
 
 
 def _with_sed(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[Recovered]:
-    """Return how scores go with SEDs, as planted: of the very trials that count, each with its planted numbers.
-
-    Planted are the scores without the noise of judgement, which is added by its variance, and the SEDs that the model
-    gives at the planted friction. Both have each subject's own means taken away; the slope is that of least squares
-    with drift and carry-over beside it.
-    """
-    strokes = {
-        (stroke["subject"], stroke["descriptor"], stroke["index"]): stroke
-        for stroke in planted["strokes"]
-        if stroke.get("sed") is not None and "score" in stroke
-    }
-    keys = [(subject, one.descriptor, index) for subject, index, _, _ in one.points]
-    if one.repeated is None or len(set(keys)) < len(keys) or not all(key in strokes for key in keys):
+    """Return how scores go with SEDs among people at large on these surfaces, beside the intervals for such people."""
+    relation = planted.get("relation", {}).get(one.descriptor)
+    if relation is None or one.repeated is None or one.repeated.people is None:
         return []
-    counted = [strokes[key] for key in keys]
-    codes = np.unique([key[0] for key in keys], return_inverse=True)[1]
-
-    def left(values: Sequence[float]) -> np.ndarray[Any, np.dtype[np.float64]]:
-        return np.array(values) - (np.bincount(codes, values) / np.bincount(codes))[codes]
-
-    seds, scores = left([1e3 * s["sed"] for s in counted]), left([s["score"] for s in counted])
-    order = [left([s["place"] for s in counted]), left([s["before"] - 50 if s["place"] else 0.0 for s in counted])]
-    noise = planted["people"]["judgement_noise"] ** 2 * (len(keys) - len(set(codes.tolist())))
-    r = float(seds @ scores) / math.sqrt(float(seds @ seds) * (float(scores @ scores) + noise))
-    told = [Recovered(one.descriptor, WITHIN, r, one.repeated.r, one.repeated.low, one.repeated.high)]
+    told = [Recovered(one.descriptor, WITHIN, relation["r"], one.repeated.r, *one.repeated.people)]
     if not isinstance(one.on_sed, str):
-        slope = float(np.linalg.lstsq(np.column_stack([seds, *order]), scores)[0][0])
         term = one.on_sed.term(SED)
-        told.append(Recovered(one.descriptor, SED, slope, term.estimate, term.low, term.high))
+        told.append(Recovered(one.descriptor, SED, relation["slope"], term.estimate, term.low, term.high))
     return told
 
 

@@ -17,6 +17,7 @@ from daq_app.synthetic import synthetic_study
 NEAR = 1e-12
 # A mean, its spread and its interval, or an effect and its interval, are one quantity: each counts against the largest.
 ONE_QUANTITY = ("estimate", "mean", "sd", "low", "high")
+SPREAD_OF = {"between_sd": 0, "slope_sd": 1}  # in a mixed model: of which term, whose spread between subjects it is
 # Probabilities, correlations, and the estimated error of an SED as a part of it: numbers that are counted against 1.
 AGAINST_ONE = (
     "error_estimate",
@@ -52,6 +53,9 @@ def numbers(found, path=(), scale=None):
         kin = [abs(found[name]) for name in ONE_QUANTITY if isinstance(found.get(name), float)]
         for name, value in found.items():
             own = max(kin, default=None) if name in ONE_QUANTITY else 1.0 if name in AGAINST_ONE else None
+            if name in SPREAD_OF and "terms" in found:
+                term = found["terms"][SPREAD_OF[name]]
+                own = max(abs(term[part]) for part in ("estimate", "low", "high"))
             yield from numbers(value, (*path, name), own)
     elif isinstance(found, list):
         for i, value in enumerate(found):

@@ -17,7 +17,7 @@ from sessions.paths import PATHS
 from sessions.pooling.exclusions import Exclusion, exclusions_in
 from sessions.pooling.findings import CARRY_OVER, DRIFT, FRICTION, INDEX, SED, WITHIN
 from sessions.pooling.pooled import pooled
-from sessions.pooling.visit import TrialRow, Visit, VisitOptions
+from sessions.pooling.visit import Visit, VisitOptions
 from sessions.prediction import PredictionOptions
 from sessions.toml_file import SettingsError
 
@@ -50,39 +50,14 @@ def test_planted_gain_drift_and_carry_over_stand_beside_what_is_found():
     assert found[INDEX].covered
 
 
-def test_what_was_planted_between_score_and_sed_is_that_of_the_planted_numbers_themselves():
-    """Three subjects at three levels, scores that rise by 10 a kPa and bend; the rest is arithmetic."""
-    strokes = [_stroke(f"S0{n}", at, level) for n, level in ((1, -9.0), (2, 9.0), (3, 0.0)) for at in range(4)]
-    planted = {
-        "score": {"gain": 0.0, "drift": 0.0, "carry_over": 0.0},
-        "people": {"judgement_noise": 2.0, "offset_spread": 9.0, "gain_spread": 0.0, "moisture": 0.0},
-        "strokes": strokes,
-    }
-    found = {one.effect: one for one in pooled(_like(strokes), planted=planted).effects}
-    # Centred: SEDs -1.5 -0.5 0.5 1.5, scores -14 -6 4 16: products 50, squares 5 and 504, and noise 3 x 2² in each of
-    # the three subjects.
-    assert found[WITHIN].planted == pytest.approx(3 * 50 / np.sqrt(3 * 5 * (3 * 504 + 9 * 4)))
-    assert found[SED].planted == pytest.approx(10.0)
-
-
-def _stroke(subject, at, level):
-    meant = (51.0, 59.0, 69.0, 81.0)[at] + level
-    named = {"subject": subject, "descriptor": "stickiness", "index": 5 * at, "trial": at, "place": 0, "before": None}
-    return {**named, "mu": 0.4, "sed": 1e-3 * (5.0 + at), "score": meant}
-
-
-def _like(strokes):
-    """Return visits that found the SEDs planted, and scores near those planted."""
-    noise = np.random.default_rng(1).normal(0.0, 2.0, len(strokes))
-    rows = [
-        (s["subject"], TrialRow(s["trial"], "b", "stickiness", s["index"], "", 1, 1, 0, None, "scored",
-                                s["score"] + off, mu=s["mu"], sed=s["sed"]))
-        for s, off in zip(strokes, noise.tolist(), strict=True)
-    ]  # fmt: skip
-    return [
-        Visit(subject, subject, "p", "", True, True, tuple(row for of, row in rows if of == subject), (), {})
-        for subject in ("S01", "S02", "S03")
-    ]
+def test_the_planted_relation_of_people_at_large_stands_beside_the_intervals_for_them():
+    score = {"gain": 0.0, "drift": 0.0, "carry_over": 0.0}
+    planted = {"score": score, "strokes": [], "relation": {"stickiness": {"r": 0.9, "slope": 60.0}}}
+    study = pooled(VISITS, planted=planted)
+    found = {one.effect: one for one in study.effects}
+    of = study.descriptors[0]
+    assert (found[WITHIN].planted, found[WITHIN].low, found[WITHIN].high) == (0.9, *of.repeated.people)
+    assert (found[SED].planted, found[SED].low) == (60.0, of.on_sed.term(SED).low)
 
 
 def test_a_decision_leaves_a_subject_out_of_every_number_and_is_told():

@@ -43,6 +43,22 @@ def test_the_correlation_within_subjects_is_the_published_one():
     assert found.p == pytest.approx(0.000847, abs=2e-6)
 
 
+def test_the_interval_for_other_people_is_that_of_the_jackknife_over_them():
+    rng = np.random.default_rng(3)
+    names, x = np.repeat(list("abcdef"), 5), rng.normal(size=30)
+    y = x + 0.5 * rng.normal(size=30)
+
+    def z(kept):
+        own = [names[kept] == name for name in np.unique(names[kept])]
+        a, b = (np.concatenate([v[kept][o] - v[kept][o].mean() for o in own]) for v in (x, y))
+        return np.arctanh(stats.pearsonr(a, b).statistic)
+
+    whole = z(np.ones(30, bool))
+    pseudo = [6 * whole - 5 * z(names != name) for name in "abcdef"]
+    expected = np.tanh(stats.ttest_1samp(pseudo, 0.0).confidence_interval(0.95))
+    assert repeated_correlation(names, x, y).people == pytest.approx(tuple(expected))
+
+
 def test_levels_of_subjects_do_not_matter_within_them():
     x, y = [1, 2, 3, 1, 2, 3], [1.0, 2.5, 3.0, 101.0, 102.5, 103.0]
     found = repeated_correlation(["a"] * 3 + ["b"] * 3, x, y)
