@@ -16,10 +16,11 @@ from solver.finite_ends import steps_asked
 from solver.finite_finger import FiniteFinger
 from solver.finite_states import course, roughly, settled
 from solver.load_steps import Steps
-from solver.mesher import Sizing, sharing, still_sharing
+from solver.mesher import AT_CUT, Sizing, sharing, still_sharing
 from solver.newton import Shape
 from solver.reach import sound
-from solver.scene import Scene
+from solver.scene import Materials, Scene
+from solver.tissues import strains_the_cut
 
 ROUGH = 3.0  # fineness of the mesh that finds the edges
 NEARLY = 0.98  # of the friction limit, from which contact is where it is when the finger slides
@@ -97,19 +98,20 @@ def foot(
             raise  # told on a mesh of its own, whatever this one is
     except SolveFailure:
         pass
+    sizing = Sizing(fineness, depth, margin=margin, at_cut=_at_cut(scene.materials))
     try:
-        return _plain(scene, Sizing(fineness, depth, margin=margin), stop, make)
+        return _plain(scene, sizing, stop, make)
     except NoSteadyState:
         if not scene.loading.dragged:
             raise
-        return _plain(scene.undragged(), Sizing(fineness, depth, margin=margin), stop, make)
+        return _plain(scene.undragged(), sizing, stop, make)
 
 
 def _rough(
     scene: Scene, depth: float, margin: float, stop: Callable[[], bool], make: Maker, near: Climbed | None
 ) -> Climbed:
     begun = perf_counter()
-    finger = make(scene, Sizing(ROUGH, depth, margin=margin))
+    finger = make(scene, Sizing(ROUGH, depth, margin=margin, at_cut=_at_cut(scene.materials)))
     setup = perf_counter() - begun
     shape = _on_rough(finger, scene, stop, near.shape if near is not None and near.finger is finger else None)
     return Climbed(finger, shape, setup)
@@ -159,7 +161,16 @@ def risen(
 def sized(fineness: float, below: Climbed) -> Sizing:
     """Return the sizing of a mesh of `fineness` whose lines follow the edges of contact found `below`."""
     edges = below.finger.edges(below.shape)
-    return Sizing(fineness, below.shape.pull.depth, margin=MARGIN, edges=edges)
+    at_cut = _at_cut(below.finger.scene.materials)
+    return Sizing(fineness, below.shape.pull.depth, margin=MARGIN, edges=edges, at_cut=at_cut)
+
+
+def _at_cut(tissues: Materials) -> float | None:
+    """Return how small the elements are where the cut meets the bone.
+
+    Under stiff skin those collapse, and Newton's iterations lose their way, sooner than they bring anything.
+    """
+    return None if strains_the_cut(tissues) else AT_CUT
 
 
 def sized_together(scene: Scene, fineness: float, feet: Sequence[Climbed]) -> list[Sizing]:

@@ -13,10 +13,10 @@ from solver.finite_states import depends_on_way
 from solver.load_steps import Steps
 from solver.mesh import Array
 from solver.scene import Scene
+from solver.tissues import stiff, strains_the_cut
 
 COARSER = 0.6  # fineness of the mesh that the error is estimated from, by that of the answer
 NUDGE = 1e-3  # of the traction bound, to see what it does
-STIFF = 8.0  # epidermis by fat, from which skin carries the drag to the cut (published: 4)
 CROWDED = 0.8  # least det F, below which tissue is squeezed where the cut meets the bone
 OF_CORNER = np.array([8.0, 4.5, 4.5, 4.5, 4.5, 4.5])  # added to differences then, by the force's or depth's
 OF_STIFF = 15.0  # the same of the SED where skin is stiff, and does not only stiffen
@@ -61,7 +61,7 @@ def compared(
     if _crowded(scene, at):
         change = np.abs(others[0] / np.where(numbers == 0.0, 1.0, numbers) - 1.0)[[1, 3]].max()
         part = OF_CORNER.copy()
-        part[0] = OF_STIFF if _stiff(scene) else part[0]
+        part[0] = OF_STIFF if stiff(scene.materials) else part[0]
         others = np.vstack([others, numbers * (1.0 + part * change)])
     return numbers, others, felt, None
 
@@ -72,15 +72,9 @@ def _crowded(scene: Scene, at: Climbed) -> bool:
     Strains are without bound in that corner, so that errors fall with the element and not with its square; in the SED
     two meshes may then agree by chance, in the normal force they do not.
     """
-    tissues = scene.materials
-    if not _stiff(scene) and "ogden" not in (tissues.epidermis.law, tissues.dermis.law):
+    if not strains_the_cut(scene.materials):
         return False
     return float(np.linalg.det(kernels_numpy.deformation(at.finger.newton.body, at.shape.u)).min()) < CROWDED
-
-
-def _stiff(scene: Scene) -> bool:
-    tissues = scene.materials
-    return max(tissues.epidermis.E, tissues.dermis.E) > STIFF * tissues.fat.E
 
 
 def _nearest(scene: Scene, fineness: float, at: Climbed, stop: Callable[[], bool]) -> Climbed:

@@ -32,6 +32,8 @@ BEYOND = 0.1  # skin beyond known edges that is looked at for contact, by its wi
 FOLD = (0.015, 0.1)  # where the skin folds: of the tip radius, and of the epidermis if that is less
 AROUND, FROM_FOLD = 4.0, 0.5  # so many of these elements to each side are as small; growth from there [-]
 THIN = 2.0 / 3.0  # across the skin there, by that along it
+AT_CUT = 0.12  # along the skin at a free cut's palmar end, by tip radius (docs/solver-finite-strain.md)
+COARSE, FROM_CUT = 10.0, 0.5  # fineness below which those are longer in proportion; growth from there [-]
 APART = 0.1  # skin nearer to where it is held is squeezed without bound, by tip radius
 FINEST = 1e-3  # smallest element by tip radius: thinner ones across the whole finger would drown in round-off [-]
 
@@ -56,6 +58,7 @@ class Sizing:
     edges: tuple[float, float] | None = None  # arc positions where contact ends, where they are known: lines lie there
     sharing: Sharing | None = None  # with the meshes of other surfaces
     fold: float | None = None  # arc position where the skin is squeezed most, where it is to be seen folding
+    at_cut: float | None = None  # elements at a free cut's palmar end, by tip radius, where its corner counts
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,14 +202,20 @@ class _Row:
         """
         low, high = _contact(outline, sizing)
         scale = 1.0 / sizing.fineness
+        at_cut = sizing.at_cut if outline.finger.cut == "free" else None
         away = np.concatenate([[0.0], np.geomspace(1e-9, 1.0, 1000)])
         palmar, dorsal = low + (outline.palmar_cut - low) * away, high + (outline.dorsal_cut - high) * away
         arc = np.concatenate([palmar, np.linspace(low, high, 1000), dorsal])
         if sizing.fold is not None:
             near = sizing.fold + np.linspace(-1.0, 1.0, 2001) * outline.finger.tip_radius
             arc = np.concatenate([arc, near[(near > outline.palmar_cut) & (near < outline.dorsal_cut)]])
+        if at_cut is not None:
+            arc = np.concatenate([arc, outline.palmar_cut + (low - outline.palmar_cut) * away])
         arc = distinct(arc)
         asked = fine + scale * (AWAY[0] * np.maximum(low - arc, 0.0) + AWAY[1] * np.maximum(arc - high, 0.0))
+        if at_cut is not None:
+            least = outline.finger.tip_radius * at_cut * max(1.0, COARSE * scale)
+            asked = np.minimum(asked, least + FROM_CUT * (arc - outline.palmar_cut))
         if sizing.edges is not None:
             inside = np.maximum(np.minimum(arc - low, high - arc), 0.0)
             asked += np.minimum(scale * TOWARDS * inside, (MIDDLE / EDGE - 1.0) * fine)

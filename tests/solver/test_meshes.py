@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from solver.elements import ELEMENTS, GAUSS_3, GAUSS_4, Q2P1
 from solver.grid import MeshError, grid_mesh, quality
-from solver.mesher import DERMIS, EPIDERMIS, FAT, Sizing, finger_mesh, sharing
+from solver.mesher import AT_CUT, DERMIS, EPIDERMIS, FAT, Sizing, finger_mesh, sharing
 from solver.outline import Outline
 from solver.scene import Finger, Receptor
 
@@ -73,6 +73,18 @@ def test_lines_lie_where_contact_ends_and_elements_are_shortest_there():
     assert max(inside[0], inside[-1]) < inside[1:-1].mean()
 
 
+def test_elements_are_short_where_a_free_cut_squeezes_tissue_to_the_bone_and_as_ever_elsewhere():
+    free, plain = (
+        finger_mesh(Finger(), Receptor(), Sizing(11, 1.8, margin=3.0, edges=(-3.2, 1.4), at_cut=at_cut)).arcs
+        for at_cut in (0.12, None)
+    )
+    assert np.diff(free)[0] < 1.5 * 0.12 * 5.0 < np.diff(plain)[0]
+    np.testing.assert_allclose(free[free > -3.92], plain[plain > -3.92], atol=1e-4)
+    driven = [Sizing(11, 1.8, edges=(-3.2, 1.4), at_cut=at_cut) for at_cut in (0.12, None)]
+    held, as_ever = (finger_mesh(Finger(cut="driven"), Receptor(), sizing).arcs for sizing in driven)
+    np.testing.assert_array_equal(held, as_ever)
+
+
 @settings(deadline=None, max_examples=8)
 @given(
     edges=st.lists(st.tuples(st.floats(-5.0, -0.5), st.floats(0.05, 4.5)), min_size=1, max_size=4),
@@ -82,7 +94,7 @@ def test_lines_lie_where_contact_ends_and_elements_are_shortest_there():
 )
 def test_meshes_of_surfaces_solved_together_differ_only_in_where_their_lines_lie(edges, fineness, angle, nail):
     finger = Finger(contact_angle=angle, nail_length=nail)
-    sizings = [Sizing(fineness, 1.8, margin=3.0, edges=each) for each in edges]
+    sizings = [Sizing(fineness, 1.8, margin=3.0, edges=each, at_cut=AT_CUT) for each in edges]
     alone = [finger_mesh(finger, Receptor(), sizing) for sizing in sizings]
     together = [finger_mesh(finger, Receptor(), sizing) for sizing in sharing(finger, Receptor(), sizings)]
     first = together[0]
