@@ -7,7 +7,7 @@ import numpy as np
 from solver import kernels
 from solver.elements import Q2P1
 from solver.finite_body import VALUES, FiniteBody, Narrow
-from solver.mesh import Array, Indices
+from solver.mesh import Array, Flags, Indices
 from solver.mesher import FingerMesh, with_middles
 from solver.newton import Shape
 
@@ -53,6 +53,7 @@ class Bridge:
     layer: Narrow  # (b, 3) and across it
     onto: Array  # (k, old k) the new skin's values by the old skin's, between whose nodes they are linear
     nearest: Indices  # (k,) old node of the skin
+    driven: Flags  # (nodes, 2) which components of the new nodes are held
 
     @staticmethod
     def of(old: Places, new: Places) -> "Bridge":
@@ -62,7 +63,7 @@ class Bridge:
         layer = _piece(old.heights[::2], new.inner_heights).astype(np.int32)
         onto = np.stack([np.interp(new.skin, old.skin, one, 0.0, 0.0) for one in np.eye(len(old.skin))], axis=1)
         nearest = np.abs(new.skin[:, None] - old.skin).argmin(axis=1)
-        return Bridge(old, new, *along, *across, station, layer, onto, nearest)
+        return Bridge(old, new, *along, *across, station, layer, onto, nearest, new.body.mesh.driven)
 
     def carried(self, shape: Shape) -> Shape:
         """Return `shape`, found on the old mesh, as a start on the new one.
@@ -95,7 +96,7 @@ class Bridge:
             shape.u, shape.pressure, old.combination, old.centre, self.along, self.along_parts, self.across,
             self.across_parts, self.station, self.layer, self.new.points, new.weight, new.modes, u, pressure,
         )  # fmt: skip
-        u[new.mesh.driven] = 0.0
+        u[self.driven] = 0.0
         return u, pressure
 
 

@@ -97,8 +97,10 @@ def _halved(centres: Array, leaf: int) -> tuple[Indices, list[tuple[int, int]], 
         if high - low > leaf:
             mine = order[low:high]
             along = int(np.argmax(np.ptp(centres[mine], axis=0)))
-            middle = (low + high) // 2
-            order[low:high] = mine[np.argsort(centres[mine, along], kind="stable")]
+            order[low:high] = mine = mine[np.argsort(centres[mine, along], kind="stable")]
+            # between two rows or columns: a cut with a step in it runs past more nodes
+            cuts = low + 1 + np.flatnonzero(np.diff(centres[mine, along]))
+            middle = int(cuts[np.abs(2 * cuts - low - high).argmin()]) if len(cuts) else (low + high) // 2
             below = (halve(low, middle), halve(middle, high))
         ranges.append((low, high))
         children.append(below)

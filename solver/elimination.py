@@ -146,6 +146,10 @@ class Elimination:
         self._still = np.zeros(plan.size)
         self._factors, self._waiting = np.empty(plan.factors), np.empty(plan.waiting)
         self._near = np.empty(int(plan.border.max()))
+        self.felt = self.carried[plan.size - skin :]
+        self.factored = (  # what loops ask for that solve with the factors
+            plan.start, plan.inner, plan.border, plan.border_at, plan.numbers, plan.factor_at, self._factors, self._near
+        )  # fmt: skip
 
     def factorise(self, tangent: Array) -> bool:
         """Eliminate the elements' tangents (e, 16, 16), lower halves; False where that is not possible."""
@@ -157,19 +161,12 @@ class Elimination:
 
     def condense(self, force: Array) -> Array:
         """Return the forces (m,) that the skin feels of `force` (n,), all of it being kept for `unfold`."""
-        p = self.plan
         self.carried[:] = force
-        kernels.condense(
-            self.carried, p.start, p.inner, p.border, p.border_at, p.numbers, p.factor_at, self._factors, self._near
-        )  # fmt: skip
-        return self.carried[p.size - len(self.stiffness) :]
+        kernels.condense(self.carried, *self.factored)
+        return self.felt
 
     def unfold(self, skin: Array, *, still: bool = False) -> Array:
         """Return all displacements (n,) for the skin's (m,), balancing the forces condensed last, or none of them."""
-        p = self.plan
-        out = np.empty(p.size)
-        kernels.unfold(
-            self._still if still else self.carried, skin, p.start, p.inner, p.border, p.border_at, p.numbers,
-            p.factor_at, self._factors, self._near, out,
-        )  # fmt: skip
+        out = np.empty(self.plan.size)
+        kernels.unfold(self._still if still else self.carried, skin, *self.factored, out)
         return out

@@ -100,10 +100,13 @@ class Newton:
         self.length = np.zeros(skin)
         self._bulk = float((body.lame / body.shear).max())  # how much stiffer the body is to a change of volume [-]
         self.skin_x, self.skin_y = body.mesh.nodes[body.skin].T.copy()
-        self._felt, self._reaction = np.zeros(2 * skin), np.zeros((skin, 2))
+        self._reaction = np.zeros((skin, 2))
         self._state, self._sense = np.zeros(skin, np.int32), np.zeros(skin, np.int32)
         self._free = np.zeros(2 * skin, np.int32)
         self._matrix, self._right = np.zeros(4 * skin * skin), np.zeros((2 * skin, 4))
+        self._felt = self.inside.felt
+        self._every = np.empty(body.size)
+        self._place, self._skin = body.mesh.nodes, body.skin
 
     def linearise(self, shape: Shape, pull: Pull, anchor: Array, rounds: int = 0) -> bool:
         """Set up the system at `shape` under `pull`, solve it for the skin's `steps` (2 k, 4); False where it fails.
@@ -139,17 +142,12 @@ class Newton:
 
     def _touch(self, shape: Shape, pull: Pull, anchor: Array, rounds: int) -> bool:
         body = self.body
-        self.force -= self.load
-        self._felt = self.inside.condense(self.force)
         self._state[:], self._sense[:] = shape.state, shape.sense
-        x = self.skin_x + shape.u[body.skin, 0]
-        above = self.skin_y + shape.u[body.skin, 1] - pull.depth
-        solved = kernels.settle(
-            self.inside.stiffness, self._felt, body.held, body.middle, self._state, self._sense, pull.mu, pull.tau,
-            pull.sense, x, above, anchor, rounds, self.length, self._free, self._matrix, self._right, self.steps,
-            self._reaction,
+        return kernels.touch(
+            shape.u, anchor, pull.depth, pull.mu, pull.tau, pull.sense, rounds, self.force, self.load, self._place,
+            self._skin, body.held, body.middle, *self.inside.factored, self.inside.carried, self.inside.stiffness,
+            self._state, self._sense, self.length, self._free, self._matrix, self._right, self.steps, self._reaction,
         )  # fmt: skip
-        return solved and bool(np.isfinite(self.steps[:, EQUILIBRIUM]).all())
 
     def reaction(self, skin: Array, *, still: bool = False) -> Array:
         """Return the surface's forces on the skin (k, 2) at the end of its step (2 k,), or their change alone."""
@@ -162,15 +160,12 @@ class Newton:
         """Return the shape after the skin's step (2 k,), its largest move [mm], and how many states it changed."""
         body = self.body
         u, pressure = np.empty_like(shape.u), np.empty_like(shape.pressure)
-        largest = kernels.advance(
-            shape.u, shape.pressure, self.inside.unfold(skin), scale, body.nodes, body.unknown, body.lame, self.fold,
-            self.dilate, self.volume, u, pressure,
-        )  # fmt: skip
         state, sense, reaction = self._state.copy(), self._sense.copy(), self.reaction(skin)
-        x = self.skin_x + u[body.skin, 0]
-        above = self.skin_y + u[body.skin, 1] - pull.depth
-        kernels.tributary(x, body.middle, self.length)
-        changed = kernels.restate(state, sense, reaction, above, x - anchor, self.length, pull.mu, pull.tau, pull.sense)
+        largest, changed = kernels.move(
+            shape.u, shape.pressure, skin, scale, anchor, pull.depth, pull.mu, pull.tau, pull.sense, u, pressure, state,
+            sense, reaction, self._place, self._skin, body.middle, *self.inside.factored, self.inside.carried,
+            self._every, body.nodes, body.unknown, body.lame, self.fold, self.dilate, self.volume, self.length,
+        )  # fmt: skip
         return Shape(u, pressure, state, sense, reaction, pull, shape.iterations + 1), largest, changed
 
     def settle(self, start: Shape, pull: Pull, tolerance: float = 1e-10, limit: int = 25) -> Shape:

@@ -6,11 +6,12 @@
 
 from solver.kernels.carrying import carry
 from solver.kernels.compiling import CAP, HELD_X, HELD_Y, OPEN, SLIP, STICK
-from solver.kernels.elements import advance, assemble, energies, forces
+from solver.kernels.elements import assemble, energies, forces
 from solver.kernels.fronts import condense, eliminate, unfold
+from solver.kernels.iterating import move, touch
 from solver.kernels.outline import crosses, pinched
 from solver.kernels.overstress import add_overstress
-from solver.kernels.skin import STEEP, impose, restate, settle, solve, tributary
+from solver.kernels.skin import STEEP, impose, restate, solve, tributary
 
 __all__ = [
     "CAP",
@@ -21,7 +22,6 @@ __all__ = [
     "STEEP",
     "STICK",
     "add_overstress",
-    "advance",
     "assemble",
     "carry",
     "condense",
@@ -30,10 +30,11 @@ __all__ = [
     "energies",
     "forces",
     "impose",
+    "move",
     "pinched",
     "restate",
-    "settle",
     "solve",
+    "touch",
     "tributary",
     "unfold",
 ]

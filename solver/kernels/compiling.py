@@ -57,6 +57,12 @@ class Loop:
 
     def _entry(self, given: tuple[object, ...]) -> Callable[..., Any]:
         types = tuple(_type_name(a) for a in given)
+        if types not in self._entries:  # kinds of numbers may differ where their types do not
+            self._entries[types] = self._found(types)
+        return self._entries[types]
+
+    def _found(self, types: tuple[str, ...]) -> Callable[..., Any]:
+        """Return the code for arguments of these `types`, from the disk or compiled."""
         name = f"{Path(self.function.__code__.co_filename).stem}.{self.function.__name__}"
         place = keeping.Place(name, types, self.sources())
         kept = keeping.linked(place)

@@ -274,7 +274,8 @@ def advance(
     integration points of Magisano, Leonetti and Garcea (2017), Int. J. Numer. Meth. Eng. 109, 1237.
     """
     largest = 0.0
-    u_new[:, :] = u
+    for n in range(u.shape[0]):
+        u_new[n, 0], u_new[n, 1] = u[n, 0], u[n, 1]
     move = np.empty(18)
     for e in range(nodes.shape[0]):
         for i in range(16):

@@ -162,13 +162,9 @@ def test_contact_rows_are_the_derivatives_of_their_conditions():
     assert newton.linearise(shape, pull, anchor)
     found = []
     for part in (1e-4, -1e-4):
-        step = newton.inside.unfold(newton.steps[:, 0]) * part
-        u_new = np.empty_like(u)
-        kernels.advance(
-            u, shape.pressure, step, 1.0, body.nodes, body.unknown, body.lame, newton.fold, newton.dilate,
-            newton.volume, u_new, np.empty_like(shape.pressure),
-        )  # fmt: skip
-        found.append(conditions(equilibrated(body, u_new))[0])
+        moved, largest, _ = newton.moved(shape, pull, newton.steps[:, 0], anchor, part)
+        assert largest == pytest.approx(np.abs(moved.u - u).max() / abs(part), rel=1e-6)
+        found.append(conditions(equilibrated(body, moved.u))[0])
     ahead, behind = found
     np.testing.assert_allclose((ahead - behind) / 2e-4, -here, atol=1e-7 * np.abs(here).max())
 
