@@ -23,9 +23,9 @@ class SolveFailure(Exception):
         largest force, where one was given.
         """
         super().__init__(message)
-        self.limit_mu = limit_mu
-        self.limit_indentation = limit_indentation
-        self.limit_normal_force = limit_normal_force
+        self.limit_mu, self.limit_indentation, self.limit_normal_force = (
+            None if limit is None else float(limit) for limit in (limit_mu, limit_indentation, limit_normal_force)
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `daq-app solve --json` prints instead of a prediction."""

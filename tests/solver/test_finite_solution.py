@@ -124,6 +124,7 @@ def test_where_no_settled_sliding_exists_there_is_no_number_but_both_limits(surf
         solve(finite(surface))
     # Without a bound the branch ends at mu = 0.373 (several meshes and orders of a study of this finger).
     assert refusal.value.limit_mu == pytest.approx(0.373, rel=0.04)
+    assert type(refusal.value.limit_mu) is float  # scripts are told numbers, not those of a library
     assert refusal.value.limit_indentation < 2.0
 
 
