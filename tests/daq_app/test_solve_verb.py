@@ -1,0 +1,77 @@
+"""'daq-app solve' at the command line: what it prints, for scripts and for people, and how it is stopped."""
+
+import json
+from contextlib import contextmanager
+
+import pytest
+
+from daq_app.cli import run
+
+SCENE = """
+title = "slipperiness 100"
+[friction]
+mu = 0.24
+tau_max = 0.00877
+[loading]
+indentation = 1.5
+slide = "-x"
+speed = 39.0
+"""
+
+
+def printed(capsys):
+    return json.loads(capsys.readouterr().out)
+
+
+def test_solve_prints_what_the_contract_names(tmp_path, capsys):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE)
+    assert run(["solve", str(scene), "--json"]) == 0
+    document = printed(capsys)
+    names = "sed_ending sed_point normal_force tangential_force contact_width error_estimate dofs newton_iterations"
+    assert {*names.split(), "wall_s", "setup_s", "row", "model", "audits"} <= set(document)
+    assert document["tangential_force"] > 0
+    assert document["normal_force"] > 0
+
+
+def test_solve_tells_people_the_error_of_each_force_and_what_was_left_out(tmp_path, capsys):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE)
+    assert run(["solve", str(scene)]) == 0
+    said = capsys.readouterr().out
+    for told in ("normal force", "tangential force", "SED at the ending"):
+        assert next(line for line in said.splitlines() if line.startswith(told)).endswith(" %")
+    assert {"bone compliance", "viscosity", "the third dimension"} <= {line[:19].strip() for line in said.splitlines()}
+
+
+def test_solve_stopped_by_the_user_gives_the_answer_that_was_there_already(tmp_path, capsys, monkeypatch):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE + '[solve]\nevidence = "measured"\n')
+
+    @contextmanager
+    def impatient(*_):
+        calls = iter(range(1))  # the solve itself; its evidence is not waited for
+
+        def told(_):
+            if next(calls, None) is None:
+                raise KeyboardInterrupt
+            return True
+
+        yield told
+
+    monkeypatch.setattr("daq_app.console.Console.working", impatient)
+    assert run(["solve", str(scene), "--json"]) == 130
+    document = printed(capsys)
+    assert document["sed_ending"] > 0.0
+    assert document["evidence_s"] is None
+    assert any("Stopped" in warning for warning in document["warnings"])
+
+
+def test_solve_with_a_history_prints_its_course(tmp_path, capsys):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE + '[solve]\ncourse = "history"\n')
+    assert run(["solve", str(scene), "--json"]) == 0
+    document = printed(capsys)
+    assert len(document["time"]) == len(document["bone_x"]) == len(document["bone_y"]) > 10
+    assert document["bone_y"][-1] == pytest.approx(-1.5)
+    assert document["bone_x"][-1] < 0
