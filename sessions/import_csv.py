@@ -105,7 +105,7 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
     writer = SessionWriter.create(
         folder,
         SessionPlan("import", stated.subject, 0, "none", (), forces=True, frame=frame),
-        _info(path, told, rate, rate_origin, stated, simulated=_says_simulated(content)),
+        _info(path, told, rate, rate_origin, stated, simulated=_says_simulated(content, told.names)),
         {**provenance(clock, _settings(told, frame, rate, rate_origin, stated)), "imported": source},
         clock=clock,
     )
@@ -252,10 +252,10 @@ def _times(
     return time - time[0], rate, "measured"
 
 
-def _says_simulated(content: bytes) -> bool:
-    """Say whether a comment at the file's head says that it came from a simulator."""
+def _says_simulated(content: bytes, names: Sequence[str]) -> bool:
+    """Say whether a comment at the file's head, or a column, says that it came from a simulator."""
     head = [line for line in content[:4096].decode(errors="replace").splitlines() if line.startswith(_COMMENT)]
-    return any(_SIMULATED in line for line in head)
+    return any(_SIMULATED in told for told in (*head, *names))
 
 
 def _block(time: Array, raw: Array) -> ReadingBlock:

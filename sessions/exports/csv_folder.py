@@ -2,10 +2,9 @@
 
 import csv
 import json
-from collections.abc import Callable, Iterator, Sequence
-from itertools import chain
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from drivers.readings import ReadingBlock
 from sessions.decisions import DECISIONS, content_of
@@ -21,21 +20,22 @@ from sessions.recording.schema import DESCRIPTION_FILE
 from sessions.recording.whole_file import write_json
 
 READINGS, EVENTS, README = "readings.csv", "events.csv", "README.md"
-COMMENT = "#"
+SIMULATED = Column("SIMULATED", "", "yes: transducer or subject were simulated", ())  # a comment would hide the header
 
 
 def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     """Write the session into an empty folder."""
     recording = source.recording
     made = [*tables(source), _events(recording)]
+    mark = (SIMULATED,) if recording.simulated_sentence else ()
     for table in made:
-        with _opened(folder / f"{table.name}.csv", recording) as file:
-            write_rows(file, [[column.heading for column in table.columns]], ",")
-            write_rows(file, table.rows, ",")
-    told = [(f"{table.name}.csv", table.meaning, table.columns) for table in made]
+        with _opened(folder / f"{table.name}.csv") as file:
+            _write_rows(file, mark, [[column.heading for column in table.columns]], table.rows)
+    told = [(f"{table.name}.csv", table.meaning, (*mark, *table.columns)) for table in made]
     if recording.info is not None:
-        told.append((READINGS, "a row for each reading, in the order recorded", columns(recording.info.calibration)))
-        _write_readings(recording, folder / READINGS, progress)
+        meaning = "a row for each reading, in the order recorded"
+        told.append((READINGS, meaning, (*mark, *columns(recording.info.calibration))))
+        _write_readings(recording, mark, folder / READINGS, progress)
     write_json(folder / DESCRIPTION_FILE, description(recording))
     for name, document in (("analysis.json", source.analysis), ("prediction.json", source.prediction)):
         if document is not None:
@@ -86,23 +86,25 @@ def _event(row: dict[str, str]) -> LoggedEvent:
     )
 
 
-def _opened(path: Path, recording: Recording) -> TextIO:
-    """Open a file whose first line says where something was simulated."""
-    file = path.open("w", encoding="utf-8", newline="")
-    if recording.simulated_sentence:
-        file.write(f"{COMMENT} {recording.simulated_sentence}\n")
-    return file
+def _opened(path: Path) -> TextIO:
+    return path.open("w", encoding="utf-8", newline="")
 
 
-def _write_readings(recording: Recording, path: Path, progress: Progress) -> None:
+def _write_rows(file: TextIO, mark: Sequence[Column], header: list[list[str]], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a header and rows; where they are marked, a column that says so comes first."""
+    write_rows(file, [[*(column.heading for column in mark), *names] for names in header], ",")
+    write_rows(file, ([*("yes" for _ in mark), *row] for row in rows), ",")
+
+
+def _write_readings(recording: Recording, mark: Sequence[Column], path: Path, progress: Progress) -> None:
     assert recording.info is not None
     calibration = recording.info.calibration
     expected = max((event.readings for event in recording.events), default=0) or 1
     written = 0
-    with _opened(path, recording) as file:
-        write_rows(file, [[column.heading for column in columns(calibration)]], ",")
+    with _opened(path) as file:
+        _write_rows(file, mark, [[column.heading for column in columns(calibration)]], ())
         for block in recording.blocks():
-            write_rows(file, rows(block, calibration), ",")
+            _write_rows(file, mark, [], rows(block, calibration))
             written += len(block)
             progress(min(written / expected, 1.0))
 
@@ -111,16 +113,13 @@ def _read_readings(path: Path) -> Iterator[ReadingBlock]:
     if not path.is_file():  # a visit that only scored
         return
     with path.open(encoding="utf-8", newline="") as file:
-        lines = iter(file)
-        header = next((line for line in lines if not line.startswith(COMMENT)), "")
-        yield from read_rows(lines, header.strip().split(","), ",")
+        header = next(file, "")
+        yield from read_rows(file, header.strip().split(","), ",")
 
 
 def _rows_of(path: Path) -> list[dict[str, str]]:
     with path.open(encoding="utf-8", newline="") as file:
-        first = file.readline()
-        lines: Iterator[str] = file if first.startswith(COMMENT) else chain([first], file)
-        return list(csv.DictReader(lines))
+        return list(csv.DictReader(file))
 
 
 def _readme(recording: Recording, told: Sequence[tuple[str, str, Sequence[Column]]]) -> str:
@@ -131,8 +130,7 @@ def _readme(recording: Recording, told: Sequence[tuple[str, str, Sequence[Column
         f"# Session of {recording.plan.subject}, protocol {recording.plan.protocol}",
         "",
         "Comma-separated values, UTF-8, a point in every decimal number; an empty cell is a number that is not known,",
-        f"or that honesty does not allow. Lines beginning with `{COMMENT}` are no rows (there is one at the head of a",
-        "file that came of a simulation). Units stand at the end of a column's name. `session.json` holds plan,",
+        "or that honesty does not allow. Units stand at the end of a column's name. `session.json` holds plan,",
         "transducer, calibration and where the recording came from; `daq-app import FOLDER` makes a session of this",
         "folder again.",
         "",

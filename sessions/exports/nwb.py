@@ -201,7 +201,7 @@ def _values(column: Column) -> list[str] | list[int] | list[float]:
 
 
 def _utc(recording: Recording, instant_ns: int) -> datetime:
-    """Return the date of an instant of the session clock."""
+    """Return the date of an instant of the session clock; told time that moves when waited on passes as the date's."""
     known = datetime.fromisoformat(str(recording.provenance["created_utc"]))
     clock = recording.provenance["clock"]
-    return known + timedelta(seconds=(instant_ns - int(clock["now_ns"])) * 1e-9 / float(clock["factor"]))
+    return known + timedelta(seconds=(instant_ns - int(clock["now_ns"])) * 1e-9 / (float(clock["factor"]) or 1.0))

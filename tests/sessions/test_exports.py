@@ -1,6 +1,7 @@
 """One contract for every export in the list: whole, marked where simulated, the same session when imported again."""
 
 import builtins
+import csv
 import gzip
 import importlib
 import json
@@ -9,6 +10,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 
 import h5py
@@ -181,7 +183,8 @@ def test_what_was_lost_before_an_export_is_named_after_it_comes_back(exports, tm
 def test_the_csv_holds_every_number_of_the_live_file_to_the_last_bit(sources, exports, name):
     recorded = plainly_read(sources[name].recording.folder)
     lines = (exports["csv", name] / "readings.csv").read_text().splitlines()
-    rows = [line.split(",") for line in lines if not line.startswith("#")]
+    first = 1 if name == "whole" else 0  # after the column that says SIMULATED
+    rows = [line.split(",")[first:] for line in lines]
     assert rows[0][:6] == ["sequence", "counter", "status", "time_s", "received_ns", "raw_1_counts"]
     assert rows[0][11:] == ["Fx_N", "Fy_N", "Fz_N", "Tx_Nmm", "Ty_Nmm", "Tz_Nmm"]
     kept = recorded if name == "whole" else recorded[:300]  # the damaged block is left out
@@ -279,11 +282,20 @@ def test_every_float_column_has_a_unit_or_is_known_to_have_none(sources):
                 assert column.name in bare or column.name.startswith("mu"), (table.name, column.name)
 
 
+def test_every_csv_of_a_simulated_session_says_so_in_a_column_and_opens_as_it_is(exports):
+    for path in exports["csv", "whole"].glob("*.csv"):
+        with path.open(newline="") as file:
+            rows = list(csv.reader(file))
+        assert rows[0][0] == "SIMULATED"
+        assert {row[0] for row in rows[1:]} <= {"yes"}
+        assert {len(row) for row in rows} == {len(rows[0])}
+
+
 def test_the_readme_tells_every_column_of_every_csv(exports):
     folder = exports["csv", "whole"]
     page = (folder / "README.md").read_text()
     for path in folder.glob("*.csv"):
-        header = next(line for line in path.read_text().splitlines() if not line.startswith("#"))
+        header = path.read_text().splitlines()[0]
         assert f"## {path.name}" in page
         for name in header.split(","):
             assert f"| `{name}` |" in page
@@ -376,6 +388,18 @@ def test_nwb_holds_what_was_recorded(sources, exports):
             if name == "whole":
                 assert file.trials["score"][...].tolist() == [trial.score for trial in recorded.trials]
             assert json.loads(file.notes)["plan"]["subject"] == "S01"
+
+
+def test_a_session_in_told_time_that_moves_when_waited_on_opens_as_nwb(sources, tmp_path):
+    pynwb = pytest.importorskip("pynwb")
+    recording = sources["whole"].recording
+    known = {**recording.provenance, "clock": {**recording.provenance["clock"], "factor": 0.0}}
+    waited = replace(sources["whole"], recording=replace(recording, provenance=known))
+    export(waited, "nwb", tmp_path / "out")
+    with pynwb.NWBHDF5IO(tmp_path / "out" / "session.nwb", "r") as io:
+        begun_s = (recording.events[0].time_ns - known["clock"]["now_ns"]) * 1e-9
+        told = io.read().session_start_time - datetime.fromisoformat(known["created_utc"])
+        assert told.total_seconds() == pytest.approx(begun_s, abs=1e-5)
 
 
 @pytest.mark.parametrize("name", ["whole", "scores_only"])
