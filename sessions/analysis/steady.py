@@ -16,7 +16,8 @@ FEWEST = 5  # readings in a window
 _HELD = 0.95  # share of a window's readings that must have a ratio
 _QUARTERS = 4
 _FEWEST_BLOCKS = 4  # of which a standard error is told
-_ALIKE = 0.9  # most that neighbours may be alike: more cannot be told from so few
+_ALIKE = 0.8  # most that neighbours may be alike: more cannot be told from so few
+_LEAST_FREE = 2.0  # degrees of freedom, likewise
 
 
 def steady_window(ratio: Array, rate: float, whole: int, settings: AnalysisSettings) -> slice | None:
@@ -123,14 +124,16 @@ def strays(blocks: Array) -> tuple[float, float]:
     """Return how much further than that of independent blocks (k,) their mean strays, and its degrees of freedom.
 
     Neighbours that are alike count for fewer: of a first-order autoregression n (1 - r) / (1 + r) are independent
-    (Bayley and Hammersley 1946, Suppl. J. R. Stat. Soc. 8:184). White noise, whose r comes out at -1/n, counts in full.
+    (Bayley and Hammersley 1946, Suppl. J. R. Stat. Soc. 8:184). Found in n blocks about their own mean, r comes out too
+    small by (1 + 4 r) / n (Marriott and Pope 1954, Biometrika 41:390; Kendall 1954, 41:403), which is put right here.
     """
     n = len(blocks)
     off = blocks - blocks.mean()
     squares = float(off @ off)
-    alike = 0.0 if squares == 0.0 else min(max(float(off[1:] @ off[:-1]) / squares + 1.0 / n, 0.0), _ALIKE)
+    found = 0.0 if squares == 0.0 else float(off[1:] @ off[:-1]) / squares
+    alike = min(max((found + 1.0 / n) / (1.0 - 4.0 / n), 0.0), _ALIKE) if n > 4 else _ALIKE
     further = ((1.0 + alike) / (1.0 - alike)) ** 0.5
-    return further, max(n / further**2 - 1.0, 1.0)
+    return further, max(n / further**2 - 1.0, _LEAST_FREE)
 
 
 @dataclass(frozen=True, slots=True)

@@ -271,7 +271,7 @@ def test_a_mean_of_white_noise_lies_in_its_interval_as_often_as_it_says():
     assert 0.92 <= inside / 400 <= 0.98  # 0.95 within three standard deviations of 400 draws
 
 
-@pytest.mark.parametrize("alike", [0.05, 0.1])  # [s]
+@pytest.mark.parametrize("alike", [0.05, 0.1, 0.2, 0.4])  # [s]
 def test_a_mean_of_a_ratio_that_wanders_lies_in_its_interval_as_often_as_it_says(alike):
     draw, kept = np.random.default_rng(2), np.exp(-1 / (200.0 * alike))
     steps = draw.standard_normal((400, 800)) * np.sqrt(1.0 - kept**2)
