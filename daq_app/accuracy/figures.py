@@ -287,9 +287,9 @@ def _plain(value: float, _place: int) -> str:
 
 
 def _decades(limits: tuple[float, float]) -> tuple[float, float]:
-    """Return the powers of ten at or beyond both ends, but for a hair."""
-    low, high = np.log10(limits)
-    return float(10.0 ** np.floor(low + 0.05)), float(10.0 ** np.ceil(high - 0.05))
+    """Return the powers of ten at or beyond both ends, but for a hair; never one twice."""
+    low, high = np.floor(np.log10(limits[0]) + 0.05), np.ceil(np.log10(limits[1]) - 0.05)
+    return float(10.0**low), float(10.0 ** max(high, low + 1.0))
 
 
 def _power_line(axes: Axes, rows: Sequence[Growth]) -> None:

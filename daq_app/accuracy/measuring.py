@@ -32,7 +32,7 @@ from solver.stepper import stepper
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-FULL_S, QUICK_S = 140.0, 14.0  # what the subjects may take; what was begun is ended, and drawing comes on top
+FULL_S, QUICK_S = 140.0, 12.5  # what the subjects may take; what was begun is ended, and drawing comes on top
 # every kind of row, by its name in the JSON file
 KINDS = {
     kind.__name__: kind

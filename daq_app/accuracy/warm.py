@@ -19,7 +19,7 @@ from solver.march import march, press_and_slide
 from solver.scene import Friction, Scene
 from solver.stepper import Stepper, stepper
 
-PASSES = 5
+PASSES, QUICK_PASSES = 5, 3
 PRESS, SLIDES, DISTANCE = 200, 60, 6.0  # readings of the press and of the slide, and how far it goes [mm]
 FINER: dict[Kinematics, float] = {"small": 10.0, "finite": 8.0}  # fineness of the truth's mesh
 SURFACES = ("slipperiness 100", "slipperiness 55", "slipperiness 0", "stickiness 0")
@@ -47,16 +47,20 @@ def measure(asked: Asked, found: Found) -> Iterator[Warm | LeftOut]:
     del found
     scenes = [s for kind, names in (QUICK if asked.quick else FULL).items() for s in cases(kind) if s.title in names]
     for scene in within(asked, scenes, "surfaces followed reading by reading"):
-        yield scene if isinstance(scene, LeftOut) else _row(replace(scene, friction=Friction(scene.friction.mu)))
+        yield (
+            scene
+            if isinstance(scene, LeftOut)
+            else _row(replace(scene, friction=Friction(scene.friction.mu)), QUICK_PASSES if asked.quick else PASSES)
+        )
 
 
-def _row(scene: Scene) -> Warm:
+def _row(scene: Scene, passes: int) -> Warm:
     kinematics = scene.solve.kinematics
     readings = list(_small(scene) if kinematics == "small" else _finite(scene))
     begun = clock()
     follows = stepper(scene)
     setup = clock() - begun
-    spans, found = timed_passes(follows, readings)
+    spans, found = timed_passes(follows, readings, passes)
     truth = np.array([sed for _, _, sed in readings])
     each = np.median(spans, axis=0)
     return Warm(
@@ -65,11 +69,11 @@ def _row(scene: Scene) -> Warm:
     )  # fmt: skip
 
 
-def timed_passes(follows: Stepper, readings: list[Reading]) -> tuple[np.ndarray, np.ndarray]:
+def timed_passes(follows: Stepper, readings: list[Reading], passes: int = PASSES) -> tuple[np.ndarray, np.ndarray]:
     """Return what each reading took in each pass (passes, n) [s], and the SED found in the last (n,)."""
-    spans = np.zeros((PASSES, len(readings)))
+    spans = np.zeros((passes, len(readings)))
     found = np.zeros(len(readings))
-    for number in range(PASSES):
+    for number in range(passes):
         follows.forget()
         for n, (normal, tangential, _) in enumerate(readings):
             begun = clock()

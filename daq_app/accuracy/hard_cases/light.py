@@ -4,8 +4,6 @@ from dataclasses import dataclass, replace
 from functools import cache
 from math import log, pi, sqrt
 
-from scipy.optimize import brentq
-
 from daq_app.accuracy.hard_cases.outcome import Outcome, of_answer
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
@@ -54,6 +52,8 @@ def hertz(asked: Scene) -> Touch:
     falls. What the finger behind the contact adds to that, and the SED there by the force squared, are constants, taken
     from the deeper touch, which every mesh resolves.
     """
+    from scipy.optimize import brentq  # slow to load, and light touches alone have need of it
+
     skin = asked.materials.of("epidermis")
     modulus = skin.E / (1.0 - skin.nu**2)
     yields, response = _finger(replace(asked, loading=replace(asked.loading, indentation=KNOWN)))
