@@ -56,13 +56,33 @@ class Loop:
         return entry(*given)
 
     def _entry(self, given: tuple[object, ...]) -> Callable[..., Any]:
+        for number, argument in enumerate(given):
+            if not isinstance(argument, np.ndarray | np.number | np.bool | bool | int | float):
+                kind = type(argument).__name__
+                raise TypeError(
+                    f"argument {number} of {self.function.__name__} is a {kind}; loops take numbers and arrays"
+                )
         types = tuple(_type_name(a) for a in given)
         if types not in self._entries:  # kinds of numbers may differ where their types do not
             self._entries[types] = self._found(types)
         return self._entries[types]
 
     def _found(self, types: tuple[str, ...]) -> Callable[..., Any]:
-        """Return the code for arguments of these `types`, from the disk or compiled."""
+        """Return the code for arguments of these `types`, from the disk or compiled.
+
+        Where it is not known how to do without numba, or that fails, numba does it its own way.
+        """
+        if keeping.known():
+            try:
+                return self._kept(types)
+            except Exception:  # noqa: BLE001 - whatever it is: numba can do without
+                pass
+        dispatcher = self.dispatcher(cached=True)
+        if not any(Path(dispatcher.stats.cache_path or "").glob(f"*{self.function.__name__}-*.nbi")):
+            _tell()
+        return dispatcher
+
+    def _kept(self, types: tuple[str, ...]) -> Callable[..., Any]:
         name = f"{Path(self.function.__code__.co_filename).stem}.{self.function.__name__}"
         place = keeping.Place(name, types, self.sources())
         kept = keeping.linked(place)
@@ -76,7 +96,7 @@ class Loop:
     def _made(self, types: tuple[str, ...]) -> tuple[Callable[..., Any], tuple[bytes, str, str, list[str]]]:
         """Compile for arguments of these `types`; return the code to call, and what `keeping.keep` asks for."""
         signature: Any = import_module("numba.core.sigutils").normalize_signature(f"({', '.join(types)},)")[0]
-        dispatcher = self.dispatcher()
+        dispatcher = self.dispatcher(cached=False)
         dispatcher.compile(signature)
         made: Any = dispatcher.overloads[signature]
         code, module = made.library.serialize_using_object_code()[2]
@@ -87,13 +107,13 @@ class Loop:
         return made.entry_point, (code, made.fndesc.llvm_cpython_wrapper_name, made.fndesc.env_name, outside)
 
     @cache  # noqa: B019 - loops live as long as the process
-    def dispatcher(self) -> Any:  # noqa: ANN401 - numba declares no types
-        """Return numba's own view of this loop, and of the loops that it calls."""
+    def dispatcher(self, *, cached: bool) -> Any:  # noqa: ANN401 - numba declares no types
+        """Return numba's own view of this loop, and of the loops that it calls; `cached` on disk in numba's way."""
         numba: Any = import_module("numba")
-        others: dict[str, Any] = {loop.function.__name__: loop.dispatcher() for loop in self._called()}
+        others: dict[str, Any] = {loop.function.__name__: loop.dispatcher(cached=cached) for loop in self._called()}
         known: dict[str, Any] = self.function.__globals__ | others
         twin = FunctionType(self.function.__code__, known, self.function.__name__)
-        return numba.njit(fastmath=_FAST, forceinline=True)(twin)
+        return numba.njit(fastmath=_FAST, forceinline=True, cache=cached)(twin)
 
     def sources(self) -> frozenset[str]:
         """Return the files that this loop is made of: its own, this one, and those of the loops it calls."""

@@ -10,6 +10,7 @@ import builtins
 import ctypes
 import json
 import os
+import re
 import sys
 import sysconfig
 from collections.abc import Callable, Iterator
@@ -29,6 +30,13 @@ _EXTENSIONS = {  # of numba, and what it calls their helpers
     "numba.core.runtime._nrt_python": "NRT_",
 }
 _ENDING = ".loop"
+KNOWN = ("0.68",)  # numbers of numba, but for the last, whose code was watched being linked; on Linux
+
+
+def known() -> bool:
+    """Return whether code of this numba, on this system, may be linked without it."""
+    version = re.search(rb'"version": "(\d+\.\d+)\.', _content(_numba() / "_version.py"))
+    return sys.platform == "linux" and version is not None and version[1].decode() in KNOWN
 
 
 @dataclass(frozen=True)
@@ -91,7 +99,7 @@ def keep(place: Place, code: bytes, wrapper: str, environment: str, outside: lis
             Path(file.name).replace(folder / place.file)
             for other in folder.glob(f"{place.label}*{_ENDING}"):
                 if other.name != place.file:
-                    other.unlink()
+                    other.unlink(missing_ok=True)
             return
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from solver import kernels
 from solver.kernels import keeping
+from solver.kernels.compiling import compiled
 from solver.kernels.keeping import Place
 
 
@@ -46,8 +47,21 @@ def test_code_of_one_layout_is_not_called_with_another():
     out = np.zeros(3)
     kernels.tributary(x[::2], at, out)
     np.testing.assert_allclose(out, [0.5, 2.0, 0.5], rtol=1e-15)  # Simpson's rule
-    with pytest.raises(KeyError):
+    with pytest.raises(TypeError, match="argument 2 of tributary is a str"):
         kernels.tributary(x[::2], at, "no array")
+
+
+def fails(*_):
+    raise AttributeError("what a later numba may have done away with")
+
+
+@pytest.mark.parametrize("change", [("KNOWN", ()), ("linked", fails)], ids=["unknown numba", "linking fails"])
+def test_where_code_cannot_be_linked_numba_does_it_its_own_way(monkeypatch, change):
+    monkeypatch.setattr(keeping, *change)
+    loop, out = compiled(kernels.tributary.function), np.zeros(3)
+    loop(np.linspace(0.0, 3.0, 3), np.array([0, 1, 0], np.int32), out)
+    np.testing.assert_allclose(out, [0.5, 2.0, 0.5], rtol=1e-15)
+    assert type(loop._entry((out, np.zeros(3, np.int32), out))).__module__ == "numba.core.registry"
 
 
 def test_what_is_kept_is_found_again_until_its_sources_change(kept):
