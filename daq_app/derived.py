@@ -26,6 +26,7 @@ from sessions.visits import force_visit
 
 ANALYSIS = "analysis.json"
 PREDICTION = "prediction.json"
+_PARTS = {ANALYSIS: ("strokes", "friction", "flaws"), PREDICTION: ("trials",)}  # without which one is damaged
 
 
 def analysed(
@@ -90,17 +91,36 @@ def _afferent_of(stored: Mapping[str, Any]) -> AfferentSettings | None:
     return None if held is None else from_table(held.get("settings") or {}, AfferentSettings, PREDICTION)
 
 
+def kept(folder: Path, name: str) -> dict[str, Any] | None:
+    """Return the analysis or prediction kept in a session's folder; None where there is none.
+
+    Raises RecordingError where it is damaged: what it holds, or which verb makes it anew.
+    """
+    try:
+        document = load_derived(folder, name)
+        if document is not None:
+            lacking = [part for part in _PARTS[name] if not isinstance(document.get(part), list)]
+            if lacking:
+                raise SettingsError(f"it holds no {lacking[0]}")
+            settings_of(document)
+            bootstrap_of(document)
+            from_table(document.get("options", {}), PredictionOptions, name)
+            _afferent_of(document)
+    except (SettingsError, AttributeError, TypeError) as damaged:
+        verb = "analyse" if name == ANALYSIS else "predict"
+        why = (
+            damaged if isinstance(damaged, SettingsError) else "its parts are not of the kinds that this program writes"
+        )
+        raise RecordingError(f"{folder / name} is damaged ({why}); 'daq-app {verb}' makes it anew") from damaged
+    return document
+
+
 def _kept(recording: Recording, name: str) -> Mapping[str, Any]:
     """Return a document as it was kept before; empty where there is none, or one that is damaged and made anew."""
     try:
-        document = load_derived(recording.folder, name) or {}
-        settings_of(document)
-        bootstrap_of(document)
-        from_table(document.get("options", {}), PredictionOptions, name)
-        _afferent_of(document)
-    except (RecordingError, SettingsError):
+        return kept(recording.folder, name) or {}
+    except RecordingError:
         return {}
-    return document
 
 
 def predicted(

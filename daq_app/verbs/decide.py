@@ -11,13 +11,12 @@ from pathlib import Path
 
 from daq_app.cli import DONE, FLAWED, WrongValue
 from daq_app.console import Console, number
-from daq_app.derived import ANALYSIS, PREDICTION, analysed, settings_of
+from daq_app.derived import ANALYSIS, PREDICTION, analysed, kept, settings_of
 from sessions.analysis import Analysis, Stroke, analyse
 from sessions.analysis.decided import tried, with_old
 from sessions.decisions import Decision, DecisionError, Decisions, append, read
 from sessions.gain_error import gain_error_set
 from sessions.recording import Recording
-from sessions.recording.derived import load_derived
 from sessions.study import check_code
 
 EXAMPLE = 'daq-app decide recordings/P07 --trial 4 --steady 31.2 32.6 --by E02 --why "the ramp was in it"'
@@ -65,7 +64,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.by is None or options.why is None:
         raise WrongValue("a decision says who decides and why: give --by CODE and --why REASON")
     check_code("--by", options.by)
-    stored = load_derived(recording.folder, ANALYSIS)
+    stored = kept(recording.folder, ANALYSIS)
     gain_error_set(recording.folder)  # where it is damaged nothing is recorded that could not be analysed then
     analysis = analyse(recording, settings_of(stored or {}), before)
     asked = _asked(options) if options.tilt is None else _tilt(options, analysis)

@@ -13,6 +13,7 @@ from daq_app.derived import (
     ANALYSIS,
     PREDICTION,
     analysed_again,
+    kept,
     made_otherwise,
     made_under,
     predicted_again,
@@ -24,7 +25,6 @@ from sessions.decisions import read
 from sessions.exports import FORMATS, ExportSource, export
 from sessions.gain_error import gain_error_set
 from sessions.recording import Recording
-from sessions.recording.derived import load_derived
 from sessions.recording.provenance import software_versions
 
 EXAMPLE = "daq-app export recordings/P07 --format csv --out P07-csv"
@@ -58,7 +58,7 @@ def _source(recording: Recording, console: Console) -> ExportSource:
     """Return the session with the numbers kept in it; those made under other decisions are made anew."""
     decided = read(recording.folder)
     made_by = {"made_by": software_versions()}
-    analysis, prediction = load_derived(recording.folder, ANALYSIS), load_derived(recording.folder, PREDICTION)
+    analysis, prediction = kept(recording.folder, ANALYSIS), kept(recording.folder, PREDICTION)
     if analysis is None or not made_under(analysis, decided):
         analysis = made_by | analysed_again(
             recording, analysis or {"gain_error": gain_error_set(recording.folder)}, decided

@@ -15,11 +15,10 @@ from typing import Any
 
 from daq_app.cli import WrongValue
 from daq_app.console import Console
-from daq_app.derived import ANALYSIS, PREDICTION, analysed_again, predicted_again, settings_of
+from daq_app.derived import ANALYSIS, PREDICTION, analysed_again, kept, predicted_again, settings_of
 from sessions.analysis import analyse
 from sessions.decisions import read
 from sessions.recording import Recording
-from sessions.recording.derived import load_derived
 from sessions.recording.provenance import software_versions
 from sessions.replay import Stopped, different_events, different_readings, replay
 from sessions.verification import differences, told, why
@@ -53,12 +52,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
         found = [*different_readings(recording, replayed), *told(list(different_events(recording, replayed)))]
         compared = ["readings", "events", ANALYSIS]
         decided = read(recording.folder)  # people decided about the recording, not about its replay
-        stored = load_derived(options.session, ANALYSIS)
+        stored = kept(options.session, ANALYSIS)
         fresh = _plain(analysed_again(replayed, stored or {}, decided))
         expected = _plain(analysed_again(recording, {}, decided)) if stored is None else stored
         found += _changed(ANALYSIS, expected, fresh)
         if not options.no_prediction:
-            predicted = load_derived(options.session, PREDICTION)
+            predicted = kept(options.session, PREDICTION)
             if predicted is not None:
                 console.progress(0.9, f"making {PREDICTION} again")
                 analysis = analyse(replayed, settings_of(predicted), decided)

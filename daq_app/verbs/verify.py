@@ -8,12 +8,11 @@ import json
 from pathlib import Path
 
 from daq_app.console import Console
-from daq_app.derived import ANALYSIS, PREDICTION, analysed_again, made_under, predicted_again, settings_of
+from daq_app.derived import ANALYSIS, PREDICTION, analysed_again, kept, made_under, predicted_again, settings_of
 from sessions.analysis import analyse
 from sessions.decisions import DECISIONS, read
 from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems
-from sessions.recording.derived import load_derived
 from sessions.recording.provenance import software_versions
 from sessions.toml_file import SettingsError
 from sessions.verification import differences, told, why
@@ -38,7 +37,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     for name in (ANALYSIS, PREDICTION):
         console.progress(0.5, f"making {name} again")
         try:
-            stored = load_derived(folder, name)
+            stored = kept(folder, name)
             if stored is None:
                 continue
             if not made_under(stored, decided):

@@ -301,3 +301,18 @@ def test_a_study_computes_a_session_again_once_something_was_decided_about_it(sm
     before = shelf.key(small)
     run(["decide", str(small), "--trial", "2", "--keep", "--by", "E02", "--why", "looked at"])
     assert shelf.key(small) != before
+
+
+@pytest.mark.parametrize(
+    "content", ['{"settings": {}}', '{"strokes": [], "friction": [], "flaws": [], "bootstrap": 7}', '{"settings": 4}']
+)
+def test_an_analysis_of_odd_parts_is_refused_in_a_sentence_and_made_anew_where_that_is_asked_for(
+    small, capsys, content
+):
+    (small / "analysis.json").write_text(content)
+    assert run(["export", str(small), "--format", "csv", "--out", str(small.parent / "out")]) == 1
+    assert run(["decide", str(small), "--trial", "1", "--drop", "--by", "E02", "--why", "pulled away"]) == 1
+    told = capsys.readouterr().err.splitlines()
+    assert [line for line in told if "analysis.json is damaged" in line and "daq-app analyse" in line] == told
+    assert run(["analyse", str(small)]) == 0
+    assert run(["export", str(small), "--format", "csv", "--out", str(small.parent / "out")]) == 0
