@@ -20,6 +20,7 @@ NAMES = ("SED", "normal force", "drag", "indentation")  # what is told apart
 PART = {"small": 0.6, "finite": 1.0}  # of what another mesh changes in a difference
 TOLD = 0.05  # part of their range to which differences are asked for
 LEAST = 1e-5  # part of the numbers below which nobody minds
+NOTICED = 1e-3  # part of a force or depth that a sensor may tell
 
 
 def together(scenes: Sequence[Scene]) -> list[list[int]]:
@@ -36,32 +37,38 @@ def together(scenes: Sequence[Scene]) -> list[list[int]]:
 
 
 class Off(NamedTuple):
-    """By how much of their range differences between surfaces may be off, at worst."""
+    """By how much of their range differences between surfaces may be off."""
 
-    share: float
-    name: str  # of the number
-
-    def in_a_sentence(self) -> str:
-        """Say so."""
-        part = f"{100.0 * self.share:.2g} %" if self.share < 1.0 else "more than all"
-        return (
-            f"Differences in {self.name} from the surfaces solved with this one are small, and may be off by {part} "
-            "of their range."
-        )
+    share: float  # at worst, of those numbers that are held to a part of their range
+    warning: str = ""  # a sentence where that is too much
 
 
 def off(found: Sequence[Prediction]) -> Off:
     """Return what differences between these surfaces may be off by.
 
-    A surface that has no state on another mesh is left out: nothing is known of it.
+    Without a tolerance the SED's alone are held to their range; of forces and depth only what is off by more than
+    sensors tell is warned of. A surface that has no state on another mesh is left out: nothing is known of it.
     """
     known = [one for one in found if len(one.beside)]
     if len(known) < 2:
-        return Off(0.0, NAMES[0])
+        return Off(0.0)
     count = min(len(one.beside) for one in known)
     numbers = np.array([told(one) for one in known])
     shares = off_by(numbers, np.array([one.beside[:count] for one in known]), PART[known[0].scene.solve.kinematics])
-    return Off(float(shares.max()), NAMES[int(shares.argmax())])
+    of_numbers = shares * np.ptp(numbers, axis=0) / np.where(numbers[0] == 0.0, 1.0, np.abs(numbers).mean(axis=0))
+    held = np.full(len(NAMES), any(one.scene.solve.tolerance is not None for one in known))
+    held[0] = True
+    warned = np.where((shares > TOLD) & (held | (of_numbers > NOTICED)), shares, 0.0)
+    worst = int(warned.argmax())
+    return Off(float(shares[held].max()), _in_a_sentence(NAMES[worst], float(warned[worst])) if warned.any() else "")
+
+
+def _in_a_sentence(name: str, share: float) -> str:
+    part = f"{100.0 * share:.2g} %" if share < 1.0 else "more than all"
+    return (
+        f"Differences in {name} from the surfaces solved with this one are small, and may be off by {part} of their "
+        "range."
+    )
 
 
 def told(one: Prediction) -> tuple[float, float, float, float]:

@@ -47,6 +47,11 @@ def steady(
     for shape in found:
         if _proven(finger, shape, proof):
             return shape
+    if steep(pull):
+        raise NotConverged(
+            f"At {pull.depth:.3g} mm of indentation there is settled sliding at mu = {pull.mu:.3g}, nearly all of the "
+            "skin slipping at the bound, and this mesh does not find it"
+        )
     begin = settled(finger.newton, pull._replace(mu=0.0), None, tolerance, stop)
     branch = follow(finger, begin, BY_FRICTION, pull.mu, 0.0, stop)
     if not branch.limited:
@@ -59,16 +64,23 @@ def steady(
     )
 
 
+def steep(pull: Pull) -> bool:
+    """Return whether friction is so steep that nearly all of the skin slips at a bound."""
+    return pull.mu > STEEP and pull.tau < np.inf
+
+
 def _tried(
     newton: Newton, pull: Pull, tolerance: float, start: Shape | None, stop: Callable[[], bool]
 ) -> Iterator[Shape]:
     """Yield the states found directly: from `start`, from undeformed, and from all skin slipping at the bound.
 
-    The last comes before undeformed where friction is steep, so that nearly all skin slips at the bound.
+    Where friction is steep, so that nearly all skin slips at the bound, undeformed leads nowhere that this does not.
     """
-    ways: list[Callable[[], Shape]] = [lambda: settled(newton, pull, None, tolerance, stop)]
+    ways: list[Callable[[], Shape]] = []
+    if not steep(pull):
+        ways.append(lambda: settled(newton, pull, None, tolerance, stop))
     if pull.tau < np.inf:
-        ways.insert(0 if pull.mu > STEEP else 1, lambda: all_at_the_bound(newton, pull, tolerance, stop))
+        ways.append(lambda: all_at_the_bound(newton, pull, tolerance, stop))
     if start is not None:
         ways.insert(0, lambda: settled(newton, pull, start, tolerance, stop))
     for way in ways:

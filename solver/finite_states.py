@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from solver import finite_forced, reach, sliding
-from solver.existence import all_at_the_bound, steady
+from solver.existence import all_at_the_bound, steady, steep
 from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.finite_finger import FiniteFinger
 from solver.finite_forced import Given, balanced
-from solver.kernels import STEEP, STICK
+from solver.kernels import STICK
 from solver.march import march
 from solver.newton import BY_DEPTH, Newton, Pull, Shape
 from solver.scene import Scene
@@ -111,7 +111,7 @@ def _sliding_under(
     newton = finger.newton
     sense = -(scene.loading.direction or 1)
     pull = Pull(0.0, float(scene.friction.mu), scene.friction.cap, sense)
-    capped = pull.mu > STEEP and pull.tau < np.inf  # nearly all of the skin slips at the bound
+    capped = steep(pull)
     if start is not None:
         near = replace(start, pull=pull._replace(depth=start.pull.depth, travel=start.pull.travel))
         with suppress(NotConverged):

@@ -27,6 +27,7 @@ FAST = 0.02  # fall of the steps' size, below which a new tangent is kept
 SLOW = 0.5  # the same, above which a kept one is given up
 TURNED = 0.1  # step times bulk over shear stiffness, above which no tangent is kept [mm]
 MARGIN = 0.5  # part of the tolerance that the step still missing, as judged, may take
+SAME, AGAIN = 1e-3, 4  # relative difference of steps that are the same, and how many in a row are a circle
 EQUILIBRIUM, BY_DEPTH, BY_FRICTION, BY_TRAVEL = 0, 1, 2, 3  # columns of Newton.steps
 
 
@@ -87,6 +88,7 @@ class Newton:
         """
         count, skin = len(body.nodes), len(body.skin)
         self.body = body
+        self.systems = 0  # tangents assembled, or tried
         self.load = np.zeros(body.size)  # dead loads on the body, of `solver.dead_loads`
         self.force = np.zeros(body.size)
         if beside is not None and beside.body.plan is body.plan:
@@ -115,6 +117,7 @@ class Newton:
         times until none contradicts the linearised body.
         """
         self.inside.found = None
+        self.systems += 1
         if not self._assembled(shape) > 0.0 or not self.inside.factorise(self.tangent):
             return False
         return self._touch(shape, pull, anchor, rounds)
@@ -178,7 +181,7 @@ class Newton:
         anchor = start.place(self.body)[:, 0] + (pull.travel - start.pull.travel)
         shape = before = self._entered(start, pull)
         kept = self.inside.found is start.u
-        scale, last, new = 1.0, 0.0, False
+        scale, last, new, alike = 1.0, 0.0, False, 0
         for _ in range(limit):
             if kept:
                 if not self.relinearise(shape, pull, anchor, ROUNDS):
@@ -196,6 +199,9 @@ class Newton:
             if not largest < 1e3:
                 raise NotConverged("the displacements grow without bound")
             fall = min(largest / last, 1.0) if last > 0.0 else 1.0
+            alike = alike + 1 if changed and abs(largest - last) <= SAME * last else 0
+            if alike == AGAIN:
+                raise NotConverged("states of contact come again and again")
             left = min((2.0 * fall) ** 2 if not kept else 4.0 * fall if new else 2.0 * fall, 1.0)
             if largest * left < MARGIN * tolerance and not changed and scale == 1.0:
                 self.inside.found = shape.u

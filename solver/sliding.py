@@ -6,6 +6,7 @@ from solver.failures import Cancelled, NotConverged
 from solver.newton import Newton, Pull, Shape
 
 FIRST_TOLERANCE = 1e-3  # of the steps that only lead to the last one [mm]; looser ones go astray near nu = 0.5
+WORK = 80  # tangents after which no more steps are halved: a state that is there takes 5 to 30
 SMALLEST = 1.0 / 64.0  # part of the way below which a failing step is given up
 
 
@@ -24,7 +25,7 @@ def settled(
     shape = Shape.undeformed(newton.body) if start is None else start
     begin = shape.pull if start is not None else Pull(0.0, pull.mu, pull.tau, pull.sense)
     done, part = 0.0, 1.0
-    used = 0
+    used, most = 0, newton.systems + WORK
     while done < 1.0:
         if stop():
             raise Cancelled
@@ -34,7 +35,7 @@ def settled(
         except NotConverged as reason:
             part /= 2.0
             used += 1
-            if part < SMALLEST or used > 12 or begin == pull:
+            if part < SMALLEST or used > 12 or begin == pull or newton.systems > most:
                 raise NotConverged(
                     f"no sliding state was found beyond {_between(begin, pull, done).depth:.3g} mm of indentation at "
                     f"mu = {_between(begin, pull, done).mu:.3g}: {reason}, in steps of 1/{1 / part:.0f} of the way"

@@ -43,8 +43,9 @@ def solve_together(
     Scenes with the same finger, materials and receptor share one mesh, fine enough for the strictest tolerance among
     them, so that differences between them are more accurate than each of them; at finite strain those do that are
     pressed alike, its lines moved to the edges of contact of each. It is also so fine that differences between those
-    pressed alike are good to 5 % of their range, as estimated, in SED, forces and depth, but for variants, asked for
-    with quick evidence; where the finest is not, a warning says by how much. Raises as `solve` does.
+    pressed alike are good to 5 % of their range, as estimated, in SED and, where a tolerance is asked for, in forces
+    and depth, but for variants, asked for with quick evidence; where the finest is not, a warning says by how much.
+    Raises as `solve` does.
     """
     done: list[Prediction] = []
     for answer in answers(scenes, progress, rough=rough, in_loops=in_loops):
@@ -229,8 +230,8 @@ def _warned(answer: Answer, off: Off | None, *, misses: bool, unfound: bool) -> 
         told.append("A finer mesh did not find this state; told is the coarser one's, with its own error estimate.")
     if misses:
         told.append("The finest mesh leaves an error estimate above the tolerance asked for.")
-    if off is not None and off.share > TOLD:
-        told.append(off.in_a_sentence())
+    if off is not None and off.warning:
+        told.append(off.warning)
     return replace(answer, warnings=(*answer.warnings, *told)) if told and isinstance(answer, Prediction) else answer
 
 

@@ -2,11 +2,12 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from solver.differences import TOLD, finer, off_by, together
+from solver.differences import TOLD, finer, off, off_by, together
 from solver.estimate import DEFAULT, FINENESS, coarsest_for, estimates
 from solver.reference import STICKINESS, scene
 from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
@@ -399,6 +400,25 @@ def test_nobody_minds_differences_that_are_off_by_less_than_a_1000th_of_a_per_ce
     numbers = np.full((2, 1), 3.0)
     others = numbers[:, None] + [[[0.0]], [[3e-5]]]
     assert off_by(numbers, others, 0.9)[0] < TOLD < off_by(numbers, others, 1.1)[0]
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "changed", "held", "warned"),
+    [(None, 0.004, False, True), (None, 0.001, False, False), (0.01, 0.001, True, True)],
+)
+def test_without_a_tolerance_forces_are_not_held_to_their_range_but_warned_of_where_a_sensor_could_tell(
+    tolerance, changed, held, warned
+):
+    def surface(force):
+        numbers = (1.0 + 10.0 * (force - 1.0), force, 0.3, 2.0)
+        other = np.array([numbers[0], force + (changed if force > 1.0 else 0.0), 0.3, 2.0])
+        asked = replace(scene(STICKINESS[0]), solve=Solve(tolerance=tolerance))
+        names = ("sed_ending", "normal_force", "tangential_force", "indentation")
+        return SimpleNamespace(scene=asked, beside=other[None], **dict(zip(names, numbers, strict=True)))
+
+    found = off([surface(1.0), surface(1.01)])
+    assert (found.share > TOLD) == held
+    assert ("Differences in normal force" in found.warning) == warned
 
 
 def test_variants_of_one_surface_and_surfaces_pressed_otherwise_are_not_told_apart():
