@@ -30,7 +30,7 @@ from solver.scene import Finger, Receptor, Scene
 
 FINENESS = {"small": (5, 6, 8, 10, 12, 16, 20, 24), "finite": (7, 11, 14, 20, 24)}  # meshes that can be asked for
 DEFAULT = {"small": 8, "finite": 11}
-FROM_MESHES = {"small": 0.25, "finite": 0.6}
+FROM_MESHES = {"small": 0.25, "finite": 0.75}
 FROM_NAIL = {"small": 2.5, "finite": 4.0}  # the same where a nail ends: errors fall with the element, or its root
 FROM_FINENESS = {"small": ((0.08, 2.0),), "finite": ((0.15, 2.0), (0.06, 1.5))}  # the largest, by the power given
 OF_OTHERS = ((0.125, 2.0), (7.0, 4.0))  # the same at small strain of any finger but the published one
