@@ -98,7 +98,7 @@ def foot(
             raise  # told on a mesh of its own, whatever this one is
     except SolveFailure:
         pass
-    sizing = Sizing(fineness, depth, margin=margin, at_cut=_at_cut(scene.materials))
+    sizing = Sizing(fineness, depth, margin=margin, at_cut=_at_cut(scene.materials, scene.loading.direction))
     try:
         return _plain(scene, sizing, stop, make)
     except NoSteadyState:
@@ -111,7 +111,7 @@ def _rough(
     scene: Scene, depth: float, margin: float, stop: Callable[[], bool], make: Maker, near: Climbed | None
 ) -> Climbed:
     begun = perf_counter()
-    finger = make(scene, Sizing(ROUGH, depth, margin=margin, at_cut=_at_cut(scene.materials)))
+    finger = make(scene, Sizing(ROUGH, depth, margin=margin, at_cut=_at_cut(scene.materials, scene.loading.direction)))
     setup = perf_counter() - begun
     shape = _on_rough(finger, scene, stop, near.shape if near is not None and near.finger is finger else None)
     return Climbed(finger, shape, setup)
@@ -161,16 +161,16 @@ def risen(
 def sized(fineness: float, below: Climbed) -> Sizing:
     """Return the sizing of a mesh of `fineness` whose lines follow the edges of contact found `below`."""
     edges = below.finger.edges(below.shape)
-    at_cut = _at_cut(below.finger.scene.materials)
+    at_cut = _at_cut(below.finger.scene.materials, -float(below.shape.force[0]))
     return Sizing(fineness, below.shape.pull.depth, margin=MARGIN, edges=edges, at_cut=at_cut)
 
 
-def _at_cut(tissues: Materials) -> float | None:
-    """Return how small the elements are where the cut meets the bone.
+def _at_cut(tissues: Materials, slide: float) -> float | None:
+    """Return how small the elements are where the cut meets the bone; a `slide` along +x squeezes tissue there.
 
-    Under stiff skin those collapse, and Newton's iterations lose their way, sooner than they bring anything.
+    Under stiff skin they collapse, and Newton's iterations lose their way, sooner than they bring anything.
     """
-    return None if strains_the_cut(tissues) else AT_CUT
+    return AT_CUT if slide > 0.0 and not strains_the_cut(tissues) else None
 
 
 def sized_together(scene: Scene, fineness: float, feet: Sequence[Climbed]) -> list[Sizing]:

@@ -20,6 +20,8 @@ NUDGE = 1e-3  # of the traction bound, to see what it does
 CROWDED = 0.8  # least det F, below which tissue is squeezed where the cut meets the bone
 OF_CORNER = np.array([8.0, 4.5, 4.5, 4.5, 4.5, 4.5])  # added to differences then, by the force's or depth's
 OF_STIFF = 15.0  # the same of the SED where skin is stiff, and does not only stiffen
+SQUEEZED, OF_SQUEEZED = 0.82, 0.032  # least det F there under other skin, from which errors grow; by how much then
+IN_COMMON = 0.004  # the most of that: what meshes of all finenesses have in common
 
 
 def error_estimates(
@@ -58,12 +60,30 @@ def compared(
     both = (coarse, way_up.first)
     others = np.array([other.finger.all_numbers(other.shape) for other in both if other is not None])
     felt = np.zeros(6) if way_up.first is None else felt_of_bound(coarse)
+    return numbers, np.vstack([others, numbers * (1.0 + _of_corner(scene, at, numbers, others[0]))]), felt, None
+
+
+def _of_corner(scene: Scene, at: Climbed, numbers: Array, other: Array) -> Array:
+    """Return the relative differences (6,) that stand for what two meshes have in common where the cut meets the bone.
+
+    They are told by how far tissue is squeezed there, and under stiff skin by what the `other` mesh makes of the force.
+    """
     if _crowded(scene, at):
-        change = np.abs(others[0] / np.where(numbers == 0.0, 1.0, numbers) - 1.0)[[1, 3]].max()
+        change = np.abs(other / np.where(numbers == 0.0, 1.0, numbers) - 1.0)[[1, 3]].max()
         part = OF_CORNER.copy()
         part[0] = OF_STIFF if stiff(scene.materials) else part[0]
-        others = np.vstack([others, numbers * (1.0 + part * change)])
-    return numbers, others, felt, None
+        return part * change
+    if scene.finger.cut == "driven":
+        return np.zeros(6)
+    geometry = at.finger.geometry
+    near = 2 * (geometry.fat + len(geometry.depths) - 1)  # elements of the first two lines from the cut
+    squeezed = max(SQUEEZED - float(_volumes(at)[:near].min()), 0.0)
+    return np.full(6, min(OF_SQUEEZED * squeezed, IN_COMMON))
+
+
+def _volumes(at: Climbed) -> Array:
+    """Return det F (e, 9) at the quadrature points."""
+    return np.linalg.det(kernels_numpy.deformation(at.finger.newton.body, at.shape.u))
 
 
 def _crowded(scene: Scene, at: Climbed) -> bool:
@@ -74,7 +94,7 @@ def _crowded(scene: Scene, at: Climbed) -> bool:
     """
     if not strains_the_cut(scene.materials):
         return False
-    return float(np.linalg.det(kernels_numpy.deformation(at.finger.newton.body, at.shape.u)).min()) < CROWDED
+    return float(_volumes(at).min()) < CROWDED
 
 
 def _nearest(scene: Scene, fineness: float, at: Climbed, stop: Callable[[], bool]) -> Climbed:
