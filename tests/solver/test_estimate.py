@@ -228,7 +228,7 @@ def test_at_finite_strain_estimates_see_layers_in_the_fat_and_the_bound_at_the_e
     assert tolerance is None or found.error_estimate <= tolerance
 
 
-STICKS_LEAST = 0.0096285  # SED of stickiness 0, on meshes of 17 to 26 with elements of 0.05 mm where the cut meets the bone
+STICKS_LEAST = 0.0096285  # SED of stickiness 0, on meshes of 17 to 26, with elements of 0.05 mm at the cut
 
 
 def test_a_bound_far_from_the_edges_of_contact_keeps_no_tolerance_from_being_met():
