@@ -24,8 +24,13 @@ class Variant:
         >>> Variant("finite", "as-printed", "depth").sentence
         'finite strain, tau_max as printed, at the planned depth'
         """
+        return f"{self.kinematics} strain, {self.way}"
+
+    @property
+    def way(self) -> str:
+        """It, without the strain."""
         reading = "tau_max as printed, " if self.tau_reading == "as-printed" else ""
-        return f"{self.kinematics} strain, {reading}{_DRIVEN[self.driven]}"
+        return f"{reading}{_DRIVEN[self.driven]}"
 
 
 _DRIVEN = {

@@ -38,6 +38,13 @@ const cut = (page) =>
   [...page.querySelectorAll(".scroll, table, figure, pre, p")]
     .filter((element) => element.scrollWidth > element.clientWidth + 1)
     .map((element) => element.textContent.trim().slice(0, 60));
+const beyond = (page) =>
+  [...page.querySelectorAll("svg text")]
+    .filter((element) => {
+      const [text, picture] = [element, element.closest("svg")].map((one) => one.getBoundingClientRect());
+      return text.left < picture.left - 1 || text.right > picture.right + 1;
+    })
+    .map((element) => element.textContent);
 onload = () => {
   const seen = {};
   for (const frame of document.querySelectorAll("iframe")) {
@@ -49,6 +56,7 @@ onload = () => {
       texts: boxes_of(page).length,
       overlaps: overlaps(page),
       cut: cut(page),
+      beyond: beyond(page),
       tallest: Math.max(...whole),
       fetched: frame.contentWindow.performance.getEntriesByType("resource").map((entry) => entry.name),
     };

@@ -303,12 +303,14 @@ def test_a_page_that_asks_fails_overlaps_or_is_cut_is_found_out(tmp_path):
         '<p>one<img src="http://127.0.0.1:9/x.png"><script>nothing()</script>'
         '<p style="position: absolute; top: 14px">another'
         '<pre style="width: 50px; overflow: auto">far too long a line</pre>'
+        '<svg width="50" height="20"><text x="0" y="15">wider than its picture</text></svg>'
     )
     seen, console, asked = opened(tmp_path, bad)
     assert "nothing is not defined" in console[0]
     assert asked == {"http://127.0.0.1:9/x.png"}
     assert seen["wide"]["overlaps"] == ["one | another"]
     assert seen["paper"]["cut"] == ["far too long a line"]
+    assert seen["wide"]["beyond"] == ["wider than its picture"]
 
 
 def test_no_request_leaves_the_page(shown):
@@ -327,6 +329,11 @@ def test_no_text_lies_over_another_and_the_page_is_no_wider_than_its_window(show
     assert frame["texts"] > 200  # there is something to overlap
     assert frame["overlaps"] == []
     assert frame["needed"] <= frame["window"]
+
+
+@pytest.mark.parametrize("window", ["narrow", "wide", "paper"])
+def test_no_label_of_a_picture_goes_beyond_it(shown, window):
+    assert shown[0][window]["beyond"] == []
 
 
 def test_nothing_is_cut_where_there_is_room_and_on_paper_nothing_at_all(shown):

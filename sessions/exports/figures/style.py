@@ -35,6 +35,7 @@ _LOOK: dict[Any, Any] = {
     # is wider than the ones a reader without it sees instead: labels may come out shorter, never cut.
     "font.sans-serif": ["DejaVu Sans"],
     "svg.fonttype": "none",
+    "text.hinting": "no_hinting",  # a reader's letters are no narrower for a coarse screen, as those laid out would be
     "font.size": TEXT,
     "axes.titlesize": TEXT,
     "axes.titlelocation": "left",

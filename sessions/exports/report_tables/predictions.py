@@ -1,7 +1,9 @@
 """Tables of predictions: responses, forces beside measured ones, both directions."""
 
+from collections.abc import Callable
+
 from sessions.alternative import Alternative
-from sessions.exports.report_tables.cells import Cell, Column, Notes, Table, grouped
+from sessions.exports.report_tables.cells import Cell, Column, Group, Notes, Table, grouped
 from sessions.exports.wording import between, digits, direction, places, sed, significant, tau
 from sessions.report import PredictionFinding, Report
 from sessions.sed_interval import SedInterval
@@ -78,9 +80,9 @@ def afferent_table(report: Report) -> Table | None:
 
 
 def beside_table(report: Report) -> Table | None:
-    """Return each trial's SED in every variant it was predicted in, side by side."""
-    first = next((p.alternatives for p in report.predictions if p.alternatives), ())
-    if not first:
+    """Return each trial's SED in every variant it was predicted in, side by side; strains one under another."""
+    ways = _ways(report)
+    if not ways:
         return None
     notes = Notes()
 
@@ -92,37 +94,48 @@ def beside_table(report: Report) -> Table | None:
         text = sed(one.sed) if held is None else f"{sed(one.sed)} ({digits(held, 2)} {unit})"
         return Cell(text, notes.mark(one.doubt), one.doubt) if one.doubt else Cell(text)
 
-    def row(p: PredictionFinding) -> tuple[Cell, ...]:
-        return (*_named(p), *(cell(one) for one in p.alternatives))
-
-    told = "; ".join(f"({n}) {one.variant.sentence}" for n, one in enumerate(first, 1))
+    told = "; ".join(f"({n}) {way}" for n, way in enumerate(ways, 1))
     caption = (
         f"The same trials predicted otherwise, SED in kPa: {told}. In brackets the model's normal force, or the depth "
-        "that the measured force presses it to. Within a column all trials share a mesh. A dash says why."
+        "that the measured force presses it to. At one strain all trials of a column share a mesh. A dash says why."
     )
-    columns = (*_who(report), *(Column(f"({n})", "kPa") for n in range(1, len(first) + 1)))
-    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
-    return Table("table-beside", caption, columns, groups, notes.listed())
+    columns = (*_who(report), *(Column(f"({n})", "kPa") for n in range(1, len(ways) + 1)))
+    return Table("table-beside", caption, columns, _by_strain(report, cell), notes.listed())
 
 
 def beside_interval_table(report: Report) -> Table | None:
     """Return the interval of each SED in every variant, where they were asked for."""
-    first = next((p.alternatives for p in report.predictions if p.alternatives), ())
-    if all(one.interval is None for one in first):
+    ways, notes = _ways(report), Notes()
+    if all(one.interval is None for p in report.predictions for one in p.alternatives):
         return None
-    notes = Notes()
-
-    def row(p: PredictionFinding) -> tuple[Cell, ...]:
-        return (*_named(p), *(_ends(one.interval, notes, one.reason) for one in p.alternatives))
-
     caption = (
         "95 % intervals of the SEDs of the table before, column by column, that the uncertainty of friction makes, and "
         "of the force where that drives the model: by derivatives (the solver's converged tangent), or where marked * "
         "by solving draws."
     )
-    columns = (*_who(report), *(Column(f"({n})", "kPa") for n in range(1, len(first) + 1)))
-    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
+    columns = (*_who(report), *(Column(f"({n})", "kPa") for n in range(1, len(ways) + 1)))
+    groups = _by_strain(report, lambda one: _ends(one.interval, notes, one.reason))
     return Table("table-beside-intervals", caption, columns, groups, notes.listed())
+
+
+def _ways(report: Report) -> tuple[str, ...]:
+    """Return the ways trials were predicted otherwise, the same at each strain."""
+    first = next((p.alternatives for p in report.predictions if p.alternatives), ())
+    return tuple(dict.fromkeys(one.variant.way for one in first))
+
+
+def _by_strain(report: Report, cell: Callable[[Alternative], Cell]) -> tuple[Group, ...]:
+    """Return the rows of each experiment at each strain."""
+    first = next((p.alternatives for p in report.predictions if p.alternatives), ())
+    groups: list[Group] = []
+    for strain in dict.fromkeys(one.variant.kinematics for one in first):
+
+        def row(p: PredictionFinding, strain: str = strain) -> tuple[Cell, ...]:
+            return (*_named(p), *(cell(one) for one in p.alternatives if one.variant.kinematics == strain))
+
+        found = grouped(report, report.predictions, lambda p: p.experiment, row)
+        groups += [Group(f"{group.name or 'trials'}, at {strain} strain", group.rows) for group in found]
+    return tuple(groups)
 
 
 def _ends(interval: SedInterval | None, notes: Notes, why: str | None) -> Cell:
