@@ -58,8 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=["small", "finite"],
         default="none",
         metavar="finite",
-        help="also along every other reasonable choice of the analysis: about twice the time; with 'finite' at finite "
-        "strain too, about a minute more a session",
+        help="also along every other reasonable choice of the analysis: a second or two more a session; with "
+        "'finite' at finite strain too, up to a minute more",
     )
     parser.add_argument(
         "--tau", choices=["computed", "as-printed"], default="computed", help="as for 'daq-app predict'"

@@ -11,6 +11,7 @@ from daq_app.console import Console
 from daq_app.derived import ANALYSIS, PREDICTION, analysed_again, kept, made_under, predicted_again, settings_of
 from sessions.analysis import analyse
 from sessions.decisions import DECISIONS, read
+from sessions.gain_error import GAIN_ERROR, gain_error_set
 from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems
 from sessions.recording.provenance import software_versions
@@ -34,6 +35,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     decided = read(folder)
     found += decided.problems
     checked += [DECISIONS] if decided.lines or decided.problems else []
+    try:
+        checked += [] if gain_error_set(folder) is None else [GAIN_ERROR]
+    except RecordingError as damaged:
+        found.append(str(damaged))
     for name in (ANALYSIS, PREDICTION):
         console.progress(0.5, f"making {name} again")
         try:

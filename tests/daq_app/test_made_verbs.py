@@ -214,6 +214,8 @@ def test_a_decision_is_not_recorded_where_a_damaged_setting_would_keep_it_from_b
     assert run([*words, "--why", "pulled away"]) == 1
     assert "set it anew" in capsys.readouterr().err
     assert not (small / "decisions.jsonl").exists()
+    assert run(["verify", str(small), "--json"]) == 3
+    assert any("calibration-error.json is damaged" in problem for problem in printed(capsys)["problems"])
 
 
 def test_a_law_of_the_contact_area_is_recorded_and_verify_goes_by_it(small, capsys):

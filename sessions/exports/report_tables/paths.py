@@ -29,9 +29,9 @@ def paths_table(named: Iterable[Named]) -> Table | None:
     caption = (
         "The correlation of predicted SED with scores as a distribution over paths of the analysis: every choice below "
         "crossed with every other at small strain; finite strain, where it was tried, with the other choices as usual. "
-        "Every friction that was met is solved; paths share a solve only where they come to the same friction, or to "
-        "bounds of traction that the skin nowhere reaches. All of them are reasonable and none is a sample of others: "
-        "quartiles describe, and are no intervals. Different r: how many are left where those that agree within "
+        "Contact is solved at every friction that was met, from the trial's own prediction on and on its mesh. All of "
+        "them are reasonable and none is a sample of others: quartiles describe, and are no intervals. Different r: "
+        "how many are left where those that agree within "
         f"{SAME:g} count once. A path of which fewer than three surfaces have an SED gives no r."
     )
     return Table("table-paths", caption, tuple(Column(name) for name in columns), tuple(groups), ())

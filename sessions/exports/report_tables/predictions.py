@@ -29,9 +29,9 @@ def prediction_table(report: Report) -> Table | None:
     def row(p: PredictionFinding) -> tuple[Cell, ...]:
         return (
             *_named(p),
-            notes.number(p.mu, places(3), p.reasons.get("mu")),
+            notes.number(p.mu, places(3), p.reasons.get("mu") or p.reasons.get("sed")),
             Cell({"mean over steady window": "mean"}.get(p.mu_rule, p.mu_rule)),
-            notes.number(p.tau_max, tau, p.reasons.get("tau_max")),
+            notes.number(p.tau_max, tau, p.reasons.get("tau_max") or p.reasons.get("sed")),
             _depth(p, notes),
             notes.number(p.sed, sed, p.reasons.get("sed")),
             _interval(p, notes),
