@@ -42,6 +42,7 @@ def study():
     """Return its findings."""
     simulated = "SIMULATED: made up"
     visits = [_full(visit(number, simulated=simulated)) for number in range(1, 11)]
+    visits[8] = replace(visits[8], session="S09_" + "as_long_as_a_folder_may_be_called_" * 7)
     planted = {
         "score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0},
         "strokes": [{"subject": v.subject, "trial": row.trial, "mu": row.mu} for v in visits for row in v.rows],
