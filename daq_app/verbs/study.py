@@ -67,8 +67,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--intervals",
         action=argparse.BooleanOptionalAction,
-        help="what the uncertainty of friction makes of each SED: five solves a trial instead of one (usual at small "
-        "strain, not at finite strain, where it takes five times as long)",
+        help="what the uncertainty of friction makes of each SED (usual at small strain, not at finite strain, where "
+        "it takes longer)",
     )
     add_area(parser)
     add_calibration(parser)
@@ -83,21 +83,33 @@ def run(options: argparse.Namespace, console: Console) -> int:
     intervals = options.kinematics == "small" if options.intervals is None else options.intervals
     model = PredictionOptions(options.tau, course="steady", kinematics=options.kinematics, intervals=intervals)
     asked = VisitOptions(model, area_law(options) or FIXED, options.paths, calibration_error(options))
+    exclusions, truth = exclusions_in(folder), _planted(folder)  # what is wrong with them is said before hours of work
     shelf = Shelf(out / "results", asked)
     done, failed = visits(sessions, asked, shelf, console, scheduler=options.scheduler, workers=options.workers)
-    planted = folder / PLANTED
-    truth: dict[str, Any] | None = json.loads(planted.read_bytes()) if planted.is_file() else None
     if truth is not None:
         from daq_app.planted_seds import planted_relations  # simulators are loaded only where they are asked for
 
         truth["relation"] = planted_relations(truth["people"], asked.prediction, asked.area)
-    study = pooled(done, failed, exclusions_in(folder), truth, asked)
+    study = pooled(done, failed, exclusions, truth, asked)
     console.progress(0.97, "writing the page")
     files = _write(study, folder.resolve().name, out)
     console.result({**files, "study": study.to_dict() | {"visits": [visit.session for visit in study.visits]}})
     _print(study, files, console)
     flawed = any(row.flaws for visit in study.visits for row in visit.rows) or any(v.losses for v in study.visits)
     return 3 if failed or flawed else 0
+
+
+def _planted(folder: Path) -> dict[str, Any] | None:
+    """Return what was planted in a synthetic study, None in any other. Raises RecordingError where that is damaged."""
+    path = folder / PLANTED
+    if not path.is_file():
+        return None
+    try:
+        found: dict[str, Any] = json.loads(path.read_bytes())
+        found["people"]
+    except (ValueError, KeyError, TypeError) as damaged:
+        raise RecordingError(f"{path} is damaged; delete it to pool the study without what was planted") from damaged
+    return found
 
 
 def _places(options: argparse.Namespace, console: Console) -> tuple[Path, Path]:

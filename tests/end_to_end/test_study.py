@@ -285,3 +285,18 @@ def test_the_whole_synthetic_study_names_everything_that_was_spoilt(tmp_path):
     assert pool["friction"]["strokes"] >= 90
     assert len(pool["flaws"]) == 7
     assert all(flaw["found"] for flaw in pool["flaws"]), pool["flaws"]
+
+
+@pytest.mark.parametrize(
+    ("name", "content"), [("exclusions.toml", "[[exclude]]\nsubject = 3\n"), ("planted.json", "[]")]
+)
+def test_what_is_wrong_beside_the_sessions_is_said_before_any_is_computed(tmp_path, monkeypatch, capsys, name, content):
+    def never(*_, **__):
+        raise AssertionError
+
+    monkeypatch.setattr("daq_app.verbs.study.visits", never)
+    (tmp_path / "S01").mkdir()
+    (tmp_path / "S01" / "session.sqlite").touch()
+    (tmp_path / name).write_text(content)
+    assert run(["study", str(tmp_path)]) in (1, 2)
+    assert name in capsys.readouterr().err
