@@ -67,10 +67,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
     for one in (recording, *others):
         if one.plan.blinded:
             raise Blinded(f"{one.folder} is blinded: a report tells scores by index; 'daq-app unblind' opens the key")
+    from sessions.exports import html
+
+    if options.out is not None:
+        html.leave_others_alone(options.out)
     analysis = analysed(recording, console, area_law(options), gain_error=calibration_error(options))
     afferent = afferent_before(recording) or (AfferentSettings() if options.afferent else None)
     prediction = predicted(recording, analysis, console, _asked(recording, options), afferent)
-    from sessions.exports import html
     from sessions.report import findings, score_table
 
     further = _further(recording, prediction, afferent, options, console)

@@ -51,9 +51,14 @@ def write_report(report: Report, path: Path, drawings: Sequence[Plate] | None = 
 
     Raises ReportError when that cannot be done, or when `path` holds something that is no page.
     """
+    leave_others_alone(path)
+    swap_in(path, page(report, drawings))
+
+
+def leave_others_alone(path: Path) -> None:
+    """Raise ReportError where a page would replace something that is none."""
     if path.exists() and not _is_page(path):
         raise ReportError(f"{path} holds something that is no report, so it is left alone: choose another file")
-    swap_in(path, page(report, drawings))
 
 
 def write_figures(report: Report, folder: Path, drawings: Sequence[Plate] | None = None) -> tuple[Path, ...]:
