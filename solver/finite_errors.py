@@ -17,11 +17,11 @@ from solver.tissues import stiff, strains_the_cut
 
 COARSER = 0.6  # fineness of the mesh that the error is estimated from, by that of the answer
 NUDGE = 1e-3  # of the traction bound, to see what it does
-CROWDED = 0.8  # least det F, below which tissue is squeezed where the cut meets the bone
-OF_CORNER = np.array([8.0, 4.5, 4.5, 4.5, 4.5, 4.5])  # added to differences then, by the force's or depth's
-OF_STIFF = 15.0  # the same of the SED where skin is stiff, and does not only stiffen
-SQUEEZED, OF_SQUEEZED = 0.82, 0.032  # least det F there under other skin, from which errors grow; by how much then
-IN_COMMON = 0.004  # the most of that: what meshes of all finenesses have in common
+SQUEEZED = 0.82  # least det F, below which tissue is squeezed where the cut meets the bone
+OF_CORNER = np.array([4.5, 2.5, 2.5, 2.5, 2.5, 2.5])  # added to differences then, by the force's or depth's
+OF_STIFF = 8.0  # the same of the SED where skin is stiff, and does not only stiffen
+OF_SQUEEZED = 0.026  # under other skin, by how much errors grow then with what det F has fallen by
+IN_COMMON = 0.0032  # the most of that: what meshes of all finenesses have in common
 
 
 def error_estimates(
@@ -94,7 +94,7 @@ def _crowded(scene: Scene, at: Climbed) -> bool:
     """
     if not strains_the_cut(scene.materials):
         return False
-    return float(_volumes(at).min()) < CROWDED
+    return float(_volumes(at).min()) < SQUEEZED
 
 
 def _nearest(scene: Scene, fineness: float, at: Climbed, stop: Callable[[], bool]) -> Climbed:
