@@ -55,6 +55,17 @@ def test_a_bound_next_to_nothing_leaves_the_frictionless_state_whatever_the_coef
     assert sed[0] == pytest.approx(sed[1], rel=1e-6)
 
 
+@pytest.mark.parametrize("fineness", [7, pytest.param(11, marks=SLOW)])
+@pytest.mark.parametrize(("depth", "tau", "sense"), [(0.01, 0.003, -1), (1e-6, 0.005, -1), (0.1, 0.01, 1)])
+def test_skin_that_nearly_all_slips_at_the_bound_drags_with_the_bound_on_all_that_touches(depth, tau, sense, fineness):
+    finger = published(fineness, depth)
+    shape = steady(finger, Pull(depth, 1000.0, tau, sense))
+    on = np.flatnonzero(shape.touching)
+    x = shape.place(finger.newton.body)[:, 0]
+    widest = x[min(on[-1] + 1, len(x) - 1)] - x[max(on[0] - 1, 0)]  # to the neighbours that do not touch
+    assert tau * (x[on[-1]] - x[on[0]]) * 0.99 <= sense * shape.force[0] <= tau * widest * 1.01
+
+
 @pytest.mark.parametrize("depth", [1e-6, 1e-4, 1e-2])
 def test_a_finger_that_barely_touches_has_an_answer(depth):
     shape = steady(published(5), Pull(depth, 0.5, 0.01, 1))
