@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +59,11 @@ def analysed(
     )
     _keep(recording, ANALYSIS, analysis_document(analysis), console)
     return analysis
+
+
+def settings_kept(recording: Recording) -> AnalysisSettings:
+    """Return the settings that were asked for a session before. Raises RecordingError where the last is damaged."""
+    return replace(settings_of(_kept(recording, ANALYSIS)), gain_error=gain_error_set(recording.folder))
 
 
 def made_otherwise(recording: Recording, now: AnalysisSettings) -> str | None:

@@ -12,7 +12,7 @@ from daq_app.analyst.compared import NAMES, compared
 from daq_app.analyst.edges import brought_back, decision_meant, decision_of, taken_back
 from daq_app.analyst.pictures import field_at, film_of, finger_of, lost_film
 from daq_app.analyst.raw import RawFile
-from daq_app.derived import analysis_document
+from daq_app.derived import analysis_document, settings_kept
 from sessions.analysis import analyse
 from sessions.blinding import revealed
 from sessions.decisions import DecisionError, append, read
@@ -104,7 +104,7 @@ class Work:
 
     def _analyse(self) -> None:
         self._say(m.Step(0.0, "analysing"))
-        self._analysis = analyse(self._recording)
+        self._analysis = analyse(self._recording, settings_kept(self._recording))
         self._prediction = None
         self._report = findings(self._recording, self._analysis)
         self._say(m.Found("analysed", self._report))
@@ -242,7 +242,7 @@ class Work:
     def _compare(self, folder: Path) -> None:
         self._say(m.Step(0.0, f"opening {folder.name}"))
         recording = _opened(folder)
-        analysis = analyse(recording)
+        analysis = analyse(recording, settings_kept(recording))
         told = self.timed(f"predicting {folder.name}")
         self._other = findings(recording, analysis, predict(analysis, recording.plan, progress=told))
         self._say(m.Compared(str(folder), self._other))

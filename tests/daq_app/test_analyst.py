@@ -25,6 +25,7 @@ from daq_app.analyst.state import AnalystState, chosen, fold, rows
 from daq_app.analyst.transport import Transport
 from daq_app.analyst.work import Work
 from sessions.decisions import Decision, Decisions, read
+from sessions.gain_error import set_gain_error
 from tests.sessions.report_example import example
 
 SESSION = Path(__file__).parents[1] / "data" / "sessions" / "version-1" / "sealed"
@@ -272,6 +273,13 @@ def test_the_readings_shown_are_those_of_the_file_and_their_rows_are_told(at_wor
         np.testing.assert_array_equal(file["readings/raw"][first : last + 1], shown.raw)
         np.testing.assert_array_equal(file["readings/sequence"][first : last + 1], shown.sequence)
         np.testing.assert_array_equal(file["readings/counter"][first : last + 1], shown.counter)
+
+
+def test_a_calibration_error_that_was_set_for_a_session_is_followed_in_its_window_too(tmp_path):
+    session, said = shutil.copytree(SESSION, tmp_path / "session"), []
+    set_gain_error(session, 0.003)
+    Work(session, said.append)
+    assert "0.3 % of each axis, set" in said[-1].report.interval_kind
 
 
 def wait(analyst, wanted):
