@@ -11,14 +11,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
-from solver.failures import NoSteadyState, SolveFailure
+from solver.existence import refuse_far_beyond
+from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.finite_ends import steps_asked
 from solver.finite_finger import FiniteFinger
-from solver.finite_states import course, roughly, settled
+from solver.finite_states import course, pull_sliding, roughly, settled
 from solver.load_steps import Steps
 from solver.mesher import AT_CUT, Sizing, sharing, still_sharing
 from solver.newton import Shape
-from solver.reach import sound
+from solver.reach import folded, sound
 from solver.scene import Materials, Scene
 from solver.tissues import strains_the_cut
 
@@ -85,6 +86,7 @@ def foot(
     """
     depth = expected if scene.normal_force is not None else scene.loading.depth
     margin = MARGIN
+    beyond = False
     try:
         low = _rough(scene, depth, margin, stop, make, near)
         if low.finger.runs_out(low.shape):
@@ -93,11 +95,16 @@ def foot(
         if sound(low.finger, low.shape):
             return low
         depth = low.shape.pull.depth
+        beyond = folded(low.finger, low.shape)
     except NoSteadyState:
         if scene.normal_force is not None and not scene.loading.dragged:
             raise  # told on a mesh of its own, whatever this one is
+    except NotConverged:
+        beyond = True
     except SolveFailure:
         pass
+    if beyond and scene.normal_force is None and scene.loading.direction != 0:
+        refuse_far_beyond(scene, pull_sliding(scene), stop)
     sizing = Sizing(fineness, depth, margin=margin, at_cut=_at_cut(scene.materials, scene.loading.direction))
     try:
         return _plain(scene, sizing, stop, make)

@@ -10,11 +10,13 @@ from solver import reach
 from solver.failures import NoSteadyState, NotConverged
 from solver.finite_finger import FiniteFinger
 from solver.kernels import CAP, OPEN, STEEP
-from solver.limit import CREASE, follow
+from solver.limit import follow
 from solver.newton import BY_FRICTION, Newton, Pull, Shape
-from solver.reach import Reach, sound
+from solver.reach import Reach, folded, sound
+from solver.scene import Scene
 from solver.sliding import settled
 
+FAR = 0.9  # of the friction asked for, below which a limit is beyond doubt
 ALIKE = 0.1  # relative difference of SED and forces within which a state is that of another mesh
 
 
@@ -43,7 +45,7 @@ def steady(
             f"there; whether there is any at mu = {pull.mu:.3g} is not known"
         )
     if proof.limited:
-        raise _refused(finger, pull, proof, stop)
+        raise _refused(finger.scene, pull, proof, stop)
     for shape in found:
         if _proven(finger, shape, proof):
             return shape
@@ -67,6 +69,21 @@ def steady(
 def steep(pull: Pull) -> bool:
     """Return whether friction is so steep that nearly all of the skin slips at a bound."""
     return pull.mu > STEEP and pull.tau < np.inf
+
+
+def refuse_far_beyond(scene: Scene, pull: Pull, stop: Callable[[], bool]) -> None:
+    """Raise NoSteadyState where the branch ends far below the friction of `pull`.
+
+    Asked where a rough mesh finds nothing, or skin that has folded: to see a fine mesh fail takes longer than to follow
+    the branch. Nothing is raised where it goes on, or ends so near that another mesh may have the state, or where
+    friction is so steep that the bound decides.
+    """
+    if pull.mu > STEEP:
+        return
+    with suppress(NotConverged):
+        proof = reach.of_friction(scene, pull, pull.mu, stop)
+        if proof.limited and not proof.lost and proof.value < FAR * pull.mu:
+            raise _refused(scene, pull, proof, stop)
 
 
 def _tried(
@@ -102,16 +119,16 @@ def doubts(finger: FiniteFinger, shape: Shape, stop: Callable[[], bool] = lambda
     )
 
 
-def _refused(finger: FiniteFinger, pull: Pull, proof: Reach, stop: Callable[[], bool]) -> NoSteadyState:
+def _refused(scene: Scene, pull: Pull, proof: Reach, stop: Callable[[], bool]) -> NoSteadyState:
     largest, depth = proof.value, None
     ends = (
         "the skin behind the contact folds"
-        if proof.near or all(tissue.law != "ogden" for tissue in finger.scene.materials.by_region)
+        if proof.near or all(tissue.law != "ogden" for tissue in scene.materials.by_region)
         else f"friction is largest there, with the skin behind the contact squeezed to {100 * proof.least:.0f} %"
     )
     beyond = ""
     with suppress(NotConverged):
-        deepest = reach.of_depth(finger.scene, pull, stop)
+        deepest = reach.of_depth(scene, pull, stop)
         if deepest.limited and not deepest.lost:
             depth = deepest.value
             beyond = f", and with this friction up to {depth:.4g} mm"
@@ -125,7 +142,7 @@ def _refused(finger: FiniteFinger, pull: Pull, proof: Reach, stop: Callable[[], 
 
 def _proven(finger: FiniteFinger, shape: Shape, proof: Reach) -> bool:
     """Return whether a state is the one that was reached along the branch on another mesh, and not a folded one."""
-    if finger.pinch(shape).kink > CREASE or finger.crosses(shape):
+    if folded(finger, shape):
         return False
     return bool(np.all(np.abs(finger.numbers(shape) - proof.numbers) <= ALIKE * np.abs(proof.numbers)))
 

@@ -41,7 +41,7 @@ def settled(
         return _settled_under(finger, scene, scene.normal_force, stop, start, times)
     if scene.loading.direction == 0 and scene.friction.mu > 0.0:
         return course(scene, finger, stop, times)[-1]
-    return steady(finger, _pull_sliding(scene), start=start, stop=stop)
+    return steady(finger, pull_sliding(scene), start=start, stop=stop)
 
 
 def roughly(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: Shape | None = None) -> Shape:
@@ -54,7 +54,7 @@ def roughly(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: 
         near = replace(near, iterations=0) if alike else None
     if scene.normal_force is not None or (scene.loading.direction == 0 and scene.friction.mu > 0.0):
         return settled(finger, scene, stop, near)
-    pull = _pull_sliding(scene)
+    pull = pull_sliding(scene)
     for begin in dict.fromkeys((near, None)):
         try:
             return sliding.settled(finger.newton, pull, begin, LEADING, stop)
@@ -171,7 +171,8 @@ def _deeper(finger: FiniteFinger, shape: Shape, force: float, stop: Callable[[],
     return steady(finger, found.pull, start=found, stop=stop)
 
 
-def _pull_sliding(scene: Scene) -> Pull:
+def pull_sliding(scene: Scene) -> Pull:
+    """Return what the surface does while it slides as a scene has it."""
     return pull_of(scene)._replace(sense=-(scene.loading.direction or 1))
 
 

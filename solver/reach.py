@@ -78,8 +78,12 @@ def of_depth(scene: Scene, pull: Pull, stop: Callable[[], bool] = lambda: False)
 
 def sound(finger: FiniteFinger, shape: Shape) -> bool:
     """Return whether the skin is nowhere squeezed so far that it may have folded, and does not cross itself."""
-    pinch = finger.pinch(shape)
-    return pinch.lowest >= SOUND and pinch.kink <= CREASE and not finger.crosses(shape)
+    return finger.pinch(shape).lowest >= SOUND and not folded(finger, shape)
+
+
+def folded(finger: FiniteFinger, shape: Shape) -> bool:
+    """Return whether the skin has a crease or crosses itself."""
+    return finger.pinch(shape).kink > CREASE or finger.crosses(shape)
 
 
 def _asked(scene: Scene, pull: Pull, by: int, target: float, stop: Callable[[], bool]) -> _Question:
