@@ -158,8 +158,33 @@ def _solve_group(
     marched = kind == "small" and any(scene.solve.course == "history" for scene in scenes)
     if marched and (asked or differences.together(scenes)):
         ends = [replace(scene, solve=replace(scene.solve, course="steady")) for scene in scenes]
-        _, fineness = _refined(ends, fineness, on_mesh, None, None)
+        ended, fineness = _refined(ends, fineness, on_mesh, None, None)
+        if watch is not None:
+            return _told_as_they_stay(scenes, fineness, on_mesh, ended, watch, rough)
     return _refined(scenes, fineness, on_mesh, watch, rough)[0]
+
+
+def _told_as_they_stay(
+    scenes: list[Scene], fineness: float, on_mesh: "_Meshing", ended: list[Answer], watch: Watch, rough: Rough | None
+) -> list[Answer]:
+    """Do the same, `watch` being told what differences between surfaces may be off by, as their `ended` courses say."""
+    told: dict[int, Answer] = {}
+
+    def noted(number: int, answer: Answer, finger: FingerModel, way: March | None) -> None:
+        end = ended[number]
+        if isinstance(answer, Prediction) and isinstance(end, Prediction):
+            more = tuple(warning for warning in end.warnings if differences.says(warning))
+            answer = replace(answer, warnings=(*answer.warnings, *more)) if more else answer
+        told[number] = answer
+        watch(number, answer, finger, way)
+
+    def stays(number: int, answer: Answer) -> Answer:
+        before = told.get(number)
+        if not (isinstance(before, Prediction) and isinstance(answer, Prediction)):
+            return answer
+        return before if (before.dofs, before.warnings) == (answer.dofs, answer.warnings) else answer
+
+    return [stays(*one) for one in enumerate(_refined(scenes, fineness, on_mesh, noted, rough)[0])]
 
 
 def _refined(
