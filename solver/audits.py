@@ -5,10 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from solver.contact import Contact
+from solver.failures import NotConverged
 from solver.finger import FingerModel
 from solver.friction import FrictionLaw
 from solver.mesh import Array
+from solver.scene import Scene
 from solver.stepping import March
+
+MISSED = 1e-5  # of forces that are given, by which a state may miss them
 
 
 def audits(
@@ -45,6 +49,23 @@ def audits(
         "cone_violation": max(float(beyond.max(initial=0.0)), 0.0) / push,
         "smallest_det_F": float(np.prod(model.stretches(displacement), axis=0).min()),
     }
+
+
+def forces_missed(scene: Scene, normal: float, tangential: float) -> dict[str, float]:
+    """Return by how much a state with these forces [N/mm] misses those that `scene` gives; nothing where it gives none.
+
+    `normal_force_missed` by the force given, `drag_missed` by what friction could carry under it. Raises NotConverged
+    where that is more than a state found leaves over.
+    """
+    given, drag = scene.normal_force, scene.tangential_force
+    if given is None:
+        return {}
+    missed = {"normal_force_missed": abs(normal / given - 1.0)}
+    if drag is not None and scene.friction.mu > 0.0:
+        missed["drag_missed"] = abs(tangential + scene.loading.direction * drag) / (float(scene.friction.mu) * given)
+    if max(missed.values()) > MISSED:
+        raise NotConverged("No state was found that has the forces given: give others, or a depth.")
+    return missed
 
 
 def inside_out(checks: Mapping[str, float]) -> str:

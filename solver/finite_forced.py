@@ -12,10 +12,12 @@ import numpy as np
 
 from solver.failures import Cancelled, NotConverged
 from solver.kernels import SLIP, STICK
+from solver.meeting import met
 from solver.mesh import Array
 from solver.newton import BY_DEPTH, BY_TRAVEL, EQUILIBRIUM, Newton, Pull, Shape
 
 STRIDE = 0.3  # largest change of depth or travel in one iteration [mm]
+UNMET = 1e-9  # part of the friction limit by which a given drag may be missed
 HALVINGS = 8  # how often a step that failed is cut in two before it is given up
 
 
@@ -80,8 +82,14 @@ def balanced(newton: Newton, start: Shape, given: Given, tolerance: float = 1e-8
 
     Raises NotConverged where `limit` iterations do not do it.
     """
+    shape = _iterated(newton, start, start, given, tolerance, limit)
+    return _met_by_travel(newton, start, shape, given, tolerance, limit) if _slips_freely(shape, given) else shape
+
+
+def _iterated(newton: Newton, start: Shape, begin: Shape, given: Given, tolerance: float, limit: int) -> Shape:
+    """Return the equilibrium one step from `start`, sought from `begin` on. Raises NotConverged."""
     origin, before = start.place(newton.body)[:, 0], start.pull.travel
-    shape = start
+    shape = begin
     for _ in range(limit):
         done = corrected(newton, shape, given, origin, before)
         if done is None:
@@ -92,6 +100,31 @@ def balanced(newton: Newton, start: Shape, given: Given, tolerance: float = 1e-8
         if largest < tolerance and not changed:
             return shape
     raise NotConverged(f"no equilibrium within {limit} iterations")
+
+
+def _slips_freely(shape: Shape, given: Given) -> bool:
+    """Return whether all that touches slips, so that nothing was there to meet the given drag, and it is not met."""
+    if given.tangential is None or not shape.pull.mu > 0.0 or (shape.state == STICK).any():
+        return False
+    return abs(shape.force[0] - given.tangential) > UNMET * shape.pull.mu * given.normal
+
+
+def _met_by_travel(newton: Newton, start: Shape, shape: Shape, given: Given, tolerance: float, limit: int) -> Shape:
+    """Return the equilibrium that meets the given drag, one step from `start`, its travel sought from `shape` on.
+
+    The travel holds a body of which nothing sticks, and the drag grows with it. Raises NotConverged.
+    """
+    wanted, near = given.tangential or 0.0, shape
+
+    def at(travel: float) -> tuple[float, Shape]:
+        nonlocal near
+        near = _iterated(newton, start, near, Given(given.normal, None, travel), tolerance, limit)
+        return float(near.force[0]) - wanted, near
+
+    found = met(at, shape.pull.travel, UNMET * shape.pull.mu * given.normal)
+    if found is None:
+        raise NotConverged("no travel meets the drag")
+    return found
 
 
 def march(

@@ -12,6 +12,7 @@ from time import perf_counter
 import numpy as np
 
 from solver import differences, evidence, kernels_numpy
+from solver.audits import forces_missed
 from solver.climbing import Ascent, Climbed, foot, risen, sized_together
 from solver.existence import doubts
 from solver.failures import Cancelled, NotConverged, SolveFailure
@@ -126,6 +127,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
     numbers = finger.all_numbers(shape)
     sed, normal, tangential, depth, shift, width = (float(number) for number in numbers)
     skin = _skin(finger, shape)
+    checks |= forces_missed(scene, float(shape.force[1]), float(shape.force[0]))
     if way:
         checks |= course_audits(newton, way)
     if way and (relaxing is None or _sticking(shape) == 0.0):  # stuck and relaxing, the end depends on the way

@@ -189,7 +189,7 @@ class RelaxingWay(Way):
 
     def found(self, before: Contact, aim: Aim) -> Contact:
         """Return the state at `aim`, and let the body come to it. Raises ContactLost."""
-        touch = self.body.ready(aim.time - self.aim.time)
+        touch = self._body = self.body.ready(aim.time - self.aim.time)
         if self.by_force:
             touch = forced(touch, 0.0, 0.0 if self.by_drag else None)
         self.course = Course(touch, self._law)

@@ -12,7 +12,7 @@ from time import perf_counter
 import numpy as np
 from numpy.linalg import LinAlgError
 
-from solver.audits import audits, course_audits, inside_out
+from solver.audits import audits, course_audits, forces_missed, inside_out
 from solver.contact import NAMES, SLIP, STICK, Contact, ContactLost
 from solver.differences import those_of, together
 from solver.evidence import model, warnings
@@ -243,6 +243,7 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
         raise NotConverged(
             f"{message}: round-off has swallowed the answer; contacts far smaller than the mesh, {MIXED} do that."
         )
+    checks |= forces_missed(scene, float(contact.normal.sum()), float(contact.tangential.sum()))
     if way is not None:
         checks |= course_audits(finger, way)
         if over_time is not None:  # what the balance of work leaves over is what the tissues took by relaxing

@@ -27,7 +27,8 @@ FURTHER = 1e-2  # of the traction bound, to see what it does on a whole course
 
 def law_of(scene: Scene) -> FrictionLaw:
     """Return the friction of a scene."""
-    return FrictionLaw(float(scene.friction.mu), scene.friction.cap)
+    cap = scene.friction.cap
+    return FrictionLaw(float(scene.friction.mu) if cap > 0.0 else 0.0, cap)  # no friction is sought as such
 
 
 def settled(scene: Scene, finger: FingerModel, times: float = 1.0) -> Contact:

@@ -9,6 +9,7 @@ import numpy as np
 from solver.contact import CAP, SLIP, STICK, Contact, ContactLost, Course, Touchable, forced, untouched
 from solver.failures import Cancelled, NotConverged
 from solver.friction import FrictionLaw
+from solver.meeting import met
 from solver.scene import Loading
 
 PRESSING_TIME = 1.0  # of the pre-indentation [s]
@@ -17,6 +18,7 @@ DRAGGING_TIME = 1.0  # within which a given tangential force grows [s]
 DRAGGING_STEPS = 25
 LONG = 25.0  # travel within which all but slides near the wedging limit settle, in indentations
 FURTHEST = 100.0  # and after which a slide that has not settled is given up
+UNMET = 1e-9  # part of the friction limit by which a given drag may be missed
 HALVINGS = 13  # how often a step that failed is cut in two before it is given up
 
 
@@ -101,6 +103,7 @@ class Way:
         # without friction there is no drag to speak of, and nothing that it could hold
         self.by_drag = loading.tangential_force is not None and not law.frictionless
         start = untouched(body)
+        self._body = body
         if self.by_force:
             body = forced(body, 0.0, 0.0 if self.by_drag else None)
             # under a force something touches from the first
@@ -140,9 +143,31 @@ class Way:
         """Return the state at `aim`, coming from `before`. Raises ContactLost."""
         if not self.by_force:
             return self.course.step(before, aim.press, aim.along)
-        if self.by_drag:
+        if not self.by_drag:
+            return self.course.step(before, 0.0, aim.along, np.array([aim.press]))
+        try:
             return self.course.step(before, 0.0, 0.0, np.array([aim.press, aim.along]))
-        return self.course.step(before, 0.0, aim.along, np.array([aim.press]))
+        except ContactLost:  # as where friction is so small that all but one point slip
+            found = self._met_by_travel(before, aim)
+            if found is None:
+                raise
+            return found
+
+    def _met_by_travel(self, before: Contact, aim: Aim) -> Contact | None:
+        """Return the state at `aim` by search for the travel, which holds what nothing else does; None where none is.
+
+        The drag falls as the bone moves along +x.
+        """
+        course = Course(forced(self._body, 0.0), self.course.law)
+        near = before
+
+        def at(travel: float) -> tuple[float, Contact]:
+            nonlocal near
+            guess = replace(before, state=near.state, sense=near.sense)
+            near = course.step(guess, 0.0, -travel, np.array([aim.press]))
+            return float(near.tangential.sum()) - aim.along, replace(near, motion=np.append(near.motion, -travel))
+
+        return met(at, -float(before.motion[1]), UNMET * self.course.law.mu * aim.press)
 
 
 def slide(way: Way, direction: int, speed: float, progress: Progress | None, times: float) -> float:

@@ -28,6 +28,8 @@ _AUDITS = {  # 0 is perfect, but for the volume
     "penetration": "skin too low by, of the indentation",
     "tension": "largest pull on a touching point, of the largest push",
     "cone_violation": "friction beyond its law by, of the largest force on a node",
+    "normal_force_missed": "normal force given and missed by, of it",
+    "drag_missed": "drag given and missed by, of what friction could carry",
     "smallest_det_F": "smallest volume, of what it was",
     "course_work_balance": "over the course, work of the bone less stored and lost energy, of that work",
     "course_step_work": "over the course, work of points that touch or let go within a step, of the bone's work",

@@ -55,6 +55,26 @@ def test_a_drag_below_the_limit_shifts_the_finger_until_the_skin_carries_it(kine
     np.testing.assert_allclose(found.history.time[-1], 2.0)
 
 
+@pytest.mark.parametrize(("mu", "direction"), [(1e-2, "+x"), (1e-6, "-x")])
+@pytest.mark.parametrize("kinematics", COURSES)
+def test_a_drag_is_met_where_friction_is_so_small_that_all_but_one_point_slip(kinematics, mu, direction):
+    given = loaded(published(kinematics), normal_force=0.1, tangential_force=mu * 0.06, slide=direction)
+    found = solve(replace(given, friction=Friction(mu)))
+    bare = solve(replace(loaded(published(kinematics), normal_force=0.1), friction=Friction(0.0)))
+    assert found.tangential_force == pytest.approx(mu * 0.06, rel=1e-6)
+    assert found.audits["drag_missed"] < 1e-8
+    assert found.sed_ending == pytest.approx(bare.sed_ending, rel=0.2 * mu + 3e-3)  # two meshes
+    assert found.error_estimate < 0.1
+
+
+@pytest.mark.parametrize("kinematics", KINEMATICS)
+def test_a_bound_of_nothing_is_no_friction_whatever_its_coefficient(kinematics):
+    given = loaded(published(kinematics), normal_force=0.1)
+    bare, bound = (solve(replace(given, friction=friction)) for friction in (Friction(0.0), Friction(378.0, 0.0)))
+    assert bound.sed_ending == pytest.approx(bare.sed_ending, rel=2e-3)
+    assert bound.error_estimate < 2.0 * bare.error_estimate
+
+
 @pytest.mark.parametrize("kinematics", COURSES)
 def test_a_drag_of_the_friction_limit_is_the_settled_slide_and_more_is_refused_in_a_sentence(kinematics):
     given = replace(published(kinematics), friction=Friction(0.24, 0.004), solve=Solve(kinematics))
