@@ -11,16 +11,12 @@ read_session <- function(folder) {
   files <- list.files(folder, pattern = "[.]csv$", full.names = TRUE)
   session <- lapply(files, read_table)
   names(session) <- sub("[.]csv$", "", basename(files))
-  first <- readLines(files[1], n = 1, encoding = "UTF-8")
-  session$simulated <- if (startsWith(first, "#")) sub("^# ", "", first) else NULL
+  first <- readLines(file.path(folder, "README.md"), n = 1, encoding = "UTF-8")
+  session$simulated <- if (startsWith(first, "SIMULATED")) first else NULL
   session
 }
 
-# Lines that begin with # are no rows; a # within a text is one.
-read_table <- function(file) {
-  lines <- readLines(file, encoding = "UTF-8")
-  read.csv(text = lines[!startsWith(lines, "#")], na.strings = "", comment.char = "", encoding = "UTF-8")
-}
+read_table <- function(file) read.csv(file, na.strings = "", encoding = "UTF-8")
 
 if (!interactive() && length(commandArgs(trailingOnly = TRUE)) == 1) {
   session <- read_session(commandArgs(trailingOnly = TRUE))

@@ -7,12 +7,11 @@ A SciPy that is laid out otherwise is asked by its front door.
 import sys
 from functools import cache
 from importlib.machinery import PathFinder
-from importlib.util import module_from_spec
+from importlib.util import find_spec, module_from_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -60,10 +59,15 @@ def _compiled(module: str, function: str) -> Any:  # noqa: ANN401 - compiled, wi
     """Return a compiled function of `scipy.signal`, None where this SciPy has it elsewhere."""
     name = f"scipy.signal.{module}"
     if name not in sys.modules:
-        spec = PathFinder.find_spec(name, [str(Path(scipy.__file__).parent / "signal")])
+        package = find_spec("scipy")
+        folder = Path(package.origin).parent / "signal" if package is not None and package.origin else Path()
+        spec = PathFinder.find_spec(name, [str(folder)])
         if spec is None or spec.loader is None:
             return None
         loaded = module_from_spec(spec)
-        spec.loader.exec_module(loaded)
+        try:
+            spec.loader.exec_module(loaded)
+        except ImportError:  # a SciPy whose libraries it must find first
+            return None
         sys.modules[name] = loaded
     return getattr(sys.modules[name], function, None)

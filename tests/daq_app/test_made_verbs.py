@@ -145,7 +145,7 @@ def test_an_exported_prediction_tells_its_model_and_friction_the_interval_of_the
 ):
     assert run(["export", str(reported), "--format", "csv", "--out", str(tmp_path / "out")]) == 0
     friction, predictions = (
-        list(csv.DictReader((tmp_path / "out" / f"{name}.csv").read_text().splitlines()[1:]))
+        list(csv.DictReader((tmp_path / "out" / f"{name}.csv").read_text().splitlines()))
         for name in ("friction", "predictions")
     )
     told = json.loads((reported / "analysis.json").read_bytes())["bootstrap"]["strokes"]
