@@ -95,12 +95,15 @@ def _under_force(scene: Scene, force: float, failure: SolveFailure) -> SolveFail
     """Return why there is no slide under a normal force, found by searching depths: no limit of friction is known."""
     if not isinstance(failure, NoSteadyState):
         return failure
-    depth = failure.limit_indentation
-    ends = "" if depth is None else f": with this friction there is settled sliding up to {depth:.3g} mm of indentation"
+    depth, most = failure.limit_indentation, failure.limit_normal_force
+    far = [] if most is None else [f"{most:.3g} N/mm"]
+    far += [] if depth is None else [f"{depth:.3g} mm of indentation"]
+    ends = f": with this friction there is settled sliding up to {', '.join(far)}" if far else ""
     return NoSteadyState(
         f"No settled sliding at mu = {float(scene.friction.mu):.3g} was found under a normal force of {force:.4g} "
         f"N/mm{ends}; ask for less force, less friction or small strain.",
         limit_indentation=depth,
+        limit_normal_force=most,
     )
 
 
@@ -166,7 +169,8 @@ def _deeper(finger: FiniteFinger, shape: Shape, force: float, stop: Callable[[],
     """
     proof = reach.of_depth(finger.scene, shape.pull._replace(depth=BEYOND * shape.pull.depth), stop)
     if proof.limited and not proof.lost and proof.numbers[1] < force:
-        raise NoSteadyState("There is no settled sliding so deep.", limit_indentation=proof.value)
+        most = proof.numbers[1]
+        raise NoSteadyState("There is none so deep.", limit_indentation=proof.value, limit_normal_force=most)
     found = _at_force(finger.newton, shape, force, stop)
     return steady(finger, found.pull, start=found, stop=stop)
 

@@ -205,6 +205,7 @@ def test_at_finite_strain_a_force_is_met_up_to_the_largest_depth_and_refused_wit
         solve(replace(pressed, friction=Friction(0.4)))
     assert refused.value.limit_mu is None  # that of the depth at which the search ended would be none of this scene
     assert refused.value.limit_indentation < 2.0
+    assert 0.2 < refused.value.limit_normal_force < 0.33
 
 
 def test_a_finger_pressed_to_its_bone_is_refused_with_the_force_that_its_tissue_carries():
