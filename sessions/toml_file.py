@@ -36,7 +36,8 @@ def load_toml(path: Path, cls: type[T]) -> T:
     Raises FileNotFoundError where there is none, SettingsError for anything wrong in it.
     """
     if not path.is_file():
-        raise FileNotFoundError(f"{path}: there is no such file; give the path of a TOML file")
+        found = "this is a folder" if path.is_dir() else "there is no such file"
+        raise FileNotFoundError(f"{path}: {found}; give the path of a TOML file")
     try:
         text = path.read_bytes().decode()
     except UnicodeDecodeError as error:

@@ -61,7 +61,7 @@ def followed(
     return None, 0.0 if unknown else reached
 
 
-class Fingers:
+class Bodies:
     """Meshes of one finger, each for depths around a power of two."""
 
     def __init__(self, scene: Scene, *, in_loops: bool = False) -> None:
@@ -89,16 +89,16 @@ def limits(scene: Scene, law: FrictionLaw, *, in_loops: bool = False) -> tuple[f
     Below those of the scene; the force is None where the scene gives none, and either where it is not known. `in_loops`
     as in `Body.of`.
     """
-    fingers = Fingers(scene, in_loops=in_loops)
+    bodies = Bodies(scene, in_loops=in_loops)
     if scene.normal_force is None:
-        return None, _deepest(fingers, scene, law, scene.loading.depth)
-    found = _strongest(fingers, scene, scene.normal_force, law)
+        return None, _deepest(bodies, scene, law, scene.loading.depth)
+    found = _strongest(bodies, scene, scene.normal_force, law)
     if found is None:
         return None, None
-    return found[0], _deepest(fingers, scene, law, BEYOND * found[1], found[1])
+    return found[0], _deepest(bodies, scene, law, BEYOND * found[1], found[1])
 
 
-def _deepest(fingers: Fingers, scene: Scene, law: FrictionLaw, high: float, low: float | None = None) -> float | None:
+def _deepest(bodies: Bodies, scene: Scene, law: FrictionLaw, high: float, low: float | None = None) -> float | None:
     """Return the largest indentation [mm] below `high`, and above `low` where that is known, with settled sliding.
 
     None where there is none, or where a finer mesh puts it elsewhere, as it does at coefficients far beyond the limit.
@@ -106,7 +106,7 @@ def _deepest(fingers: Fingers, scene: Scene, law: FrictionLaw, high: float, low:
     direction = scene.loading.direction
 
     def slides(depth: float) -> bool:
-        return followed(fingers.at(depth), law, depth, direction)[0] is not None
+        return followed(bodies.at(depth), law, depth, direction)[0] is not None
 
     least = LEAST * high
     while low is None:
@@ -114,12 +114,12 @@ def _deepest(fingers: Fingers, scene: Scene, law: FrictionLaw, high: float, low:
             return None
         low, high = (high / 2.0, high) if slides(high / 2.0) else (None, high / 2.0)
     found = _largest(slides, low, high)
-    finer = fingers.made_for(found, FINER * FINENESS)
+    finer = bodies.made_for(found, FINER * FINENESS)
     ends = [followed(finer, law, part * found, direction)[0] is None for part in (0.97, 1.03)]
     return found if ends == [False, True] else None
 
 
-def _strongest(fingers: Fingers, scene: Scene, force: float, law: FrictionLaw) -> tuple[float | None, float] | None:
+def _strongest(bodies: Bodies, scene: Scene, force: float, law: FrictionLaw) -> tuple[float | None, float] | None:
     """Return the largest normal force [N/mm] below `force` with settled sliding, and the largest depth [mm] on the way.
 
     The force is None where a finer mesh puts it elsewhere; all is None where there is no sliding.
@@ -132,11 +132,11 @@ def _strongest(fingers: Fingers, scene: Scene, force: float, law: FrictionLaw) -
         return followed(forced(body, force), law, 0.0, direction, first)[0]
 
     def rubless(force: float) -> float:
-        return depth_of(sliding_under(fingers.at(bone / 2.0), bare, force, direction, bone))
+        return depth_of(sliding_under(bodies.at(bone / 2.0), bare, force, direction, bone))
 
     def slides(force: float) -> bool:
         with suppress(ContactLost):
-            found = reached(fingers.at(rubless(force)), force)
+            found = reached(bodies.at(rubless(force)), force)
             if found is not None:
                 depths.append(depth_of(found))
             return found is not None
@@ -145,7 +145,7 @@ def _strongest(fingers: Fingers, scene: Scene, force: float, law: FrictionLaw) -
     if not slides(LEAST * force):
         return None
     most = _largest(slides, LEAST * force, force)
-    finer = fingers.made_for(rubless(most), FINER * FINENESS)
+    finer = bodies.made_for(rubless(most), FINER * FINENESS)
     ends = [reached(finer, part * most) is None for part in (0.97, 1.03)]
     return most if ends == [False, True] else None, max(depths)
 
