@@ -46,6 +46,14 @@ def test_a_whole_cylinder_between_two_plates_approaches_them_as_in_johnson_5_57(
     assert found.peak == pytest.approx(0.008135, rel=0.01)
 
 
+def test_pressed_to_a_third_of_its_radius_a_cylinder_differs_from_johnson_5_57_by_what_that_neglects():
+    found = contacts.whole_cylinder(0.05, 1.749897, 0.018190)
+    neglected = (1.749897 / 5.0 / 2.0) ** 2  # the next term of the circle's outline: 3 %
+    assert found.approach == pytest.approx(0.592884, rel=neglected)
+    assert found.half_width == pytest.approx(1.749897, rel=neglected)
+    assert found.peak == pytest.approx(0.018190, rel=neglected)
+
+
 AXIS = np.array([0.25, 0.5, 0.786, 1.0, 1.5])
 
 
@@ -74,6 +82,23 @@ def test_below_a_sliding_cylinder_the_stresses_are_those_of_smith_and_liu(mu):
     largest = np.hypot((got[:, 0, 0] - got[:, 1, 1]) / 2, got[:, 0, 1])
     told = np.hypot((table[:, 2] - table[:, 3]) / 2, table[:, 4])
     assert np.abs(largest - told).max() < 0.005
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_the_stress_along_a_sliding_surface_is_the_closed_form_and_pulls_behind_the_contact(mu):
+    light = contacts.light(wide=300.0)
+    state = light.slid(FrictionLaw(mu, np.inf), -1)
+    inside, outside = np.linspace(-0.9, 0.9, 7), np.array([-2.0, -1.5, -1.2, 1.2, 1.5, 2.0])
+    x = np.concatenate([inside, outside])
+    # Johnson 1985, sections 4.1 and 7.1: sigma_x by p0 along a surface pulled along +x, behind which it is stretched
+    closed = np.concatenate([
+        -np.sqrt(1.0 - inside**2) - 2.0 * mu * inside,
+        -2.0 * mu * (outside - np.sign(outside) * np.sqrt(outside**2 - 1.0)),
+    ])  # fmt: skip
+    got = light.stress(state, np.stack([x, 0.0 * x], axis=1))
+    np.testing.assert_allclose(got[:, 0, 0], closed, atol=0.005)
+    shear = np.hypot((got[:7, 0, 0] - got[:7, 1, 1]) / 2.0, got[:7, 0, 1])
+    np.testing.assert_allclose(shear, mu, atol=0.005)  # all along the contact: from 0.3 on the largest there is
 
 
 @pytest.mark.parametrize("part", PARTS)
