@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
+from scipy.optimize import isotonic_regression
 
 from sessions.exports.figures.style import GREY, INK, TEXT, Sheet
 
@@ -37,26 +37,10 @@ def spread(wanted: Sequence[float], gap: float, low: float, high: float) -> list
     order = np.argsort(wanted, kind="stable")
     steps = gap * np.arange(n)
     # Without the steps, labels at least `gap` apart are numbers that do not fall.
-    rising = _rising(np.asarray(wanted, np.float64)[order] - steps)
+    rising = isotonic_regression(np.asarray(wanted)[order] - steps).x
     places = np.empty(n)
     places[order] = np.clip(rising, low, max(low, high - steps[-1])) + steps
     return [float(place) for place in places]
-
-
-def _rising(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the numbers nearest to `values` that never fall: neighbours that fall share their mean (Ayer et al. 1955).
-
-    >>> _rising(np.array([1.0, 3.0, 2.0]))
-    array([1. , 2.5, 2.5])
-    """
-    pools: list[tuple[float, int]] = []  # mean, and of how many
-    for value in values.tolist():
-        mean, count = value, 1
-        while pools and pools[-1][0] > mean:
-            before, held = pools.pop()
-            mean, count = (before * held + mean * count) / (held + count), held + count
-        pools.append((mean, count))
-    return np.repeat([mean for mean, _ in pools], [count for _, count in pools])
 
 
 def label_right(drawn: Sheet, axes: Axes, labels: Sequence[Label], head: str = "") -> None:
