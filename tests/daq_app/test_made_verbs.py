@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from examples import SCENE
 from report_session import record
 
 from daq_app.cli import run
@@ -27,16 +28,6 @@ from sessions.recording.archive import seal
 from sessions.report import findings
 
 ROOT = Path(__file__).parents[2]
-SCENE = """
-title = "slipperiness 100"
-[friction]
-mu = 0.24
-tau_max = 0.00877
-[loading]
-indentation = 1.5
-slide = "-x"
-speed = 39.0
-"""
 
 
 @pytest.fixture(scope="module")

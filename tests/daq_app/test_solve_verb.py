@@ -4,19 +4,9 @@ import json
 from contextlib import contextmanager
 
 import pytest
+from examples import SCENE
 
 from daq_app.cli import run
-
-SCENE = """
-title = "slipperiness 100"
-[friction]
-mu = 0.24
-tau_max = 0.00877
-[loading]
-indentation = 1.5
-slide = "-x"
-speed = 39.0
-"""
 
 
 def printed(capsys):

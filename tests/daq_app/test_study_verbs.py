@@ -3,34 +3,12 @@
 import json
 
 import pytest
+from examples import short_protocol
 
 from daq_app.cli import run
 from sessions.recording import Recording
 
-FOUR = """
-name = "four"
-title = "Four surfaces"
-label_seed = 1
-contact_angle = 45.0
-
-[[blocks]]
-name = "stickiness"
-descriptor = "stickiness"
-direction = "proximal to distal"
-indentation = 2.0
-indices = [0, 100]
-instruction = "Push your finger once away from you."
-scale_ends = ["not sticky at all", "as sticky as can be"]
-
-[[blocks]]
-name = "slipperiness"
-descriptor = "slipperiness"
-direction = "distal to proximal"
-indentation = 1.5
-indices = [0, 100]
-instruction = "Pull your finger once towards you."
-scale_ends = ["not slippery at all", "as slippery as can be"]
-"""
+FOUR = short_protocol("four", "Four surfaces", [0, 100], [0, 100])
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ import pytest
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
+from examples import short_protocol
 from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QApplication
 
@@ -21,30 +22,7 @@ PATIENCE = 60.0  # far beyond what anything takes [s]
 
 
 # Three of the ten surfaces of sensotact-friction: enough for a session from its first trial to its last.
-THREE = """
-name = "three"
-title = "Three surfaces"
-label_seed = 1
-contact_angle = 45.0
-
-[[blocks]]
-name = "stickiness"
-descriptor = "stickiness"
-direction = "proximal to distal"
-indentation = 2.0
-indices = [0, 100]
-instruction = "Push your finger once away from you."
-scale_ends = ["not sticky at all", "as sticky as can be"]
-
-[[blocks]]
-name = "slipperiness"
-descriptor = "slipperiness"
-direction = "distal to proximal"
-indentation = 1.5
-indices = [100]
-instruction = "Pull your finger once towards you."
-scale_ends = ["not slippery at all", "as slippery as can be"]
-"""
+THREE = short_protocol("three", "Three surfaces", [0, 100], [100])
 
 
 class Driver:
