@@ -13,6 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from sessions.recording.derived import bytes_of
 from sessions.recording.errors import RecordingError
 from sessions.recording.head import json_text
 
@@ -215,11 +216,7 @@ def read(folder: Path) -> Decisions:
 
 def content_of(folder: Path) -> bytes:
     """Return the bytes of the file, none where there is no file. Raises RecordingError where it cannot be read."""
-    path = folder / DECISIONS
-    try:
-        return path.read_bytes() if path.is_file() else b""
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be read ({error.strerror}); permit reading, or copy the folder") from error
+    return bytes_of(folder / DECISIONS)
 
 
 def parsed(content: bytes) -> Decisions:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from sessions.recording.derived import load_derived, store_derived
+from sessions.recording.derived import bytes_of, load_derived, store_derived
 from sessions.recording.errors import RecordingError
 from sessions.toml_file import SettingsError
 
@@ -27,11 +27,7 @@ def gain_error_set(folder: Path) -> float | None:
 
 def gain_error_content(folder: Path) -> bytes:
     """Return the bytes of the file, none where there is no file. Raises RecordingError where it cannot be read."""
-    path = folder / GAIN_ERROR
-    try:
-        return path.read_bytes() if path.is_file() else b""
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be read ({error.strerror}); permit reading, or copy the folder") from error
+    return bytes_of(folder / GAIN_ERROR)
 
 
 def set_gain_error(folder: Path, gain_error: float) -> None:

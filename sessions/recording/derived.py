@@ -47,6 +47,14 @@ def load_derived(folder: Path, name: str) -> dict[str, Any] | None:
     return cast("dict[str, Any]", found)
 
 
+def bytes_of(path: Path) -> bytes:
+    """Return the bytes of a file, none where there is no file. Raises RecordingError where it cannot be read."""
+    try:
+        return path.read_bytes() if path.is_file() else b""
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read ({error.strerror}); permit reading, or copy the folder") from error
+
+
 def _store(folder: Path, name: str, content: bytes, simulated: str | None) -> Path:
     if name in RECORDED or not re.fullmatch(r"[a-z0-9][a-z0-9_-]*\.[a-z0-9]+", name):
         raise ValueError(f"{name} is no name for a file made from a recording")
