@@ -61,7 +61,6 @@ class Errors(NamedTuple):
     width: float | None  # of the contact
 
 
-STEEP = 1.0  # coefficient of friction under a bound, from which nearly all of the skin slips at it
 DEPTH = slice(3, 4)  # place of the indentation among the numbers
 UNKNOWN = Errors(1.0, 1.0, 1.0, 1.0, None, 1.0)
 
@@ -150,13 +149,10 @@ def _off(
     else:
         of_bound[2] = _of_bound(scene, fineness, float(size[1]), float(size[2]))
         if kind == "finite" and np.any(felt):
-            of_edge = (
-                (FROM_STEEP if scene.friction.mu > STEEP else FROM_EDGE)
-                * scene.friction.cap
-                * _element(scene, fineness)
-                / size[2]
-                * np.abs(felt)
-            )
+            from solver.kernels import STEEP  # loaded at finite strain alone
+
+            by = FROM_STEEP if scene.friction.mu > STEEP else FROM_EDGE
+            of_edge = by * scene.friction.cap * _element(scene, fineness) / size[2] * np.abs(felt)
     from_meshes = (FROM_NAIL if scene.finger.nail_length > 0.0 else FROM_MESHES)[kind]
     return np.linalg.norm([from_meshes * largest, part * size, of_bound * size, of_edge * size], axis=0)
 

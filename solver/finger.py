@@ -89,18 +89,19 @@ class FingerModel:
 
     def sed_endings(self, contacts: Sequence[Contact]) -> Array:
         """Return the SED averaged over the reference ending (c,) [MPa] of several states, unfolded together there."""
-        mesh = self.geometry.mesh
-        forces = np.array([(*c.normal, *c.tangential) for c in contacts]).T
-        displacement = self.body.displacement(self.body.skin_displacement(forces), only=self.ending.nodes(mesh))
-        return self.ending.average(mesh, self.body.elastic, displacement)[0]
+        return self._averaged(contacts, self.ending)[:, 0]
 
     def seds(self, contacts: Sequence[Contact]) -> Array:
         """Return the SED of the reference ending and in its middle (c, 2) [MPa] of several states."""
+        return self._averaged(contacts, self.ending, self.point)
+
+    def _averaged(self, contacts: Sequence[Contact], *patches: Endings) -> Array:
+        """Return the SED averaged over the first ending of each of the patches (c, p) [MPa], unfolded there alone."""
         mesh, elastic = self.geometry.mesh, self.body.elastic
         forces = np.array([(*c.normal, *c.tangential) for c in contacts]).T
-        nodes = distinct(np.concatenate([self.ending.nodes(mesh), self.point.nodes(mesh)]))
+        nodes = distinct(np.concatenate([patch.nodes(mesh) for patch in patches]))
         displacement = self.body.displacement(self.body.skin_displacement(forces), only=nodes)
-        return np.stack([patch.average(mesh, elastic, displacement)[0] for patch in (self.ending, self.point)], axis=1)
+        return np.stack([patch.average(mesh, elastic, displacement)[0] for patch in patches], axis=1)
 
     def sed_point(self, displacement: Array) -> float:
         """Return the SED in the middle of the reference ending [MPa]."""

@@ -12,12 +12,11 @@ import numpy as np
 
 from solver.failures import Cancelled, NotConverged
 from solver.kernels import SLIP, STICK
-from solver.meeting import met
+from solver.meeting import UNMET, met
 from solver.mesh import Array
 from solver.newton import BY_DEPTH, BY_TRAVEL, EQUILIBRIUM, Newton, Pull, Shape
 
 STRIDE = 0.3  # largest change of depth or travel in one iteration [mm]
-UNMET = 1e-9  # part of the friction limit by which a given drag may be missed
 HALVINGS = 8  # how often a step that failed is cut in two before it is given up
 
 

@@ -6,6 +6,7 @@ from typing import TypeVar
 State = TypeVar("State")
 FIRST, FURTHEST = 1e-7, 1.0  # first stride [mm], and where the search for two ends is given up
 SEARCHES = 60
+UNMET = 1e-9  # part of the friction limit by which a given drag may be missed
 
 
 def met(at: Callable[[float], tuple[float, State]], start: float, close: float) -> State | None:

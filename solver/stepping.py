@@ -9,7 +9,7 @@ import numpy as np
 from solver.contact import CAP, SLIP, STICK, Contact, ContactLost, Course, Touchable, forced, untouched
 from solver.failures import Cancelled, NotConverged
 from solver.friction import FrictionLaw
-from solver.meeting import met
+from solver.meeting import UNMET, met
 from solver.scene import Loading
 
 PRESSING_TIME = 1.0  # of the pre-indentation [s]
@@ -18,7 +18,6 @@ DRAGGING_TIME = 1.0  # within which a given tangential force grows [s]
 DRAGGING_STEPS = 25
 LONG = 25.0  # travel within which all but slides near the wedging limit settle, in indentations
 FURTHEST = 100.0  # and after which a slide that has not settled is given up
-UNMET = 1e-9  # part of the friction limit by which a given drag may be missed
 HALVINGS = 13  # how often a step that failed is cut in two before it is given up
 
 

@@ -19,10 +19,10 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from hashlib import blake2b
 from importlib import import_module
-from importlib.machinery import PathFinder
-from importlib.util import find_spec, module_from_spec
 from pathlib import Path
 from typing import Any
+
+from solver.extension import extension, package_folder
 
 _EXTENSIONS = {  # of numba, and what it calls their helpers
     "numba._helperlib": "numba_",
@@ -35,7 +35,7 @@ KNOWN = ("0.68",)  # numbers of numba, but for the last, whose code was watched 
 
 def known() -> bool:
     """Return whether code of this numba, on this system, may be linked without it."""
-    version = re.search(rb'"version": "(\d+\.\d+)\.', _content(_numba() / "_version.py"))
+    version = re.search(rb'"version": "(\d+\.\d+)\.', _content(package_folder("numba") / "_version.py"))
     return sys.platform == "linux" and version is not None and version[1].decode() in KNOWN
 
 
@@ -109,7 +109,7 @@ def _linked(place: Place, code: bytes, wrapper: str, environment: str, outside: 
         return None  # LLVM would end the process
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
-    dynamic: Any = _extension("numba._dynfunc")
+    dynamic: Any = extension("numba._dynfunc")
     around = dynamic.Environment({})
     ctypes.c_void_p.from_address(engine.get_global_value_address(environment)).value = id(around)
     module, name = sys.modules[__name__], place.name.rpartition(".")[2]
@@ -123,7 +123,7 @@ def _engine() -> Any:  # noqa: ANN401 - llvmlite declares no types
     """Return LLVM's linker, with the helpers that numba's code asks for."""
     llvm = _llvm()
     for name, prefix in _EXTENSIONS.items():
-        for helper, address in _extension(name).c_helpers.items():
+        for helper, address in extension(name).c_helpers.items():
             llvm.add_symbol(helper if helper.startswith("_") else prefix + helper, address)
     for name, one in vars(builtins).items():
         if isinstance(one, type) and issubclass(one, BaseException):
@@ -135,19 +135,6 @@ def _engine() -> Any:  # noqa: ANN401 - llvmlite declares no types
     return llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
 
 
-def _extension(name: str) -> Any:  # noqa: ANN401 - C
-    """Return a C extension of numba: its own module, under its own name, whoever imports it first."""
-    if name not in sys.modules:
-        folder = _numba().joinpath(*name.split(".")[1:-1])
-        spec = PathFinder.find_spec(name, [str(folder)])
-        if spec is None or spec.loader is None:
-            raise ImportError(f"{name} is not in {folder}")
-        module = module_from_spec(spec)
-        spec.loader.exec_module(module)
-        sys.modules[name] = module
-    return sys.modules[name]
-
-
 @cache
 def _machine() -> tuple[bytes, ...]:
     """Return what code is made for and by: this processor, Python, numba and LLVM."""
@@ -155,14 +142,7 @@ def _machine() -> tuple[bytes, ...]:
     processor = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
     python = f"{sys.version} {sysconfig.get_platform()}"
     linker: str = import_module("llvmlite").__version__
-    return processor.encode(), python.encode(), linker.encode(), _content(_numba() / "_version.py")
-
-
-def _numba() -> Path:
-    spec = find_spec("numba")
-    if spec is None or not spec.submodule_search_locations:
-        raise ImportError("numba is not installed")
-    return Path(spec.submodule_search_locations[0])
+    return processor.encode(), python.encode(), linker.encode(), _content(package_folder("numba") / "_version.py")
 
 
 def _llvm() -> Any:  # noqa: ANN401 - llvmlite declares no types
