@@ -12,14 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.friction import FrictionLaw
+from solver.friction import CAP, OPEN, SLIP, STICK, FrictionLaw
 from solver.lapack import dgesv, dgetrf, dgetrs
 
 Array = NDArray[np.float64]
 States = NDArray[np.int8]
 Flags = NDArray[np.bool_]
-OPEN, STICK, SLIP, CAP = 0, 1, 2, 3
-NAMES = ("open", "stick", "slip", "cap")
 SMALL = 1e-11  # a contradiction smaller than this, relative to the largest of its kind, is round-off
 ROUNDS = 12  # systems after which the short way to settled sliding is given up
 HERTZ = 0.5  # part of the depth below which skin is first thought to touch: half as deep is half the overlap's square
@@ -78,10 +76,10 @@ class System:
         self.key = state.tobytes() + sense.tobytes()
         self.on = np.flatnonzero(state != OPEN)
         self.stuck = np.flatnonzero(state == STICK)
-        self.capped = np.flatnonzero(state == CAP)
         on, stuck, free = self.on, self.stuck, body.motions.shape[1]
-        drag = np.where(state == SLIP, sense * law.mu, 0.0)[on]  # tangential by normal force
-        self.drag = drag
+        by_force, by_length = law.slopes(state, sense)
+        self.drag = drag = by_force[on]  # tangential by normal force
+        self.capped = by_length * body.length  # (k,) tangential force of points at the bound
         count = len(on) + len(stuck)
         matrix = np.zeros((count + free, count + free))
         touch = body.normal_by_normal[np.ix_(on, on)] + body.normal_by_tangential[np.ix_(on, on)] * drag
@@ -253,9 +251,7 @@ class Course:
         sense: Array,
         iteration: int,
     ) -> Contact:
-        body, on, stuck = self.body, system.on, system.stuck
-        tangential = np.zeros(len(state))
-        tangential[system.capped] = sense[system.capped] * self.law.bound(body.length[system.capped])
+        body, on, stuck, tangential = self.body, system.on, system.stuck, system.capped
         lifted = body.gap + body.normal_free - depth + body.normal_by_tangential @ tangential
         moved = body.tangential_free + travel + body.tangential_by_tangential @ tangential
         missing = self._resultants - body.motions[len(state) :].T @ tangential

@@ -8,6 +8,7 @@ import numpy as np
 from solver import kernels_numpy
 from solver.finite_finger import FiniteFinger
 from solver.finite_relaxing import RelaxingNewton
+from solver.friction import FrictionLaw
 from solver.newton import Newton, Shape
 from solver.scene import Scene
 
@@ -43,9 +44,7 @@ def audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: Newton) -> 
     push = max(float(normal.max(initial=0.0)), np.finfo(float).tiny)
     # Open skin may hang over, its length along the surface negative: no limit of it is meant.
     length = np.maximum(kernels_numpy.tributary(shape.place(body)[:, 0]), 0.0)
-    limit = scene.friction.mu * np.maximum(normal, 0.0)
-    if scene.friction.tau_max is not None:
-        limit = np.minimum(limit, scene.friction.tau_max * length)
+    limit = FrictionLaw(float(scene.friction.mu), scene.friction.cap).limit(normal, length)
     return {
         "equilibrium_x": abs(float(bone[0] + shape.force[0])) / total,
         "equilibrium_y": abs(float(bone[1] + shape.force[1])) / total,

@@ -22,7 +22,8 @@ from solver.finite_errors import error_estimates
 from solver.finite_finger import FiniteFinger
 from solver.finite_relaxing import RelaxingCourse
 from solver.finite_states import course, presses
-from solver.kernels import CAP, OPEN, SLIP, STICK
+from solver.friction import NAMES
+from solver.kernels import STICK
 from solver.matching import within_reach
 from solver.mesh import Array
 from solver.mesher import Sizing
@@ -31,7 +32,6 @@ from solver.prediction import History, Prediction, Row, Skin
 from solver.receptor import ROW
 from solver.scene import Scene
 
-NAMES = {OPEN: "open", STICK: "stick", SLIP: "slip", CAP: "cap"}
 ROUGH = 1e-8  # unbalanced part of the forces from which displacements are corrected further [-]
 CORRECTIONS = 4  # at most
 

@@ -5,7 +5,9 @@ from typing import cast
 import numpy as np
 
 from solver.finite_body import FiniteBody
+from solver.friction import CAP, OPEN, SLIP, STICK, FrictionLaw
 from solver.hyperelastic import shape, slopes
+from solver.kernels.skin import STEEP
 from solver.mesh import Array, Indices
 
 IMAGINARY = 1e-30  # step whose square is nothing [-]
@@ -160,3 +162,39 @@ def carry(
     rows = np.einsum("rn,lrnc->lrc", across[1], lines[:, across[0][:, None] + np.arange(3)])
     field = slopes[host, 0] + slopes[host, 1] * points[..., 0] + slopes[host, 2] * points[..., 1]
     return rows, np.einsum("eq,eqm,eq->em", weight, modes, field)
+
+
+def restated(
+    state: Indices,
+    sense: Indices,
+    reaction: Array,
+    above: Array,
+    slid: Array,
+    length: Array,
+    law: FrictionLaw,
+    direction: int,
+) -> tuple[Indices, Indices]:
+    """Return states and senses (k,) as `solver.friction` asks for them, for the forces and places of a solution.
+
+    Arguments as those of the loop `restate`, which changes its own.
+    """
+    slack, small = 1e-12 * np.abs(reaction[:, 1]).max(initial=0.0), 1e-13 * np.abs(above).max(initial=0.0)
+    drag, push = reaction.T
+    length = np.maximum(length, 0.0)  # skin that hangs over has no limit
+    was_open, stuck, slips = state == OPEN, state == STICK, state >= SLIP
+    coulomb, bound, most = law.mu * np.maximum(push, 0.0), law.bound(length), law.limit(push, length)
+    at_bound = (bound < coulomb - slack) | ((state == CAP) & (bound <= coulomb + slack))
+    now, turned = np.where(at_bound, CAP, SLIP), sense.copy()
+    if direction == 0:
+        over = np.abs(drag) > most + slack
+        turned = np.where(stuck & over & (push >= -slack), np.where(drag > 0.0, 1, -1), sense)
+        now = np.where(stuck, np.where(over, np.where(bound < coulomb, CAP, SLIP), STICK), now)
+        now = np.where(slips & (slid * sense > small) & (most > 0.0), STICK, now)
+        entering = SLIP if law.frictionless else STICK
+    else:
+        turned = np.where(was_open | (push < -slack), sense, direction)
+        entering = CAP if law.mu > STEEP and law.tau_max < np.inf else SLIP
+        turned = np.where(was_open & (above < -small), direction, turned)
+    now = np.where(push < -slack, OPEN, now)
+    now = np.where(was_open, np.where(above < -small, entering, OPEN), now)
+    return now, turned

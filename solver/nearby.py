@@ -11,13 +11,16 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.contact import NAMES, SLIP, Contact, ContactLost, Course, States, forced
+from solver.contact import SLIP, Contact, ContactLost, Course, States, forced
 from solver.derivatives import Derivatives, of_contact
 from solver.finger import FingerModel
+from solver.friction import NAMES
 from solver.mesh import Array
 from solver.prediction import Prediction, Skin
 from solver.scene import Scene
 from solver.small_states import law_of
+
+NUMBERS = {name: state for state, name in NAMES.items()}
 
 
 class Nearby(Protocol):
@@ -89,7 +92,7 @@ class _SmallNearby:
 
 def states(skin: Skin) -> NDArray[np.int64]:
     """Return the states (k,) of a skin that slides: what still stuck slips once it has settled."""
-    return np.array([SLIP if state == "stick" else NAMES.index(state) for state in skin.state])
+    return np.array([SLIP if state == "stick" else NUMBERS[state] for state in skin.state])
 
 
 def _slide(finger: FingerModel, scene: Scene, guess: States) -> Contact:

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.linalg import LinAlgError
 
 from solver.audits import audits, course_audits, forces_missed, inside_out
-from solver.contact import NAMES, SLIP, STICK, Contact, ContactLost
+from solver.contact import SLIP, STICK, Contact, ContactLost
 from solver.differences import those_of, together
 from solver.evidence import model, warnings
 from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure
 from solver.finger import FingerModel
-from solver.friction import FrictionLaw
+from solver.friction import NAMES, FrictionLaw
 from solver.grid import MeshError
 from solver.load_steps import Steps
 from solver.mesh import Array
