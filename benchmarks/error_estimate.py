@@ -147,7 +147,7 @@ class Case:
 
     def asked(self, tolerance: float) -> float:
         """Return the mesh that the solver ends on when asked for this tolerance."""
-        finer = [n for n in CHECKED if n >= coarsest_for(self.scene, tolerance)]
+        finer = [n for n in CHECKED if n >= coarsest_for(self.scene, tolerance)] or [CHECKED[-1]]
         return next((n for n in finer if self.on(n)[0][0] <= tolerance), finer[-1])
 
 

@@ -17,7 +17,6 @@ from solver.prediction import Prediction
 from solver.scene import Scene
 
 NAMES = ("SED", "normal force", "drag", "indentation")  # what is told apart
-SAYING = "Differences in"
 PART = {"small": 0.6, "finite": 1.0}  # of what another mesh changes in a difference
 TOLD = 0.05  # part of their range to which differences are asked for
 LEAST = 1e-5  # part of the numbers below which nobody minds
@@ -64,14 +63,10 @@ def off(found: Sequence[Prediction]) -> Off:
     return Off(float(shares[held].max()), _in_a_sentence(NAMES[worst], float(warned[worst])) if warned.any() else "")
 
 
-def says(warning: str) -> bool:
-    """Return whether a warning is one of differences."""
-    return warning.startswith(SAYING)
-
-
 def _in_a_sentence(name: str, share: float) -> str:
     part = f"{100.0 * share:.2g} %" if share < 1.0 else "more than all"
-    return f"{SAYING} {name} from the surfaces solved with this one are small, and may be off by {part} of their range."
+    small = f"Differences in {name} from the surfaces solved with this one are small"
+    return f"{small}, and may be off by {part} of their range."
 
 
 def told(one: Prediction) -> tuple[float, float, float, float]:

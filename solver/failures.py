@@ -46,15 +46,8 @@ class SolveFailure(Exception):
         'No equilibrium within 25 iterations.'
         """
         told = str(self)
-        return self._saying(told[:1].upper() + told[1:] + ("" if told.endswith(".") else "."))
-
-    def doubted(self, why: str) -> "SolveFailure":
-        """Return this failure with a sentence more."""
-        return self._saying(f"{self.in_a_sentence()} {why}")
-
-    def _saying(self, message: str) -> "SolveFailure":
         return type(self)(
-            message,
+            told[:1].upper() + told[1:] + ("" if told.endswith(".") else "."),
             limit_mu=self.limit_mu,
             limit_indentation=self.limit_indentation,
             limit_normal_force=self.limit_normal_force,

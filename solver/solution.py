@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from solver import differences, small_solution
 from solver.differences import TOLD, Off
 from solver.estimate import DEFAULT, FINENESS, coarsest_for, finer_than
-from solver.failures import NoSteadyState, NotConverged, SolveFailure
+from solver.failures import NotConverged, SolveFailure
 from solver.finger import FingerModel
 from solver.holding import with_held
 from solver.matching import expected_depth
@@ -16,7 +16,9 @@ from solver.scene import Scene
 from solver.small_solution import Answer, Fingers, Progress, Watch
 from solver.stepping import March
 
-STILL = "A coarser mesh still has a settled state here, so that this lies within what is known of that limit."
+KNOWN = 0.03  # of a limit of friction, to which it is known
+WORTH = 0.1  # error estimate up to which a coarser mesh's number near a limit is worth more than the limit alone
+NEAR_LIMIT = "That mesh ends settled sliding at mu = {:.3g}, which is known to {:.0f} %: this state may lie beyond."
 Rough = Callable[[Prediction], None]  # told an answer before more is made of it: what there is, should work be stopped
 
 
@@ -146,10 +148,7 @@ def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
 def _solve_group(
     scenes: list[Scene], progress: Progress | None, watch: Watch | None, rough: Rough | None, in_loops: bool
 ) -> list[Answer]:
-    """Solve scenes that share a mesh on the coarsest that does.
-
-    Where courses are marched, that is looked for on their settled ends: each is marched, and told, once.
-    """
+    """Solve scenes that share a mesh on the coarsest that does."""
     asked = [s.solve.tolerance for s in scenes if s.solve.tolerance is not None]
     kind = scenes[0].solve.kinematics
     depth = max(expected_depth(scene, in_loops=in_loops) for scene in scenes)
@@ -157,61 +156,60 @@ def _solve_group(
     on_mesh = _Meshing(depth, progress, Fingers(scenes[0], in_loops=in_loops))
     marched = kind == "small" and any(scene.solve.course == "history" for scene in scenes)
     if marched and (asked or differences.together(scenes)):
-        ends = [replace(scene, solve=replace(scene.solve, course="steady")) for scene in scenes]
-        ended, fineness = _refined(ends, fineness, on_mesh, None, None)
-        if watch is not None:
-            return _told_as_they_stay(scenes, fineness, on_mesh, ended, watch, rough)
-    return _refined(scenes, fineness, on_mesh, watch, rough)[0]
+        return _marched(scenes, fineness, on_mesh, watch)
+    found = _refined(scenes, fineness, on_mesh, watch, rough)
+    return [_saying(answer, told) for answer, told in zip(found.answers, found.told, strict=True)]
 
 
-def _told_as_they_stay(
-    scenes: list[Scene], fineness: float, on_mesh: "_Meshing", ended: list[Answer], watch: Watch, rough: Rough | None
-) -> list[Answer]:
-    """Do the same, `watch` being told what differences between surfaces may be off by, as their `ended` courses say."""
-    told: dict[int, Answer] = {}
+def _marched(scenes: list[Scene], fineness: float, on_mesh: "_Meshing", watch: Watch | None) -> list[Answer]:
+    """March courses on the mesh that their settled ends ask for, so that each is marched, and told, once.
+
+    What is to be said of an end is said of its course.
+    """
+    ends = [replace(scene, solve=replace(scene.solve, course="steady")) for scene in scenes]
+    ended = _refined(ends, fineness, on_mesh, None, None)
+    out: dict[int, Answer] = {}
 
     def noted(number: int, answer: Answer, finger: FingerModel, way: March | None) -> None:
-        end = ended[number]
-        if isinstance(answer, Prediction) and isinstance(end, Prediction):
-            more = tuple(warning for warning in end.warnings if differences.says(warning))
-            answer = replace(answer, warnings=(*answer.warnings, *more)) if more else answer
-        told[number] = answer
-        watch(number, answer, finger, way)
+        out[number] = _saying(answer, ended.told[number])
+        if watch is not None:
+            watch(number, out[number], finger, way)
 
-    def stays(number: int, answer: Answer) -> Answer:
-        before = told.get(number)
-        if not (isinstance(before, Prediction) and isinstance(answer, Prediction)):
-            return answer
-        return before if (before.dofs, before.warnings) == (answer.dofs, answer.warnings) else answer
+    found = on_mesh(scenes, ended.fineness, noted)
+    return [out.get(number, answer) for number, answer in enumerate(found)]
 
-    return [stays(*one) for one in enumerate(_refined(scenes, fineness, on_mesh, noted, rough)[0])]
+
+@dataclass(frozen=True, slots=True)
+class _Refined:
+    """What was found of scenes that share a mesh."""
+
+    answers: list[Answer]
+    told: list[tuple[str, ...]]  # of each, sentences about what the finest mesh has left undone
+    fineness: float  # of the last mesh
 
 
 def _refined(
     scenes: list[Scene], fineness: float, on_mesh: "_Meshing", watch: Watch | None, rough: Rough | None
-) -> tuple[list[Answer], float]:
+) -> _Refined:
     """Refine until every scene's estimate meets its tolerance and surfaces are told apart, or no mesh is finer.
 
-    Scenes that share a mesh are solved again together on the finer one. A state that a finer mesh does not find is told
-    as the coarser one has it; one that the finer mesh puts beyond a limit is refused, with a sentence that the coarser
-    does not. Returns the answers, and the fineness at last.
+    Scenes that share a mesh are solved again together on the finer one. Where that has no answer, the coarser mesh's
+    is told if it `_stands`.
     """
     surfaces = differences.together(scenes)
     first, kind = fineness, scenes[0].solve.kinematics
     found: dict[int, Answer] = {}
-    unfound: set[int] = set()  # by a finer mesh
+    lost: dict[int, SolveFailure] = {}  # what finer meshes made of those told as a coarser one has them
     todo = list(range(len(scenes)))
     while True:
         solved = on_mesh([scenes[i] for i in todo], fineness, watch)
         for i, answer in zip(todo, solved, strict=True):
             coarser = found.get(i)
-            if isinstance(answer, NotConverged) and isinstance(coarser, Prediction):
-                unfound.add(i)
-            elif isinstance(answer, NoSteadyState) and isinstance(coarser, Prediction):
-                found[i] = answer.doubted(STILL)
+            if isinstance(answer, SolveFailure) and coarser is not None and _stands(coarser, answer):
+                lost[i] = answer
             else:
                 found[i] = answer
-        missed = [i not in unfound and _misses(found[i]) for i in range(len(scenes))]
+        missed = [i not in lost and _misses(found[i]) for i in range(len(scenes))]
         apart = [
             differences.off([one for i in together if isinstance(one := found[i], Prediction)]) for together in surfaces
         ]
@@ -226,37 +224,62 @@ def _refined(
         if kind == "finite":
             again = {scenes[i].pressed for i in todo if missed[i] or i in alike}
             todo = [i for i in todo if scenes[i].pressed in again]
-    unfound |= _fallen_back(scenes, found, first, on_mesh)
+    if kind == "finite":  # where a fine mesh may lose its way
+        lost |= _fallen_back(scenes, found, first, on_mesh)
     of = {i: off for together, off in zip(surfaces, apart, strict=True) for i in together}
-    told = [_warned(found[i], of.get(i), misses=missed[i], unfound=i in unfound) for i in range(len(scenes))]
-    return told, fineness
+    told = [_undone(of.get(i), misses=missed[i], lost=lost.get(i)) for i in range(len(scenes))]
+    return _Refined([found[i] for i in range(len(scenes))], told, fineness)
 
 
-def _fallen_back(scenes: list[Scene], found: dict[int, Answer], first: float, on_mesh: "_Meshing") -> set[int]:
-    """Put answers of coarser meshes in place of what even the `first` mesh did not find, and return which ones.
-
-    At finite strain alone, where a fine mesh may lose its way.
-    """
-    back: set[int] = set()
+def _fallen_back(
+    scenes: list[Scene], found: dict[int, Answer], first: float, on_mesh: "_Meshing"
+) -> dict[int, SolveFailure]:
+    """Put answers of coarser meshes in place of what the `first` mesh has none of; return what that made of them."""
+    lost: dict[int, SolveFailure] = {}
     for i, scene in enumerate(scenes):
-        coarser = [n for n in FINENESS["finite"] if n < first and scene.solve.kinematics == "finite"]
-        while coarser and isinstance(found[i], NotConverged):
+        coarser = [n for n in FINENESS["finite"] if n < first]
+        while coarser and isinstance(failure := found[i], SolveFailure) and _doubtful(scene, failure):
             answer = on_mesh([scene], coarser.pop(), None)[0]
-            if isinstance(answer, Prediction):
-                found[i] = answer
-                back.add(i)
-    return back
+            if _stands(answer, failure):
+                found[i], lost[i] = answer, failure
+    return lost
 
 
-def _warned(answer: Answer, off: Off | None, *, misses: bool, unfound: bool) -> Answer:
-    """Return the answer with what the finest mesh has left undone."""
+def _doubtful(scene: Scene, failure: SolveFailure) -> bool:
+    """Return whether there may be a state nevertheless: none was found, or the limit is as near as limits are known."""
+    if isinstance(failure, NotConverged):
+        return True
+    limit = failure.limit_mu
+    return limit is not None and float(scene.friction.mu) <= (1.0 + KNOWN) * limit
+
+
+def _stands(coarser: Answer, failure: SolveFailure) -> bool:
+    """Return whether the answer of a coarser mesh is told where a finer one has none.
+
+    Where the finer one is sure that there is none it is not; nor near a limit at which numbers grow so that the coarser
+    mesh knows little of them: then the limit is told.
+    """
+    if not isinstance(coarser, Prediction) or not _doubtful(coarser.scene, failure):
+        return False
+    return isinstance(failure, NotConverged) or coarser.error_estimate <= WORTH
+
+
+def _undone(off: Off | None, *, misses: bool, lost: SolveFailure | None) -> tuple[str, ...]:
+    """Return what is to be said of an answer for what the finest mesh has left undone."""
     told: list[str] = []
-    if unfound:
+    if lost is not None:
         told.append("A finer mesh did not find this state; told is the coarser one's, with its own error estimate.")
+        if lost.limit_mu is not None:
+            told.append(NEAR_LIMIT.format(lost.limit_mu, 100.0 * KNOWN))
     if misses:
         told.append("The finest mesh leaves an error estimate above the tolerance asked for.")
     if off is not None and off.warning:
         told.append(off.warning)
+    return tuple(told)
+
+
+def _saying(answer: Answer, told: tuple[str, ...]) -> Answer:
+    """Return the answer with more warnings."""
     return replace(answer, warnings=(*answer.warnings, *told)) if told and isinstance(answer, Prediction) else answer
 
 

@@ -53,12 +53,27 @@ def test_a_tolerance_so_strict_that_its_first_mesh_finds_nothing_does_not_lose_t
     assert any("finer mesh did not find" in told for told in found.warnings)
 
 
-def test_a_state_that_a_finer_mesh_puts_beyond_its_limit_is_refused_and_the_refusal_names_the_doubt(monkeypatch):
+def test_a_state_that_a_finer_mesh_puts_far_beyond_its_limit_is_refused_with_that_limit(monkeypatch):
+    beyond = NoSteadyState("beyond", limit_mu=0.29)
+    meshing(monkeypatch, beyond, missed=lambda answer: isinstance(answer, Prediction))
+    with pytest.raises(NoSteadyState, match=r"^Beyond\.$") as told:
+        solve(stiffening(0.3, 0.01))
+    assert told.value.limit_mu == 0.29
+
+
+@pytest.mark.parametrize("tolerance", [0.01, None])
+def test_a_state_as_near_its_limit_as_limits_are_known_is_told_by_a_coarser_mesh_with_a_warning(monkeypatch, tolerance):
     beyond = NoSteadyState("beyond", limit_mu=0.299)
     meshing(monkeypatch, beyond, missed=lambda answer: isinstance(answer, Prediction))
-    with pytest.raises(NoSteadyState, match=r"^Beyond\. A coarser mesh still has a settled state") as told:
+    found = solve(stiffening(0.3, tolerance))
+    assert "That mesh ends settled sliding at mu = 0.299, which is known to 3 %" in " ".join(found.warnings)
+
+
+def test_a_number_of_which_little_is_known_near_its_limit_gives_way_to_the_limit(monkeypatch):
+    meshing(monkeypatch, NoSteadyState("beyond", limit_mu=0.299), missed=lambda answer: isinstance(answer, Prediction))
+    monkeypatch.setattr(solution, "WORTH", 1e-6)
+    with pytest.raises(NoSteadyState, match=r"^Beyond\.$"):
         solve(stiffening(0.3, 0.01))
-    assert told.value.limit_mu == 0.299
 
 
 @pytest.mark.slow

@@ -1,0 +1,175 @@
+"""Whether error estimates are true of scenes harder than usual: steep friction with a bound, stiff or stiffening skin.
+
+Run from the root: python -m benchmarks.hard_estimates steep --scenes 20 (10 to 60 s a scene), or stiff; `--small` for
+small strain. `--keep FILE` appends what was solved to FILE, and a run that finds a scene there does not solve it again.
+
+"steep": depth 0.01 to 2 mm, mu 1.2 to 1000, a bound of 0.002 to 0.02 MPa, all drawn evenly by their logarithms, both
+directions, the published finger. "stiff": 1 to 2 mm, mu 0.1 to 0.5, both directions, angles 30 to 75; in every other
+scene epidermis and dermis 8 to 100 times as stiff as fat, in the others Ogden's law in both with an exponent of 3 to
+14. Each is solved as users do, without a tolerance, at 1 % and at 0.3 %. The truth is the mean of three meshes finer
+than any of these; a number is counted where none of the three is further from their mean than a third of its estimate.
+"""
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: threads cost more than they bring at these sizes
+
+import json
+from argparse import ArgumentParser
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from benchmarks.error_estimate import on_mesh
+from daq_app.accuracy.methods import overkill
+from solver.climbing import MARGIN, sized
+from solver.contact import ContactLost
+from solver.failures import SolveFailure
+from solver.mesh import Array
+from solver.mesher import Sizing
+from solver.prediction import Prediction
+from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
+from solver.solution import answers
+
+NAMES = ("SED of the ending", "normal force", "drag")
+ASKED = (None, 0.01, 0.003)
+FINEST = ((30.0, False), (30.0, True), (27.0, False))  # of truths at small strain, and whether moved by half an element
+PLAIN, LINED = 17.0, (23.0, 26.0, 29.0)  # and at finite strain: the first without lines at the edges of contact
+SMALL = 2e-4  # relative error below which nobody minds by how much an estimate is too large
+
+
+def steep_scene(number: int) -> Scene:
+    """Return the scene of this number whose coefficient of friction is large, and bounded."""
+    draw = np.random.default_rng([number, 99])
+    depth, mu, bound = (float(np.exp(draw.uniform(*np.log(ends)))) for ends in ((0.01, 2.0), (1.2, 1e3), (2e-3, 2e-2)))
+    return Scene(friction=Friction(mu, bound), loading=Loading(depth, "+x" if draw.random() < 0.5 else "-x"))
+
+
+def stiff_scene(number: int) -> Scene:
+    """Return the scene of this number whose skin is stiff, or becomes it."""
+    draw = np.random.default_rng([number, 98])
+    fat = Materials().fat
+    if number % 2:
+        skin = [Material(fat.E * float(np.exp(draw.uniform(*np.log((8.0, 100.0))))), 0.48) for _ in range(2)]
+    else:
+        usual, exponent = Materials(), float(draw.uniform(3.0, 14.0))
+        skin = [replace(one, law="ogden", stiffening=exponent) for one in (usual.epidermis, usual.dermis)]
+    return Scene(
+        finger=Finger(contact_angle=float(draw.uniform(30.0, 75.0))),
+        materials=replace(Materials(), epidermis=skin[0], dermis=skin[1]),
+        friction=Friction(float(draw.uniform(0.1, 0.5))),
+        loading=Loading(float(draw.uniform(1.0, 2.0)), "+x" if draw.random() < 0.5 else "-x"),
+    )
+
+
+DRAWN = {"steep": steep_scene, "stiff": stiff_scene}
+
+
+def _numbers(found: Prediction) -> list[list[float | None]]:
+    off = found.error_estimate, found.normal_force_error, found.tangential_force_error
+    return [[found.sed_ending, found.normal_force, abs(found.tangential_force)], list(off)]
+
+
+def truths(scene: Scene) -> list[list[float]]:
+    """Return the numbers (3, 3) on three meshes finer than any of an answer. Raises SolveFailure, ContactLost."""
+    if scene.solve.kinematics == "small":
+        return np.abs([on_mesh(scene, *mesh) for mesh in FINEST]).tolist()
+    over = overkill(scene, Sizing(PLAIN, scene.loading.depth, margin=MARGIN))
+    found: list[Array] = []
+    for fineness in LINED:
+        over = overkill(scene, sized(fineness, over), over)
+        found.append(np.abs(over.finger.numbers(over.shape)))
+    return np.array(found).tolist()
+
+
+def measured(family: str, number: int, kinematics: str) -> dict[str, Any]:
+    """Return what one scene gives, as plain data: answers with their estimates or reasons, and the truth or why not."""
+    drawn = replace(DRAWN[family](number), solve=Solve(kinematics))
+    row: dict[str, Any] = {"scene": [family, number, kinematics], "answers": []}
+    for tolerance in ASKED:
+        begun = process_time()
+        asked = replace(drawn, solve=replace(drawn.solve, tolerance=tolerance))
+        answer = answers([asked], in_loops=True)[0]
+        told = _numbers(answer) if isinstance(answer, Prediction) else str(answer)
+        row["answers"].append({"told": told, "seconds": process_time() - begun})
+    try:
+        row["truth"] = truths(drawn)
+    except (SolveFailure, ContactLost) as failure:
+        row["truth"] = str(failure)
+    return row
+
+
+def solved(family: str, first: int, scenes: int, kinematics: str, keep: Path | None) -> Iterator[dict[str, Any]]:
+    """Yield what was found of all scenes, from the file where it has them."""
+    kept: dict[tuple[str, int, str], dict[str, Any]] = {}
+    if keep is not None and keep.exists():
+        rows = map(json.loads, keep.read_text().splitlines())
+        kept = {(one[0], one[1], one[2]): row for row in rows for one in [row["scene"]]}
+    for number in range(first, first + scenes):
+        row = kept.get((family, number, kinematics))
+        if row is None:
+            row = measured(family, number, kinematics)
+            if keep is not None:
+                with keep.open("a") as file:
+                    print(json.dumps(row), file=file)
+        yield row
+
+
+def report(rows: list[dict[str, Any]]) -> None:
+    """Print who is above, who is near, and what is worst."""
+    for place, tolerance in enumerate(ASKED):
+        found = [row["answers"][place] for row in rows]
+        seconds = [one["seconds"] for one in found]
+        told = [(row, one["told"]) for row, one in zip(rows, found, strict=True) if not isinstance(one["told"], str)]
+        asked = "no tolerance" if tolerance is None else f"{100 * tolerance:g} %"
+        print(f"{asked}: {len(told)} answers, {np.median(seconds):.2f} s in the median, {max(seconds):.1f} s at most")
+        for number, name in enumerate(NAMES):
+            above: list[bool] = []
+            near: list[bool] = []
+            worst = (0.0, 0.0, 0.0, 0)
+            for row, (numbers, estimates) in told:
+                if isinstance(row["truth"], str) or not numbers[number]:
+                    continue
+                truth = np.array(row["truth"])[:, number]
+                doubt = float(np.abs(truth / truth.mean() - 1.0).max())
+                error, estimate = abs(numbers[number] / float(truth.mean()) - 1.0), estimates[number]
+                bound = 10.0 * max(error, SMALL)
+                if doubt <= max(estimate, error) / 3.0:
+                    above.append(estimate >= error)
+                    worst = max(worst, (error / estimate, error, estimate, row["scene"][1]))
+                if doubt <= bound / 3.0:
+                    near.append(estimate < bound)
+            shares = (f"{sum(kind)} of {len(kind)}" for kind in (above, near))
+            ratio, error, estimate, scene = worst
+            print(
+                f"  {name}: above {next(shares)}, near {next(shares)}; worst {ratio:.2f}, "
+                f"{100 * error:.2f} % estimated at {100 * estimate:.2f} % in scene {scene}"
+            )
+
+
+def main() -> None:
+    """Solve and print."""
+    parser = ArgumentParser(description=__doc__)
+    parser.add_argument("family", choices=sorted(DRAWN))
+    parser.add_argument("--scenes", type=int, default=20)
+    parser.add_argument("--first", type=int, default=0, help="number of the first scene")
+    parser.add_argument("--small", action="store_true", help="small strain")
+    parser.add_argument("--keep", type=Path, help="file of solved scenes")
+    asked = parser.parse_args()
+    kinematics = "small" if asked.small else "finite"
+    rows = list(solved(asked.family, asked.first, asked.scenes, kinematics, asked.keep))
+    for row in rows:
+        reasons = [one["told"] for one in row["answers"] if isinstance(one["told"], str)]
+        if reasons:
+            print(f"scene {row['scene'][1]}: {reasons[-1]}")
+        elif isinstance(row["truth"], str):
+            print(f"scene {row['scene'][1]} has answers and no truth: {row['truth']}")
+    report(rows)
+
+
+if __name__ == "__main__":
+    main()
