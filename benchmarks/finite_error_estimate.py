@@ -71,10 +71,10 @@ def measured(number: int, *, bounded: bool) -> dict[str, Any]:
     try:
         depth = scene.loading.depth
         over = overkill(scene, Sizing(PLAIN, depth, margin=MARGIN))
-        truth = [] if bounded else [over.finger.numbers(over.shape).tolist()]
+        solves = [] if bounded else [over]
         for fineness in OVERKILL if bounded else OVERKILL[:2]:
-            over = overkill(scene, sized(fineness, over), over)
-            truth.append(over.finger.numbers(over.shape).tolist())
+            over = overkill(scene, sized(fineness, over.at), over.at)
+            solves.append(over)
         meshes: dict[str, list[Any]] = {}
         for fineness in MESHES:
             way_up = ascended(scene, depth, fineness, going_on)
@@ -82,7 +82,9 @@ def measured(number: int, *, bounded: bool) -> dict[str, Any]:
             meshes[f"{fineness:g}"] = [numbers[..., :3].tolist() for numbers in found[:3]]
     except SolveFailure:
         return {"number": number, "bounded": bounded}
-    return {"number": number, "bounded": bounded, "meshes": meshes, "truth": truth}
+    truth = [over.numbers.tolist() for over in solves]
+    at_cut = [over.at_cut for over in solves]
+    return {"number": number, "bounded": bounded, "meshes": meshes, "truth": truth, "at_cut": at_cut}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

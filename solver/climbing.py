@@ -15,18 +15,21 @@ from solver.existence import refuse_far_beyond
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.finite_ends import steps_asked
 from solver.finite_finger import FiniteFinger
-from solver.finite_states import course, pull_sliding, roughly, settled
+from solver.finite_states import course, nearby, pull_sliding, roughly, settled
 from solver.load_steps import Steps
-from solver.mesher import AT_CUT, Sizing, sharing, still_sharing
+from solver.mesher import AT_CUT, SHORT_AT_CUT, Sizing, sharing, still_sharing
 from solver.newton import Shape
 from solver.reach import folded, sound
-from solver.scene import Materials, Scene
+from solver.scene import Scene
 from solver.tissues import strains_the_cut
 
 ROUGH = 3.0  # fineness of the mesh that finds the edges
 NEARLY = 0.98  # of the friction limit, from which contact is where it is when the finger slides
 MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
 WIDER = 6.0  # the same where contact was met at the end of that skin
+UNSQUEEZED = 0.78  # least det F at the cut on the rough mesh, from which elements there are shortest
+DOUBLED = 0.07  # by how much it lies below where they are twice as long
+COLLAPSED = 0.4  # least det F at the cut, below which short elements have several states
 
 
 Maker = Callable[[Scene, Sizing], FiniteFinger]  # of meshes; whoever wants may keep what it makes
@@ -39,6 +42,7 @@ class Climbed:
     finger: FiniteFinger
     shape: Shape
     setup_s: float  # meshes and tables [s]
+    at_cut: float | None = None  # of meshes that are climbed from here, as in `Sizing`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,7 +109,7 @@ def foot(
         pass
     if beyond and scene.normal_force is None and scene.loading.direction != 0:
         refuse_far_beyond(scene, pull_sliding(scene), stop)
-    sizing = Sizing(fineness, depth, margin=margin, at_cut=_at_cut(scene.materials, scene.loading.direction))
+    sizing = Sizing(fineness, depth, margin=margin, at_cut=_usual_at_cut(scene))
     try:
         return _plain(scene, sizing, stop, make)
     except NoSteadyState:
@@ -118,17 +122,20 @@ def _rough(
     scene: Scene, depth: float, margin: float, stop: Callable[[], bool], make: Maker, near: Climbed | None
 ) -> Climbed:
     begun = perf_counter()
-    finger = make(scene, Sizing(ROUGH, depth, margin=margin, at_cut=_at_cut(scene.materials, scene.loading.direction)))
+    finger = make(scene, Sizing(ROUGH, depth, margin=margin, at_cut=_usual_at_cut(scene)))
     setup = perf_counter() - begun
     shape = _on_rough(finger, scene, stop, near.shape if near is not None and near.finger is finger else None)
-    return Climbed(finger, shape, setup)
+    return Climbed(finger, shape, setup, _at_cut(scene, finger, shape))
 
 
 def _plain(scene: Scene, sizing: Sizing, stop: Callable[[], bool], make: Maker) -> Climbed:
-    found = _on(scene, sizing, None, stop, make)
-    if sizing.margin < WIDER and found.finger.runs_out(found.shape):
-        return _on(scene, replace(sizing, margin=WIDER), None, stop, make)
-    return found
+    begun = perf_counter()
+    finger = make(scene, sizing)
+    setup = perf_counter() - begun
+    shape = settled(finger, scene, stop)
+    if sizing.margin < WIDER and finger.runs_out(shape):
+        return _plain(scene, replace(sizing, margin=WIDER), stop, make)
+    return Climbed(finger, shape, setup, sizing.at_cut)
 
 
 def _on_rough(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: Shape | None) -> Shape:
@@ -168,16 +175,29 @@ def risen(
 def sized(fineness: float, below: Climbed) -> Sizing:
     """Return the sizing of a mesh of `fineness` whose lines follow the edges of contact found `below`."""
     edges = below.finger.edges(below.shape)
-    at_cut = _at_cut(below.finger.scene.materials, -float(below.shape.force[0]))
-    return Sizing(fineness, below.shape.pull.depth, margin=MARGIN, edges=edges, at_cut=at_cut)
+    return Sizing(fineness, below.shape.pull.depth, margin=MARGIN, edges=edges, at_cut=below.at_cut)
 
 
-def _at_cut(tissues: Materials, slide: float) -> float | None:
-    """Return how small the elements are where the cut meets the bone; a `slide` along +x squeezes tissue there.
+def _usual_at_cut(scene: Scene) -> float | None:
+    """Return how long the elements are where the cut meets the bone, on a mesh that finds how tissue is squeezed there.
 
-    Under stiff skin they collapse, and Newton's iterations lose their way, sooner than they bring anything.
+    Sliding along +x squeezes it. Under stiff skin short elements collapse, and Newton's iterations lose their way,
+    sooner than they bring anything.
     """
-    return AT_CUT if slide > 0.0 and not strains_the_cut(tissues) else None
+    return AT_CUT if scene.loading.direction > 0 and not strains_the_cut(scene.materials) else None
+
+
+def _at_cut(scene: Scene, finger: FiniteFinger, shape: Shape) -> float | None:
+    """Return the same for the meshes above a rough one: the shorter, the less this squeezes that corner.
+
+    Where it is squeezed far, short elements collapse, and have more states than one. Ends of courses are not found from
+    a state nearby, that could show it.
+    """
+    usual = _usual_at_cut(scene)
+    if usual is None or scene.loading.dragged or shape.pull.sense == 0:
+        return usual
+    squeezed = max(UNSQUEEZED - finger.least_at_cut(shape), 0.0)
+    return min(SHORT_AT_CUT * 2.0 ** (squeezed / DOUBLED), usual)
 
 
 def sized_together(scene: Scene, fineness: float, feet: Sequence[Climbed]) -> list[Sizing]:
@@ -186,6 +206,8 @@ def sized_together(scene: Scene, fineness: float, feet: Sequence[Climbed]) -> li
     `scene` is that of any of them. Where contact is too short to tell its edges, a surface has a mesh of its own.
     """
     sizings = [sized(fineness, below) for below in feet]
+    longest = max((sizing.at_cut for sizing in sizings if sizing.at_cut is not None), default=None)
+    sizings = [sizing if sizing.at_cut is None else replace(sizing, at_cut=longest) for sizing in sizings]
     known = [number for number, sizing in enumerate(sizings) if sizing.edges is not None]
     if known:
         shared = sharing(scene.finger, scene.receptor, [sizings[number] for number in known])
@@ -211,28 +233,27 @@ def climbed(
     course has so many `times` the usual load steps. Raises NoSteadyState, NotConverged, Cancelled.
     """
     near = before if before is not None and before.foot.finger is below.finger else None
-    return _on(scene, sizing or sized(fineness, below), below, stop, make, near, times)
+    sizing = sizing or sized(fineness, below)
+    if sizing.at_cut is not None and sizing.at_cut < AT_CUT:
+        begun = _begun(scene, sizing, below, make, near)
+        shape = nearby(begun.finger, scene, begun.shape)
+        if shape is not None and begun.finger.least_at_cut(shape) >= COLLAPSED:
+            return replace(begun, shape=shape)
+        sizing = replace(sizing, at_cut=AT_CUT, sharing=None)
+    begun = _begun(scene, sizing, below, make, near)
+    return replace(begun, shape=settled(begun.finger, scene, stop, begun.shape, times))
 
 
-def _on(
-    scene: Scene,
-    sizing: Sizing,
-    below: Climbed | None,
-    stop: Callable[[], bool],
-    make: Maker,
-    before: Ascent | None = None,
-    times: int = 1,
-) -> Climbed:
+def _begun(scene: Scene, sizing: Sizing, below: Climbed, make: Maker, before: Ascent | None) -> Climbed:
+    """Return a mesh above the state `below`, with the shape that a settled one is sought from."""
     begun = perf_counter()
     finger = make(scene, sizing)
     for other in (below, before.top if before is not None else None):
         if other is not None:
             finger.bridge(other.finger)
     setup = perf_counter() - begun
-    start = None
-    if below is not None and before is None:
+    if before is None:
         start = finger.brought(below.shape, below.finger)
-    elif below is not None and before is not None:
-        low, top = before.foot.shape, before.top
-        start = finger.brought_on(below.shape, low, below.finger, top.shape, top.finger)
-    return Climbed(finger, settled(finger, scene, stop, start, times), setup)
+    else:
+        start = finger.brought_on(below.shape, before.foot.shape, below.finger, before.top.shape, before.top.finger)
+    return Climbed(finger, start, setup, sizing.at_cut)

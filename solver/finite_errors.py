@@ -20,8 +20,7 @@ NUDGE = 1e-3  # of the traction bound, to see what it does
 SQUEEZED = 0.82  # least det F, below which tissue is squeezed where the cut meets the bone
 OF_CORNER = np.array([4.5, 2.5, 2.5, 2.5, 2.5, 2.5])  # added to differences then, by the force's or depth's
 OF_STIFF = 8.0  # the same of the SED where skin is stiff, and does not only stiffen
-OF_SQUEEZED = 0.026  # under other skin, by how much errors grow then with what det F has fallen by
-IN_COMMON = 0.0032  # the most of that: what meshes of all finenesses have in common
+OF_SQUEEZED = 3.5  # under other skin, of the element there squared and what det F has fallen by cubed
 
 
 def error_estimates(
@@ -73,12 +72,12 @@ def _of_corner(scene: Scene, at: Climbed, numbers: Array, other: Array) -> Array
         part = OF_CORNER.copy()
         part[0] = OF_STIFF if stiff(scene.materials) else part[0]
         return part * change
-    if scene.finger.cut == "driven":
+    if scene.finger.cut == "driven" or at.at_cut is None:
         return np.zeros(6)
-    geometry = at.finger.geometry
-    near = 2 * (geometry.fat + len(geometry.depths) - 1)  # elements of the first two lines from the cut
-    squeezed = max(SQUEEZED - float(_volumes(at)[:near].min()), 0.0)
-    return np.full(6, min(OF_SQUEEZED * squeezed, IN_COMMON))
+    arcs = at.finger.geometry.arcs
+    element = float(arcs[1] - arcs[0]) / scene.finger.tip_radius
+    fallen = max(1.0 - at.finger.least_at_cut(at.shape), 0.0)
+    return np.full(6, OF_SQUEEZED * element**2 * fallen**3)
 
 
 def _volumes(at: Climbed) -> Array:

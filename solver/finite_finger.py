@@ -121,6 +121,14 @@ class FiniteFinger:
         """Return whether the skin crosses itself."""
         return kernels.crosses(self.geometry.mesh.nodes, shape.u, self.geometry.whole)
 
+    def least_at_cut(self, shape: Shape) -> float:
+        """Return the least det F at the quadrature points of the two elements along the skin at its palmar end."""
+        body, layers = self.newton.body, self.geometry.fat + len(self.geometry.depths) - 1
+        near = slice(0, 2 * layers)
+        local = shape.u[body.nodes[near]]
+        by_x, by_y = body.grad_x[near] @ local, body.grad_y[near] @ local
+        return float(((1.0 + by_x[..., 0]) * (1.0 + by_y[..., 1]) - by_x[..., 1] * by_y[..., 0]).min())
+
     def edges(self, shape: Shape) -> tuple[float, float] | None:
         """Return the arc positions [mm] where contact ends; None where it is too short to tell."""
         return edges(self.geometry, shape.reaction[:, 1], shape.touching)

@@ -16,6 +16,7 @@ from solver.march import march
 from solver.newton import BY_DEPTH, Newton, Pull, Shape
 from solver.scene import Scene
 
+FEW = 10  # iterations from a state nearby to one that is simple to find: 4 to 7 are usual
 LEADING = 1e-3  # tolerance of states that only lead to others [mm]
 GOOD, CLOSE = 1e-7, 1e-7  # tolerance of the states of a course [mm], and by the indentation where that is less
 PRESSES = 40  # steps of the pre-indentation, and of a drag that grows
@@ -42,6 +43,21 @@ def settled(
     if scene.loading.direction == 0 and scene.friction.mu > 0.0:
         return course(scene, finger, stop, times)[-1]
     return steady(finger, pull_sliding(scene), start=start, stop=stop)
+
+
+def nearby(finger: FiniteFinger, scene: Scene, start: Shape) -> Shape | None:
+    """Return the settled slide that lies a few iterations from `start`, or None where there is no sound one so near."""
+    newton, force = finger.newton, scene.normal_force
+    try:
+        if force is None:
+            shape = newton.settle(start, pull_sliding(scene), limit=FEW)
+        else:
+            near = replace(start, pull=_under(scene)._replace(depth=start.pull.depth, travel=start.pull.travel))
+            found = balanced(newton, near, Given(force, None), limit=FEW)
+            shape = newton.settle(found, found.pull, limit=FEW)
+    except NotConverged:
+        return None
+    return shape if reach.sound(finger, shape) else None
 
 
 def roughly(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: Shape | None = None) -> Shape:
@@ -112,8 +128,7 @@ def _sliding_under(
 ) -> Shape:
     """Return settled sliding under the normal force of a scene, from `start` or reached as the force grows."""
     newton = finger.newton
-    sense = -(scene.loading.direction or 1)
-    pull = Pull(0.0, float(scene.friction.mu), scene.friction.cap, sense)
+    pull = _under(scene)
     capped = steep(pull)
     if start is not None:
         near = replace(start, pull=pull._replace(depth=start.pull.depth, travel=start.pull.travel))
@@ -136,6 +151,11 @@ def _sliding_under(
         return _deeper(finger, shape, force, stop)
     assert shape is not None
     return steady(finger, shape.pull, start=shape, stop=stop)
+
+
+def _under(scene: Scene) -> Pull:
+    """Return what the surface does while it slides under a normal force, before that has pressed."""
+    return Pull(0.0, float(scene.friction.mu), scene.friction.cap, -(scene.loading.direction or 1))
 
 
 def _grown(newton: Newton, pull: Pull, force: float, stop: Callable[[], bool]) -> Iterator[Shape]:

@@ -33,6 +33,7 @@ FOLD = (0.015, 0.1)  # where the skin folds: of the tip radius, and of the epide
 AROUND, FROM_FOLD = 4.0, 0.5  # so many of these elements to each side are as small; growth from there [-]
 THIN = 2.0 / 3.0  # across the skin there, by that along it
 AT_CUT = 0.12  # along the skin at a free cut's palmar end, by tip radius (docs/solver-finite-strain.md)
+SHORT_AT_CUT = 0.03  # the same where tissue is hardly squeezed there
 COARSE, FROM_CUT = 10.0, 0.5  # fineness below which those are longer in proportion; growth from there [-]
 APART = 0.1  # skin nearer to where it is held is squeezed without bound, by tip radius
 FINEST = 1e-3  # smallest element by tip radius: thinner ones across the whole finger would drown in round-off [-]

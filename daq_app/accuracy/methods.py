@@ -1,7 +1,6 @@
 """Every way of solving a scene that the project keeps, behind one face, so that all are measured alike."""
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
@@ -15,10 +14,10 @@ from solver.body import Body
 from solver.climbing import MARGIN, Ascent, Climbed, climbed, foot, risen, sized, sized_together
 from solver.elements import Q2P1
 from solver.existence import steady
-from solver.failures import NotConverged
 from solver.finger import FingerModel
 from solver.finite_finger import FiniteFinger
 from solver.finite_solution import alike
+from solver.finite_states import nearby
 from solver.mesh import Array
 from solver.mesher import AT_CUT, Sizing
 from solver.newton import Newton, Pull, Shape
@@ -26,7 +25,11 @@ from solver.scene import Friction, Scene
 from solver.small_states import numbers_on, settled
 from solver.tissues import settled_moduli
 
-CORNER = (0.01, 0.02, 0.04, AT_CUT)  # of truths, elements where the cut meets the bone, by tip radius
+SHORTEST = 0.02  # of truths, elements where the cut meets the bone, by tip radius, below which none are asked for
+HALF, LITTLE_LESS = 0.5, 0.7  # each by the one before; the second where the first leads nowhere
+FALLS = 0.8  # with the power of that length what is left there falls (docs/solver-finite-strain.md)
+ALIKE = 1e-5  # relative change from one length to the next, below which none is shorter
+LEAST = 0.35  # det F there, below which such states are no longer one row
 Kinematics = Literal["small", "finite"]
 State = Any  # of contact at small strain, of the body, with its mesh or not, at finite strain; only handed back
 
@@ -207,20 +210,44 @@ class FiniteMeshed:
         return _system(self.finger.newton)
 
 
-def overkill(scene: Scene, sizing: Sizing, below: Climbed | None = None) -> Climbed:
-    """Return the state on a fine mesh, found from one `below`; where the cut meets the bone it is the finest that does.
+@dataclass(frozen=True, slots=True, eq=False)
+class Overkill:
+    """A state on a fine mesh, and what its numbers tend to as elements where the cut meets the bone get shorter."""
 
-    Solver and truth would otherwise have the error of that corner in common, which falls as slowly as elements do.
-    Raises NoSteadyState, NotConverged.
+    at: Climbed
+    numbers: Array  # (3,)
+    at_cut: float  # the shortest of those elements, by tip radius
+
+
+def overkill(scene: Scene, sizing: Sizing, below: Climbed | None = None) -> Overkill:
+    """Return the state on a fine mesh, found from one `below`, and where its numbers tend to.
+
+    Where the cut meets the bone errors fall with the power 0.8 of an element's length, and solver and truth would have
+    them in common. So that corner's elements are shortened in steps, as long as one state leads to the next, and the
+    numbers of the last two are carried on. Raises NoSteadyState, NotConverged.
     """
-    for at_cut in CORNER:
-        finest = replace(sizing, at_cut=at_cut)
-        with suppress(NotConverged):
-            if below is not None:
-                return climbed(scene, sizing.fineness, below, _going_on, sizing=finest)
-            finger = FiniteFinger.of(scene, finest)
-            return Climbed(finger, steady(finger, pull_of(scene)), 0.0)
-    raise NotConverged(f"No state was found on a mesh of fineness {sizing.fineness:g}.")
+    sizing = replace(sizing, at_cut=AT_CUT)
+    if below is None:
+        finger = FiniteFinger.of(scene, sizing)
+        first = Climbed(finger, steady(finger, pull_of(scene)), 0.0)
+    else:
+        first = climbed(scene, sizing.fineness, below, _going_on, sizing=sizing)
+    length, last, numbers = AT_CUT, first, first.finger.numbers(first.shape)
+    tends, part = numbers, HALF
+    while length > SHORTEST:
+        finger = FiniteFinger.of(scene, replace(sizing, at_cut=part * length))
+        shape = nearby(finger, scene, finger.brought(last.shape, last.finger))
+        if shape is None or finger.least_at_cut(shape) < LEAST:
+            if part == LITTLE_LESS:
+                break
+            part = LITTLE_LESS
+            continue
+        before, numbers = numbers, finger.numbers(shape)
+        tends = numbers + (numbers - before) / (part**-FALLS - 1.0)
+        length, last = part * length, Climbed(finger, shape, 0.0)
+        if np.abs(numbers - before).max() <= ALIKE * np.abs(numbers).max():
+            break
+    return Overkill(first, tends, length)
 
 
 def climbed_twice(scene: Scene, finenesses: tuple[float, float, float]) -> tuple[Array, tuple[int, ...]]:
@@ -229,9 +256,9 @@ def climbed_twice(scene: Scene, finenesses: tuple[float, float, float]) -> tuple
     Raises NoSteadyState, NotConverged.
     """
     below = overkill(scene, Sizing(finenesses[0], scene.loading.depth, margin=MARGIN))
-    found = [below, *(overkill(scene, sized(fineness, below), below) for fineness in finenesses[1:])]
-    numbers = np.abs([at.finger.numbers(at.shape) for at in found])
-    return numbers, tuple(at.finger.newton.body.dofs for at in found)
+    edges = below.at
+    found = [below, *(overkill(scene, sized(fineness, edges), edges) for fineness in finenesses[1:])]
+    return np.abs([over.numbers for over in found]), tuple(over.at.finger.newton.body.dofs for over in found)
 
 
 def _system(newton: Newton) -> float:
