@@ -145,19 +145,19 @@ class Elimination:
         self.carried = np.zeros(plan.size)  # L^-1 force, the skin's condensed forces at the end
         self._still = np.zeros(plan.size)
         self._factors, self._waiting = np.empty(plan.factors), np.empty(plan.waiting)
-        self._near = np.empty(int(plan.border.max()))
+        self._near = np.empty(int((plan.inner + plan.border).max()))
         self.felt = self.carried[plan.size - skin :]
         self.factored = (  # what loops ask for that solve with the factors
             plan.start, plan.inner, plan.border, plan.border_at, plan.numbers, plan.factor_at, self._factors, self._near
         )  # fmt: skip
+        self._eliminate = kernels.ending(
+            kernels.eliminate, plan.start, plan.inner, plan.border, plan.children, plan.border_at, plan.place, plan.run,
+            plan.factor_at, plan.wait_at, plan.leaf, plan.order, plan.at, self._factors, self._waiting, self.stiffness,
+        )  # fmt: skip
 
     def factorise(self, tangent: Array) -> bool:
         """Eliminate the elements' tangents (e, 16, 16), lower halves; False where that is not possible."""
-        p = self.plan
-        return kernels.eliminate(
-            tangent, p.start, p.inner, p.border, p.children, p.border_at, p.place, p.run, p.factor_at, p.wait_at,
-            p.leaf, p.order, p.at, self._factors, self._waiting, self.stiffness,
-        )  # fmt: skip
+        return self._eliminate(tangent)
 
     def condense(self, force: Array) -> Array:
         """Return the forces (m,) that the skin feels of `force` (n,), all of it being kept for `unfold`."""

@@ -16,7 +16,7 @@ from solver import kernels
 from solver.elimination import Elimination
 from solver.failures import NotConverged
 from solver.finite_body import FiniteBody
-from solver.kernels import OPEN
+from solver.kernels import OPEN, ending
 from solver.mesh import Array
 
 States = NDArray[np.int32]
@@ -108,7 +108,25 @@ class Newton:
         self._matrix, self._right = np.zeros(4 * skin * skin), np.zeros((2 * skin, 4))
         self._felt = self.inside.felt
         self._every = np.empty(body.size)
-        self._place, self._skin = body.mesh.nodes, body.skin
+        place, skin, factored = body.mesh.nodes, body.skin, self.inside.factored
+        self._assemble = ending(
+            kernels.assemble, body.grad_x, body.grad_y, body.weight, body.modes, body.laplace, body.shear,
+            body.stiffening, body.lame, body.nodes, body.unknown, self.tangent, self.force, self.fold, self.core,
+            self.dilate, self.volume,
+        )  # fmt: skip
+        self._forces = ending(
+            kernels.forces, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening, body.lame,
+            body.nodes, body.unknown, self.force, self.fold, self.core, self.volume,
+        )  # fmt: skip
+        self._settle_skin = ending(
+            kernels.touch, self.force, self.load, place, skin, body.held, body.middle, *factored, self.inside.carried,
+            self.inside.stiffness, self._state, self._sense, self.length, self._free, self._matrix, self._right,
+            self.steps, self._reaction,
+        )  # fmt: skip
+        self._move = ending(
+            kernels.move, place, skin, body.middle, *factored, self.inside.carried, self._every, body.nodes,
+            body.unknown, body.lame, self.fold, self.dilate, self.volume, self.length,
+        )  # fmt: skip
 
     def linearise(self, shape: Shape, pull: Pull, anchor: Array, rounds: int = 0) -> bool:
         """Set up the system at `shape` under `pull`, solve it for the skin's `steps` (2 k, 4); False where it fails.
@@ -128,29 +146,15 @@ class Newton:
 
     def _assembled(self, shape: Shape) -> float:
         """Fill tangents and forces at `shape` and return the least det F."""
-        body = self.body
-        return kernels.assemble(
-            shape.u, shape.pressure, body.grad_x, body.grad_y, body.weight, body.modes, body.laplace, body.shear,
-            body.stiffening, body.lame, body.nodes, body.unknown, self.tangent, self.force, self.fold, self.core,
-            self.dilate, self.volume,
-        )  # fmt: skip
+        return self._assemble(shape.u, shape.pressure)
 
     def _resisted(self, shape: Shape) -> float:
         """Fill the forces at `shape` for the tangent that is there and return the least det F."""
-        body = self.body
-        return kernels.forces(
-            shape.u, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening, body.lame,
-            body.nodes, body.unknown, self.force, self.fold, self.core, self.volume,
-        )  # fmt: skip
+        return self._forces(shape.u)
 
     def _touch(self, shape: Shape, pull: Pull, anchor: Array, rounds: int) -> bool:
-        body = self.body
         self._state[:], self._sense[:] = shape.state, shape.sense
-        return kernels.touch(
-            shape.u, anchor, pull.depth, pull.mu, pull.tau, pull.sense, rounds, self.force, self.load, self._place,
-            self._skin, body.held, body.middle, *self.inside.factored, self.inside.carried, self.inside.stiffness,
-            self._state, self._sense, self.length, self._free, self._matrix, self._right, self.steps, self._reaction,
-        )  # fmt: skip
+        return self._settle_skin(shape.u, anchor, pull.depth, pull.mu, pull.tau, pull.sense, rounds)
 
     def reaction(self, skin: Array, *, still: bool = False) -> Array:
         """Return the surface's forces on the skin (k, 2) at the end of its step (2 k,), or their change alone."""
@@ -161,13 +165,11 @@ class Newton:
         self, shape: Shape, pull: Pull, skin: Array, anchor: Array, scale: float = 1.0
     ) -> tuple[Shape, float, int]:
         """Return the shape after the skin's step (2 k,), its largest move [mm], and how many states it changed."""
-        body = self.body
         u, pressure = np.empty_like(shape.u), np.empty_like(shape.pressure)
         state, sense, reaction = self._state.copy(), self._sense.copy(), self.reaction(skin)
-        largest, changed = kernels.move(
+        largest, changed = self._move(
             shape.u, shape.pressure, skin, scale, anchor, pull.depth, pull.mu, pull.tau, pull.sense, u, pressure, state,
-            sense, reaction, self._place, self._skin, body.middle, *self.inside.factored, self.inside.carried,
-            self._every, body.nodes, body.unknown, body.lame, self.fold, self.dilate, self.volume, self.length,
+            sense, reaction,
         )  # fmt: skip
         return Shape(u, pressure, state, sense, reaction, pull, shape.iterations + 1), largest, changed
 

@@ -5,7 +5,7 @@
 """
 
 from solver.kernels.carrying import carry
-from solver.kernels.compiling import CAP, HELD_X, HELD_Y, OPEN, SLIP, STICK
+from solver.kernels.compiling import CAP, HELD_X, HELD_Y, OPEN, SLIP, STICK, ending
 from solver.kernels.elements import assemble, energies, forces
 from solver.kernels.fronts import condense, eliminate, unfold
 from solver.kernels.iterating import move, touch
@@ -27,6 +27,7 @@ __all__ = [
     "condense",
     "crosses",
     "eliminate",
+    "ending",
     "energies",
     "forces",
     "impose",

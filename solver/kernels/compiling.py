@@ -19,6 +19,7 @@ Wide = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 States = NDArray[np.int8]
 Compiled = TypeVar("Compiled", bound=Callable[..., Any])
+Result = TypeVar("Result")
 
 HELD_X, HELD_Y = 1, 2  # of a node of the skin that is held; both: their sum
 OPEN, STICK, SLIP, CAP = 0, 1, 2, 3  # states of a node of the skin
@@ -46,14 +47,16 @@ class Loop:
 
     def __call__(self, *given: object) -> Any:  # noqa: ANN401 - each returns what its function says
         """Call the code for arguments of these types; it believes what it is told of them, so all are looked at."""
-        kinds = tuple(
-            [(a.dtype.num, a.ndim, a.flags.c_contiguous) if type(a) is np.ndarray else type(a) for a in given]
-        )
+        kinds = _kinds(given)
         entry = self._entries.get(kinds)
         if entry is None:
-            with _ONE_BY_ONE:
-                entry = self._entries[kinds] = self._entry(given)
+            entry = self._entries[kinds] = self.entry(given)
         return entry(*given)
+
+    def entry(self, given: tuple[object, ...]) -> Callable[..., Any]:
+        """Return the code for arguments of the types of those `given`. Raises TypeError where loops take none such."""
+        with _ONE_BY_ONE:
+            return self._entry(given)
 
     def _entry(self, given: tuple[object, ...]) -> Callable[..., Any]:
         for number, argument in enumerate(given):
@@ -122,6 +125,27 @@ class Loop:
     def _called(self) -> Iterator["Loop"]:
         named = (self.function.__globals__.get(name) for name in self.function.__code__.co_names)
         return (one for one in named if isinstance(one, Loop))
+
+
+def ending(loop: Callable[..., Result], *last: object) -> Callable[..., Result]:
+    """Return `loop` with its `last` arguments given for good, so that only the first are looked at in every call.
+
+    To look at thirty arrays takes as long as a tenth of the work on a small mesh.
+    """
+    entries: dict[tuple[object, ...], Callable[..., Result]] = {}
+
+    def call(*first: object) -> Result:
+        kinds = _kinds(first)
+        entry = entries.get(kinds)
+        if entry is None:
+            entry = entries[kinds] = cast("Loop", loop).entry((*first, *last))
+        return entry(*first, *last)
+
+    return call
+
+
+def _kinds(given: tuple[object, ...]) -> tuple[object, ...]:
+    return tuple([(a.dtype.num, a.ndim, a.flags.c_contiguous) if type(a) is np.ndarray else type(a) for a in given])
 
 
 def _type_name(argument: object) -> str:

@@ -59,17 +59,19 @@ def assemble(
     """
     force[:] = 0.0
     least = np.inf
-    # Sums over quadrature points are products of small matrices of a fixed size, columns by direction: x of nine nodes,
-    # then y. `h`: gradients in the deformed body, `bent`: the same by their weights, `s`: what the stress is made of.
-    h, s, bent = np.empty((9, 18)), np.empty((9, 18)), np.empty((9, 18))
-    wide, push, more, even = np.empty((9, 3)), np.empty(9), np.empty(9), np.empty(9)
+    # Sums over quadrature points are products of small matrices of a fixed size, sixteen columns at a time: x of the
+    # outer nodes, then y; the centre's come last. `h`: gradients in the deformed body, `s`: what the stress is made of.
+    h, s = np.empty((9, 18)), np.empty((9, 18))
+    wide, push, more, bend = np.empty((9, 3)), np.empty(9), np.empty(9), np.empty(9)
     d, f = np.empty((3, 18)), np.empty(18)
-    by_x, by_y, full = np.empty(18), np.empty(18), np.empty((18, 18))
+    by_x, by_y, grown_laplace = np.empty((9, 16)), np.empty((9, 16)), np.empty((9, 9))
+    left, right, own = np.empty((18, 5)), np.empty((5, 16)), np.empty((16, 16))
     ux, uy = np.empty(9), np.empty(9)
     for e in range(nodes.shape[0]):
         for i in range(9):
             ux[i], uy[i] = u[nodes[e, i], 0], u[nodes[e, i], 1]
         v0 = v1 = v2 = 0.0
+        p0, p1, p2 = pressure[e, 0], pressure[e, 1], pressure[e, 2]
         stiffens = stiffening[e] != PLAIN
         for q in range(9):
             gx, gy = grad_x[e, q], grad_y[e, q]
@@ -85,11 +87,12 @@ def assemble(
             if not j > 0.0:
                 return least
             w = weight[e, q]
-            wide[q, 0], wide[q, 1], wide[q, 2] = w * modes[e, q, 0], w * modes[e, q, 1], w * modes[e, q, 2]
+            w0, w1, w2 = w * modes[e, q, 0], w * modes[e, q, 1], w * modes[e, q, 2]
+            wide[q, 0], wide[q, 1], wide[q, 2] = w0, w1, w2
             log = np.log1p(grown)
-            v0 += wide[q, 0] * log
-            v1 += wide[q, 1] * log
-            v2 += wide[q, 2] * log
+            v0 += w0 * log
+            v1 += w1 * log
+            v2 += w2 * log
             wg = w * shear[e]
             if stiffens:
                 excess = 2.0 * (h00 + h11 - log) + h00 * h00 + f01 * f01 + f10 * f10 + h11 * h11
@@ -97,13 +100,16 @@ def assemble(
                 more[q] = 2.0 * growth * wg
                 wg *= grown
             push[q] = wg
-            geometric = wg - (wide[q, 0] * pressure[e, 0] + wide[q, 1] * pressure[e, 1] + wide[q, 2] * pressure[e, 2])
-            a00, a01, a10, a11 = f11 / j, -f10 / j, -f01 / j, f00 / j  # inverse transposed
-            for i in range(9):
+            bend[q] = wg - (w0 * p0 + w1 * p1 + w2 * p2)
+            over = 1.0 / j
+            a00, a01, a10, a11 = f11 * over, -f10 * over, -f01 * over, f00 * over  # inverse transposed
+            for i in range(8):
                 x, y = a00 * gx[i] + a01 * gy[i], a10 * gx[i] + a11 * gy[i]
-                h[q, i], h[q, 9 + i] = x, y
-                bent[q, i], bent[q, 9 + i] = geometric * x, geometric * y
-                s[q, i], s[q, 9 + i] = f00 * gx[i] + f01 * gy[i] - x, f10 * gx[i] + f11 * gy[i] - y
+                h[q, i], h[q, 8 + i] = x, y
+                s[q, i], s[q, 8 + i] = f00 * gx[i] + f01 * gy[i] - x, f10 * gx[i] + f11 * gy[i] - y
+            x, y = a00 * gx[8] + a01 * gy[8], a10 * gx[8] + a11 * gy[8]
+            h[q, 16], h[q, 17] = x, y
+            s[q, 16], s[q, 17] = f00 * gx[8] + f01 * gy[8] - x, f10 * gx[8] + f11 * gy[8] - y
         lam = lame[e]
         volume[e, 0], volume[e, 1], volume[e, 2] = v0, v1, v2
         for c in range(18):
@@ -115,61 +121,92 @@ def assemble(
                 total += push[q] * s[q, c]
             d[0, c], d[1, c], d[2, c] = d0, d1, d2
             f[c] = total + lam * (d0 * v0 + d1 * v1 + d2 * v2)
-        for i in range(9):
-            dilate[e, 0, 2 * i], dilate[e, 1, 2 * i], dilate[e, 2, 2 * i] = d[0, i], d[1, i], d[2, i]
-            dilate[e, 0, 2 * i + 1], dilate[e, 1, 2 * i + 1], dilate[e, 2, 2 * i + 1] = (
-                d[0, 9 + i],
-                d[1, 9 + i],
-                d[2, 9 + i],
-            )
-            for c in range(18):  # columns along x of the node's rows (x, then y), and those along y
-                x = y = 0.0
-                for q in range(9):
-                    x += bent[q, i] * h[q, c]
-                    y += bent[q, 9 + i] * h[q, c]
-                by_x[c], by_y[c] = x, y
-            x0, x1, x2 = lam * d[0, i], lam * d[1, i], lam * d[2, i]
-            y0, y1, y2 = lam * d[0, 9 + i], lam * d[1, 9 + i], lam * d[2, 9 + i]
-            for c in range(9):
-                even[c] = laplace[e, i, c]
-            if stiffens:
-                even[:] = 0.0
+        for m in range(3):
+            for c in range(8):
+                dilate[e, m, 2 * c], dilate[e, m, 2 * c + 1] = d[m, c], d[m, 8 + c]
+            dilate[e, m, 16], dilate[e, m, 17] = d[m, 16], d[m, 17]
+            for c in range(16):
+                right[m, c] = d[m, c]
+            for c in range(18):
+                left[c, m] = lam * d[m, c]
+        even = laplace[e]
+        if stiffens:
+            for i in range(9):
+                grown_laplace[i] = 0.0
                 for q in range(9):
                     x, y = push[q] * grad_x[e, q, i], push[q] * grad_y[e, q, i]
                     for c in range(9):
-                        even[c] += x * grad_x[e, q, c] + y * grad_y[e, q, c]
-            for c in range(9):
-                by_x[c] += even[c] + x0 * d[0, c] + x1 * d[1, c] + x2 * d[2, c]
-                by_x[9 + c] += y0 * d[0, c] + y1 * d[1, c] + y2 * d[2, c]
-                by_y[c] += x0 * d[0, 9 + c] + x1 * d[1, 9 + c] + x2 * d[2, 9 + c]
-                by_y[9 + c] += even[c] + y0 * d[0, 9 + c] + y1 * d[1, 9 + c] + y2 * d[2, 9 + c]
+                        grown_laplace[i, c] += x * grad_x[e, q, c] + y * grad_y[e, q, c]
+            even = grown_laplace
+        for i in range(9):  # each node's x, then its y, by all: rows of the one go with columns of the other
+            a, b = i + 8 * (i == 8), i + 8 + (i == 8)
+            for c in range(16):
+                x = y = 0.0
+                for q in range(9):
+                    x += bend[q] * h[q, a] * h[q, c]
+                    y += bend[q] * h[q, b] * h[q, c]
+                by_x[i, c], by_y[i, c] = x, y
+        # the centre node meets no other element: it is eliminated
+        xx, yy, xy = even[8, 8], even[8, 8], 0.0
+        for q in range(9):
+            x, y = bend[q] * h[q, 16], bend[q] * h[q, 17]
+            xx += x * h[q, 16]
+            xy += x * h[q, 17]
+            yy += y * h[q, 17]
+        for m in range(3):
+            xx += left[16, m] * d[m, 16]
+            xy += left[16, m] * d[m, 17]
+            yy += left[17, m] * d[m, 17]
+        if stiffens:
+            for q in range(9):
+                xx += more[q] * s[q, 16] * s[q, 16]
+                xy += more[q] * s[q, 16] * s[q, 17]
+                yy += more[q] * s[q, 17] * s[q, 17]
+        det = xx * yy - xy * xy
+        k00, k01, k11 = yy / det, -xy / det, xx / det
+        core[e, 0], core[e, 1], core[e, 2] = k00, k01, k11
+        for c in range(16):
+            i = c % 8
+            if c < 8:
+                x, y = by_x[8, i] + even[8, i], by_x[8, 8 + i]
+            else:
+                x, y = by_y[8, i], by_y[8, 8 + i] + even[8, i]
+            for m in range(3):
+                x += left[16, m] * d[m, c]
+                y += left[17, m] * d[m, c]
             if stiffens:
                 for q in range(9):
-                    x, y = more[q] * s[q, i], more[q] * s[q, 9 + i]
-                    for c in range(9):
-                        by_x[c] += x * s[q, c]
-                        by_x[9 + c] += y * s[q, c]
-                        by_y[c] += x * s[q, 9 + c]
-                        by_y[9 + c] += y * s[q, 9 + c]
+                    x += more[q] * s[q, 16] * s[q, c]
+                    y += more[q] * s[q, 17] * s[q, c]
+            left[c, 3], left[c, 4] = -x, -y
+            right[3, c], right[4, c] = k00 * x + k01 * y, k01 * x + k11 * y
+        for i in range(16):
+            for c in range(16):
+                total = 0.0
+                for m in range(5):
+                    total += left[i, m] * right[m, c]
+                own[i, c] = total
+        if stiffens:
+            for i in range(16):
+                for q in range(9):
+                    x = more[q] * s[q, i]
+                    for c in range(16):
+                        own[i, c] += x * s[q, c]
+        for i in range(8):
             for c in range(i + 1):
-                full[2 * i, 2 * c], full[2 * i, 2 * c + 1] = by_x[c], by_y[c]
-                full[2 * i + 1, 2 * c], full[2 * i + 1, 2 * c + 1] = by_x[9 + c], by_y[9 + c]
-        # the centre node meets no other element: rows 16 and 17 are eliminated
-        det = full[16, 16] * full[17, 17] - full[17, 16] * full[17, 16]
-        k00, k01, k11 = full[17, 17] / det, -full[17, 16] / det, full[16, 16] / det
-        core[e, 0], core[e, 1], core[e, 2] = k00, k01, k11
-        for i in range(16):
-            fold[e, 0, i] = k00 * full[16, i] + k01 * full[17, i]
-            fold[e, 1, i] = k01 * full[16, i] + k11 * full[17, i]
-        fold[e, 0, 16] = k00 * f[8] + k01 * f[17]
-        fold[e, 1, 16] = k01 * f[8] + k11 * f[17]
-        for i in range(16):
-            c0, c1 = full[16, i], full[17, i]
-            for k in range(i + 1):
-                tangent[e, i, k] = full[i, k] - c0 * fold[e, 0, k] - c1 * fold[e, 1, k]
-            row = unknown[e, i // 2, i % 2]
+                tangent[e, 2 * i, 2 * c] = own[i, c] + by_x[i, c] + even[i, c]
+                tangent[e, 2 * i, 2 * c + 1] = own[i, 8 + c] + by_y[i, c]
+                tangent[e, 2 * i + 1, 2 * c] = own[8 + i, c] + by_x[i, 8 + c]
+                tangent[e, 2 * i + 1, 2 * c + 1] = own[8 + i, 8 + c] + by_y[i, 8 + c] + even[i, c]
+        for m in range(2):
+            for c in range(8):
+                fold[e, m, 2 * c], fold[e, m, 2 * c + 1] = right[3 + m, c], right[3 + m, 8 + c]
+        fold[e, 0, 16] = k00 * f[16] + k01 * f[17]
+        fold[e, 1, 16] = k01 * f[16] + k11 * f[17]
+        for c in range(16):
+            row = unknown[e, c % 8, c // 8]
             if row >= 0:
-                force[row] += f[i // 2 + 9 * (i % 2)] - c0 * fold[e, 0, 16] - c1 * fold[e, 1, 16]
+                force[row] += f[c] - right[3, c] * f[16] - right[4, c] * f[17]
     return least
 
 

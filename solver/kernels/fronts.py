@@ -168,8 +168,8 @@ def condense(
 ) -> None:
     """Replace `force` (n,) by L^-1 force inside the body, and at its end by the force that the skin feels.
 
-    `numbers` are the unknowns of all borders, one after the other from `border_at` on; `near` (b,) is memory for the
-    largest of them.
+    `numbers` are the unknowns of all borders, one after the other from `border_at` on; `near` (k + b,) is memory for
+    the largest part.
     """
     for p in range(start.shape[0]):
         k, b, first = inner[p], border[p], start[p]
@@ -190,22 +190,46 @@ def condense(
 
 
 @compiled
-def unfold_part(carried: Array, first: int, k: int, border: Narrow, top: Array, near: Array, out: Array) -> None:
-    """Fill the `k` displacements of `out` (n,) from `first` on, which one part of the body eliminates.
+def unfold_part(
+    p: int,
+    carried: Array,
+    start: Narrow,
+    inner: Narrow,
+    border: Narrow,
+    border_at: Narrow,
+    numbers: Narrow,
+    factor_at: Wide,
+    factors: Array,
+    near: Array,
+    out: Array,
+) -> None:
+    """Fill the displacements of `out` (n,) which part `p` of the body eliminates; those of its border are there.
 
-    Those of its `border` (b,) are there; `top` (k, k + b) is its factor, `near` (b,) memory.
+    `near` (k + b,) is memory for the largest part.
     """
-    b = border.shape[0]
+    k, b, first = inner[p], border[p], start[p]
+    wide = k + b
+    top = factors[factor_at[p] : factor_at[p] + k * wide].reshape(k, wide)
+    beyond = numbers[border_at[p] : border_at[p] + b]
     for j in range(b):
-        near[j] = out[border[j]]
-    for i in range(k - 1, -1, -1):
-        row = top[i]
-        total = carried[first + i]
-        for j in range(i + 1, k):
-            total += row[j] * out[first + j]
-        for j in range(b):
-            total += row[k + j] * near[j]
-        out[first + i] = -total / row[i]
+        near[k + j] = out[beyond[j]]
+    i = k
+    while i >= 2:  # two rows at a time, which share what they ask for
+        i -= 2
+        one, two, known = top[i, i:], top[i + 1, i:], near[i:wide]
+        x, y = carried[first + i], carried[first + i + 1]
+        for j in range(2, wide - i):
+            x += one[j] * known[j]
+            y += two[j] * known[j]
+        y = -y / two[1]
+        near[i], near[i + 1] = -(x + one[1] * y) / one[0], y
+    if i == 1:
+        one, x = top[0], carried[first]
+        for j in range(1, wide):
+            x += one[j] * near[j]
+        near[0] = -x / one[0]
+    for i in range(k):
+        out[first + i] = near[i]
 
 
 @compiled
@@ -224,11 +248,8 @@ def unfold(
 ) -> None:
     """Fill `out` (n,) with the displacements under -`carried` (n,), from `condense`, when the skin's are `skin` (m,).
 
-    `near` (b,) is memory for the largest border.
+    `near` (k + b,) is memory for the largest part.
     """
-    inside = out.shape[0] - skin.shape[0]
-    out[inside:] = skin
+    out[out.shape[0] - skin.shape[0] :] = skin
     for p in range(start.shape[0] - 1, -1, -1):
-        k, b, first = inner[p], border[p], start[p]
-        top = factors[factor_at[p] : factor_at[p] + k * (k + b)].reshape(k, k + b)
-        unfold_part(carried, first, k, numbers[border_at[p] : border_at[p] + b], top, near, out)
+        unfold_part(p, carried, start, inner, border, border_at, numbers, factor_at, factors, near, out)

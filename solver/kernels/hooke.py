@@ -170,15 +170,13 @@ def displace(
             needed[p] |= child >= 0 and needed[child]
         for i in range(start[p], start[p] + inner[p]):
             needed[p] |= wanted[i]
-    near, inside, move = np.empty(border.max()), np.zeros(size), np.empty(16)
+    near, inside, move = np.empty((inner + border).max()), np.zeros(size), np.empty(16)
     for c in range(skin.shape[0]):
         inside[size - skin.shape[1] :] = skin[c]
         for p in range(parts - 1, -1, -1):
             if not needed[p]:
                 continue
-            k, b, first = inner[p], border[p], start[p]
-            top = factors[factor_at[p] : factor_at[p] + k * (k + b)].reshape(k, k + b)
-            unfold_part(carried, first, k, numbers[border_at[p] : border_at[p] + b], top, near, inside)
+            unfold_part(p, carried, start, inner, border, border_at, numbers, factor_at, factors, near, inside)
         for e in range(nodes.shape[0]):
             if not used[e]:
                 continue
