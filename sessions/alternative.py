@@ -61,6 +61,9 @@ class Alternative:
     reason: str = ""
     traction: float | None = None  # the greatest friction traction on the skin: below tau_max that bounds nothing [MPa]
     interval: SedInterval | None = None  # of the SED, where it was asked for
+    normal_force_error: float | None = None  # estimated by the solver, of normal_force, relative [-]; None: given
+    tangential_force_error: float | None = None  # likewise of tangential_force
+    indentation_error: float | None = None  # likewise of the indentation; None where that was given
     doubt: str = ""  # why the numbers are not to be believed, where the model was driven beyond its range
 
 

@@ -29,14 +29,18 @@ def with_alternatives(
 ) -> SessionPrediction:
     """Return a prediction with every trial predicted in the variants that its options ask for (`beside`) as well.
 
-    Where the options ask for the interval of each (`beside_intervals`), `analysis` is what the friction came from.
+    Where the options ask for `intervals`, each at small strain has its own, and each at finite strain where they ask
+    for `beside_intervals`; `analysis` is what the friction came from.
     Raises Cancelled where `progress`, told the part done, returns False.
     """
     asked, options = tuple(variants(prediction.options.beside)), prediction.options
-    told = asked and analysis is not None and options.intervals and options.beside_intervals
-    drawn = draws_of(analysis, prediction) if told and analysis is not None else None
+    drawn = draws_of(analysis, prediction) if asked and analysis is not None and options.intervals else None
+
+    def told(variant: Variant) -> Sequence[Drawn] | None:
+        return drawn if variant.kinematics == "small" or options.beside_intervals else None
+
     along = [
-        _along(prediction, variant, drawn, _part(progress, number / len(asked), (number + 1) / len(asked)))
+        _along(prediction, variant, told(variant), _part(progress, number / len(asked), (number + 1) / len(asked)))
         for number, variant in enumerate(asked)
     ]
     trials = tuple(
@@ -56,7 +60,13 @@ def _with_depth(row: TrialPrediction, options: PredictionOptions) -> TrialPredic
     if found is None:
         return row
     reasons = {name: why for name, why in row.reasons.items() if name != "matching_depth"}
-    return replace(row, matching_depth=found.indentation, reasons=reasons)
+    return replace(
+        row,
+        matching_depth=found.indentation,
+        matching_depth_error=found.indentation_error,
+        matching_depth_interval=None if found.interval is None else found.interval.indentation,
+        reasons=reasons,
+    )
 
 
 def _along(
@@ -110,6 +120,9 @@ def _alternative(row: TrialPrediction, variant: Variant, tau_max: float | None, 
         found.normal_force * width,
         found.tangential_force * width,
         traction=traction_reached(found),
+        normal_force_error=found.normal_force_error,
+        tangential_force_error=found.tangential_force_error,
+        indentation_error=found.indentation_error,
         doubt=doubt_of(found),
     )
 

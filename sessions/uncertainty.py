@@ -21,12 +21,12 @@ from sessions.prediction import (
     Scene,
     SessionPrediction,
     TrialPrediction,
-    sed_by,
+    derivatives_by,
     slides,
     tau_scale,
     with_loads,
 )
-from sessions.sed_interval import SedInterval
+from sessions.sed_interval import Ends, SedInterval
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -35,7 +35,7 @@ Drawn = FrictionDraws | str  # what the friction of a trial may have been, or wh
 SAMPLES = 60  # draws that are solved where derivatives do not suffice
 MISS = 0.05  # part of the interval's width by which derivatives may miss a draw that is solved [-]
 _FLAT = 1e-5  # a miss below this share of the SED is of no account [-]
-_ENDS = (0.025, 0.975)
+_QUANTILES = (0.025, 0.975)
 
 
 def with_intervals(
@@ -111,10 +111,20 @@ def _interval(found: Prediction, slide: Nearby | None, drawn: Drawn, scale: floa
     if isinstance(loads, str):
         return SedInterval(None, None, None, reason=loads)
     names, draws, told = loads
-    by = sed_by(slide, found.scene)
-    carried = found.sed_ending + (draws - told) @ [by[name] for name in names]
-    low, high = np.quantile(carried, _ENDS).tolist()
-    slopes = by["mu"], by["tau_max"], by["force"] if "force" in names else None
+    by, width = derivatives_by(slide, found.scene), found.scene.finger.width
+
+    def along(number: str, value: float) -> Array:
+        return value + (draws - told) @ [by[number][name] for name in names]
+
+    carried = along("sed", found.sed_ending)
+    low, high = _ends(carried)
+    felt = by["sed"]
+    slopes = felt["mu"], felt["tau_max"], felt["force"] if "force" in names else None
+    forces = {
+        "normal_force": _ends(along("normal_force", found.normal_force * width)),
+        "tangential_force": _ends(along("tangential_force", found.tangential_force * width)),
+        "indentation": _ends(along("indentation", found.indentation)),
+    }
 
     def solved(which: Indices) -> Array:
         scenes = [with_loads(found.scene, dict(zip(names, draw, strict=True))) for draw in draws[which].tolist()]
@@ -124,14 +134,19 @@ def _interval(found: Prediction, slide: Nearby | None, drawn: Drawn, scale: floa
     tried = _extremes(carried, draws)
     missed = np.abs(solved(tried) - carried[tried])  # nan, and so no less, where one has no settled state
     if bool((missed <= max(MISS * (high - low), _FLAT * found.sed_ending)).all()):
-        return SedInterval(low, high, "derivatives", *slopes)
+        return SedInterval(low, high, "derivatives", *slopes, **forces)
     some = solved(_spread_out(carried))
     lost = int(np.isnan(some).sum())
     if lost:
         reason = f"{lost} of {SAMPLES} draws of the friction have no settled state"
-        return SedInterval(None, None, "sampling", *slopes, reason=reason)
-    low, high = np.quantile(some, _ENDS, method="hazen").tolist()  # each stands for the middle of its share
-    return SedInterval(low, high, "sampling", *slopes)
+        return SedInterval(None, None, "sampling", *slopes, reason=reason, **forces)
+    low, high = np.quantile(some, _QUANTILES, method="hazen").tolist()  # each stands for the middle of its share
+    return SedInterval(low, high, "sampling", *slopes, **forces)
+
+
+def _ends(draws: Array) -> Ends:
+    low, high = np.quantile(draws, _QUANTILES).tolist()
+    return low, high
 
 
 def _spread_out(carried: Array) -> Indices:
@@ -167,5 +182,5 @@ def _extremes(carried: Array, draws: Array) -> Indices:
     spread = draws.std(axis=0)
     units = (draws - draws.mean(axis=0)) / np.where(spread > 0.0, spread, 1.0)
     axes = np.linalg.svd(units, full_matrices=False)[2]
-    ranks = [round(end * (len(draws) - 1)) for end in _ENDS]
+    ranks = [round(end * (len(draws) - 1)) for end in _QUANTILES]
     return np.unique([np.argsort(way, kind="stable")[ranks] for way in (carried, *(units @ axes.T).T)])

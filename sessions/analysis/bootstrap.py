@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.analysis.friction import Rule
-from sessions.analysis.instants import break_away_draws, slide_onset_draws
+from sessions.analysis.instants import break_away_draws, onset_draws, slide_onset_draws
+from sessions.analysis.onset import DetectorSettings
 from sessions.analysis.settings import AnalysisSettings
 from sessions.analysis.steady import strays
 from sessions.analysis.stroke import Interval, Stroke, StrokeCurve
@@ -22,6 +23,7 @@ Array = NDArray[np.float64]
 
 _FEWEST_BLOCKS = 4
 _FEWEST_QUIET = 10  # readings before onset from which noise is told
+_BEFORE = 0.02  # from here on before the onset a reading may be the touch's already [s]
 NUMBERS = (  # of a stroke that have an interval
     "mu_static",
     "mu_dynamic",
@@ -33,6 +35,7 @@ NUMBERS = (  # of a stroke that have an interval
     "peak_normal",
     "peak_tangential",
     "heading",
+    "onset",
     "break_away",
     "slide_onset",
 )
@@ -75,10 +78,14 @@ class BootstrapSettings:
             "stroke is no uncertainty of its mean; of the tangential force likewise",
             "heading": "noise, zero, choice of window, and gains of the axes that differ; not a transducer that is "
             "turned; with it the share of repeats whose direction is the one told",
+            "onset": "the detector's rule repeated: a force that climbs as steeply crosses three standard deviations of "
+            "its noise between two readings, noise drawn anew, zero; a gain moves no instant; none where a person "
+            "decided it",
             "break_away": "deviations from the fitted climb turned at random (wild bootstrap, the same blocks), zero, "
             "and where the fit ends; a gain moves no instant; none where a person decided it",
             "slide_onset": f"a range rather: any share of the steady speed may tell it, {low:g} to {high:g} %, with "
-            "noise and unevenness of the speed; none where a person decided it",
+            "noise and unevenness of the speed; where the finger slid as fast when its speed was first known, any "
+            "instant since the contact; none where a person decided it",
         }
 
 
@@ -106,6 +113,7 @@ class StrokeIntervals:
     peak_tangential: Interval | None  # [N]
     heading: Interval | None  # about the angle told: an end may lie beyond 180 [degrees]
     direction_agrees: float | None  # share of repeats in which the direction is the one told [-]
+    onset: Interval | None  # [s, device time]
     break_away: Interval | None  # [s, device time]
     slide_onset: Interval | None  # [s, device time]
 
@@ -180,7 +188,7 @@ class _Repeats:
         n = settings.repeats
         self._step = float(np.median(np.diff(curve.time)))
         self._gain_t, self._gain_n, self._gain_torque = 1.0 + settings.gain_error * draw.standard_normal((3, n))
-        quiet = curve.time < (curve.time[0] if stroke.onset is None else stroke.onset - 0.02)
+        quiet = curve.time < (curve.time[0] if stroke.onset is None else stroke.onset - _BEFORE)
         enough = int(quiet.sum()) >= _FEWEST_QUIET
         # Before the onset nothing presses: T is the length of two noises, N one.
         self._noise_n = float(np.nanstd(curve.normal[quiet])) if enough else 0.0
@@ -211,7 +219,7 @@ class _Repeats:
         if self._stroke.peak_normal is not None:
             top = self._top(self._curve.normal, self._noise_n)
             found["peak_normal"] = self._stroke.peak_normal * self._gain_n + self._zero_n + top
-        return found | self._instants(found.get("speed"))
+        return found | self._instants(found.get("speed")) | self._onset()
 
     def _top(self, force: Array, noise: float) -> Array:
         """Return how far the true greatest force may lie from the one told (repeats,) [N].
@@ -300,9 +308,25 @@ class _Repeats:
             part = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[0])
             noise = float(np.nanstd(curve.speed[inside])) * self._draw.standard_normal(len(speed))
             told = self._draw.uniform(*self._settings.slide_share, len(speed)) * speed
-            draws = slide_onset_draws(curve.time[part], curve.speed[part], told, noise)
+            draws = slide_onset_draws(curve.time[part], curve.speed[part], told, noise, self._draw)
             found |= {} if draws is None else {"slide_onset": draws}
         return found
+
+    def _onset(self) -> dict[str, Array]:
+        """Return the onset (repeats,), where the contact began there and nobody decided it."""
+        onset, curve = self._stroke.onset, self._curve
+        if onset is None or "onset" in self._stroke.decided:
+            return {}
+        quiet = curve.felt[curve.time < onset - _BEFORE]
+        quiet = quiet[np.isfinite(quiet)]
+        if len(quiet) < _FEWEST_QUIET:
+            return {}
+        noise = float(quiet.std())
+        # How large the noise is, and with it the threshold, is told from these readings too.
+        band = DetectorSettings().leave_noise * noise / np.sqrt(2.0 * len(quiet))
+        wrong = self._zero_n + band * self._draw.standard_normal(self._settings.repeats)
+        draws = onset_draws((curve.time, curve.felt), onset, noise, wrong, self._draw)
+        return {} if draws is None else {"onset": draws}
 
     def _chosen(self, count: int) -> tuple[NDArray[np.int64], Array, Array]:
         """Return blocks drawn for each repeat (repeats, count); 1 for those that fit into its window; 1 for its own."""

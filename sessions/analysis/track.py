@@ -78,4 +78,6 @@ def curve_of(span: Span, contact: Contact, zero: ZeroInForce, height: float, set
     last = int(np.searchsorted(span.time, float(span.time[contact.stop - 1]) + _AROUND[1]))
     shown = track_of(span, Contact(first, last, None, None), zero, height, settings)
     force = shown.wrench[:, :2]
-    return StrokeCurve(shown.time, shown.normal, shown.tangential, force, shown.ratio, shown.position, shown.speed)
+    felt = zero.level[2] - span.wrench[first:last, 2]
+    way = shown.position, shown.speed
+    return StrokeCurve(shown.time, shown.normal, felt, shown.tangential, force, shown.ratio, *way)

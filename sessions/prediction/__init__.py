@@ -8,8 +8,8 @@ from sessions.prediction.predicting import Way, predict
 from sessions.prediction.scenes import DEFAULT_SPEED, SLIDES, scene_along, scenes_of, with_loads
 from sessions.prediction.solving import (
     Progress,
+    derivatives_by,
     doubt_of,
-    sed_by,
     seds_at,
     settled,
     slides,
@@ -33,11 +33,11 @@ __all__ = [
     "SessionPrediction",
     "TrialPrediction",
     "Way",
+    "derivatives_by",
     "doubt_of",
     "predict",
     "scene_along",
     "scenes_of",
-    "sed_by",
     "seds_at",
     "settled",
     "slides",

@@ -19,7 +19,7 @@ class PredictionOptions:
     course: Literal["steady", "history"] = "history"
     kinematics: Literal["small", "finite"] = "small"
     intervals: bool = False  # also what the uncertainty of friction makes of each SED, see `sessions.uncertainty`
-    beside_intervals: bool = False  # those of each variant too, which takes longer
+    beside_intervals: bool = False  # those of the variants at finite strain too, which takes longer
     beside: Literal["none", "small", "both"] = "none"  # also otherwise, see `sessions.side_by_side`; at which strain
 
 

@@ -123,7 +123,7 @@ def _filled(
     if isinstance(back, SolveFailure):
         reasons["opposite_sed"] = str(back)
     else:
-        row = replace(row, opposite_sed=back.sed_ending, opposite=back)
+        row = replace(row, opposite_sed=back.sed_ending, opposite_error=back.error_estimate, opposite=back)
     row = replace(row, matching_depth=depth)
     if isinstance(found, SolveFailure):
         reasons |= dict.fromkeys(("sed", "normal_force", "tangential_force"), str(found))
@@ -136,6 +136,8 @@ def _filled(
         tangential_per_mm=found.tangential_force,
         normal_force=found.normal_force * scene.finger.width,
         tangential_force=found.tangential_force * scene.finger.width,
+        normal_force_error=found.normal_force_error,
+        tangential_force_error=found.tangential_force_error,
         wall_s=found.wall_s,
         prediction=found,
         reasons=reasons,

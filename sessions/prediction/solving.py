@@ -6,6 +6,7 @@ from dataclasses import replace
 from sessions.prediction.options import PredictionOptions, bound, template
 from sessions.prediction.scenes import SLIDES
 from solver.audits import inside_out
+from solver.derivatives import By
 from solver.failures import Cancelled, SolveFailure
 from solver.nearby import Nearby, nearby
 from solver.prediction import Prediction
@@ -66,11 +67,24 @@ def slides(predictions: Sequence[Prediction], progress: Progress | None = None) 
         yield slide
 
 
-def sed_by(slide: Nearby, scene: Scene) -> Mapping[str, float]:
-    """Return the derivatives of the SED by each load that `with_loads` knows, at the slide of a scene."""
-    by, force = slide.derivatives().sed, scene.loading.normal_force
-    driven = 0.0 if by.normal_force is None or force is None else by.normal_force * (scene.normal_force or 0.0) / force
-    return {"mu": by.mu, "tau_max": by.tau_max, "force": driven}
+def derivatives_by(slide: Nearby, scene: Scene) -> Mapping[str, Mapping[str, float]]:
+    """Return the derivatives, by each load that `with_loads` knows, at the slide of a scene.
+
+    They are those of "sed" [MPa], of the whole finger's "normal_force" and "tangential_force" [N], and of the
+    "indentation" [mm].
+    """
+    found, force, width = slide.derivatives(), scene.loading.normal_force, scene.finger.width
+    per_mm = 0.0 if force is None else (scene.normal_force or 0.0) / force  # of a force as it is given
+
+    def by(one: By, unit: float = 1.0) -> dict[str, float]:
+        return {"mu": unit * one.mu, "tau_max": unit * one.tau_max, "force": unit * per_mm * (one.normal_force or 0.0)}
+
+    return {
+        "sed": by(found.sed),
+        "normal_force": by(found.normal, width),
+        "tangential_force": by(found.tangential, width),
+        "indentation": by(found.indentation),
+    }
 
 
 def traction_reached(found: Prediction) -> float:

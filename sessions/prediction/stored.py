@@ -9,7 +9,7 @@ from sessions.analysis.area import FIXED, AreaLaw
 from sessions.decisions import Decision
 from sessions.plan import Stimulus
 from sessions.prediction.options import PredictionOptions, template
-from sessions.sed_interval import SedInterval
+from sessions.sed_interval import Ends, SedInterval
 from solver.fields import Fields, fields_of
 from solver.prediction import History, Prediction, Skin
 
@@ -51,6 +51,12 @@ class TrialPrediction:
     alternatives: tuple[Alternative, ...] = ()  # the same trial predicted otherwise, where that was asked for
     interval: SedInterval | None = None  # of `sed`, where it was asked for
     opposite_interval: SedInterval | None = None  # of `opposite_sed`
+    # Estimated by the solver, relative [-]: None where there is no such number, or nobody solved for its error
+    normal_force_error: float | None = None
+    tangential_force_error: float | None = None
+    opposite_error: float | None = None
+    matching_depth_error: float | None = None
+    matching_depth_interval: Ends | None = None  # that friction and the measured force make of it [mm]
 
     @property
     def history(self) -> History | None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sessions.analysis.bootstrap import BootstrapSettings, stroke_intervals
+from sessions.analysis.instants import onset_draws
 from sessions.analysis.stroke import StrokeCurve
 from simulators.bench import BenchSettings
 from simulators.stroke import Course
@@ -44,7 +45,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_others(strokes):
 def test_every_number_lies_in_its_interval(strokes):
     for number, stroke in enumerate(strokes):
         found = stroke_intervals(stroke, number)
-        for name in (*NUMBERS, *FORCES, "heading"):
+        for name in (*NUMBERS, *FORCES, "heading", "onset"):
             low, high = getattr(found, name)
             assert low < getattr(stroke, name) < high
 
@@ -86,7 +87,7 @@ def test_a_movement_nearly_across_leaves_its_sign_in_doubt():
     way = np.array([0.5, np.sqrt(0.75)])  # at 60 degrees: as far along x as the analysis asks for
     position = 25.0 * t[:, None] * way + rng.normal(0.0, 0.3, (400, 2))
     full = np.ones(400)
-    curve = StrokeCurve(t, 2.0 * full, full, np.outer(full, way), 0.5 * full, position, 25.0 * full)
+    curve = StrokeCurve(t, 2.0 * full, 2.0 * full, full, np.outer(full, way), 0.5 * full, position, 25.0 * full)
     crossing = replace(
         planted_truth.visit(1).analysed().strokes[0],
         curve=curve,
@@ -104,8 +105,32 @@ def test_a_movement_nearly_across_leaves_its_sign_in_doubt():
 
 def test_an_instant_that_a_person_decided_has_no_interval(strokes):
     held = next(stroke for stroke in strokes if stroke.break_away is not None)
-    found = stroke_intervals(replace(held, decided={"stick": "by E02", "slide_onset": "by E02"}), 0)
-    assert (found.break_away, found.slide_onset) == (None, None)
+    by = dict.fromkeys(("onset", "stick", "slide_onset"), "by E02")
+    found = stroke_intervals(replace(held, decided=by), 0)
+    assert (found.onset, found.break_away, found.slide_onset) == (None, None, None)
+
+
+def test_of_a_force_without_noise_the_onset_lies_anywhere_between_two_readings():
+    time = np.arange(60) * 0.005
+    force = 20.0 * np.maximum(time - 0.2013, 0.0)
+    draws = onset_draws((time, force), 0.205, 1e-9, np.zeros(4000), np.random.default_rng(0))
+    assert draws.min() == pytest.approx(0.2, abs=1e-5)
+    assert draws.max() == pytest.approx(0.205, abs=1e-5)
+    assert draws.mean() == pytest.approx(0.2025, abs=1e-4)
+
+
+def test_an_onset_that_no_force_climbed_to_has_no_interval():
+    time = np.arange(60) * 0.005
+    draw = np.random.default_rng(0)
+    assert onset_draws((time, np.full(60, 2.0)), 0.205, 0.004, np.zeros(9), draw) is None  # it touched before
+    assert onset_draws((time, 2.0 - 8.0 * time), 0.0, 0.004, np.zeros(9), draw) is None  # the first reading
+
+
+def test_a_finger_that_slid_when_its_speed_was_first_known_began_at_any_instant_since_the_contact(strokes):
+    stroke = next(one for one in strokes if one.break_away is None)
+    low, high = stroke_intervals(stroke, strokes.index(stroke)).slide_onset
+    assert stroke.onset <= low < stroke.onset + 0.01
+    assert low < stroke.slide_onset <= high
 
 
 def truths(seed, truth):
@@ -115,6 +140,7 @@ def truths(seed, truth):
     yield from (("normal_force", pressing), ("tangential_force", truth.mu * pressing))
     yield from (("mu_dynamic", truth.mu), ("tau_max", truth.tau_max), ("speed", truth.speed))
     yield from (("peak_normal", truth.peak_normal_force), ("peak_tangential", truth.mu * truth.peak_normal_force))
+    yield "onset", truth.onset
     yield "heading", slant if truth.direction == 1 else slant + 180.0
     if truth.surface.holds:
         yield "break_away", truth.slip

@@ -72,11 +72,17 @@ def test_derivatives_give_what_solving_the_draws_gives(analysis, prediction, int
     assert found.method == "derivatives"
     mu, tau_max, _ = friction_draws(analysis.strokes[0], 0, "maximum")
     scene = row.prediction.scene
-    seds = solved([with_loads(scene, {"mu": m, "tau_max": t}) for m, t in zip(mu[:24], tau_max[:24], strict=True)])
-    low, high = np.quantile(seds, [0.025, 0.975])
+    drawn = settled([with_loads(scene, {"mu": m, "tau_max": t}) for m, t in zip(mu[:24], tau_max[:24], strict=True)])
+    low, high = np.quantile([one.sed_ending for one in drawn], [0.025, 0.975])
     carried = found.by_mu * (mu[:24] - row.mu) + found.by_tau_max * (tau_max[:24] - row.tau_max)
     assert np.quantile(row.sed + carried, [0.025, 0.975]) == pytest.approx([low, high], abs=0.05 * (high - low))
     assert found.low < row.sed < found.high
+    for name, value in (("normal_force", row.normal_force), ("tangential_force", row.tangential_force)):
+        low, high = getattr(found, name)
+        forces = np.array([getattr(one, name) for one in drawn]) * scene.finger.width
+        assert low < value < high
+        assert 0.85 <= np.mean((low <= forces) & (forces <= high)) <= 1.0
+        assert (high - low) / np.ptp(forces) == pytest.approx(1.0, abs=0.25)  # 95 % of all against all of two dozen
 
 
 def test_a_stickier_surface_has_the_wider_interval(intervals):
@@ -97,7 +103,9 @@ class Made:
         self.formula, self.by_mu, self.row = formula, by_mu, row
 
     def derivatives(self):
-        return SimpleNamespace(sed=By(self.by_mu, 0.0, 0.0, None))
+        none = By(0.0, 0.0, 0.0, None)
+        sed = none._replace(mu=self.by_mu)
+        return SimpleNamespace(sed=sed, normal=none, tangential=none, indentation=none)
 
     def seds(self, scenes):
         off = [(one.friction.mu - self.row.mu, one.friction.tau_max - self.row.tau_max) for one in scenes]
@@ -168,6 +176,23 @@ def test_pressed_by_the_force_measured_the_uncertainty_of_that_force_is_in_the_i
     low, high = solved([with_loads(scene, {"force": least}), with_loads(scene, {"force": most})])
     assert pressed.interval.by_force == pytest.approx((high - low) / (most - least), rel=0.02)
     assert pressed.interval.high - pressed.interval.low >= 0.95 * (high - low)
+
+
+def test_the_depth_that_matches_holds_the_uncertainty_of_force_and_friction(analysis, beside):
+    """Against slopes from solves at both ends of each load, by which all draws are carried."""
+    (row,) = beside.trials
+    pressed = next(one for one in row.alternatives if one.variant.driven == "force")
+    assert (row.matching_depth, row.matching_depth_interval) == (pressed.indentation, pressed.interval.indentation)
+    draws = dict(zip(("mu", "tau_max", "force"), friction_draws(analysis.strokes[0], 0, "maximum"), strict=True))
+    ends = {name: np.quantile(drawn, [0.025, 0.975]).tolist() for name, drawn in draws.items()}
+    scene = scene_along(row, pressed.variant, beside.options)
+    found = settled([with_loads(scene, {name: end}) for name, pair in ends.items() for end in pair])
+    depths = np.array([one.indentation for one in found]).reshape(-1, 2)
+    slopes = np.diff(depths)[:, 0] / np.diff(list(ends.values()))[:, 0]
+    carried = sum(slope * (drawn - drawn.mean()) for slope, drawn in zip(slopes, draws.values(), strict=True))
+    low, high = np.quantile(carried, [0.025, 0.975])
+    assert np.ptp(row.matching_depth_interval) == pytest.approx(high - low, rel=0.05)
+    assert 0.0 < row.matching_depth_error < 0.01
 
 
 # Many solves, most of them at finite strain: make test-long
