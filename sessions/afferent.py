@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.prediction import SessionPrediction
+from sessions.sed_interval import Ends
 
 Array = NDArray[np.float64]
 
@@ -76,13 +77,17 @@ class Firing:
     rate: Array  # (m,) [imp/s]
     settled_rate: float  # long after: background + (static - adaptation) x, within its bounds [imp/s]
     spikes: Array  # (k,) [s]
+    peak_interval: Ends | None = None  # of the greatest rate, that the interval of the SED makes; None without that
+    settled_interval: Ends | None = None  # likewise of the settled rate [imp/s]
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, the rate every 10 ms."""
         return {
             "trial": self.trial,
             "settled_rate": self.settled_rate,
+            "settled_rate_interval": self.settled_interval,
             "peak_rate": float(self.rate.max()),
+            "peak_rate_interval": self.peak_interval,
             "time": self.time[::SHOWN].tolist(),
             "rate": self.rate[::SHOWN].tolist(),
             "spikes": self.spikes.tolist(),
@@ -141,11 +146,26 @@ def session_firing(
         if row.history is None or row.sed is None:
             continue
         time, rate = firing_rate(row.history.time, row.history.sed_ending, reference, chosen)
-        x = float(_drive(np.array(row.sed), reference, chosen))
-        settled = chosen.background + (chosen.static_gain - chosen.adaptation_gain) * x
         spikes = spike_times(time, rate, np.random.default_rng([chosen.seed, number]), chosen)
-        found.append(Firing(row.trial, time, rate, float(np.clip(settled, 0.0, chosen.greatest_rate)), spikes))
+        peak = settled = None
+        if row.interval is not None and row.interval.low is not None and row.interval.high is not None:
+            # The whole course moves with its end: friction is what is uncertain, and presses nothing.
+            low, high = row.interval.low / row.sed, row.interval.high / row.sed
+            course = row.history.sed_ending
+            peaks = [firing_rate(row.history.time, share * course, reference, chosen)[1] for share in (low, high)]
+            peak = float(peaks[0].max()), float(peaks[1].max())
+            settled = (
+                _settled_rate(row.interval.low, reference, chosen),
+                _settled_rate(row.interval.high, reference, chosen),
+            )
+        found.append(Firing(row.trial, time, rate, _settled_rate(row.sed, reference, chosen), spikes, peak, settled))
     return reference, tuple(found)
+
+
+def _settled_rate(sed: float, reference: float, settings: AfferentSettings) -> float:
+    x = float(_drive(np.array(sed), reference, settings))
+    settled = settings.background + (settings.static_gain - settings.adaptation_gain) * x
+    return float(np.clip(settled, 0.0, settings.greatest_rate))
 
 
 def firing_document(prediction: SessionPrediction, settings: AfferentSettings) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from daq_app.study import Study, StudyCutShort, simulated_study
 from drivers.clock import PacedClock, RealClock
 from sessions.analysis import Analysis
 from sessions.analysis.scores import mean_scores
-from sessions.prediction import SessionPrediction
+from sessions.prediction import PredictionOptions, SessionPrediction
 from sessions.recording import Recording
 
 EXAMPLE = "daq-app demo --seed 7"
@@ -50,7 +50,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         return FLAWED
     recording = Recording.open(study.stroked)
     analysis = analysed(recording, console)
-    prediction = predicted(recording, analysis, console)
+    prediction = predicted(recording, analysis, console, PredictionOptions(intervals=True, beside="small"))
     # Imported here: drawing is slow to load, and the session is on the disk by now.
     from sessions.exports.html import plates, write_figures, write_report
     from sessions.report import findings, score_table

@@ -39,6 +39,7 @@ NUMBERS = (  # of a stroke that have an interval
     "break_away",
     "slide_onset",
 )
+_RANGES = ("onset", "slide_onset")
 _TOP = 0.97  # of the peak: readings above this share of it may be the peak
 
 
@@ -78,8 +79,8 @@ class BootstrapSettings:
             "stroke is no uncertainty of its mean; of the tangential force likewise",
             "heading": "noise, zero, choice of window, and gains of the axes that differ; not a transducer that is "
             "turned; with it the share of repeats whose direction is the one told",
-            "onset": "the detector's rule repeated: a force that climbs as steeply crosses three standard deviations of "
-            "its noise between two readings, noise drawn anew, zero; a gain moves no instant; none where a person "
+            "onset": "the detector's rule repeated (a force that climbs as steeply crosses three standard deviations "
+            "of its noise between two readings, noise drawn anew), zero; a gain moves no instant; none where a person "
             "decided it",
             "break_away": "deviations from the fitted climb turned at random (wild bootstrap, the same blocks), zero, "
             "and where the fit ends; a gain moves no instant; none where a person decided it",
@@ -133,7 +134,9 @@ def stroke_intervals(stroke: Stroke, number: int, settings: BootstrapSettings | 
         if name not in found or getattr(stroke, name) is None:
             return None
         low, high = np.quantile(found[name], [(1 - chosen.confidence) / 2, (1 + chosen.confidence) / 2]).tolist()
-        return low, high
+        told = getattr(stroke, name)
+        # An instant told at the end of the stretch in which it may lie, as by the first reading after it, is one too.
+        return (min(low, told), max(high, told)) if name in _RANGES else (low, high)
 
     told = {name: interval(name) for name in NUMBERS}
     return StrokeIntervals(number, stroke.trial, **told, direction_agrees=_agreeing(stroke, found))

@@ -99,9 +99,7 @@ def break_away_draws(
     return np.concatenate(found)
 
 
-def slide_onset_draws(
-    time: Array, speed: Array, told: Array, noise: Array, draw: np.random.Generator
-) -> Array | None:
+def slide_onset_draws(time: Array, speed: Array, told: Array, noise: Array, draw: np.random.Generator) -> Array | None:
     """Return from when the centre of pressure may have slid (repeats,) [s]; None where its speed is not known.
 
     `speed` (n,) [mm/s] at `time` (n,) [s], from the contact's onset on, reaches to the steady window; `told` is the

@@ -187,6 +187,33 @@ def score_matrix(tables: Iterable[ScoreTable], descriptor: str) -> Mapping[str, 
     return {subject: rows[subject] for subject in sorted(rows)}
 
 
+def sd_interval(sd: float, n: int) -> tuple[float, float]:
+    """Return the 95 % interval of the standard deviation of n normal values, by chi squared.
+
+    >>> tuple(round(end, 3) for end in sd_interval(1.0, 10))
+    (0.688, 1.826)
+    """
+    from scipy.special import chdtri
+
+    tail = (1 - CONFIDENCE) / 2
+    low, high = (sd * math.sqrt((n - 1) / float(chdtri(n - 1, upper))) for upper in (tail, 1 - tail))
+    return low, high
+
+
+def slope_interval(related: Relation) -> tuple[float, float] | None:
+    """Return the 95 % t interval of the slope (n - 2 degrees of freedom); None without one, or where r is 0 or 1.
+
+    Its standard error follows from r: (slope / r) sqrt((1 - r^2) / (n - 2)).
+    """
+    r, slope, n = related.pearson, related.slope, related.n
+    if r is None or slope is None or not r or n < 3 or abs(r) > 1 - 1e-12:
+        return None
+    from scipy.special import stdtrit
+
+    half = float(stdtrit(n - 2, (1 + CONFIDENCE) / 2)) * abs(slope / r) * math.sqrt((1 - r * r) / (n - 2))
+    return slope - half, slope + half
+
+
 def _mean(descriptor: str, index: int, values: Sequence[float]) -> MeanScore:
     n, mean = len(values), float(np.mean(values))
     if n < 2:

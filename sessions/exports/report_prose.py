@@ -91,7 +91,7 @@ def _otherwise(report: Report) -> str:
         if asked:
             seds, scores = [point[2] for point in points], [point[1] for point in points]
             found = relation(seds, scores, [point[0] for point in points])
-            r = found.reason if found.pearson is None else f"r = {correlation(found.pearson)}"
+            r = found.reason if found.pearson is None else f"r = {correlation(found.pearson)}{_ends(found)}"
             told.append(f"{experiment.name} {r}, n = {found.n} {'stimulus' if found.n == 1 else 'stimuli'}")
     if told:
         return f"At {other} strain the SED goes with the mean scores thus: {'; '.join(told)}."
@@ -104,10 +104,14 @@ def related_words(related: Relation | None) -> str:
         return "; there are no scores to hold it against"
     if related.pearson is None:
         return f"; no correlation with the scores: {related.reason}"
-    words = f"; against the mean scores r = {correlation(related.pearson)}"
-    if related.low is not None and related.high is not None:
-        words += f", 95 % interval {correlation(related.low)} to {correlation(related.high)}"
+    words = f"; against the mean scores r = {correlation(related.pearson)}{_ends(related)}"
     return words + f", n = {related.n} stimuli"
+
+
+def _ends(related: Relation) -> str:
+    if related.low is None or related.high is None:
+        return ""
+    return f", 95 % interval {correlation(related.low)} to {correlation(related.high)}"
 
 
 def _plural(n: int, one: str, many: str) -> str:

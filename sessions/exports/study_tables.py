@@ -7,6 +7,7 @@ from sessions.analysis.scores import MeanScore, Relation
 from sessions.analysis.within import RepeatedCorrelation
 from sessions.exports.report_tables.cells import Cell, Column, Notes, Table
 from sessions.exports.report_tables.paths import paths_table
+from sessions.exports.report_tables.scores import spread_cell
 from sessions.exports.study_cells import between, correlations, interval, model_in_short, p_value, study_table
 from sessions.exports.study_models import flaws_table, models_table, planted_table
 from sessions.exports.study_trials import trials_table
@@ -67,7 +68,7 @@ def _scores(study: StudyFindings) -> Table:
                 Cell(str(mean.index)),
                 Cell(str(mean.n)),
                 Cell(digits(mean.mean, 1)),
-                notes.number(mean.sd, lambda v: digits(v, 1), mean.reason),
+                spread_cell(mean.sd, mean.n, lambda v: digits(v, 1), mean.reason, notes),
                 _of_scores(mean, notes),
                 interval(None, None, 1) if inner is None else interval(inner.low, inner.high, 1),
             )
@@ -83,7 +84,8 @@ def _scores(study: StudyFindings) -> Table:
     complete = ", ".join(f"{one.within[0].n} for {one.descriptor}" for one in study.descriptors if one.within)
     caption = (
         "Scores: t interval of the mean over subjects; and interval within subjects (Cousineau 2005, Morey 2008), for "
-        f"comparing surfaces with one another, of the subjects who scored every surface ({complete or 'none'})."
+        f"comparing surfaces with one another, of the subjects who scored every surface ({complete or 'none'}). Under "
+        "the standard deviation: its 95 % interval by chi squared."
     )
     groups = _by_descriptor(study, rows)
     return study_table("table-scores", caption, columns, groups, notes)
@@ -222,24 +224,31 @@ def _surfaces(study: StudyFindings) -> Table:
                 Cell(str(s.subjects)),
                 *_mean(s.mu, 3, notes),
                 *_mean(kilopascal, 3, notes),
-                Cell(NONE if kilopascal is None or kilopascal.sd is None else significant(kilopascal.sd, 2)),
+                _spread(kilopascal, notes),
             )
 
     columns = (
         Column("index"),
         Column("subjects"),
-        Column("µ"),
-        Column("95 % interval"),
+        Column("µ", "1"),
+        Column("95 % interval", "1"),
         Column("SED", "kPa"),
         Column("95 % interval", "kPa"),
         Column("standard deviation", "kPa"),
     )
     caption = (
         "Friction that the model got, and predicted SED: means over subjects, each from its own strokes, with t "
-        f"intervals. Model: {model_in_short(study)}."
+        "intervals; standard deviation of the SED with its interval by chi squared. "
+        f"Model: {model_in_short(study)}."
     )
     groups = [(one.descriptor, tuple(row(one))) for one in study.descriptors if any(s.subjects for s in one.surfaces)]
     return study_table("table-surfaces", caption, columns, groups, notes)
+
+
+def _spread(mean: Average | None, notes: Notes) -> Cell:
+    if mean is None:
+        return notes.number(None, str, "no subject's stroke gives this number")
+    return spread_cell(mean.sd, mean.n, lambda v: significant(v, 2), "one subject alone has no spread", notes)
 
 
 def _forces(study: StudyFindings) -> Table:
@@ -249,10 +258,15 @@ def _forces(study: StudyFindings) -> Table:
         for s in one.surfaces:
             if s.normal_force is not None or s.model_normal_force is not None:
                 numbers = (s.normal_force, s.model_normal_force, s.matching_depth)
-                yield (Cell(str(s.index)), *(cell for number in numbers for cell in _mean(number, 2, notes)))
+                yield (
+                    Cell(str(s.index)),
+                    Cell(str(s.subjects)),
+                    *(cell for number in numbers for cell in _mean(number, 2, notes)),
+                )
 
     columns = (
         Column("index"),
+        Column("subjects"),
         Column("measured N", "N"),
         Column("95 % interval", "N"),
         Column("model N", "N"),
@@ -263,7 +277,8 @@ def _forces(study: StudyFindings) -> Table:
     caption = (
         "Model against measurement: normal force over the steady window, the force of the model pressed to the depth "
         "of its block (times the finger's width, assumed unless it was measured), and the depth at which the model "
-        f"would press as hard as the subject did. Means over subjects with t intervals. Model: {model_in_short(study)}."
+        "would press as hard as the subject did (on a rough mesh, to some tenths of a per cent). Means over "
+        f"subjects with t intervals, which hold what errs from trial to trial. Model: {model_in_short(study)}."
     )
     return study_table(
         "table-forces", caption, columns, [(one.descriptor, tuple(row(one))) for one in study.descriptors], notes

@@ -8,7 +8,9 @@ from sessions.exports.wording import places, sed, significant, tau
 from sessions.pooling.exclusions import decided
 from sessions.pooling.findings import StudyFindings
 from sessions.pooling.visit import TrialRow, Visit
+from sessions.sed_interval import Ends
 
+_FEW = "too few readings"
 MOST = 400  # rows on the page; of a larger study they are in the table beside it, and in the page as a file
 
 
@@ -21,16 +23,12 @@ def trials_table(study: StudyFindings) -> Table | None:
         Column("trial"),
         Column("index"),
         Column("score", "0–100"),
-        Column("µ"),
-        Column("95 % interval"),
+        Column("µ", "1"),
         Column("τ max", "kPa"),
-        Column("95 % interval", "kPa"),
         Column("N", "N"),
         Column("speed", "mm/s"),
-        Column("95 % interval", "mm/s"),
         Column("SED", "kPa"),
-        Column("95 % interval", "kPa"),
-        Column("error", "%"),
+        Column("estimated error", "%"),
         Column("flaws"),
     )
     groups = tuple(
@@ -45,9 +43,9 @@ def trials_table(study: StudyFindings) -> Table | None:
     calibrations = f" (calibration: {'; '.join(known)})" if known else ""
     caption = (
         "Every trial, from which all numbers above come. µ: what the model got; τ max, normal force N and speed of the "
-        f"stroke; intervals of µ, τ max and speed by block bootstrap{calibrations}. SED: at "
-        f"{model_in_short(study)}; its interval is what the uncertainty of friction makes of it, the error that "
-        "estimated from its mesh. A dash says why. Means, correlations and models above take each number as it "
+        f"stroke, each over its 95 % interval by block bootstrap{calibrations}. SED: at "
+        f"{model_in_short(study)}, over what the uncertainty of friction makes of it; error: that estimated from its "
+        "mesh. A dash says why. Means, correlations and models above take each number as it "
         "stands: their own intervals come from how subjects and trials differ, which holds these errors too."
     )
     return Table("table-trials", caption, columns, groups, notes.listed())
@@ -69,25 +67,22 @@ def _row(row: TrialRow, notes: Notes) -> tuple[Cell, ...]:
     given = row.score if row.score is not None else row.estimate
     why = row.why or "withheld: the flaws say why"
 
-    def interval(low: float | None, high: float | None, shown: Callable[[float], str], without: str) -> Cell:
-        if low is None or high is None:
-            return notes.number(None, str, without)
-        return Cell(f"{shown(low)} to {shown(high)}")
+    def ends(low: float | None, high: float | None) -> Ends | None:
+        return None if low is None or high is None else (low, high)
 
-    short = row.why or "too few readings for an interval"
+    def estimate(name: str, shown: Callable[[float], str], unit: float = 1.0, without: str = _FEW) -> Cell:
+        held = ends(getattr(row, f"{name}_low"), getattr(row, f"{name}_high"))
+        return notes.estimate(getattr(row, name), shown, why, held, without, unit=unit)
+
     return (
         Cell(str(row.trial)),
         Cell(str(row.index)),
         notes.number(given, places(1), f"no score: {row.outcome}"),
-        notes.number(row.mu, places(3), why),
-        interval(row.mu_low, row.mu_high, places(3), short),
-        notes.number(row.tau_max, tau, why),
-        interval(row.tau_max_low, row.tau_max_high, tau, short),
-        notes.number(row.normal_force, places(2), why),
-        notes.number(row.speed, places(1), why),
-        interval(row.speed_low, row.speed_high, places(1), short),
-        notes.number(row.sed, sed, why),
-        interval(row.sed_low, row.sed_high, sed, row.why or row.sed_interval or why),
+        estimate("mu", places(3)),
+        estimate("tau_max", tau, 1e3),
+        estimate("normal_force", places(2)),
+        estimate("speed", places(1)),
+        estimate("sed", sed, 1e3, row.sed_interval),
         notes.number(row.error_estimate, lambda v: significant(100 * v, 2), why),
         Cell(", ".join(flaw.replace("_", " ") for flaw in row.flaws) or "none"),
     )

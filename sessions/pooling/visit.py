@@ -23,7 +23,7 @@ from sessions.report.predictions import modelled
 from sessions.sealing import NUMBERS, sealed_sentence
 from sessions.uncertainty import with_intervals
 
-FORM = 8  # raised when a row holds something else: what was stored before is then computed anew
+FORM = 9  # raised when a row holds something else: what was stored before is then computed anew
 
 
 NO_INTERVAL = "intervals of the SED were not asked for"
@@ -57,7 +57,7 @@ class TrialRow:
     estimate: float | None = None  # on a scale of the subject's own
     rule: str = ""  # which mu the model got
     mu: float | None = None
-    mu_low: float | None = None  # 95 % bootstrap interval of mu, as of tau_max and speed: `BootstrapSettings.kind`
+    mu_low: float | None = None  # 95 % bootstrap interval of mu, as of all that was measured: `BootstrapSettings.kind`
     mu_high: float | None = None
     mu_dynamic: float | None = None
     mu_static: float | None = None
@@ -68,12 +68,15 @@ class TrialRow:
     speed_low: float | None = None
     speed_high: float | None = None
     normal_force: float | None = None  # [N]
+    normal_force_low: float | None = None
+    normal_force_high: float | None = None
     sed: float | None = None  # [MPa]
     sed_low: float | None = None  # 95 % interval that friction alone makes, see `sessions.uncertainty`
     sed_high: float | None = None
     sed_interval: str = ""  # how it was found, or why there is none
     error_estimate: float | None = None  # relative, of sed
     model_normal_force: float | None = None  # [N]
+    model_normal_force_error: float | None = None  # relative, estimated by the solver
     matching_depth: float | None = None  # [mm]
     flaws: tuple[str, ...] = ()
     why: str = ""
@@ -190,6 +193,7 @@ def _row(
     mu_low, mu_high = (intervals.mu_max if friction.rule == "maximum" else intervals.mu_dynamic) or (None, None)
     tau_max_low, tau_max_high = intervals.tau_max or (None, None)
     speed_low, speed_high = intervals.speed or (None, None)
+    normal_low, normal_high = intervals.normal_force or (None, None)
     row = replace(
         row,
         rule=friction.rule,
@@ -205,6 +209,8 @@ def _row(
         speed_low=None if friction.speed is None else speed_low,
         speed_high=None if friction.speed is None else speed_high,
         normal_force=stroke.normal_force,
+        normal_force_low=normal_low,
+        normal_force_high=normal_high,
         flaws=flaws,
     )
     if answer is None:
@@ -218,6 +224,7 @@ def _row(
         sed_interval=NO_INTERVAL if interval is None else interval.reason or f"by {interval.method}",
         error_estimate=answer.error_estimate,
         model_normal_force=answer.normal_force,
+        model_normal_force_error=answer.normal_force_error,
         matching_depth=answer.matching_depth,
         why=answer.reasons.get("sed", ""),
     )

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, field
 from sessions.alternative import Alternative
 from sessions.analysis.scores import MeanScore, Relation
 from sessions.paths import PathFinding
-from sessions.sed_interval import SedInterval
+from sessions.sed_interval import Ends, SedInterval
 
 Numbers = tuple[float, ...]
 
@@ -138,8 +138,17 @@ class PredictionFinding:
     sed_interval: tuple[float, float] | None = None  # that the uncertainty of friction alone makes [MPa]
     interval_by: str = ""  # "derivatives" or "sampling"
     opposite_interval: SedInterval | None = None  # of opposite_sed, likewise
+    opposite_error: float | None = None  # relative, of opposite_sed
+    normal_force_error: float | None = None  # relative, estimated by the solver
+    tangential_force_error: float | None = None  # likewise
+    matching_depth_error: float | None = None  # likewise
+    normal_force_interval: Ends | None = None  # that the uncertainty of friction makes [N]
+    tangential_force_interval: Ends | None = None  # likewise [N]
+    matching_depth_interval: Ends | None = None  # that friction and the force measured make [mm]
     peak_rate: float | None = None  # of an SA-II afferent, an illustration [imp/s]
     settled_rate: float | None = None  # likewise
+    peak_rate_interval: Ends | None = None  # that the interval of the SED makes of it, every parameter as given
+    settled_rate_interval: Ends | None = None  # likewise
     alternatives: tuple[Alternative, ...] = ()  # the trial in each variant, where they were asked for
 
 

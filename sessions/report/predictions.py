@@ -175,6 +175,11 @@ def finding_of(row: TrialPrediction) -> PredictionFinding:
         history=None if history is None else History(_numbers(history.time), _numbers(history.sed_ending)),
         reasons=reasons,
         alternatives=row.alternatives,
+        opposite_error=row.opposite_error,
+        normal_force_error=row.normal_force_error,
+        tangential_force_error=row.tangential_force_error,
+        matching_depth_error=row.matching_depth_error,
+        matching_depth_interval=row.matching_depth_interval,
     )
 
 
@@ -186,8 +191,17 @@ def _with_more(finding: PredictionFinding, row: TrialPrediction, firing: Firing 
     elif interval is not None:
         finding = replace(finding, reasons={**finding.reasons, "sed_interval": interval.reason})
     finding = replace(finding, opposite_interval=row.opposite_interval)
+    if interval is not None:
+        forces = interval.normal_force, interval.tangential_force
+        finding = replace(finding, normal_force_interval=forces[0], tangential_force_interval=forces[1])
     if firing is not None:
-        finding = replace(finding, peak_rate=float(firing.rate.max()), settled_rate=firing.settled_rate)
+        finding = replace(
+            finding,
+            peak_rate=float(firing.rate.max()),
+            settled_rate=firing.settled_rate,
+            peak_rate_interval=firing.peak_interval,
+            settled_rate_interval=firing.settled_interval,
+        )
     return finding
 
 

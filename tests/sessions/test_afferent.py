@@ -51,12 +51,23 @@ def test_a_steady_rate_gives_its_count_and_the_declared_regularity():
     assert intervals.min() >= USUAL.refractory
 
 
-def rows(seds):
+def rows(seds, interval=None):
     time = np.array([0.0, 1.0, 3.0])
+    made = [SimpleNamespace(time=time, sed_ending=np.array([0.0, sed, sed])) for sed in seds]
     return tuple(
-        SimpleNamespace(trial=i, sed=sed, history=SimpleNamespace(time=time, sed_ending=np.array([0.0, sed, sed])))
-        for i, sed in enumerate(seds, 1)
+        SimpleNamespace(trial=i, sed=sed, history=history, interval=interval)
+        for i, (sed, history) in enumerate(zip(seds, made, strict=True), 1)
     )
+
+
+def test_the_interval_of_an_sed_goes_through_to_the_rates():
+    interval = SimpleNamespace(low=0.008, high=0.012)
+    _, (alone,) = session_firing(SimpleNamespace(trials=rows([0.01])))
+    _, (found,) = session_firing(SimpleNamespace(trials=rows([0.01], interval)))
+    assert (alone.settled_interval, alone.peak_interval) == (None, None)
+    # Drive 1 at the reference of 10 kPa, straight in the SED beyond a threshold of 4 Pa: 14 imp/s for it.
+    assert found.settled_interval == pytest.approx((19.0 - 14.0 * 0.2, 19.0 + 14.0 * 0.2), abs=2e-2)
+    assert found.peak_interval[0] < found.rate.max() < found.peak_interval[1]
 
 
 def test_the_order_of_surfaces_is_that_of_the_sed_whatever_the_exponent():

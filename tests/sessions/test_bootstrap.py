@@ -45,9 +45,10 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_others(strokes):
 def test_every_number_lies_in_its_interval(strokes):
     for number, stroke in enumerate(strokes):
         found = stroke_intervals(stroke, number)
-        for name in (*NUMBERS, *FORCES, "heading", "onset"):
+        for name in (*NUMBERS, *FORCES, "heading"):
             low, high = getattr(found, name)
             assert low < getattr(stroke, name) < high
+        assert found.onset[0] < stroke.onset <= found.onset[1]
 
 
 def test_of_a_calibration_alone_tau_max_has_the_closed_form(strokes):

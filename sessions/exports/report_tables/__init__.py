@@ -4,14 +4,14 @@ from sessions.exports.report_tables.cells import Cell, Column, Group, Table
 from sessions.exports.report_tables.paths import paths_table
 from sessions.exports.report_tables.predictions import (
     afferent_table,
-    beside_interval_table,
+    beside_forces_table,
     beside_table,
     direction_table,
     force_table,
     prediction_table,
 )
 from sessions.exports.report_tables.scores import answer_tables, relation_table, score_table
-from sessions.exports.report_tables.strokes import course_table, interval_table, planted_table, stroke_table
+from sessions.exports.report_tables.strokes import course_table, planted_table, stroke_table
 from sessions.report import Report
 
 __all__ = ["Cell", "Column", "Group", "Table", "tables"]
@@ -21,13 +21,13 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
     """Return the tables a report has numbers for, by section, in their order."""
     sections = {
         "scores": (score_table(report), *answer_tables(report)),
-        "strokes": (stroke_table(report), interval_table(report), course_table(report)),
+        "strokes": (stroke_table(report), course_table(report)),
         "predictions": (
             prediction_table(report),
             force_table(report),
             direction_table(report),
             beside_table(report),
-            beside_interval_table(report),
+            beside_forces_table(report),
         ),
         "afferent": (afferent_table(report),),
         "relation": (relation_table(report),),

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from sessions.exports.wording import NONE
+from sessions.exports.wording import NONE, between
 from sessions.report import Report
 
 Thing = TypeVar("Thing")
@@ -12,11 +12,12 @@ Thing = TypeVar("Thing")
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What stands in one cell, and the mark of the note that explains it."""
+    """What stands in one cell, the mark of the note that explains it, and under it the interval of its number."""
 
     text: str
     mark: str = ""
     hover: str = ""
+    interval: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +65,30 @@ class Notes:
             return Cell(shown(value))
         why = reason or "not determined"
         return Cell(NONE, self.mark(why), why)
+
+    def estimate(
+        self,
+        value: float | None,
+        shown: Callable[[float], str],
+        reason: str | None,
+        ends: tuple[float, float] | None,
+        without: str | None = None,
+        *,
+        told: Callable[[float], str] | None = None,
+        unit: float = 1.0,
+        star: bool = False,
+    ) -> Cell:
+        """Return the number over its interval, `without` which it has a note that says why; or a dash with its reason.
+
+        `told` shows an end of the interval where `shown` shows more than a number; `unit` as for `wording.between`.
+        `star` marks an interval that was found otherwise than the others of its table.
+        """
+        if value is None:
+            return self.number(None, shown, reason)
+        if ends is None:
+            why = f"no interval: {without or 'not computed'}"
+            return Cell(shown(value), self.mark(why), why)
+        return Cell(shown(value), interval=between(*ends, told or shown, unit) + ("*" if star else ""))
 
     def listed(self) -> tuple[tuple[str, str], ...]:
         """Return every note with its letter."""

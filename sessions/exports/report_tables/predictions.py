@@ -1,12 +1,14 @@
 """Tables of predictions: responses, forces beside measured ones, both directions."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from sessions.alternative import Alternative
 from sessions.exports.report_tables.cells import Cell, Column, Group, Notes, Table, grouped
-from sessions.exports.wording import between, digits, direction, places, sed, significant, tau
+from sessions.exports.report_tables.strokes import model_mu
+from sessions.exports.wording import direction, places, sed, significant, tau, with_error
 from sessions.report import PredictionFinding, Report
-from sessions.sed_interval import SedInterval
+from sessions.sed_interval import Ends, SedInterval
 
 
 def prediction_table(report: Report) -> Table | None:
@@ -16,25 +18,31 @@ def prediction_table(report: Report) -> Table | None:
     notes = Notes()
     columns = (
         *_who(report),
-        Column("µ"),
+        Column("µ", "1"),
         Column("which µ"),
         Column("τ max", "kPa"),
         Column("depth", "mm"),
         Column("SED", "kPa"),
-        Column("95 % interval", "kPa"),
         Column("estimated error", "%"),
         Column("solved in", "s"),
     )
+    strokes = {stroke.number: stroke for stroke in report.strokes}
 
     def row(p: PredictionFinding) -> tuple[Cell, ...]:
+        stroke = None if p.stroke is None else strokes.get(p.stroke)
+        held = {} if stroke is None else stroke.bootstrap
+        mu = held.get(model_mu(stroke, p)[0])
+        bound = held.get("tau_max")
+        if bound is not None and p.tau_max is not None and stroke is not None and stroke.tau_max:
+            bound = bound[0] * p.tau_max / stroke.tau_max, bound[1] * p.tau_max / stroke.tau_max  # as it was read
+        missing = p.reasons.get("sed")
         return (
             *_named(p),
-            notes.number(p.mu, places(3), p.reasons.get("mu") or p.reasons.get("sed")),
+            notes.estimate(p.mu, places(3), p.reasons.get("mu") or missing, mu, _SHORT),
             Cell({"mean over steady window": "mean"}.get(p.mu_rule, p.mu_rule)),
-            notes.number(p.tau_max, tau, p.reasons.get("tau_max") or p.reasons.get("sed")),
+            notes.estimate(p.tau_max, tau, p.reasons.get("tau_max") or missing, bound, _SHORT, unit=1e3),
             _depth(p, notes),
-            notes.number(p.sed, sed, p.reasons.get("sed")),
-            _interval(p, notes),
+            _stroked_sed(p, notes),
             notes.number(p.error_estimate, lambda v: significant(100 * v, 2), p.reasons.get("error_estimate")),
             notes.number(p.wall_s, lambda v: significant(v, 2), p.reasons.get("wall_s")),
         )
@@ -42,20 +50,49 @@ def prediction_table(report: Report) -> Table | None:
     groups = grouped(report, report.predictions, lambda p: p.experiment, row)
     caption = (
         "Predictions: SED averaged over the ending in the settled state (1 kPa = 1 mJ/cm³). Which µ: the mean over the "
-        "steady window, or the maximum. Interval: what the uncertainty of friction alone makes of the SED, by "
-        "derivatives (the solver's converged tangent), or where marked * by solving draws; the model's own error is "
-        "not in it. Estimated error: of one "
-        "SED, from the mesh; differences between stimuli, which share the mesh, are more accurate. "
-        f"Model: {report.model}."
+        "steady window, or the maximum; under µ and τ max their bootstrap intervals. Under the SED: the 95 % interval "
+        f"that the uncertainty of friction alone makes of it, {_HOW}; the model's own error is not in it. ± and "
+        "estimated error: of one SED, from the mesh; differences between stimuli, which share the mesh, are more "
+        f"accurate. Model: {report.model}."
     )
     return Table("table-predictions", caption, columns, groups, notes.listed())
 
 
-def _interval(p: PredictionFinding, notes: Notes) -> Cell:
-    if p.sed_interval is None:
-        return notes.number(None, sed, p.reasons.get("sed_interval") or p.reasons.get("sed") or "not computed")
-    low, high = p.sed_interval
-    return Cell(f"{between(low, high, sed, 1e3)}{'*' if p.interval_by == 'sampling' else ''}")
+_HOW = "by derivatives (the solver's converged tangent), or where marked * by solving draws"
+_SHORT = "the stroke has too few readings"
+
+
+def _stroked_sed(p: PredictionFinding, notes: Notes) -> Cell:
+    interval = p.sed_interval
+    why = p.reasons.get("sed_interval")
+    star = p.interval_by == "sampling"
+    return _sed(notes, p.sed, p.error_estimate, p.reasons.get("sed"), interval, why, star=star)
+
+
+def _sed(
+    notes: Notes,
+    value: float | None,
+    error: float | None,
+    reason: str | None,
+    ends: Ends | None,
+    without: str | None,
+    *,
+    star: bool,
+) -> Cell:
+    """Return an SED in kPa, ± its relative error from the mesh, over the interval that friction makes."""
+    return notes.estimate(value, _with(error, 3, 1e3), reason, ends, without, told=sed, unit=1e3, star=star)
+
+
+def _with(error: float | None, least: int, unit: float = 1.0) -> Callable[[float], str]:
+    """Return what shows a number with its relative error, in another unit."""
+    return lambda value: with_error(unit * value, None if error is None else unit * error * abs(value), least)
+
+
+def _of(interval: SedInterval | None) -> tuple[Ends | None, str | None, bool]:
+    """Return the ends of an interval, why it has none, and whether draws were solved for it."""
+    if interval is None or interval.low is None or interval.high is None:
+        return None, None if interval is None else interval.reason, False
+    return (interval.low, interval.high), None, interval.method == "sampling"
 
 
 def afferent_table(report: Report) -> Table | None:
@@ -66,15 +103,19 @@ def afferent_table(report: Report) -> Table | None:
     columns = (*_who(report), Column("SED", "kPa"), Column("peak rate", "imp/s"), Column("settled rate", "imp/s"))
 
     def row(p: PredictionFinding) -> tuple[Cell, ...]:
-        rates = (notes.number(rate, places(1), p.reasons.get("sed")) for rate in (p.peak_rate, p.settled_rate))
-        return (*_named(p), notes.number(p.sed, sed, p.reasons.get("sed")), *rates)
+        told = ((p.peak_rate, p.peak_rate_interval), (p.settled_rate, p.settled_rate_interval))
+        why, without = p.reasons.get("sed"), p.reasons.get("sed_interval")
+        rates = (notes.estimate(rate, places(1), why, ends, without) for rate, ends in told)
+        return (*_named(p), _stroked_sed(p, notes), *rates)
 
     groups = grouped(report, report.predictions, lambda p: p.experiment, row)
     caption = (
         "Firing of an SA-II afferent: an illustration. No fitted map from SED to the rate of a human SA-II afferent is "
         "known; every parameter is told below, assumed unless it says that somebody set it. The order of the settled "
         "rates is that of the SED as long as no rate lies at a bound, every SED is beyond the threshold and the "
-        f"adaptation gain stays below the static gain. Model of the SED: {report.model}."
+        "adaptation gain stays below the static gain. Under each number: the 95 % interval that the uncertainty of "
+        "friction makes of it, parameters and reference as given; ±: the SED's error from the mesh. Model of the SED: "
+        f"{report.model}."
     )
     return Table("table-afferent", caption, columns, groups, notes.listed())
 
@@ -87,35 +128,51 @@ def beside_table(report: Report) -> Table | None:
     notes = Notes()
 
     def cell(one: Alternative) -> Cell:
-        if one.sed is None:
-            return notes.number(None, sed, one.reason)
-        held = one.indentation if one.variant.driven == "force" else one.normal_force
-        unit = "mm" if one.variant.driven == "force" else "N"
-        text = sed(one.sed) if held is None else f"{sed(one.sed)} ({digits(held, 2)} {unit})"
-        return Cell(text, notes.mark(one.doubt), one.doubt) if one.doubt else Cell(text)
+        ends, why, star = _of(one.interval)
+        cell = _sed(notes, one.sed, one.error_estimate, one.reason, ends, why, star=star)
+        if one.doubt and one.sed is not None:
+            doubt = notes.mark(one.doubt)
+            return replace(cell, mark=f"{cell.mark},{doubt}" if cell.mark else doubt, hover=one.doubt)
+        return cell
 
     told = "; ".join(f"({n}) {way}" for n, way in enumerate(ways, 1))
     caption = (
-        f"The same trials predicted otherwise, SED in kPa: {told}. In brackets the model's normal force, or the depth "
-        "that the measured force presses it to. At one strain all trials of a column share a mesh. A dash says why."
+        f"The same trials predicted otherwise, SED in kPa: {told}. ±: the solver's estimate of its error, from the "
+        "mesh. Under it: the 95 % interval that the uncertainty of friction makes, and of the force where that drives "
+        f"the model, {_HOW}. At one strain all trials of a column share a mesh. A dash says why."
     )
     columns = (*_who(report), *(Column(f"({n})", "kPa") for n in range(1, len(ways) + 1)))
     return Table("table-beside", caption, columns, _by_strain(report, cell), notes.listed())
 
 
-def beside_interval_table(report: Report) -> Table | None:
-    """Return the interval of each SED in every variant, where they were asked for."""
+def beside_forces_table(report: Report) -> Table | None:
+    """Return the normal force of each variant, or the depth that the measured force presses it to."""
     ways, notes = _ways(report), Notes()
-    if all(one.interval is None for p in report.predictions for one in p.alternatives):
+    if not ways:
         return None
+
+    def cell(one: Alternative) -> Cell:
+        pressed = one.variant.driven == "force"
+        value = one.indentation if pressed else one.normal_force
+        error = one.indentation_error if pressed else one.normal_force_error
+        interval = one.interval
+        ends = None if interval is None else interval.indentation if pressed else interval.normal_force
+        why = None if interval is None else interval.reason
+        value = None if one.sed is None else value
+        return notes.estimate(value, _with(error, 2), one.reason, ends, why, told=places(2))
+
+    units = {
+        one.variant.way: "mm" if one.variant.driven == "force" else "N"
+        for p in report.predictions
+        for one in p.alternatives
+    }
     caption = (
-        "95 % intervals of the SEDs of the table before, column by column, that the uncertainty of friction makes, and "
-        "of the force where that drives the model: by derivatives (the solver's converged tangent), or where marked * "
-        "by solving draws."
+        "The model's normal force in each column of the table before, or the depth that the measured force presses it "
+        "to. ±: the solver's estimate of its error, from the mesh. Under it: the 95 % interval that the uncertainty of "
+        "friction makes, and of the force where that drives the model, by derivatives."
     )
-    columns = (*_who(report), *(Column(f"({n})", "kPa") for n in range(1, len(ways) + 1)))
-    groups = _by_strain(report, lambda one: _ends(one.interval, notes, one.reason))
-    return Table("table-beside-intervals", caption, columns, groups, notes.listed())
+    columns = (*_who(report), *(Column(f"({n})", units[way]) for n, way in enumerate(ways, 1)))
+    return Table("table-beside-forces", caption, columns, _by_strain(report, cell), notes.listed())
 
 
 def _ways(report: Report) -> tuple[str, ...]:
@@ -138,13 +195,6 @@ def _by_strain(report: Report, cell: Callable[[Alternative], Cell]) -> tuple[Gro
     return tuple(groups)
 
 
-def _ends(interval: SedInterval | None, notes: Notes, why: str | None) -> Cell:
-    if interval is None or interval.low is None or interval.high is None:
-        told = "" if interval is None else interval.reason
-        return notes.number(None, sed, told or why or "not computed")
-    return Cell(f"{between(interval.low, interval.high, sed, 1e3)}{'*' if interval.method == 'sampling' else ''}")
-
-
 def force_table(report: Report) -> Table | None:
     """Return the model's forces beside the measured ones."""
     if not report.predictions:
@@ -160,29 +210,42 @@ def force_table(report: Report) -> Table | None:
         Column("depth of the model", "mm"),
         Column("depth to match", "mm"),
     )
+    strokes = {stroke.number: stroke.bootstrap for stroke in report.strokes}
 
     def row(p: PredictionFinding) -> tuple[Cell, ...]:
-        def cell(name: str, value: float | None, decimals: int = 2) -> Cell:
-            return notes.number(value, places(decimals), p.reasons.get(name))
+        held = {} if p.stroke is None else strokes.get(p.stroke, {})
+        normal = p.normal_force_interval
+        per_mm = None if normal is None or not report.width else (normal[0] / report.width, normal[1] / report.width)
 
+        def cell(name: str, error: float | None, ends: Ends | None, without: str | None, decimals: int = 2) -> Cell:
+            value, shown = getattr(p, name), places(decimals)
+            return notes.estimate(value, _with(error, decimals), p.reasons.get(name), ends, without, told=shown)
+
+        why = p.reasons.get("sed_interval")
         return (
             *_named(p),
-            cell("normal_per_mm", p.normal_per_mm, 4),
-            cell("normal_force", p.normal_force),
-            cell("measured_normal", p.measured_normal),
-            cell("tangential_force", p.tangential_force),
-            cell("measured_tangential", p.measured_tangential),
+            cell("normal_per_mm", p.normal_force_error, per_mm, why, 4),
+            cell("normal_force", p.normal_force_error, normal, why),
+            cell("measured_normal", None, held.get("normal_force"), _SHORT),
+            cell("tangential_force", p.tangential_force_error, p.tangential_force_interval, why),
+            cell("measured_tangential", None, held.get("tangential_force"), _SHORT),
             _depth(p, notes),
-            cell("matching_depth", p.matching_depth),
+            cell("matching_depth", p.matching_depth_error, p.matching_depth_interval, why or _ROUGH),
         )
 
     width = "the finger's width" if report.width is None else f"a width of {report.width:g} mm"
     caption = (
         f"Forces of the model, per mm and times {width} (assumed), beside the means measured over the steady window. "
-        f"Depth to match: indentation at which the model would press as hard as the subject did. Model: {report.model}."
+        "Depth to match: indentation at which the model would press as hard as the subject did. ±: the solver's "
+        "estimate of its error, from the mesh. Under each number of the model: the 95 % interval that the uncertainty "
+        "of friction makes, and of the measured force where that is to be matched, by derivatives; the width is taken "
+        f"as given. Under what was measured: its bootstrap interval. Model: {report.model}."
     )
     groups = grouped(report, report.predictions, lambda p: p.experiment, row)
     return Table("table-forces", caption, columns, groups, notes.listed())
+
+
+_ROUGH = "it was found on a rough mesh, for the trial was not solved under the force measured (--beside small)"
 
 
 def direction_table(report: Report) -> Table | None:
@@ -195,37 +258,43 @@ def direction_table(report: Report) -> Table | None:
         Column("depth", "mm"),
         Column("stroked"),
         Column("SED as stroked", "kPa"),
-        Column("95 % interval", "kPa"),
         Column("SED the other way", "kPa"),
-        Column("95 % interval", "kPa"),
-        Column("d → p over p → d"),
+        Column("d → p over p → d", "1"),
     )
 
     def row(p: PredictionFinding) -> tuple[Cell, ...]:
-        ratio = None
-        if p.sed is not None and p.opposite_sed is not None and p.direction is not None:
-            backward, forward = (p.sed, p.opposite_sed) if p.direction < 0 else (p.opposite_sed, p.sed)
-            ratio = backward / forward
+        back, without, star = _of(p.opposite_interval)
         why = p.reasons.get("opposite_sed") or p.reasons.get("sed")
+        ratio, ends = _ratio(p, back)
         return (
             *_named(p),
             _depth(p, notes),
             Cell(direction(p.direction)),
-            notes.number(p.sed, sed, p.reasons.get("sed")),
-            _interval(p, notes),
-            notes.number(p.opposite_sed, sed, why),
-            _ends(p.opposite_interval, notes, why),
-            notes.number(ratio, places(3), why),
+            _stroked_sed(p, notes),
+            _sed(notes, p.opposite_sed, p.opposite_error, why, back, without, star=star),
+            notes.estimate(ratio, places(3), why, ends, without or p.reasons.get("sed_interval")),
         )
 
     caption = (
-        "Both directions at equal depth, each with its trial's friction. Intervals: what the uncertainty of friction "
-        "makes of each, by derivatives (the solver's converged tangent), or where marked * by solving draws. "
-        "Last column: SED while sliding from distal "
-        f"to proximal over SED while sliding from proximal to distal. Model: {report.model}."
+        "Both directions at equal depth, each with its trial's friction. ±: the solver's estimate of its error, from "
+        f"the mesh. Under each: the 95 % interval that the uncertainty of friction makes, {_HOW}. "
+        "Last column: SED while sliding from distal to proximal over SED while sliding from proximal to distal, and "
+        "the least and greatest that both intervals allow: no narrower than 95 %, for both move with one friction. "
+        f"Model: {report.model}."
     )
     groups = grouped(report, report.predictions, lambda p: p.experiment, row)
     return Table("table-directions", caption, columns, groups, notes.listed())
+
+
+def _ratio(p: PredictionFinding, back: Ends | None) -> tuple[float | None, Ends | None]:
+    """Return the SED slid from distal to proximal over that slid back, with the range that their intervals allow."""
+    if p.sed is None or p.opposite_sed is None or p.direction is None:
+        return None, None
+    upper, lower = (p.sed, p.opposite_sed) if p.direction < 0 else (p.opposite_sed, p.sed)
+    if back is None or p.sed_interval is None:
+        return upper / lower, None
+    over, under = (p.sed_interval, back) if p.direction < 0 else (back, p.sed_interval)
+    return upper / lower, (over[0] / under[1], over[1] / under[0])
 
 
 def _who(report: Report) -> tuple[Column, ...]:

@@ -1,6 +1,8 @@
 """Tables of scores, and of how predictions go with them."""
 
-from sessions.analysis.scores import MeanScore, Relation
+from collections.abc import Callable
+
+from sessions.analysis.scores import MeanScore, Relation, sd_interval, slope_interval
 from sessions.exports.report_tables.cells import Cell, Column, Group, Notes, Table
 from sessions.exports.wording import NONE, correlation, digits, places, significant
 from sessions.report import Report
@@ -16,10 +18,13 @@ def score_table(report: Report) -> Table | None:
         Column("index"),
         Column("subjects"),
         Column("mean score", "0–100"),
-        Column("standard deviation"),
-        Column("95 % interval of the mean"),
+        Column("standard deviation", "0–100"),
+        Column("95 % interval of the mean", "0–100"),
     )
-    caption = "Scores: mean ± t(0.975, n − 1) s / √n, n subjects. Repeats of one subject are averaged first."
+    caption = (
+        "Scores: mean ± t(0.975, n − 1) s / √n, n subjects. Repeats of one subject are averaged first. Under the "
+        "standard deviation s: its 95 % interval by chi squared."
+    )
     return Table("table-scores", caption, columns, groups, notes.listed())
 
 
@@ -40,9 +45,17 @@ def _score_row(mean: MeanScore, notes: Notes) -> tuple[Cell, ...]:
         Cell(str(mean.index)),
         Cell(str(mean.n)),
         Cell(digits(mean.mean, 1)),
-        notes.number(mean.sd, places(1), mean.reason),
+        spread_cell(mean.sd, mean.n, places(1), mean.reason, notes),
         interval,
     )
+
+
+def spread_cell(
+    sd: float | None, n: int, shown: Callable[[float], str], reason: str | None, notes: Notes, unit: float = 1.0
+) -> Cell:
+    """Return the standard deviation of n values over its interval."""
+    ends = None if sd is None else sd_interval(sd, n)
+    return notes.estimate(sd, shown, reason, ends, unit=unit)
 
 
 def answer_tables(report: Report) -> tuple[Table, ...]:
@@ -85,7 +98,8 @@ def relation_table(report: Report) -> Table | None:
     caption = (
         f"Relation of the predicted SED ({report.model}) to scores and to the stimuli's indices. The forces are those "
         "of one subject: a case study. Intervals: Fisher's z, for rho as by Bonett and Wright (2000). p: two-sided, "
-        "counted over all orders. Last column: r when the stimulus of that index is left out."
+        "counted over all orders. Slope: of the SED on the score or index, over its t interval. Last column: r when "
+        "the stimulus of that index is left out."
     )
     return Table("table-relation", caption, columns, tuple(groups), notes.listed())
 
@@ -113,6 +127,13 @@ def _relation_row(name: str, related: Relation, notes: Notes) -> tuple[Cell, ...
         notes.number(related.spearman, correlation, related.reason),
         _rank(related, notes),
         notes.number(related.spearman_p, places(3), related.reason or "too many orders to count"),
-        notes.number(related.slope, lambda v: significant(1e6 * v, 3), related.reason),
+        notes.estimate(
+            related.slope,
+            lambda v: significant(1e6 * v, 3),
+            related.reason,
+            slope_interval(related),
+            "no line has one through two points, or through points wholly on it",
+            unit=1e6,
+        ),
         Cell(left_out),
     )
