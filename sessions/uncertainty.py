@@ -120,11 +120,15 @@ def _interval(found: Prediction, slide: Nearby | None, drawn: Drawn, scale: floa
     low, high = _ends(carried)
     felt = by["sed"]
     slopes = felt["mu"], felt["tau_max"], felt["force"] if "force" in names else None
-    forces = {
-        "normal_force": _ends(along("normal_force", found.normal_force * width)),
-        "tangential_force": _ends(along("tangential_force", found.tangential_force * width)),
-        "indentation": _ends(along("indentation", found.indentation)),
-    }
+    whole = SedInterval(
+        low,
+        high,
+        "derivatives",
+        *slopes,
+        normal_force=_ends(along("normal_force", found.normal_force * width)),
+        tangential_force=_ends(along("tangential_force", found.tangential_force * width)),
+        indentation=_ends(along("indentation", found.indentation)),
+    )
 
     def solved(which: Indices) -> Array:
         scenes = [with_loads(found.scene, dict(zip(names, draw, strict=True))) for draw in draws[which].tolist()]
@@ -134,14 +138,14 @@ def _interval(found: Prediction, slide: Nearby | None, drawn: Drawn, scale: floa
     tried = _extremes(carried, draws)
     missed = np.abs(solved(tried) - carried[tried])  # nan, and so no less, where one has no settled state
     if bool((missed <= max(MISS * (high - low), _FLAT * found.sed_ending)).all()):
-        return SedInterval(low, high, "derivatives", *slopes, **forces)
+        return whole
     some = solved(_spread_out(carried))
     lost = int(np.isnan(some).sum())
     if lost:
         reason = f"{lost} of {SAMPLES} draws of the friction have no settled state"
-        return SedInterval(None, None, "sampling", *slopes, reason=reason, **forces)
+        return replace(whole, low=None, high=None, method="sampling", reason=reason)
     low, high = np.quantile(some, _QUANTILES, method="hazen").tolist()  # each stands for the middle of its share
-    return SedInterval(low, high, "sampling", *slopes, **forces)
+    return replace(whole, low=low, high=high, method="sampling")
 
 
 def _ends(draws: Array) -> Ends:

@@ -19,7 +19,7 @@ from sessions.recording import Recording
 EXAMPLE = "daq-app analyse recordings/P07 --json"
 HEAD = ["trial", "onset [s]", "steady [s]", "mu static", "mu dynamic", "mu max", "tau_max [kPa]", "speed [mm/s]", "way"]
 INTERVALS = ["trial", "mu static", "mu dynamic", "mu max", "tau_max [kPa]", "speed [mm/s]"]
-COURSES = ["trial", "N [N]", "T [N]", "heading [°]", "same way", "break-away [s]", "slide onset [s]"]
+COURSES = ["trial", "N [N]", "T [N]", "heading [°]", "same way", "onset [s]", "break-away [s]", "slide onset [s]"]
 WAYS = {1: "p → d", -1: "d → p", None: "–"}
 
 
@@ -98,7 +98,7 @@ def _row(found: StrokeIntervals) -> list[str]:
 def _course(found: StrokeIntervals) -> list[str]:
     share = "–" if found.direction_agrees is None else f"{100 * found.direction_agrees:.3g} %"
     forces = map(_ends, (found.normal_force, found.tangential_force))
-    instants = (_ends(pair, 5) for pair in (found.break_away, found.slide_onset))
+    instants = (_ends(pair, 5) for pair in (found.onset, found.break_away, found.slide_onset))
     trial = "–" if found.trial is None else str(found.trial)
     return [trial, *forces, _ends(found.heading), share, *instants]
 

@@ -68,18 +68,18 @@ def _scores(study: StudyFindings) -> Table:
                 Cell(str(mean.index)),
                 Cell(str(mean.n)),
                 Cell(digits(mean.mean, 1)),
-                spread_cell(mean.sd, mean.n, lambda v: digits(v, 1), mean.reason, notes),
                 _of_scores(mean, notes),
                 interval(None, None, 1) if inner is None else interval(inner.low, inner.high, 1),
+                spread_cell(mean.sd, mean.n, lambda v: digits(v, 1), mean.reason, notes),
             )
 
     columns = (
         Column("index"),
         Column("subjects"),
         Column("mean score", POINTS),
-        Column("standard deviation", POINTS),
         Column("95 % interval of the mean", POINTS),
         Column("within subjects", POINTS),
+        Column("standard deviation", POINTS),
     )
     complete = ", ".join(f"{one.within[0].n} for {one.descriptor}" for one in study.descriptors if one.within)
     caption = (

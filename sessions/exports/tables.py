@@ -22,6 +22,10 @@ _PAIRS = {
     "tau_max_interval": ("low", "high"),
     "sed_interval": ("low", "high"),
     "opposite_sed_interval": ("low", "high"),
+    "normal_force_interval": ("low", "high"),
+    "tangential_force_interval": ("low", "high"),
+    "indentation_interval": ("low", "high"),
+    "matching_depth_interval": ("low", "high"),
     "mu_dynamic_interval": ("low", "high"),
 } | {f"{name}_bootstrap": ("low", "high") for name in NUMBERS}
 
@@ -79,6 +83,7 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
     rows = [{k: v for k, v in row.items() if k not in _OTHERWISE_TOLD} for row in prediction["trials"]]
     for row, told in zip(rows, prediction["trials"], strict=True):
         row |= _sed_interval("sed", told.get("interval")) | _sed_interval("opposite_sed", told.get("opposite_interval"))
+        row |= _force_intervals(told.get("interval"))
         row |= made_with(prediction, told)
     predicted = _of("predictions", "what the finite-element finger predicts for each trial", rows, _PREDICTION)
     otherwise = [
@@ -87,6 +92,8 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
             **one["variant"],
             **{k: v for k, v in one.items() if k not in ("variant", "interval")},
             **_sed_interval("sed", one.get("interval")),
+            **_force_intervals(one.get("interval")),
+            "indentation_interval": None if one.get("interval") is None else one["interval"]["indentation"],
         }
         for row in prediction["trials"]
         for one in row.get("alternatives", ())
@@ -103,6 +110,11 @@ def _sed_interval(name: str, told: Mapping[str, Any] | None) -> dict[str, Any]:
         return {}
     ends = None if told["low"] is None else (told["low"], told["high"])
     return {f"{name}_interval": ends, f"{name}_interval_by": told["method"] or told["reason"]}
+
+
+def _force_intervals(told: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return the columns of the intervals of a state's forces, and of its depth where that was found."""
+    return {} if told is None else {f"{name}_interval": told[name] for name in ("normal_force", "tangential_force")}
 
 
 def trials(recording: Recording) -> Table:
@@ -275,6 +287,7 @@ _STROKE = {
             "peak_normal": "N",
             "peak_tangential": "N",
             "heading": "deg",
+            "onset": "s",
             "break_away": "s",
             "slide_onset": "s",
         }.items()
@@ -334,6 +347,12 @@ _POSITION = {
     "instant": ("s", "session clock"),
     "position": ("", "on the line, 0 to 100"),
 }
+_FORCES = {
+    "normal_force_error": ("", "relative, estimated by the solver, of normal_force"),
+    "tangential_force_error": ("", "relative, estimated by the solver, of tangential_force"),
+    "normal_force_interval": ("N", "95 % interval of normal_force that the uncertainty of friction makes"),
+    "tangential_force_interval": ("N", "95 % interval of tangential_force that the uncertainty of friction makes"),
+}
 _ALTERNATIVE = {
     "trial": ("", "number of the trial"),
     "kinematics": ("", "small or finite strain"),
@@ -345,6 +364,9 @@ _ALTERNATIVE = {
     "error_estimate": ("", "relative, of sed"),
     "normal_force": ("N", "the model's, times the finger's width"),
     "tangential_force": ("N", "likewise"),
+    **_FORCES,
+    "indentation_error": ("", "relative, estimated by the solver, of a depth that was found"),
+    "indentation_interval": ("mm", "95 % interval that friction, and the force, make of a depth that was found"),
     "reason": ("", "why there is no number"),
     "doubt": ("", "why the numbers are not to be believed: the model was driven beyond its range"),
     "traction": ("MPa", "greatest friction traction on the skin; a tau_max above it bounds nothing"),
@@ -382,8 +404,12 @@ _PREDICTION = {
     "tangential_force": ("N", "the same times the finger's width"),
     "measured_normal": ("N", "mean over the steady window"),
     "measured_tangential": ("N", "mean over the steady window"),
+    **_FORCES,
     "matching_depth": ("mm", "indentation at which the model presses as was measured"),
+    "matching_depth_error": ("", "relative, estimated by the solver; none where found on a rough mesh"),
+    "matching_depth_interval": ("mm", "95 % interval that friction and the measured force make of it"),
     "opposite_sed": ("MPa", "slid the other way"),
+    "opposite_error": ("", "relative, of opposite_sed"),
     "wall_s": ("", "time the solve took, in s"),
     **MADE_WITH,
     "reasons": ("", "for each number left out, why"),

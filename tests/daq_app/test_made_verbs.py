@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from examples import SCENE
+from page_numbers import estimates
 from report_session import record
 
 from daq_app.cli import run
@@ -55,6 +56,18 @@ def reported(two, tmp_path_factory):
     assert run(["predict", str(session), *words, "--afferent", "--afferent-set", "static_gain=30"]) == 0
     assert run(["report", str(session)]) == 0
     return session
+
+
+def test_every_number_of_a_reported_session_has_a_unit_and_an_interval(reported):
+    found = list(estimates((reported / "report.html").read_text(encoding="utf-8")))
+    assert len(found) > 50
+    assert [place for place, unit, _, _ in found if not unit] == []
+    # One subject gave the scores, and with tau_max as printed no trial is solved under the measured force.
+    without = {(place.split(",")[1].strip(), why.split(";")[0]) for place, _, interval, why in found if not interval}
+    assert without == {
+        ("mean score", "one subject alone has no interval"),
+        ("depth to match", "no interval: found on a rough mesh"),
+    }
 
 
 def printed(capsys):
@@ -271,7 +284,9 @@ def test_the_afferent_stays_with_the_prediction_and_what_is_not_asked_for_again_
     capsys.readouterr()
     run(["predict", str(small), "--beside", "none"])
     assert "intervals of the SED (--intervals)" in capsys.readouterr().err
-    assert json.loads((small / "prediction.json").read_text())["afferent"] == shown
+    kept = json.loads((small / "prediction.json").read_text())["afferent"]
+    assert (kept["settings"], kept["reference_sed"]) == (shown["settings"], shown["reference_sed"])
+    assert [one["rate"] for one in kept["trials"]] == [one["rate"] for one in shown["trials"]]
 
 
 def test_a_prediction_made_with_another_calibration_error_is_named(small, capsys):

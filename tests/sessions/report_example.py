@@ -21,6 +21,7 @@ from sessions.report import (
     StrokeFinding,
     Trace,
 )
+from sessions.sed_interval import SedInterval
 
 # The published Tables 1 and 2, and SEDs of the small-strain reference where it has them, else between its neighbours.
 TABLES = {
@@ -140,7 +141,25 @@ def stroke(number, descriptor, index):
             **({"speed": "the centre of pressure moves in steps as large as the stroke"} if number == 7 else {}),
         },
         trace=trace(mu, speed, onset),
-        bootstrap={} if number == 7 else {"mu_dynamic": (mu * 0.98, mu * 1.02), "tau_max": (tau * 0.97, tau * 1.03)},
+        bootstrap={}
+        if number == 7
+        else {
+            "mu_static": (mu * 1.02, mu * 1.06),
+            "mu_dynamic": (mu * 0.98, mu * 1.02),
+            "mu_max": (mu * 1.0, mu * 1.06),
+            "tau_max": (tau * 0.97, tau * 1.03),
+            "speed": (speed * 1.0, speed * 1.05),
+            "normal_force": (3.0, 3.2),
+            "tangential_force": (3.0 * mu, 3.2 * mu),
+            "heading": (1.1, 1.3),
+            "onset": (onset - 0.005, onset),
+            "break_away": (onset + 0.48, onset + 0.52),
+            "slide_onset": (onset + 0.5, onset + 0.56),
+        },
+        break_away=onset + 0.5 if sticky else None,
+        slide_onset=onset + 0.53,
+        heading=1.2,
+        direction_agrees=1.0,
     )
 
 
@@ -176,11 +195,25 @@ def prediction(number, descriptor, index):
         interval_by="derivatives",
         peak_rate=34.5,
         settled_rate=22.6,
+        peak_rate_interval=(34.1, 34.9),
+        settled_rate_interval=(22.3, 22.9),
+        opposite_interval=SedInterval(0.69 * sed, 0.71 * sed, "sampling"),
+        opposite_error=0.002,
+        normal_force_error=0.002,
+        tangential_force_error=0.002,
+        matching_depth_error=0.002,
+        normal_force_interval=(2.9, 3.1),
+        tangential_force_interval=(1.9, 2.1),
+        matching_depth_interval=(1.88, 1.97),
         alternatives=tuple(
-            Alternative(variant, tau, DEPTH[descriptor], *((sed, 0.001) if small else (None, None)), 3.0, 2.0, why)
+            Alternative(
+                variant, tau, DEPTH[descriptor], *((sed, 0.001) if small else (None, None)), 3.0, 2.0, why, 0.01, held
+            )
             for variant in variants("both")
             for small in [variant.kinematics == "small"]
             for why in ["" if small else "there is no settled sliding"]
+            for ends in [((2.9, 3.1), (1.9, 2.1), (1.9, 2.1))]  # of N, T and depth
+            for held in [SedInterval(0.99 * sed, 1.01 * sed, "derivatives", 0.1, 0.1, None, "", *ends)]
         ),
     )
 

@@ -69,6 +69,8 @@ def _full(made):
             sed_high=1.03 * row.sed,
             sed_interval="by derivatives",
             normal_force=2.5,
+            normal_force_low=2.4,
+            normal_force_high=2.7,
             error_estimate=0.002,
             model_normal_force=2.1,
             matching_depth=2.2,

@@ -12,6 +12,7 @@ from browser import CHROMIUM, FLAGS, PAPER_HEIGHT, opened
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
+from page_numbers import estimates
 from report_example import TABLES, example
 from study_example import study
 
@@ -288,6 +289,27 @@ def test_the_numbers_of_a_picture_are_on_the_page_itself(made, drawn):
 @pytest.fixture(scope="module", params=["session", "study"])
 def text(request, made):
     return made if request.param == "session" else study_page(study(), "example")
+
+
+def test_every_number_of_a_table_has_a_unit_and_an_interval_or_says_why_it_has_none(text):
+    found = list(estimates(text))
+    assert [place for place, unit, _, _ in found if not unit] == []
+    assert [place for place, _, interval, why in found if not interval and not why] == []
+    without = [(place, why) for place, _, interval, why in found if not interval]
+    assert {place for place, why in without if why != "no interval of a perfect rho" and ", 7 " not in place} == set()
+    assert len(without) < 0.1 * len(found)  # those of the one stroke with too few readings, the seventh
+    assert sum(bool(interval) for _, _, interval, _ in found) > 100
+
+
+def test_a_number_without_a_unit_or_an_interval_is_found_out():
+    bad = (
+        '<table class="data" id="t"><caption>1</caption><tr><th>trial</th><th>µ</th><th>N<small>[N]</small></th></tr>'
+        '<tr><td>7</td><td>0.5<span class="ends">0.4 to 0.6</span></td><td>2.0</td></tr></table>'
+    )
+    assert list(estimates(bad)) == [
+        ("t, µ, 7 0.5 2.0: 0.5", "", "0.4 to 0.6", ""),
+        ("t, N, 7 0.5 2.0: 2.0", "[N]", "", ""),
+    ]
 
 
 @pytest.fixture(scope="module")

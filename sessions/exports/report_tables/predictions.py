@@ -245,7 +245,7 @@ def force_table(report: Report) -> Table | None:
     return Table("table-forces", caption, columns, groups, notes.listed())
 
 
-_ROUGH = "it was found on a rough mesh, for the trial was not solved under the force measured (--beside small)"
+_ROUGH = "found on a rough mesh; under the measured force trials are solved with tau_max computed (--beside small)"
 
 
 def direction_table(report: Report) -> Table | None:

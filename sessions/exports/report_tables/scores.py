@@ -18,8 +18,8 @@ def score_table(report: Report) -> Table | None:
         Column("index"),
         Column("subjects"),
         Column("mean score", "0–100"),
-        Column("standard deviation", "0–100"),
         Column("95 % interval of the mean", "0–100"),
+        Column("standard deviation", "0–100"),
     )
     caption = (
         "Scores: mean ± t(0.975, n − 1) s / √n, n subjects. Repeats of one subject are averaged first. Under the "
@@ -45,8 +45,8 @@ def _score_row(mean: MeanScore, notes: Notes) -> tuple[Cell, ...]:
         Cell(str(mean.index)),
         Cell(str(mean.n)),
         Cell(digits(mean.mean, 1)),
-        spread_cell(mean.sd, mean.n, places(1), mean.reason, notes),
         interval,
+        spread_cell(mean.sd, mean.n, places(1), mean.reason, notes),
     )
 
 

@@ -29,7 +29,6 @@ def stroke_table(report: Report) -> Table | None:
     planned = any(stroke.trial is not None for stroke in report.strokes)
     columns = (
         *_who(planned=planned),
-        Column("onset", "s"),
         Column("µ static", "1"),
         Column("µ dynamic", "1"),
         Column("µ maximum", "1"),
@@ -47,7 +46,6 @@ def stroke_table(report: Report) -> Table | None:
         error = stroke.speed_error
         return (
             *_named(stroke, notes, planned=planned),
-            cell("onset", places(3)),
             cell("mu_static", places(3)),
             cell("mu_dynamic", lambda v: with_error(v, half, 3), places(3)),
             cell("mu_max", places(3)),
@@ -60,16 +58,14 @@ def stroke_table(report: Report) -> Table | None:
         )
 
     groups = grouped(report, report.strokes, lambda s: s.experiment, row)
-    kind = f"Under each number: {report.interval_kind}. " if report.interval_kind else ""
-    of_onset = report.interval_kinds.get("onset")
-    onset = f" Interval of the onset: {of_onset}." if of_onset else ""
+    kind = f" Under each number: {report.interval_kind}." if report.interval_kind else ""
     caption = (
         "Strokes. µ dynamic: mean over the steady window (± half its 95 % t interval, noise and zero alone); µ static: "
         "height of the static peak; µ maximum: greatest above the force floor; τ max: greatest tangential force over "
-        "the contact area, which is taken as given; speed: slope of the centre of pressure (± its standard error). "
-        f"Onset: where the normal force leaves its noise. {kind}{onset}"
+        "the contact area, which is taken as given; speed: slope of the centre of pressure (± its standard error)."
+        f"{kind}"
     )
-    return Table("table-strokes", caption.strip(), columns, groups, notes.listed())
+    return Table("table-strokes", caption, columns, groups, notes.listed())
 
 
 def course_table(report: Report) -> Table | None:
@@ -84,6 +80,7 @@ def course_table(report: Report) -> Table | None:
         Column("tangential force", "N"),
         Column("heading", "°"),
         Column("agree", "1"),
+        Column("onset", "s"),
         Column("break-away", "s"),
         Column("slide onset", "s"),
     )
@@ -99,18 +96,18 @@ def course_table(report: Report) -> Table | None:
             cell("tangential_force", places(2)),
             cell("heading", places(1)),
             notes.number(stroke.direction_agrees, places(3), why),
+            cell("onset", places(3)),
             cell("break_away", places(3)),
             cell("slide_onset", places(3)),
         )
 
-    kinds = "; ".join(
-        f"{name.replace('_', ' ')}: {what}" for name, what in report.interval_kinds.items() if name != "onset"
-    )
+    kinds = "; ".join(f"{name.replace('_', ' ')}: {what}" for name, what in report.interval_kinds.items())
     caption = (
         "Forces, direction and instants of the strokes, each over its interval from the same repeats. Forces: means "
         "over the steady window. Heading: angle of the movement from +x (proximal to distal) towards +y; agree: share "
-        "of repeats with the direction told. Break-away: where T/N stops climbing. Slide onset: from when the centre "
-        f"of pressure keeps a fifth of its steady speed. What each interval holds: {kinds}."
+        "of repeats with the direction told. Onset: where N leaves its noise. Break-away: where T/N stops climbing. "
+        "Slide onset: from when the centre of pressure keeps a fifth of its steady speed. What each interval holds: "
+        f"{kinds}."
     )
     groups = grouped(report, report.strokes, lambda s: s.experiment, row)
     return Table("table-courses", caption, columns, groups, notes.listed())
