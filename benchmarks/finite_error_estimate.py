@@ -5,7 +5,8 @@ what was solved to FILE, and a run that finds a scene there does not solve it ag
 
 A scene is drawn from its number: indentation 0.5 to 2 mm, mu 0 to 0.7, contact angle 30 to 75 degrees, the stiffness of
 each tissue within 30 % of the published one, both directions; half of them with a bound of 0.005 to 0.05 MPa, which
-acts in few. With `--bounded` mu is 0.15 at least and the bound 0.003 to 0.012 MPa. The truth is the mean of three
+acts in few. With `--bounded` mu is 0.15 at least and the bound 0.003 to 0.012 MPa; with `--fingers` outline and
+receptor are drawn too, and the indentation grows with the tip (`other_finger`). The truth is the mean of three
 solves on overkill meshes whose nodes lie elsewhere, their numbers carried on to elements of no length where the cut
 meets the bone; one of them has no lines at the edges of contact, but with `--bounded`, where such a mesh is not good
 enough. A scene is counted only where none of the three is further from their mean than a third of what is tested.
@@ -26,6 +27,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.error_estimate import other_finger
 from daq_app.accuracy.methods import overkill
 from solver.climbing import MARGIN, ascended, sized
 from solver.estimate import FINENESS, coarsest_for, estimates
@@ -42,8 +44,13 @@ TOLERANCES = (0.01, 0.003, 0.001)
 SMALL = 2e-4  # relative error below which nobody minds by how much an estimate is too large
 
 
-def random_scene(number: int, *, bounded: bool = False) -> Scene:
+def random_scene(number: int, *, bounded: bool = False, fingers: bool = False) -> Scene:
     """Return the scene of this number, always the same."""
+    scene = _of_published_finger(number, bounded=bounded)
+    return other_finger(number, scene) if fingers else scene
+
+
+def _of_published_finger(number: int, *, bounded: bool) -> Scene:
     draw = np.random.default_rng([number, 28])
     usual = Materials()
     tissues = {
@@ -65,9 +72,9 @@ def going_on() -> bool:
     return False
 
 
-def measured(number: int, *, bounded: bool) -> dict[str, Any]:
-    """Return what one scene gives on all meshes, as plain data; nothing but its number where it has no state."""
-    scene = random_scene(number, bounded=bounded)
+def measured(number: int, **drawn: bool) -> dict[str, Any]:
+    """Return what one scene gives on all meshes, as plain data; nothing but how it was drawn where it has no state."""
+    scene, bounded = random_scene(number, **drawn), drawn["bounded"]
     try:
         depth = scene.loading.depth
         over = overkill(scene, Sizing(PLAIN, depth, margin=MARGIN))
@@ -81,10 +88,10 @@ def measured(number: int, *, bounded: bool) -> dict[str, Any]:
             found = compared(scene, fineness, way_up, way_up.top.finger.all_numbers(way_up.top.shape), going_on)
             meshes[f"{fineness:g}"] = [numbers[..., :3].tolist() for numbers in found[:3]]
     except SolveFailure:
-        return {"number": number, "bounded": bounded}
+        return {"number": number, **drawn}
     truth = [over.numbers.tolist() for over in solves]
     at_cut = [over.at_cut for over in solves]
-    return {"number": number, "bounded": bounded, "meshes": meshes, "truth": truth, "at_cut": at_cut}
+    return {"number": number, **drawn, "meshes": meshes, "truth": truth, "at_cut": at_cut}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,7 +108,7 @@ class Case:
         """Return the case that `measured` found."""
         solves = np.array(row["truth"])
         truth = solves.mean(axis=0)
-        scene = random_scene(row["number"], bounded=row["bounded"])
+        scene = random_scene(row["number"], bounded=row["bounded"], fingers=row["fingers"])
         return Case(scene, row["meshes"], truth, np.abs(solves / truth - 1.0).max(axis=0))
 
     def on(self, fineness: float) -> tuple[np.ndarray, np.ndarray]:
@@ -117,15 +124,16 @@ class Case:
         )
 
 
-def solved(scenes: int, first: int, keep: Path | None, *, bounded: bool) -> Iterator[dict[str, Any]]:
+def solved(scenes: int, first: int, keep: Path | None, **drawn: bool) -> Iterator[dict[str, Any]]:
     """Yield what was found of all scenes, from the file where it has them."""
-    kept: dict[tuple[int, bool], dict[str, Any]] = {}
+    kept: dict[tuple[int, ...], dict[str, Any]] = {}
     if keep is not None and keep.exists():
-        kept = {(row["number"], row["bounded"]): row for row in map(json.loads, keep.read_text().splitlines())}
+        rows = map(json.loads, keep.read_text().splitlines())
+        kept = {(row["number"], *(row[name] for name in drawn)): row for row in rows}
     for number in range(first, first + scenes):
-        row = kept.get((number, bounded))
+        row = kept.get((number, *drawn.values()))
         if row is None:
-            row = measured(number, bounded=bounded)
+            row = measured(number, **drawn)
             if keep is not None:
                 with keep.open("a") as file:
                     print(json.dumps(row), file=file)
@@ -164,8 +172,9 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="number of the first scene")
     parser.add_argument("--keep", type=Path, help="file of solved scenes")
     parser.add_argument("--bounded", action="store_true", help="scenes whose traction bound acts")
+    parser.add_argument("--fingers", action="store_true", help="other fingers than the published one")
     asked = parser.parse_args()
-    rows = list(solved(asked.scenes, asked.first, asked.keep, bounded=asked.bounded))
+    rows = list(solved(asked.scenes, asked.first, asked.keep, bounded=asked.bounded, fingers=asked.fingers))
     there = [row for row in rows if "truth" in row]
     cases = [Case.of(row) for row in there if max(row["at_cut"]) < AT_CUT]
     print(f"{len(rows)} scenes, {len(rows) - len(there)} without a settled state, {len(there) - len(cases)} not known")
