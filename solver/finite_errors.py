@@ -7,7 +7,7 @@ import numpy as np
 
 from solver import finite_ends, kernels_numpy
 from solver.climbing import Ascent, Climbed, climbed
-from solver.estimate import Errors, errors
+from solver.estimate import FROM_MESHES, Errors, errors
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.finite_states import depends_on_way
 from solver.load_steps import Steps
@@ -25,14 +25,14 @@ OF_SQUEEZED = 3.5  # under other skin, of the element there squared and what det
 
 def error_estimates(
     scene: Scene, fineness: float, way_up: Ascent, numbers: Array, stop: Callable[[], bool]
-) -> tuple[Errors, Array]:
+) -> tuple[Errors, Array, float]:
     """Return how far the `numbers` (6,) (`finger.all_numbers`) of a scene may be off that was solved by `way_up`.
 
     The same scene is solved on a coarser mesh with lines at the same edges of contact. Beside the errors: its numbers
-    there (1, 6), or none where it has no state.
+    there (1, 6), or none where it has no state; and what of the SED's error meshes of all finenesses have in common.
     """
     found = compared(scene, fineness, way_up, numbers, stop)
-    return errors(scene, fineness, *found), found[1][:1]
+    return errors(scene, fineness, *found), found[1][:1], FROM_MESHES["finite"] * _squeezed(scene, way_up.top)
 
 
 def compared(
@@ -72,12 +72,16 @@ def _of_corner(scene: Scene, at: Climbed, numbers: Array, other: Array) -> Array
         part = OF_CORNER.copy()
         part[0] = OF_STIFF if stiff(scene.materials) else part[0]
         return part * change
+    return np.full(6, _squeezed(scene, at))
+
+
+def _squeezed(scene: Scene, at: Climbed) -> float:
+    """Return the same for skin that is not stiff, in all numbers: told by the first element and its least det F."""
     if scene.finger.cut == "driven" or at.at_cut is None:
-        return np.zeros(6)
+        return 0.0
     arcs = at.finger.geometry.arcs
     element = float(arcs[1] - arcs[0]) / scene.finger.tip_radius
-    fallen = max(1.0 - at.finger.least_at_cut(at.shape), 0.0)
-    return np.full(6, OF_SQUEEZED * element**2 * fallen**3)
+    return OF_SQUEEZED * element**2 * max(1.0 - at.finger.least_at_cut(at.shape), 0.0) ** 3
 
 
 def _volumes(at: Climbed) -> Array:

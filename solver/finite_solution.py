@@ -134,7 +134,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         checks["course_against_direct"] = abs(finger.sed_ending(at.shape) / sed - 1.0)
     held = scene.loading.dragged and _sticking(shape) > 0.0  # sliding, a finger may have shifted by anything
     solved = perf_counter()
-    errors, others = error_estimates(scene, fineness, way_up, numbers, stop)
+    errors, others, stays = error_estimates(scene, fineness, way_up, numbers, stop)
     estimated = perf_counter()
     model = evidence.finite_model(
         driven, force=shape.force, width=width, sticking=_sticking(shape), slide=_slide(finger, shape)
@@ -154,6 +154,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         indentation_error=errors.indentation,
         shift_error=errors.shift if held else None,
         contact_width_error=errors.width,
+        error_stays=stays,
         beside=differences.those_of(others),
         dofs=body.dofs,
         newton_iterations=shape.iterations,

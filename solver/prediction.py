@@ -79,6 +79,7 @@ class Prediction:
     indentation_error: float | None = None  # likewise of indentation; None where that was given
     shift_error: float | None = None  # estimated, of shift [mm]; None where there is none
     contact_width_error: float | None = None  # estimated, of contact_width, relative [-]
+    error_stays: float = 0.0  # part of error_estimate that meshes of all finenesses have in common
     beside: Array = field(default_factory=lambda: np.empty((0, 4)))  # SED, forces, indentation on m other meshes (m, 4)
     warnings: tuple[str, ...] = field(default=())  # one sentence each
 

@@ -19,6 +19,9 @@ from solver.stepping import March
 KNOWN = 0.03  # of a limit of friction, to which it is known
 WORTH = 0.1  # error estimate up to which a coarser mesh's number near a limit is worth more than the limit alone
 NEAR_LIMIT = "That mesh ends settled sliding at mu = {:.3g}, which is known to {:.0f} %: this state may lie beyond."
+MISSES = "The finest mesh leaves an error estimate above the tolerance asked for."
+STAYS = "Where the cut meets the bone tissue is squeezed so far that no mesh meets the tolerance asked for."
+FINEST_HAS = 0.5  # of an error that meshes have in common, the part that is there on the finest of them too
 Rough = Callable[[Prediction], None]  # told an answer before more is made of it: what there is, should work be stopped
 
 
@@ -210,11 +213,12 @@ def _refined(
             else:
                 found[i] = answer
         missed = [i not in lost and _misses(found[i]) for i in range(len(scenes))]
+        mended = [one and not _stays(found[i]) for i, one in enumerate(missed)]
         apart = [
             differences.off([one for i in together if isinstance(one := found[i], Prediction)]) for together in surfaces
         ]
         alike = {i for together, off in zip(surfaces, apart, strict=True) if off.share > TOLD for i in together}
-        finer = finer_than(scenes[0].driven(on_mesh.depth), fineness) if any(missed) or alike else []
+        finer = finer_than(scenes[0].driven(on_mesh.depth), fineness) if any(mended) or alike else []
         if not finer:
             break
         for answer in found.values():
@@ -222,12 +226,13 @@ def _refined(
                 rough(answer)
         fineness = differences.finer(finer, fineness, max((off.share for off in apart), default=0.0))
         if kind == "finite":
-            again = {scenes[i].pressed for i in todo if missed[i] or i in alike}
+            again = {scenes[i].pressed for i in todo if mended[i] or i in alike}
             todo = [i for i in todo if scenes[i].pressed in again]
     if kind == "finite":  # where a fine mesh may lose its way
         lost |= _fallen_back(scenes, found, first, on_mesh)
     of = {i: off for together, off in zip(surfaces, apart, strict=True) for i in together}
-    told = [_undone(of.get(i), misses=missed[i], lost=lost.get(i)) for i in range(len(scenes))]
+    left = [(STAYS if _stays(found[i]) else MISSES) if missed[i] else "" for i in range(len(scenes))]
+    told = [_undone(of.get(i), left[i], lost.get(i)) for i in range(len(scenes))]
     return _Refined([found[i] for i in range(len(scenes))], told, fineness)
 
 
@@ -264,7 +269,7 @@ def _stands(coarser: Answer, failure: SolveFailure) -> bool:
     return isinstance(failure, NotConverged) or coarser.error_estimate <= WORTH
 
 
-def _undone(off: Off | None, *, misses: bool, lost: SolveFailure | None) -> tuple[str, ...]:
+def _undone(off: Off | None, misses: str, lost: SolveFailure | None) -> tuple[str, ...]:
     """Return what is to be said of an answer for what the finest mesh has left undone."""
     told: list[str] = []
     if lost is not None:
@@ -272,7 +277,7 @@ def _undone(off: Off | None, *, misses: bool, lost: SolveFailure | None) -> tupl
         if lost.limit_mu is not None:
             told.append(NEAR_LIMIT.format(lost.limit_mu, 100.0 * KNOWN))
     if misses:
-        told.append("The finest mesh leaves an error estimate above the tolerance asked for.")
+        told.append(misses)
     if off is not None and off.warning:
         told.append(off.warning)
     return tuple(told)
@@ -306,3 +311,10 @@ def _misses(answer: Answer) -> bool:
     if not isinstance(answer, Prediction) or answer.scene.solve.tolerance is None:
         return False
     return answer.error_estimate > answer.scene.solve.tolerance
+
+
+def _stays(answer: Answer) -> bool:
+    """Return whether what meshes of all finenesses have in common is above the tolerance of an answer's scene."""
+    if not isinstance(answer, Prediction) or answer.scene.solve.tolerance is None:
+        return False
+    return FINEST_HAS * answer.error_stays > answer.scene.solve.tolerance

@@ -2,8 +2,9 @@
 
 The ten published surfaces, at small and at finite strain. The truth of a number is the mean of three solves on fine
 meshes: at finite strain one without lines at the edges of contact, which finds them, and two with lines there. How far
-they lie from their mean is its doubt. Nothing is shipped and nothing comes from elsewhere, so
-the truth is never older than the solver. Where a surface has no settled sliding the solver's refusal stands instead.
+they lie from their mean is its doubt. Where the free cut meets the bone each is carried on to elements of no length.
+Nothing is shipped and nothing comes from elsewhere, so the truth is never older than the solver. Where a surface has no
+settled sliding the solver's refusal stands instead.
 """
 
 from collections.abc import Callable, Iterator

@@ -250,10 +250,18 @@ def test_what_all_meshes_have_in_common_where_the_cut_meets_the_bone_is_part_of_
     estimated: list[float] = []
     for top in (way_up.top, usual):
         numbers = top.finger.all_numbers(top.shape)
-        found, _ = error_estimates(sticks, 20.0, replace(way_up, top=top), numbers, lambda: False)
+        found, *_ = error_estimates(sticks, 20.0, replace(way_up, top=top), numbers, lambda: False)
         assert numbers[0] == pytest.approx(STICKS_LEAST, rel=found.sed)
         estimated.append(found.sed)
     assert 1.3 * estimated[0] < estimated[1]
+
+
+def test_where_no_mesh_meets_a_tolerance_for_the_corner_of_the_cut_no_finer_one_is_tried():
+    squeezed = Scene(finger=Finger(contact_angle=31.0), friction=Friction(0.55), loading=Loading(1.5, "+x"))
+    found = solve(replace(squeezed, solve=Solve("finite", tolerance=0.001)))
+    assert found.error_stays > 0.002
+    assert found.dofs < 13000  # fineness 20, and not 24
+    assert "Where the cut meets the bone" in found.warnings[-1]
 
 
 # Scenes that no factor of the estimates was chosen on: the first four of 7000 and, bounded, of 8000 of
