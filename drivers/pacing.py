@@ -17,6 +17,8 @@ from drivers.rate import RateWatch
 
 GAP = 0.1  # shortest loss without a trace that is noticed [real s]
 _SETTLE = 0.05  # how long after a pause its lump may still be arriving [real s]
+_STEADY = 0.3  # records come as fast as they are made where their lateness changes by less of the time passed [-]
+_LONGEST = 1.0  # that records are kept back while they come faster or slower [real s]
 _LEAD = 1.0  # how fast times and rate follow the session's clock [rad/s]
 _SPREAD = 0.05  # how far the true rate may lie from the one told [-]
 
@@ -39,6 +41,7 @@ class Pacing:
         self._told = self._period
         self._limit = GAP * factor + 3.0 * self._period
         self._settle = _SETTLE * factor + self._period
+        self._longest = _LONGEST * factor + self._period
         self.watch = RateWatch(rate, factor, self._limit, vague=2.0 * _SPREAD)
         self._count = 0  # records that came, broken ones too
         self._sequence = 0
@@ -47,6 +50,7 @@ class Pacing:
         self._held_damaged: list[NDArray[np.int64]] = []
         self._held_since_ns = 0
         self._held_until_ns = 0
+        self._looked_ns, self._held_late = 0, 0.0  # how late they were when that was last looked at [s]
 
     def take(self, damaged: NDArray[np.int64], received_ns: int) -> Paced:
         """Place n records that arrived together, broken ones counted before each (n,), and any kept back before."""
@@ -62,12 +66,19 @@ class Pacing:
         if not self._held_damaged:
             if self._lateness(damaged, received_ns) <= self._limit:
                 return self._placed(damaged, received_ns)
-            self._held_since_ns = received_ns
+            self._held_since_ns = self._looked_ns = received_ns
+            self._held_late = self._lateness(damaged, received_ns)
         self._held_damaged.append(damaged)
         self._held_until_ns = received_ns
-        if (received_ns - self._held_since_ns) * 1e-9 < self._settle:
+        passed = (received_ns - self._looked_ns) * 1e-9
+        if passed < self._settle:
             return _NONE
-        return self.release()
+        late, before = self._lateness(np.concatenate(self._held_damaged), received_ns), self._held_late
+        self._looked_ns, self._held_late = received_ns, late
+        steady = abs(late - before) < _STEADY * passed
+        if late < 0.5 * self._limit or steady or received_ns - self._held_since_ns > self._longest * 1e9:
+            return self.release()
+        return _NONE
 
     def release(self) -> Paced:
         """Place what was kept back, as at the end of the stream."""

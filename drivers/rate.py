@@ -1,6 +1,9 @@
 """Whether a device keeps to its rate: what it has counted, held against the computer's clock."""
 
+import math
 from collections import deque
+from collections.abc import Sequence
+from itertools import pairwise
 
 WINDOW = 1.0  # of the records that arrive within, the one that waited least is taken [real s]
 COARSE, FINE = (1, 0.1), (3, 0.02)  # over so many windows, twice running, the rate is off by more than this [-]
@@ -81,6 +84,33 @@ class RateWatch:
             self.rate = self.asked if abs(found / self.asked - 1.0) < most else found
             self.found += 1
         self._vague = 0.0
+
+
+def rate_of_least_late(came: Sequence[tuple[int, int]]) -> float:
+    """Return the steady rate [Hz] at which these counts can have come [ns], each late but never early; nan of one.
+
+    That of the line below all arrivals that is highest in their middle (Moon, Skelly and Towsley 1999, Proc. INFOCOM,
+    227): as long as two of them came in time, one on either side, it is exact. At 100 Hz, the first 7 ms late and
+    the last 30:
+
+    >>> rate_of_least_late([(0, 7_000_000), (1, 10_000_000), (2, 20_000_000), (3, 30_000_000), (4, 70_000_000)])
+    100.0
+    """
+    if len(came) < 2:
+        return math.nan
+    below: list[tuple[int, int]] = []  # corners of the lower hull
+    for count, at in came:
+        while len(below) > 1 and _turns_down(below[-2], below[-1], (count, at)):
+            below.pop()
+        below.append((count, at))
+    middle = (came[0][0] + came[-1][0]) / 2.0
+    first, last = next(side for side in pairwise(below) if side[1][0] >= middle)
+    return (last[0] - first[0]) / (last[1] - first[1]) * 1e9 if last[1] > first[1] else math.nan
+
+
+def _turns_down(first: tuple[int, int], middle: tuple[int, int], last: tuple[int, int]) -> bool:
+    """Tell whether the middle point lies on or above the line between the others."""
+    return (middle[1] - first[1]) * (last[0] - first[0]) >= (last[1] - first[1]) * (middle[0] - first[0])
 
 
 def rate_words(what: str, found: float, asked: float) -> str:

@@ -2,6 +2,8 @@
 
 import contextlib
 import errno
+import os
+import select
 from typing import Literal
 from urllib.parse import unquote, urlsplit
 
@@ -25,6 +27,8 @@ def _terminal_errors() -> tuple[type[Exception], ...]:
 
 _PARITY = {"none": serial.PARITY_NONE, "even": serial.PARITY_EVEN}
 _GONE = (OSError, *_terminal_errors())  # raised when a port is pulled out; pyserial's own errors are OSErrors
+_POSIX = os.name == "posix"
+_MOST = 65536  # bytes taken at one go
 _WRITE_PATIENCE = 0.1  # for the system to take what is sent [real s]
 
 
@@ -43,7 +47,7 @@ class SerialLink:
                 parity=_PARITY[parity],
                 stopbits=serial.STOPBITS_ONE,
                 timeout=0.0,
-                write_timeout=_WRITE_PATIENCE,
+                write_timeout=0.0 if _POSIX else _WRITE_PATIENCE,
                 xonxoff=False,  # binary records may hold those very bytes
                 exclusive=True,
             )
@@ -53,9 +57,16 @@ class SerialLink:
     def send(self, data: bytes) -> None:
         """Send `data`. Raises LinkLost when the port is gone or takes nothing any more."""
         try:
-            self._port.write(data)
-        except _GONE:
+            while data:
+                if not self._takes():
+                    raise OSError
+                data = data[self._port.write(data) :]
+        except (*_GONE, ValueError):  # the latter from a port that is closed
             raise LinkLost(f"{self._where} takes no bytes any more; check that its plug is in") from None
+
+    def _takes(self) -> bool:
+        """Wait until the port takes a byte; pyserial's own time for writing runs out where this computer is busy."""
+        return not _POSIX or bool(select.select([], [self._port.fileno()], [], _WRITE_PATIENCE)[1])
 
     def receive(self, timeout: float) -> bytes | None:
         """Return what has arrived, or None when nothing came within `timeout` real seconds."""
@@ -63,9 +74,10 @@ class SerialLink:
             if timeout != self._timeout:
                 self._port.timeout = timeout
                 self._timeout = timeout
-            first = self._port.read(1)
-            waiting = self._port.in_waiting if first else 0
-            return (first + self._port.read(waiting) if waiting else first) or None
+            data = self._port.read(1)
+            while data and len(data) < _MOST and (waiting := self._port.in_waiting):  # the system shows 4 KB at a time
+                data += self._port.read(waiting)
+            return data or None
         except (*_GONE, ValueError):  # the latter from a port that vanishes while its waiting time is set
             raise LinkLost(f"{self._where} is gone; check that its plug is in") from None
 

@@ -1,5 +1,6 @@
 """A transducer that streams records without full numbers: thread, times, loss and return. Its wire is told to it."""
 
+import math
 import threading
 import time
 from collections import deque
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from drivers.clock import Clock
 from drivers.links import Link
 from drivers.pacing import Paced
-from drivers.rate import RateWatch, rate_words
+from drivers.rate import RateWatch, rate_of_least_late, rate_words
 from drivers.readings import ReadingBlock
 from drivers.records import RecordDecoder, Records
 from drivers.threaded import ThreadedTransducer
@@ -21,10 +22,13 @@ from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, Transd
 
 # All in real seconds.
 _TICK = 0.03  # longest wait for bytes, and so for a stop
-_GATHER = 0.002  # at fast rates bytes are let gather for so long before they are taken
+_GATHER = 0.002  # at fast rates bytes are let gather for so long before they are taken,
+_LUMP = 2048  # but where so many came at one go: there the computer was busy, and more may be waiting
 _FIRST = 3.0  # until a device that never sent a record is given up, beyond what bringing it to stream takes
 _QUIET = 0.3  # without a whole record, after which the device is asked to stream again
 _SILENCE = 5.0  # without a whole record, after which it is given up
+_LOOKS = 12  # at a rate that is to be measured, until two running say the same
+_ALIKE = 0.03  # rates that differ by less are said to be the same [-]
 _BACK_OFF = (0.05, 0.1, 0.2, 0.4)  # between two tries to bring it back; the last one again and again
 
 
@@ -82,25 +86,36 @@ class Conversation(Protocol):
         ...
 
 
-def measured_rate(link: Link, conversation: Conversation, clock: Clock, seconds: float) -> float:
+def measured_rate(
+    link: Link, conversation: Conversation, clock: Clock, seconds: float, stated: float = math.nan
+) -> float:
     """Return how many records a second of the session's clock come [Hz], from `seconds` of streaming [real s].
 
-    Good to a few per cent. Raises LinkLost when hardly any come, and what `conversation.begin` raises.
+    Good to a few per cent. Where it is neither the rate `stated` nor what the stream up to half a time before said, the
+    computer may have been busy, and the stream is watched for longer. Raises LinkLost when hardly any records come, and
+    what `conversation.begin` raises.
     """
     decoder = conversation.decoder()
     data: bytes | None = conversation.begin(link)
-    counted, first_ns, last_ns = 0, 0, 0
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        count = len(decoder.feed(data).status) if data else 0
-        if count:
-            last_ns = clock.now_ns()
-            first_ns, counted = (first_ns, counted + count) if first_ns else (last_ns, 0)
-        data = link.receive(_TICK)
+    came: list[tuple[int, int]] = []  # how many records so far, and when the last of them came [ns]
+    found, count = math.nan, 0
+    for look in range(_LOOKS):
+        until = time.monotonic() + seconds / 2.0
+        while True:
+            more = len(decoder.feed(data).status) if data else 0
+            if more:
+                count += more
+                came.append((count, clock.now_ns()))
+            data = link.receive(_TICK)
+            if time.monotonic() >= until:
+                break
+        before, found = found, rate_of_least_late(came)
+        if look and (abs(found / stated - 1.0) < _ALIKE or abs(found / before - 1.0) < _ALIKE):
+            break
     conversation.end(link)
-    if counted < 2 or last_ns == first_ns:
+    if math.isnan(found):
         raise LinkLost("it sends no readings when asked to stream; switch it off and on, and check the cable")
-    return counted / (last_ns - first_ns) * 1e9
+    return found
 
 
 class _Stopped(Exception):
@@ -278,7 +293,7 @@ class StreamingTransducer(ThreadedTransducer):
                 raise LinkLost(
                     f"{self._info.uri} has sent no reading for {now - self._heard:.1f} s; check its power and cable"
                 )
-            if self._gather and data:
+            if self._gather and data and len(data) < _LUMP:
                 time.sleep(self._gather)
             data = link.receive(_TICK)
 

@@ -72,6 +72,7 @@ class Bench:
         self._drift_size = limits * draw.uniform(0.3, 1.0, 6)
         self._drift_rate = 2 * np.pi / draw.uniform(*self.settings.drift_period, 6)
         self._drift_phase = draw.uniform(0.0, 2 * np.pi, 6)
+        white_noise(seed, np.zeros(1))  # the first noise loads much: now, and not in the thread that sends readings
 
     def mount(self, surface: Surface) -> None:
         """Put a stimulus on the transducer; later strokes rub on it."""

@@ -40,7 +40,7 @@ class Simulator:
     """How a simulated device is started, and what can go wrong on its wire."""
 
     start: Start
-    factor: float  # times as fast as real it can run
+    factor: float  # times as fast as real it can run on a computer that has much else to do
     tells: tuple[Kind, ...]  # faults that can happen on this wire and that a driver can tell
     hides: tuple[Kind, ...] = ()  # faults that can happen and that no driver can tell: nothing on the wire shows them
 
@@ -96,7 +96,7 @@ def _nidaq(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> Simulate
 SIMULATORS: Mapping[str, Simulator] = {
     "net-ft": Simulator(_net_ft, 10.0, (*_NETWORK, *_LINE)),
     "serial-ft": Simulator(_serial_ft, 2.0, _LINE, hides=("stall",)),
-    "digital-ft": Simulator(_digital_ft, 1.0, _LINE, hides=("stall",)),
+    "digital-ft": Simulator(_digital_ft, 0.4, _LINE, hides=("stall",)),
     "labjack-u6": Simulator(_labjack_u6, 2.0, _LINE, hides=("stall",)),
     "nidaq": Simulator(_nidaq, 1.0, ("lose", "saturate", "unplug", "reboot", "slow"), hides=("stall",)),
 }

@@ -14,7 +14,7 @@ from drivers.clock import Clock
 from simulators.bench import Bench
 from simulators.faults import Faults
 from simulators.gauges import FT32831
-from simulators.pseudo_terminal import PseudoTerminal
+from simulators.pseudo_terminal import ROOM, PseudoTerminal
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ _DEAF = 0.3  # after a jam [s]
 _START_UP = 0.2  # after power-up [s]
 _NAP = 0.005  # longest wait [real s]
 _SHORTEST_NAP = 0.001
-_BURST = 700  # packets at one go after the computer was busy
+_BURST = ROOM // 13  # packets at one go after the computer was busy: as many as are kept for a late reader
 
 
 class DigitalFtBox:

@@ -19,6 +19,7 @@ from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo
 
 # All in real seconds.
 _ANSWER = 0.15  # for one answer
+_PATIENCE = (1.0, 2.0, 4.0, 8.0)  # times that, for the answers to one request asked again
 _REST = 0.4  # for the transducer to come to itself after a jam; a published driver waits 0.5 to 1 s
 _END = 0.08  # for a jammed stream to fall silent
 _SILENT = 0.02
@@ -51,7 +52,7 @@ def open_digital_ft(address: Address, clock: Clock) -> StreamingTransducer:
         hold(link)
         stored, word = _stored(place, link), status_word(link)
         conversation = DigitalConversation(place.number, stored)
-        rate = measured_rate(link, conversation, clock, _MEASURED)
+        rate = measured_rate(link, conversation, clock, _MEASURED, wire.STREAM_RATE)
     except (LinkLost, DeviceFault) as error:
         raise type(error)(f"{address.uri}: {error}") from None
     finally:
@@ -167,7 +168,7 @@ class DigitalConversation:
                 "the transducer did not take the gains and offsets of its calibration; switch it off and on"
             )
         start, started = (wire.request(wire.START_STREAM, bytes([key])) for key in (wire.START_KEY, 1))
-        heard = _heard(link, start, started)
+        heard = _heard(link, start, started, _PATIENCE[-1] * _ANSWER)
         if started not in heard:
             raise LinkLost("the transducer does not begin to stream; switch it off and on")
         return heard.partition(started)[2]
@@ -217,9 +218,12 @@ def _done(link: Link, asked: bytes, what: str) -> None:
 
 
 def _answer(link: Link, asked: bytes, what: str) -> bytes:
-    """Return the answer to a request, asking three times. Raises LinkLost or DeviceFault when there is none."""
-    for _ in range(3):
-        answer = wire.answer_in(_heard(link, asked, b""), asked)
+    """Return the answer to a request, asking again where none comes. Raises LinkLost or DeviceFault for want of one."""
+    for times in _PATIENCE:
+        answer = wire.answer_in(_heard(link, asked, b"", times * _ANSWER), asked)
+        if times > 1.0:  # answers say not to what: one more to the same request must not be taken for another's
+            while link.receive(_ANSWER) is not None:
+                pass
         if isinstance(answer, wire.Refused):
             raise DeviceFault(f"the transducer was asked {what} and refused: {answer.reason}")
         if answer is not None:
@@ -227,16 +231,16 @@ def _answer(link: Link, asked: bytes, what: str) -> bytes:
     raise LinkLost(f"the transducer was asked {what} and did not answer; check the cable")
 
 
-def _heard(link: Link, asked: bytes, expected: bytes) -> bytes:
+def _heard(link: Link, asked: bytes, expected: bytes, patience: float = _ANSWER) -> bytes:
     """Return what comes after a request, up to an answer to it, or to the bytes expected where there are some."""
     deadline = time.monotonic() + _ANSWER
     while link.receive(0.0) and time.monotonic() < deadline:
         pass  # left over from before
     link.send(asked)
     heard = b""
-    deadline = time.monotonic() + _ANSWER
-    while time.monotonic() < deadline:
-        heard += link.receive(deadline - time.monotonic()) or b""
-        if expected in heard if expected else wire.answer_in(heard, asked) is not None:
-            break
-    return heard
+    deadline = time.monotonic() + patience
+    while True:
+        left = deadline - time.monotonic()
+        heard += link.receive(max(left, 0.0)) or b""  # also where this computer was busy until now
+        if left <= 0.0 or (expected in heard if expected else wire.answer_in(heard, asked) is not None):
+            return heard

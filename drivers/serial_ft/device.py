@@ -252,9 +252,9 @@ def _said(link: Link, request: bytes, patience: float, *, settled: bool = True) 
     link.send(request)
     said = b""
     deadline = time.monotonic() + patience
-    while time.monotonic() < deadline:
-        data = link.receive(_SETTLED)
+    while True:
+        over = time.monotonic() >= deadline
+        data = link.receive(_SETTLED)  # once more where this computer was busy until now
         said += data or b""
-        if said.rstrip().endswith(wire.PROMPT) and (data is None or not settled):
-            break
-    return said
+        if over or (said.rstrip().endswith(wire.PROMPT) and (data is None or not settled)):
+            return said

@@ -172,13 +172,15 @@ def undisturbed_course(name, folder):
             transducer, bench, now = opened.transducer, opened.bench or device.bench, opened.bench_now or device.now
             course.info, course.bench = transducer.info, bench
             bench.mount(paper_surfaces()["stickiness", 80])
+            begun = now()
             transducer.start()
-            stroke = Stroke(7.81, 17.5, approach=0.3, stick=0.3, slide=1.0)
+            stroke = Stroke(7.81, 17.5, approach=0.2, stick=0.2, slide=0.8)
             course.planted = bench.begin_stroke(stroke, now() + 0.2 * clock.factor)
             course.found_in_use = identified(name, device.uri)
             blocks, newest = [], 0.0
+            far = 0.5 if name == "replay" else course.planted.end - begun  # readings count from the first of them
             try:
-                while (now() < course.planted.end + 0.2) if name != "replay" else newest < 0.5:
+                while newest < far:
                     blocks.append(transducer.read(0.1))
                     newest = max([newest, *blocks[-1].time[-1:].tolist()])
             finally:
@@ -193,7 +195,7 @@ def undisturbed_course(name, folder):
                 stopped(transducer, course)
                 course.blocks.append(ReadingBlock.joined([again, transducer.read(0.0)]))
                 course.healths.append(transducer.health)
-                while min(course.stops) >= STOPS_WITHIN and len(course.stops) < AGAIN:  # the machine was busy just then
+                while min(course.stops) >= STOPS_WITHIN and len(course.stops) < 4 * AGAIN:  # a busy machine
                     transducer.start()
                     stopped(transducer, course)
             transducer.stop()
@@ -360,10 +362,10 @@ def test_an_undisturbed_stream_is_whole(undisturbed, name):
     if name != "replay":
         assert health.lost == 0
         assert np.diff(block.sequence).tolist() == [1] * (len(block) - 1)
-        passed = (block.received_ns[-1] - block.received_ns[0]) * 1e-9
-        assert block.time[-1] == pytest.approx(
-            passed, rel=0.05, abs=0.1 + 0.1 * simulator(name).factor
-        )  # both may have come late
+        late = (block.received_ns - block.received_ns[0]) * 1e-9 - block.time
+        half = len(late) // 2
+        apart = late[half:].min() - late[:half].min()  # by readings that waited least: the others came late
+        assert abs(apart) < 0.05 * block.time[-1] + 0.1 * simulator(name).factor
     assert np.all(np.diff(block.time) > 0.0)
     assert np.all(np.diff(block.received_ns) >= 0)
 

@@ -61,6 +61,19 @@ def test_a_pause_followed_by_the_lump_that_was_kept_back_is_no_loss():
     np.testing.assert_allclose(time, made, atol=0.07)  # half of the lump came late by GAP
 
 
+def test_a_lump_that_a_busy_computer_hands_over_bit_by_bit_is_no_loss_either():
+    rate = 7000.0
+    made = np.arange(round(rate * 4)) / rate
+    slow = (made > 2.0) & (made < 3.0)
+    handed = np.where(slow, 2.5 + (made - 2.0) * 0.5, made)  # half a second of nothing, then twice as fast
+    times, counts = np.unique(np.ceil(handed / 0.01) * 0.01, return_counts=True)
+    pacing = Pacing(rate)
+    sequence, time = paced(pacing, zip(times.tolist(), counts.tolist(), strict=True))
+    assert pacing.lost == 0
+    np.testing.assert_array_equal(sequence, np.arange(1, len(made) + 1))
+    assert np.all(np.diff(time) > 0.0)
+
+
 def test_broken_records_take_their_numbers_with_them():
     pacing = Pacing(100.0)
     first = pacing.take(np.array([3, 0]), START)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from drivers.pacing import Pacing
-from drivers.rate import RateWatch, rate_words
+from drivers.rate import RateWatch, rate_of_least_late, rate_words
 
 START = 7.0  # [s]
 
@@ -93,3 +93,17 @@ def test_a_line_without_numbers_is_followed_at_its_new_rate(to):
 
 def test_words_name_both_rates():
     assert rate_words("its clock runs", 6510.44, 7000.0) == "its clock runs at 6510 Hz, not at 7000 Hz"
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_rate_of_a_moment_is_exact_where_two_came_in_time_however_late_the_others(seed):
+    draw = np.random.default_rng(seed)
+    waited = draw.exponential(0.1, 40)
+    waited[[draw.integers(0, 10), draw.integers(30, 40)]] = 0.0
+    counted = np.cumsum(draw.integers(1, 60, 40))
+    came = zip(counted.tolist(), np.rint((counted / 250.0 + waited) * 1e9).astype(int).tolist(), strict=True)
+    assert rate_of_least_late(list(came)) == pytest.approx(250.0, rel=1e-8)
+
+
+def test_of_fewer_than_two_arrivals_there_is_no_rate():
+    assert np.isnan([rate_of_least_late([]), rate_of_least_late([(4, 10)]), rate_of_least_late([(4, 9), (7, 9)])]).all()

@@ -1,4 +1,7 @@
 import os
+import time
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import serial
@@ -6,6 +9,8 @@ import serial
 from drivers import serial_link
 from drivers.address import parse_address
 from drivers.clock import RealClock
+from drivers.digital_ft import device as digital_ft
+from drivers.digital_ft import wire
 from drivers.digital_ft.device import open_digital_ft
 from drivers.serial_ft.device import open_serial_ft
 from drivers.serial_link import SerialLink, port_of
@@ -34,6 +39,9 @@ def stand_in(monkeypatch):
         def __init__(self, *arguments, **settings):
             opened.append((arguments, settings))
 
+        def fileno(self):
+            return nowhere.fileno()
+
         def write(self, data):
             return len(data)
 
@@ -44,7 +52,8 @@ def stand_in(monkeypatch):
             self.is_open = False
 
     monkeypatch.setattr(serial_link.serial, "Serial", Port)
-    return opened
+    with Path(os.devnull).open("wb") as nowhere:
+        yield opened
 
 
 def test_the_rs485_transducer_is_opened_with_its_own_line_settings(stand_in):
@@ -64,6 +73,38 @@ def test_the_controller_is_opened_without_parity_at_each_rate_it_might_have(stan
         open_serial_ft(parse_address("serial-ft:///dev/ttyUSB0?counts_per_N=20&counts_per_Nm=333.33"), RealClock())
     assert [arguments[1] for arguments, _ in stand_in][:3] == [38400, 9600, 115200]
     assert {settings["parity"] for _, settings in stand_in} == {serial.PARITY_NONE}
+
+
+@needs_terminals
+def test_a_computer_busy_while_it_sends_has_sent_all_the_same(terminal, monkeypatch):
+    import serial.serialposix
+
+    def late(*given):
+        time.sleep(1.5 * serial_link._WRITE_PATIENCE)
+        return os.write(*given)
+
+    link = SerialLink(terminal.path, 38400)
+    monkeypatch.setattr(serial.serialposix, "os", SimpleNamespace(**{**vars(os), "write": late}))
+    link.send(b"asked")
+    monkeypatch.undo()
+    assert terminal.heard(1.0) == b"asked"
+    link.close()
+
+
+def test_an_answer_that_waited_for_a_busy_computer_is_heard():
+    class Busy:
+        def __init__(self):
+            self.comes = [None, None, wire.request(0x46, b"\x01")]  # nothing left over; none in time; there after all
+
+        def send(self, data):
+            pass
+
+        def receive(self, timeout):
+            if timeout > 0.0:
+                time.sleep(timeout + 0.01)
+            return self.comes.pop(0)
+
+    assert digital_ft._heard(Busy(), b"", wire.request(0x46, b"\x01")) == wire.request(0x46, b"\x01")
 
 
 @needs_terminals
