@@ -176,7 +176,12 @@ def main() -> None:
     asked = parser.parse_args()
     rows = list(solved(asked.scenes, asked.first, asked.keep, bounded=asked.bounded, fingers=asked.fingers))
     there = [row for row in rows if "truth" in row]
-    cases = [Case.of(row) for row in there if max(row["at_cut"]) < AT_CUT]
+    every = [Case.of(row) for row in there]
+    cases = [
+        case
+        for case, row in zip(every, there, strict=True)
+        if case.scene.loading.direction < 0 or max(row["at_cut"]) < AT_CUT
+    ]
     print(f"{len(rows)} scenes, {len(rows) - len(there)} without a settled state, {len(there) - len(cases)} not known")
     report(cases)
 
