@@ -353,7 +353,7 @@ class MainWindow(QMainWindow):
         middle.addLayout(row)
         body = QHBoxLayout()
         body.setSpacing(GRID)
-        self._left.setFixedWidth(round(300 * min(self._scale, 1.4)))
+        self._left.setFixedWidth(round(316 * min(self._scale, 1.4)))
         self._left.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
         self.bench.setFixedWidth(round(290 * min(self._scale, 1.4)))
         body.addWidget(self._left)

@@ -22,11 +22,11 @@ def test_a_killed_run_is_resumed_at_the_same_trial_on_the_same_bench_only_and_en
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    for _ in range(400):
+    kept = False
+    while not kept and process.poll() is None:
         time.sleep(0.05)
         with suppress(RecordingError):  # not begun yet
-            if any(event.kind == "take_kept" for event in Recording.open(folder).events):
-                break
+            kept = any(event.kind == "take_kept" for event in Recording.open(folder).events)
     process.send_signal(signal.SIGKILL)
     process.wait()
     while (before := Recording.open(folder)).end is None:  # the recorder waits for the lift

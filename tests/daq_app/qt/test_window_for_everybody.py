@@ -105,6 +105,16 @@ def test_the_window_fits_the_screen_and_nothing_is_laid_over_anything_else(drive
     window.resize(1440, 900)
 
 
+def test_no_button_beside_the_plan_cuts_its_words_off(driver):
+    course, before = driver.window.course, driver.window.course.end.text()
+    course.end.setText("New Ctrl+N")  # once the session has ended, the longest it says
+    course.ensurePolished()
+    edges = course.layout().contentsMargins()
+    wanted = course._bottom.widget(0).layout().sizeHint().width() + edges.left() + edges.right()
+    assert wanted <= driver.window._left.width()
+    course.end.setText(before)
+
+
 def test_below_1366_pixels_the_bench_folds_and_a_key_unfolds_it(driver):
     window = driver.window
     window.resize(1200, 800)
