@@ -15,6 +15,7 @@ from sessions.analysis.bootstrap import BootstrapSettings, drawn_from, intervals
 from sessions.blinding import revealed
 from sessions.decisions import Decisions
 from sessions.gain_error import checked_gain_error, gain_error_set, set_gain_error
+from sessions.kept_shape import check_analysis, check_prediction
 from sessions.plan import SessionPlan
 from sessions.prediction import PredictionOptions, Progress, SessionPrediction, predict
 from sessions.recording import Recording, RecordingError
@@ -27,7 +28,6 @@ from sessions.visits import force_visit
 
 ANALYSIS = "analysis.json"
 PREDICTION = "prediction.json"
-_PARTS = {ANALYSIS: ("strokes", "friction", "flaws"), PREDICTION: ("trials",)}  # without which one is damaged
 
 
 def analysed(
@@ -102,18 +102,17 @@ def kept(folder: Path, name: str) -> dict[str, Any] | None:
 
     Raises RecordingError where it is damaged: what it holds, or which verb makes it anew.
     """
+    verb = "analyse" if name == ANALYSIS else "predict"
     try:
         document = load_derived(folder, name)
         if document is not None:
-            lacking = [part for part in _PARTS[name] if not isinstance(document.get(part), list)]
-            if lacking:
-                raise SettingsError(f"it holds no {lacking[0]}")
+            (check_analysis if name == ANALYSIS else check_prediction)(document)
             settings_of(document)
-            bootstrap_of(document)
-            from_table(document.get("options", {}), PredictionOptions, name)
             _afferent_of(document)
+    except RecordingError as damaged:
+        told = str(damaged).replace("make it anew from the recording", f"'daq-app {verb}' makes it anew")
+        raise RecordingError(told) from damaged
     except (SettingsError, AttributeError, TypeError) as damaged:
-        verb = "analyse" if name == ANALYSIS else "predict"
         why = (
             damaged if isinstance(damaged, SettingsError) else "its parts are not of the kinds that this program writes"
         )

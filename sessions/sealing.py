@@ -9,7 +9,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, cast
 
 from sessions.blinding import UNBLINDING
 from sessions.recording import Recording, RecordingError
@@ -65,7 +65,10 @@ def sealed_sentence(recording: Recording, predicted: Sequence[Mapping[str, Any]]
         return f"A seal of predictions is there, but {SEAL} is damaged and proves nothing; restore a copy of it."
     if seal is None:
         return "The predictions were made after the scores had been given, and had not been sealed before."
-    numbers: list[dict[str, Any]] = seal.get("numbers") or []
+    held: Any = seal.get("numbers")
+    if not isinstance(held, list) or not all(isinstance(row, dict) for row in cast("list[object]", held)):
+        return f"A seal of predictions is there, but {SEAL} is damaged and proves nothing; restore a copy of it."
+    numbers = cast("list[dict[str, Any]]", held)
     sha256 = str(seal.get("sha256"))
     if digest(numbers) != sha256:
         return f"A seal of predictions is there, but its numbers are not those of its SHA-256: {SEAL} was changed."
@@ -88,7 +91,8 @@ def _how_blind(recording: Recording, *, blinded: bool) -> str:
     if opened is None:
         return "while the key of the stimuli was sealed, as it still is"
     content = (recording.folder / SEAL).read_bytes()
-    if opened.get("made_before", {}).get(SEAL) != hashlib.sha256(content).hexdigest():
+    before: Any = opened.get("made_before")
+    if not isinstance(before, dict) or cast("dict[str, Any]", before).get(SEAL) != hashlib.sha256(content).hexdigest():
         return "but the record of unblinding does not hold this seal: it was made or changed after the key was opened"
     return f"while the key of the stimuli was sealed; it was opened on {opened.get('unblinded_utc')}"
 

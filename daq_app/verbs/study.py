@@ -21,6 +21,7 @@ from daq_app.pooling import Shelf, visits
 from sessions.analysis.area import FIXED
 from sessions.pooling.exclusions import exclusions_in
 from sessions.pooling.findings import UNITS, StudyFindings
+from sessions.pooling.planted import checked_planted
 from sessions.pooling.pooled import pooled
 from sessions.pooling.visit import VisitOptions
 from sessions.prediction import PredictionOptions
@@ -105,9 +106,8 @@ def _planted(folder: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        found: dict[str, Any] = json.loads(path.read_bytes())
-        found["people"]
-    except (ValueError, KeyError, TypeError) as damaged:
+        found = checked_planted(json.loads(path.read_bytes()))
+    except ValueError as damaged:
         raise RecordingError(f"{path} is damaged; delete it to pool the study without what was planted") from damaged
     return found
 

@@ -2,8 +2,9 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
+import msgspec
 import numpy as np
 
 from sessions.analysis.scores import reversed_subjects
@@ -25,6 +26,58 @@ from sessions.pooling.findings import (
     Recovered,
 )
 from sessions.pooling.visit import Visit, scores_of
+
+
+class _Score(msgspec.Struct):
+    gain: float
+    drift: float
+    carry_over: float
+    friction: dict[str, float] = {}
+
+
+class _People(msgspec.Struct):
+    gain_spread: float
+    offset_spread: float
+    judgement_noise: float
+    moisture: float
+    friction_weight: float = 0.0
+
+
+class _Relation(msgspec.Struct):
+    r: float
+    slope: float
+
+
+class _Stroke(msgspec.Struct):
+    subject: str
+    trial: int
+    mu: float
+
+
+class _Spoilt(msgspec.Struct):
+    expected: str
+    lost: int = 0
+    frozen: int = 0
+    light: int = 0
+    unanswered: int = 0
+    aborted: int = 0
+    reversed: bool = False
+
+
+class _Planted(msgspec.Struct):
+    score: _Score
+    people: _People
+    strokes: list[_Stroke]
+    calibration_sd: float = 0.0
+    relation: dict[str, _Relation] = {}
+    spoilt: dict[str, _Spoilt] = {}
+    seed: int | None = None
+
+
+def checked_planted(planted: object) -> dict[str, Any]:
+    """Return what was planted in a study, as its file holds it. Raises ValueError where it is nothing of the kind."""
+    msgspec.convert(planted, _Planted)
+    return cast("dict[str, Any]", planted)
 
 
 def recovered(found: Sequence[DescriptorFindings], planted: Mapping[str, Any]) -> tuple[Recovered, ...]:
@@ -106,6 +159,9 @@ def found_flaws(
             found.append(PlantedFlaw(session, told["expected"], session in failed))
             continue
         rows = {row.trial: row for row in visit.rows}
+        if any(told.get(name) and told[name] not in rows for name in (*_FLAWS, "unanswered", "aborted")):
+            found.append(PlantedFlaw(session, told["expected"], found=False))  # a trial that the session does not have
+            continue
         seen = [flaw in rows[told[name]].flaws for name, flaw in _FLAWS.items() if told.get(name)]
         seen += [rows[told["unanswered"]].score is None] if told.get("unanswered") else []
         seen += [rows[told["aborted"]].outcome == "open" and not visit.complete] if told.get("aborted") else []

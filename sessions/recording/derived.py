@@ -39,12 +39,16 @@ def load_derived(folder: Path, name: str) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        found = json.loads(path.read_bytes())
-    except ValueError as error:
+        found = json.loads(path.read_bytes(), parse_constant=_no_number)
+    except (ValueError, RecursionError) as error:
         raise RecordingError(f"{path} is damaged ({error}); make it anew from the recording") from error
     if not isinstance(found, dict):
         raise RecordingError(f"{path} is damaged (it holds no names); make it anew from the recording")
     return cast("dict[str, Any]", found)
+
+
+def _no_number(name: str) -> None:
+    raise ValueError(f"{name} is no number that this program stores")
 
 
 def bytes_of(path: Path) -> bytes:

@@ -1,0 +1,138 @@
+"""Documents that are valid JSON and hold nonsense: named in one sentence with what makes them anew, or used."""
+
+import copy
+import json
+import shutil
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from report_session import record
+from study_example import study
+
+from daq_app.cli import run
+from daq_app.derived import ANALYSIS, PREDICTION, kept
+from sessions.blinding import revealed
+from sessions.exports import ExportSource
+from sessions.exports.tables import tables
+from sessions.pooling.planted import checked_planted, found_flaws, found_friction, recovered
+from sessions.recording import Recording, RecordingError
+from sessions.sealing import SEAL, digest, sealed_sentence
+
+VERB = {ANALYSIS: "'daq-app analyse' makes it anew", PREDICTION: "'daq-app predict' makes it anew"}
+NONSENSE = st.sampled_from([None, "x", "", -7, 0.5, True, [], {}, [None], {"a": 1}, [[1, 2, 3]], "delete"])
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    """A session of two trials, analysed and predicted with all that can be asked for."""
+    folder, _ = record(tmp_path_factory.mktemp("nonsense") / "P01", per_block=1)
+    assert run(["analyse", str(folder)]) == 0
+    assert run(["predict", str(folder), "--intervals", "--afferent"]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def documents(session):
+    return {name: json.loads((session / name).read_text()) for name in (ANALYSIS, PREDICTION)}
+
+
+def spoilt(data, document):
+    """Return a document with nonsense at one place of it, of those that are no long column of numbers."""
+    found = copy.deepcopy(document)
+    inside = found
+    while True:
+        names = list(inside) if isinstance(inside, dict) else list(range(min(len(inside), 3)))
+        name = data.draw(st.sampled_from(names))
+        deeper = inside[name]
+        if not isinstance(deeper, dict | list) or not deeper or data.draw(st.integers(0, 3)) == 0:
+            break
+        inside = deeper
+    nonsense = data.draw(NONSENSE)
+    if nonsense == "delete":
+        del inside[name]
+    else:
+        inside[name] = nonsense
+    return found
+
+
+@pytest.mark.parametrize("name", [ANALYSIS, PREDICTION])
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+def test_a_stored_document_with_nonsense_is_named_with_its_verb_or_makes_every_table(
+    session, documents, tmp_path_factory, name, data
+):
+    room = tmp_path_factory.mktemp("room")
+    (room / name).write_text(json.dumps(spoilt(data, documents[name])))
+    try:
+        found = kept(room, name)
+    except RecordingError as damaged:
+        told = str(damaged)
+        found = None
+    if found is None:
+        assert f"{name} is damaged" in told
+        assert VERB[name] in told
+        return
+    source = {ANALYSIS: documents[ANALYSIS], PREDICTION: documents[PREDICTION], name: found}
+    for table in tables(ExportSource(revealed(Recording.open(session)), source[ANALYSIS], source[PREDICTION])):
+        assert all(isinstance(cell, str | int | float | None) for column in table.columns for cell in column.values)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        (ANALYSIS, '{"strokes": [null], "friction": [], "flaws": []}'),
+        (ANALYSIS, "[" * 5000),
+        (PREDICTION, '{"trials": [{"trial": "first"}]}'),
+        (PREDICTION, '{"trials": [], "width": NaN}'),
+    ],
+)
+@pytest.mark.parametrize("form", ["csv", "nwb"])
+def test_an_export_of_nonsense_ends_in_one_sentence(session, tmp_path, capsys, name, content, form):
+    folder = shutil.copytree(session, tmp_path / "P01")
+    (folder / name).write_text(content)
+    assert run(["export", str(folder), "--format", form, "--out", str(tmp_path / "out")]) == 1
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 1
+    assert f"{name} is damaged" in told[0]
+    assert VERB[name] in told[0]
+
+
+@settings(max_examples=40, deadline=None)
+@given(data=st.data())
+def test_a_seal_with_nonsense_proves_nothing_and_stands_in_nobodys_way(session, data):
+    numbers = [{"trial": 1, "mu": 0.3, "tau_max": 0.01, "indentation": 2.0, "direction": 1, "sed": 0.008}]
+    seal = {"sealed_utc": "2026-01-01", "blinded": False, "sha256": digest(numbers), "numbers": numbers}
+    (session / SEAL).write_text(json.dumps(spoilt(data, seal)))
+    try:
+        assert sealed_sentence(Recording.open(session), numbers).endswith(".")
+    finally:
+        (session / SEAL).unlink()
+
+
+PLANTED = {
+    "score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0, "friction": {"stickiness": 52.0}},
+    "people": {"gain_spread": 0.05, "offset_spread": 3.0, "judgement_noise": 4.0, "moisture": 0.08},
+    "calibration_sd": 0.01,
+    "relation": {"stickiness": {"r": 0.9, "slope": 6.0}},
+    "spoilt": {"S02": {"lost": 3, "expected": "trial 3: lost_readings"}, "S03": {"unanswered": 9, "expected": "none"}},
+    "strokes": [{"subject": "S01", "trial": 1, "mu": 0.44}],
+}
+
+
+@pytest.fixture(scope="module")
+def pooled_study():
+    return study()
+
+
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+def test_what_was_planted_is_refused_as_a_whole_or_held_against_what_was_found(pooled_study, data):
+    planted = spoilt(data, PLANTED)
+    try:
+        held = checked_planted(planted)
+    except ValueError:
+        return
+    recovered(pooled_study.descriptors, held)
+    found_friction(pooled_study.visits, held["strokes"])
+    assert len(found_flaws(pooled_study.visits, {}, held.get("spoilt", {}))) == len(held.get("spoilt", {}))
