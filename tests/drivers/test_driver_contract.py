@@ -5,207 +5,30 @@ on its wire, one thing after the other. Each test then looks at one thing that c
 """
 
 import os
-import threading
-import time
-from dataclasses import dataclass, field
-from functools import cache, partial
-from pathlib import Path
-from typing import Any
+from functools import cache
 
 import numpy as np
 import pytest
+from driver_courses import (
+    IDENTIFY,
+    LIVE,
+    NAMES,
+    ONE_AFTER_THE_OTHER,
+    SEED,
+    STOPS_WITHIN,
+    counted,
+    disturbed_course,
+    simulator,
+    undisturbed_course,
+)
 
-from daq_app import wiring
 from daq_app.wiring import connected
-from drivers import rate, streaming
-from drivers.address import parse_address
 from drivers.catalog import DRIVERS, reachable
 from drivers.clock import PacedClock
-from drivers.digital_ft import device as digital_ft
-from drivers.net_ft import device as net_ft
-from drivers.readings import ReadingBlock
-from drivers.serial_ft import device as serial_ft
-from drivers.transducer import LinkLost, SetupError
-from simulators.bench import Bench
-from simulators.boxes import SIMULATORS, Simulated
-from simulators.faults import Fault, Faults
-from simulators.net_ft_box import NetFtBox
-from simulators.stroke import Stroke
-from simulators.surface import paper_surfaces
+from drivers.transducer import SetupError
+from simulators.boxes import SIMULATORS
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="there are no pseudo-terminals on this system")
-
-SEED = 3
-RECORDED = Path(__file__).parents[1] / "data" / "sessions" / "version-1" / "sealed"
-IDENTIFY = {driver.name: driver.identify for driver in DRIVERS}
-LIVE = [*IDENTIFY, "sim"]
-NAMES = [*LIVE, "replay"]
-PATIENCE = 15.0  # until a stream is taken not to have gone on [real s]
-LENGTH = {"unplug": 0.5, "reboot": 0.5, "slow": PATIENCE}  # of a fault, where not 0.25 [real s]
-SHARE = {"corrupt": 0.1, "shorten": 0.1, "repeat": 0.3, "reorder": 0.3, "delay": 0.3, "slow": 0.6}
-STOPS_WITHIN = 0.2  # [real s]
-AGAIN = 5  # times a fault is tried again that happened while nothing was sent
-FIELD = {  # of Health, which a fault must show in
-    "lose": "lost",
-    "repeat": "repeated",
-    "reorder": "late",
-    "delay": "late",
-    "corrupt": "malformed",
-    "shorten": "malformed",
-    "stall": "stalled",
-    "saturate": "saturated",
-    "unplug": "lost",
-    "reboot": "restarted",
-    "slow": "off_rate",
-}
-ONE_AFTER_THE_OTHER = tuple(FIELD)  # with the slow clock last: it stays slow
-
-
-def simulated_bench(faults, monkeypatch):
-    monkeypatch.setattr(wiring, "NetFtBox", partial(NetFtBox, faults=faults))
-    return Simulated(f"sim:?seed={SEED}", Bench(SEED), lambda: 0.0, lambda: None)
-
-
-def recording():
-    return Simulated(f"replay:{RECORDED}", Bench(SEED), lambda: 0.0, lambda: None)
-
-
-def started(name, faults, clock, folder, monkeypatch):
-    match name:
-        case "sim":
-            return simulated_bench(faults, monkeypatch)
-        case "replay":
-            return recording()
-        case _:
-            return SIMULATORS[name].start(Bench(SEED), clock, faults, folder)
-
-
-def simulator(name):
-    return SIMULATORS["net-ft" if name in ("sim", "replay") else name]
-
-
-def handles(device, before=0):
-    """Return how many handles are open beyond `before`; a simulated device needs a moment to hang up."""
-    for _ in range(50):
-        count = len(list(Path("/dev/fd").iterdir())) + device.held() - before
-        if not before or count <= 0:
-            break
-        time.sleep(0.02)
-    return count
-
-
-def quickened(monkeypatch):
-    """Let what a driver waits for be no longer than a test needs; a first reading comes, however busy the machine."""
-    monkeypatch.setattr(net_ft, "_PATIENCE", 120.0)
-    monkeypatch.setattr(serial_ft, "_MEASURED", 0.25)
-    monkeypatch.setattr(digital_ft, "_MEASURED", 0.15)
-    monkeypatch.setattr(streaming, "_SILENCE", 0.8)
-    monkeypatch.setattr(net_ft, "_SILENCE", 0.9)
-    monkeypatch.setattr(rate, "WINDOW", 0.25)
-
-
-@dataclass
-class Undisturbed:
-    """What came of an undisturbed course."""
-
-    uri: str
-    bench: Bench
-    found: Any = None  # who was identified before, during and after it was open; or the refusal
-    found_in_use: Any = None
-    found_after: Any = None
-    info: Any = None
-    healths: list[Any] = field(default_factory=list)  # of the first stream, and of a second one
-    blocks: list[ReadingBlock] = field(default_factory=list)
-    planted: Any = None
-    stops: list[float] = field(default_factory=list)  # how long each took [real s]
-    started_twice: str = ""
-    after_stop: int = -1  # readings still coming
-    threads_left: set[Any] = field(default_factory=set)
-    handles_left: int = -1
-
-
-@dataclass
-class Disturbed:
-    """What came of a course full of faults."""
-
-    told: dict[str, tuple[Any, Any, bool]]  # by fault: health before and after, and whether the stream went on
-    info: Any
-    block: ReadingBlock
-    health: Any
-    sentence: str  # when the device went away
-    uri: str
-    threads_left: set[Any]
-    handles_left: int
-
-
-def identified(name, uri):
-    """Return who answers, or why nobody may ask; nothing where the address is not of the catalogue's."""
-    if name not in IDENTIFY:
-        return None
-    for _ in range(20):  # a device may be deaf for a moment after its stream was ended
-        try:
-            return IDENTIFY[name](parse_address(uri), 2.0)
-        except SetupError as error:
-            return str(error)
-        except LinkLost as error:
-            why = str(error)
-            time.sleep(0.05)
-    return why
-
-
-def stopped(transducer, course):
-    began = time.monotonic()
-    transducer.stop()
-    course.stops.append(time.monotonic() - began)
-
-
-def undisturbed_course(name, folder):
-    """Go through the undisturbed course with one driver."""
-    clock, threads = PacedClock(simulator(name).factor), set(threading.enumerate())
-    with pytest.MonkeyPatch.context() as monkeypatch:
-        quickened(monkeypatch)
-        device = started(name, Faults(), clock, folder, monkeypatch)
-        before = handles(device)
-        course = Undisturbed(device.uri, device.bench)
-        course.found = identified(name, device.uri)
-        with connected(device.uri, clock) as opened:
-            transducer, bench, now = opened.transducer, opened.bench or device.bench, opened.bench_now or device.now
-            course.info, course.bench = transducer.info, bench
-            bench.mount(paper_surfaces()["stickiness", 80])
-            begun = now()
-            transducer.start()
-            stroke = Stroke(7.81, 17.5, approach=0.2, stick=0.2, slide=0.8)
-            course.planted = bench.begin_stroke(stroke, now() + 0.2 * clock.factor)
-            course.found_in_use = identified(name, device.uri)
-            blocks, newest = [], 0.0
-            far = 0.5 if name == "replay" else course.planted.end - begun  # readings count from the first of them
-            try:
-                while newest < far:
-                    blocks.append(transducer.read(0.1))
-                    newest = max([newest, *blocks[-1].time[-1:].tolist()])
-            finally:
-                stopped(transducer, course)
-            course.blocks.append(ReadingBlock.joined([*blocks, transducer.read(0.0)]))
-            course.after_stop = len(transducer.read(0.0))
-            course.healths.append(transducer.health)
-            if name != "replay":
-                transducer.start()
-                course.started_twice = refusal(transducer)
-                again = transducer.read(10.0)
-                stopped(transducer, course)
-                course.blocks.append(ReadingBlock.joined([again, transducer.read(0.0)]))
-                course.healths.append(transducer.health)
-                while min(course.stops) >= STOPS_WITHIN and len(course.stops) < 4 * AGAIN:  # a busy machine
-                    transducer.start()
-                    stopped(transducer, course)
-            transducer.stop()
-            transducer.close()
-        course.found_after = identified(name, device.uri)
-        course.handles_left = handles(device, before)
-        device.close()
-        device.forget()
-        course.threads_left = set(threading.enumerate()) - threads
-    return course
 
 
 @pytest.fixture(scope="module")
@@ -218,88 +41,6 @@ def undisturbed(tmp_path_factory):
 def disturbed(tmp_path_factory):
     """Return a function that gives the course full of faults of a driver, gone through once."""
     return cache(lambda name: disturbed_course(name, tmp_path_factory.mktemp("device")))
-
-
-def refusal(transducer):
-    try:
-        transducer.start()
-    except SetupError as error:
-        return str(error)
-    return ""
-
-
-def disturbed_course(name, folder):
-    """Go through all that can go wrong with one driver, and lose the device at the end."""
-    clock, faults, threads = PacedClock(simulator(name).factor), Faults(seed=1), set(threading.enumerate())
-    with pytest.MonkeyPatch.context() as monkeypatch:
-        quickened(monkeypatch)
-        device = started(name, faults, clock, folder, monkeypatch)
-        before = handles(device)
-        told, blocks, sentence = {}, [], ""
-        with connected(device.uri, clock) as opened:
-            transducer, now = opened.transducer, opened.bench_now or device.now
-            transducer.start()
-            blocks.append(transducer.read(10.0))
-            for kind in ONE_AFTER_THE_OTHER:
-                if kind in (*simulator(name).tells, *simulator(name).hides):
-                    told[kind] = gone_through(kind, transducer, blocks, faults, clock, now)
-                    for _ in range(AGAIN):  # a machine that slept through the fault has had none
-                        if kind not in simulator(name).tells or counted(kind, told[kind]):
-                            break
-                        told[kind] = gone_through(kind, transducer, blocks, faults, clock, now)
-            if name == "sim":  # whose device cannot be taken away: it is closed with it
-                transducer.stop()
-                blocks.append(transducer.read(0.0))
-            else:
-                device.close()
-                sentence = lost(transducer, blocks)
-            health, info = transducer.health, transducer.info
-        left = handles(device, before)
-        device.forget()
-    return Disturbed(
-        told,
-        info,
-        ReadingBlock.joined(blocks),
-        health,
-        sentence,
-        device.uri,
-        set(threading.enumerate()) - threads,
-        left,
-    )
-
-
-def counted(kind, told):
-    """Say whether the counter of a fault has grown."""
-    before, after, _ = told
-    return getattr(after, FIELD[kind]) > getattr(before, FIELD[kind])
-
-
-def gone_through(kind, transducer, blocks, faults, clock, now):
-    """Let one thing go wrong, and read until the stream has gone on behind it, or what was looked for is found."""
-    before = transducer.health
-    begin = now() + 0.02 * clock.factor
-    end = begin + LENGTH.get(kind, 0.25) * clock.factor
-    faults.put(Fault(kind, begin, end, SHARE.get(kind, 1.0), 0.05 * clock.factor))
-    origin_ns = clock.now_ns() - round(now() * 1e9)
-    deadline = time.monotonic() + PATIENCE
-    went_on = False
-    while not went_on and time.monotonic() < deadline:
-        block = transducer.read(0.1 * clock.factor)
-        blocks.append(block)
-        if kind == "slow":
-            went_on = transducer.health.off_rate > before.off_rate
-        elif len(block):
-            went_on = (int(block.received_ns[-1]) - origin_ns) * 1e-9 > end + 0.05 * clock.factor
-    return before, transducer.health, went_on
-
-
-def lost(transducer, blocks):
-    """Return what is said when the device has gone away."""
-    while True:
-        try:
-            blocks.append(transducer.read(10.0))
-        except LinkLost as error:
-            return str(error)
 
 
 def test_every_driver_in_the_list_has_a_simulated_device_in_its_own():

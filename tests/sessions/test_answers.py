@@ -1,5 +1,5 @@
 from stand_ins import Hands, ToldClock
-from test_runner import PAPER, Session, once
+from told_session import PAPER, Session, once
 
 from sessions.event_log import event_of
 from sessions.protocols import plan

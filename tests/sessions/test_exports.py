@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from recordings import PLAN, TRIAL, begun, ended, plainly_read, readings
 from stand_ins import INFO, ToldClock
-from test_runner import Session
+from told_session import Session
 
 from drivers.readings import ReadingBlock
 from sessions.analysis import analyse

@@ -1,10 +1,10 @@
+"""The course of a session, case by case; `test_machine_walks` goes through it at random."""
+
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from walks import CODES, FIRST, FORCES, NUMBERS, PAIRS, RESTFUL, SCORES, made_plan
 
 from sessions.machine import advance, interrupted, start, trial_in_hand
-from sessions.plan import Block, Frame, Rests, SessionPlan, Stimulus, Trial
-from sessions.protocols import plan, protocol
+from sessions.plan import Frame, Rests, SessionPlan
 from sessions.steps import (
     Abort,
     AskBegin,
@@ -17,7 +17,6 @@ from sessions.steps import (
     AskStroke,
     Begin,
     Chosen,
-    Closing,
     ContactOnset,
     DiscardTake,
     Ended,
@@ -31,8 +30,6 @@ from sessions.steps import (
     Note,
     NumberGiven,
     Pause,
-    Paused,
-    Ready,
     Redo,
     Refuse,
     Resting,
@@ -52,11 +49,6 @@ from sessions.steps import (
     Tell,
     Zeroed,
 )
-
-FORCES = plan(protocol("sensotact-friction"), "S01", 3)
-SCORES = plan(protocol("sensotact-friction"), "S01", 3, forces=False)
-CODES = [trial.stimulus.code for trial in FORCES.trials]
-FIRST = FORCES.trials[0]
 
 
 def after(plan, *events):
@@ -81,23 +73,6 @@ STROKE = (ContactOnset(), FingerLifted())
 
 def done(trial=0, score=50.0):
     return (mounted(trial), Zeroed(), *STROKE, Settled(), Scored(score))
-
-
-def made_plan(answers, *, forces=True, phase="main", strokes_allowed=1, **options):
-    """A plan of one block whose trials ask for `answers`; "choice" compares with the trial before."""
-    trials = tuple(
-        Trial(n, "b", Stimulus("d", n, f"K{n:02d}"), 1, 1, phase, answer, n - 1 if answer == "choice" else None)
-        for n, answer in enumerate(answers, 1)
-    )
-    block = Block("b", "Stroke.", 1, 2.0, ("", ""), trials, phase, "Which?", strokes_allowed)
-    return SessionPlan("made", "S01", 0, "none", (block,), forces, Frame(), **options)
-
-
-PAIRS = made_plan(["none", "choice"] * 3)
-PAIRS_UNSEEN = made_plan(["none", "choice"] * 3, forces=False)
-NUMBERS = made_plan(["number"] * 4, forces=False)
-RESTFUL = made_plan(["line"] * 5, forces=False, rests=Rests(after_trials=2, duration=30.0))
-PLANS_OF_ALL_KINDS = [FORCES, SCORES, PAIRS, PAIRS_UNSEEN, NUMBERS, RESTFUL]
 
 
 def put_on(plan, number):
@@ -368,141 +343,3 @@ def test_abort_names_its_reason_and_discards_the_open_take():
     state, commands = after(FORCES, Begin(), mounted(), Abort("fire alarm"))
     assert commands == (DiscardTake(1, 1, "fire alarm"), EndSession("fire alarm", complete=False))
     assert state == Ended("fire alarm", complete=False)
-
-
-# ---- random walks
-
-EVENTS = st.one_of(
-    st.sampled_from(
-        [
-            Begin(),
-            Zeroed(),
-            ContactOnset(),
-            FingerLifted(),
-            Settled(),
-            StrokeDone(),
-            Pause(),
-            Resume(),
-            RestOver(),
-            Finish(),
-        ]
-    ),
-    st.builds(StimulusMounted, st.sampled_from([*CODES, "K01", "K02", "K03"])),
-    st.builds(Scored, st.none() | st.floats(-10, 110)),
-    st.builds(NumberGiven, st.none() | st.floats(-1, 1e6)),
-    st.builds(Chosen, st.sampled_from([None, "first", "second"])),
-    st.builds(Note, st.sampled_from(["", "yawned"])),
-    st.builds(Redo, st.sampled_from(["", "sneezed"])),
-    st.builds(Skip, st.sampled_from(["", "dirty"])),
-)
-PLANS = st.sampled_from(PLANS_OF_ALL_KINDS)
-
-
-def meant(state):
-    """The event that leads on from `state`."""
-    match state:
-        case Mounting(place):
-            return StimulusMounted(place.trial.stimulus.code)
-        case Taring():
-            return Zeroed()
-        case Ready(place):
-            return ContactOnset() if place.plan.forces else StrokeDone()
-        case Stroking():
-            return FingerLifted()
-        case Scoring(place):
-            return {"line": Scored(40.0), "number": NumberGiven(4.0), "choice": Chosen("first")}[place.trial.answer]
-        case Settling(touching=touching):
-            return FingerLifted() if touching else Settled()
-        case Paused() | Resting():
-            return Resume()
-        case Closing():
-            return Finish()
-        case _:
-            return Begin()
-
-
-@st.composite
-def walks(draw):
-    """A plan and events, at least half of which lead on."""
-    plan = draw(PLANS)
-    state, _ = start(plan)
-    events = []
-    for chance in draw(st.lists(st.none() | EVENTS, max_size=80)):
-        event = meant(state) if chance is None else chance
-        events.append(event)
-        state, _ = advance(state, event)
-    return plan, events
-
-
-def steps(plan, events):
-    """Every (state before, event, state after, commands) of a walk."""
-    state, _ = start(plan)
-    found = []
-    for event in events:
-        before = state
-        state, commands = advance(state, event)
-        found.append((before, event, state, commands))
-    return found
-
-
-@given(walk=walks())
-@settings(max_examples=300)
-def test_from_any_state_any_event_is_meant_or_refused_with_a_sentence(walk):
-    for before, event, state, commands in steps(*walk):
-        refusals = [command for command in commands if isinstance(command, Refuse)]
-        if refusals:
-            assert state == before
-            assert commands == tuple(refusals)
-            assert len(refusals[0].sentence.split()) > 3
-        else:
-            assert state != before or commands or isinstance(event, Note)
-
-
-@given(walk=walks())
-def test_the_same_plan_and_events_give_the_same_session(walk):
-    assert steps(*walk) == steps(*walk)
-
-
-@given(walk=walks())
-@settings(max_examples=300)
-def test_no_walk_brings_the_order_into_disorder_or_confuses_takes(walk):
-    kept, open_take, begun, asked, left_out = {}, None, set(), {}, set()
-    for _, _, state, commands in steps(*walk):
-        for command in commands:
-            match command:
-                case StartTake(trial, take):
-                    assert open_take is None
-                    assert (trial, take - 1) in begun or take == 1
-                    assert (trial, take) not in begun
-                    begun.add((trial, take))
-                    open_take = (trial, take)
-                case KeepTake(trial, take):
-                    assert open_take == (trial, take)
-                    assert trial not in kept
-                    kept[trial], open_take = take, None
-                case DiscardTake(trial, take):
-                    assert (trial, take) == open_take or kept.pop(trial) == take
-                    open_take = None
-                case AskMount(trial):
-                    asked.setdefault(trial.number)
-                case LeaveOut(trial):
-                    left_out.add(trial)
-        if isinstance(state, Closing):
-            assert open_take is None
-    reached = max(asked, default=0)
-    assert set(range(1, reached + 1)) <= {*asked, *left_out}
-    first_asked = [number for number in asked if number not in left_out]
-    assert first_asked == sorted(first_asked)
-
-
-@given(walk=walks())
-def test_every_walk_can_be_completed_and_can_be_aborted(walk):
-    plan, events = walk
-    state = ([start(plan)[0]] + [step[2] for step in steps(plan, events)])[-1]
-    if not isinstance(state, Ended):
-        assert isinstance(advance(state, Abort("enough"))[0], Ended)
-    for _ in range(100):
-        if isinstance(state, Ended):
-            break
-        state, _ = advance(state, meant(state))
-    assert isinstance(state, Ended)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from recordings import change, plainly_read, rows
-from test_runner import Session
+from told_session import Session
 
 from sessions.analysis import analyse
 from sessions.exports import ExportSource, export

@@ -10,7 +10,7 @@ import time
 import numpy as np
 import pytest
 from recordings import begun, readings
-from test_runner import Session
+from told_session import Session
 
 from sessions.recording import Recording, RecordingError
 from sessions.recording.torn import log_tail

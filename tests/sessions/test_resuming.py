@@ -7,9 +7,9 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from hypothesis import given, settings
 from stand_ins import INFO, Hands, StandIn, ToldClock
-from test_machine import steps, walks
 from test_recording_crash import forked, kill, reported
-from test_runner import Session
+from told_session import Session
+from walks import FORCES, steps, walks
 
 from sessions.event_log import kind_of, line_of
 from sessions.machine import advance, start
@@ -90,8 +90,6 @@ def test_a_log_in_which_something_does_not_follow_is_refused():
 
 
 def start_plan():
-    from test_machine import FORCES
-
     return FORCES, start(FORCES)
 
 

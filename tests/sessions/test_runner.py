@@ -3,10 +3,10 @@ import signal
 
 import numpy as np
 import pytest
-from stand_ins import INFO, RATE, Hands, StandIn, ToldClock
+from stand_ins import RATE, Hands
+from told_session import Session, once
 
-from sessions.protocols import plan, protocol
-from sessions.recording import Recording, SessionWriter, provenance
+from sessions.recording import Recording
 from sessions.recording.replay import health_of
 from sessions.runner import RunnerSettings, run_session
 from sessions.steps import (
@@ -25,36 +25,9 @@ from sessions.steps import (
     Tell,
 )
 
-PAPER = protocol("sensotact-friction")
-
-
-class Session:
-    """A session in told time, run when called."""
-
-    def __init__(self, folder, *, forces=True, instead=None, **transducer):
-        self.clock = ToldClock()
-        self.plan = plan(PAPER, "S01", 3, forces=forces)
-        info = INFO if forces else None
-        self.writer = SessionWriter.create(
-            folder, self.plan, info, provenance(self.clock), subject_simulated=True, clock=self.clock
-        )
-        self.transducer = StandIn(self.clock, **transducer) if forces else None
-        self.hands = Hands(self.clock, self.transducer, instead)
-        self.folder = folder
-
-    def run(self, **options):
-        self.end = run_session(self.plan, self.writer, self.hands, self.transducer, self.clock, **options)
-        return Recording.open(self.folder)
-
 
 def kinds(recording, trial=None):
     return [event.kind for event in recording.events if trial is None or event.trial == trial]
-
-
-def once(events):
-    """Answer with `events` the first time, as usual afterwards."""
-    left = [events]
-    return lambda _: left.pop() if left else None
 
 
 # ---- a session as it should go

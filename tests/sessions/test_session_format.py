@@ -7,7 +7,7 @@ from typing import get_args
 import h5py
 import pytest
 from recordings import rows
-from test_runner import Session
+from told_session import Session
 
 from sessions.plan import Shown
 from sessions.protocols.protocol import (

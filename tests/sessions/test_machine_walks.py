@@ -1,0 +1,81 @@
+"""What holds in any session, whatever is done in whatever order."""
+
+from hypothesis import given, settings
+from walks import meant, steps, walks
+
+from sessions.machine import advance, start
+from sessions.steps import (
+    Abort,
+    AskMount,
+    Closing,
+    DiscardTake,
+    Ended,
+    KeepTake,
+    LeaveOut,
+    Note,
+    Refuse,
+    StartTake,
+)
+
+
+@given(walk=walks())
+@settings(max_examples=300)
+def test_from_any_state_any_event_is_meant_or_refused_with_a_sentence(walk):
+    for before, event, state, commands in steps(*walk):
+        refusals = [command for command in commands if isinstance(command, Refuse)]
+        if refusals:
+            assert state == before
+            assert commands == tuple(refusals)
+            assert len(refusals[0].sentence.split()) > 3
+        else:
+            assert state != before or commands or isinstance(event, Note)
+
+
+@given(walk=walks())
+def test_the_same_plan_and_events_give_the_same_session(walk):
+    assert steps(*walk) == steps(*walk)
+
+
+@given(walk=walks())
+@settings(max_examples=300)
+def test_no_walk_brings_the_order_into_disorder_or_confuses_takes(walk):
+    kept, open_take, begun, asked, left_out = {}, None, set(), {}, set()
+    for _, _, state, commands in steps(*walk):
+        for command in commands:
+            match command:
+                case StartTake(trial, take):
+                    assert open_take is None
+                    assert (trial, take - 1) in begun or take == 1
+                    assert (trial, take) not in begun
+                    begun.add((trial, take))
+                    open_take = (trial, take)
+                case KeepTake(trial, take):
+                    assert open_take == (trial, take)
+                    assert trial not in kept
+                    kept[trial], open_take = take, None
+                case DiscardTake(trial, take):
+                    assert (trial, take) == open_take or kept.pop(trial) == take
+                    open_take = None
+                case AskMount(trial):
+                    asked.setdefault(trial.number)
+                case LeaveOut(trial):
+                    left_out.add(trial)
+        if isinstance(state, Closing):
+            assert open_take is None
+    reached = max(asked, default=0)
+    assert set(range(1, reached + 1)) <= {*asked, *left_out}
+    first_asked = [number for number in asked if number not in left_out]
+    assert first_asked == sorted(first_asked)
+
+
+@given(walk=walks())
+def test_every_walk_can_be_completed_and_can_be_aborted(walk):
+    plan, events = walk
+    state = ([start(plan)[0]] + [step[2] for step in steps(plan, events)])[-1]
+    if not isinstance(state, Ended):
+        assert isinstance(advance(state, Abort("enough"))[0], Ended)
+    for _ in range(100):
+        if isinstance(state, Ended):
+            break
+        state, _ = advance(state, meant(state))
+    assert isinstance(state, Ended)

@@ -1,0 +1,129 @@
+"""Plans of all kinds, and random walks through them: events of which at least half lead on."""
+
+from hypothesis import strategies as st
+
+from sessions.machine import advance, start
+from sessions.plan import Block, Frame, Rests, SessionPlan, Stimulus, Trial
+from sessions.protocols import plan, protocol
+from sessions.steps import (
+    Begin,
+    Chosen,
+    Closing,
+    ContactOnset,
+    FingerLifted,
+    Finish,
+    Mounting,
+    Note,
+    NumberGiven,
+    Pause,
+    Paused,
+    Ready,
+    Redo,
+    Resting,
+    RestOver,
+    Resume,
+    Scored,
+    Scoring,
+    Settled,
+    Settling,
+    Skip,
+    StimulusMounted,
+    StrokeDone,
+    Stroking,
+    Taring,
+    Zeroed,
+)
+
+FORCES = plan(protocol("sensotact-friction"), "S01", 3)
+SCORES = plan(protocol("sensotact-friction"), "S01", 3, forces=False)
+CODES = [trial.stimulus.code for trial in FORCES.trials]
+FIRST = FORCES.trials[0]
+
+
+def made_plan(answers, *, forces=True, phase="main", strokes_allowed=1, **options):
+    """A plan of one block whose trials ask for `answers`; "choice" compares with the trial before."""
+    trials = tuple(
+        Trial(n, "b", Stimulus("d", n, f"K{n:02d}"), 1, 1, phase, answer, n - 1 if answer == "choice" else None)
+        for n, answer in enumerate(answers, 1)
+    )
+    block = Block("b", "Stroke.", 1, 2.0, ("", ""), trials, phase, "Which?", strokes_allowed)
+    return SessionPlan("made", "S01", 0, "none", (block,), forces, Frame(), **options)
+
+
+PAIRS = made_plan(["none", "choice"] * 3)
+PAIRS_UNSEEN = made_plan(["none", "choice"] * 3, forces=False)
+NUMBERS = made_plan(["number"] * 4, forces=False)
+RESTFUL = made_plan(["line"] * 5, forces=False, rests=Rests(after_trials=2, duration=30.0))
+PLANS_OF_ALL_KINDS = [FORCES, SCORES, PAIRS, PAIRS_UNSEEN, NUMBERS, RESTFUL]
+
+EVENTS = st.one_of(
+    st.sampled_from(
+        [
+            Begin(),
+            Zeroed(),
+            ContactOnset(),
+            FingerLifted(),
+            Settled(),
+            StrokeDone(),
+            Pause(),
+            Resume(),
+            RestOver(),
+            Finish(),
+        ]
+    ),
+    st.builds(StimulusMounted, st.sampled_from([*CODES, "K01", "K02", "K03"])),
+    st.builds(Scored, st.none() | st.floats(-10, 110)),
+    st.builds(NumberGiven, st.none() | st.floats(-1, 1e6)),
+    st.builds(Chosen, st.sampled_from([None, "first", "second"])),
+    st.builds(Note, st.sampled_from(["", "yawned"])),
+    st.builds(Redo, st.sampled_from(["", "sneezed"])),
+    st.builds(Skip, st.sampled_from(["", "dirty"])),
+)
+PLANS = st.sampled_from(PLANS_OF_ALL_KINDS)
+
+
+def meant(state):
+    """The event that leads on from `state`."""
+    match state:
+        case Mounting(place):
+            return StimulusMounted(place.trial.stimulus.code)
+        case Taring():
+            return Zeroed()
+        case Ready(place):
+            return ContactOnset() if place.plan.forces else StrokeDone()
+        case Stroking():
+            return FingerLifted()
+        case Scoring(place):
+            return {"line": Scored(40.0), "number": NumberGiven(4.0), "choice": Chosen("first")}[place.trial.answer]
+        case Settling(touching=touching):
+            return FingerLifted() if touching else Settled()
+        case Paused() | Resting():
+            return Resume()
+        case Closing():
+            return Finish()
+        case _:
+            return Begin()
+
+
+@st.composite
+def walks(draw):
+    """A plan and events, at least half of which lead on."""
+    plan = draw(PLANS)
+    state, _ = start(plan)
+    events = []
+    for chance in draw(st.lists(st.none() | EVENTS, max_size=80)):
+        event = meant(state) if chance is None else chance
+        events.append(event)
+        state, _ = advance(state, event)
+    return plan, events
+
+
+def steps(plan, events):
+    """Every (state before, event, state after, commands) of a walk."""
+    state, _ = start(plan)
+    found = []
+    for event in events:
+        before = state
+        state, commands = advance(state, event)
+        found.append((before, event, state, commands))
+    return found
