@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
-from solver.existence import refuse_far_beyond
+from solver.existence import refuse_far_beyond, steep
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.finite_ends import steps_asked
 from solver.finite_finger import FiniteFinger
@@ -24,6 +24,7 @@ from solver.scene import Scene
 from solver.tissues import strains_the_cut
 
 ROUGH = 3.0  # fineness of the mesh that finds the edges
+BESIDE = 1.05  # times as fine is a mesh whose nodes lie elsewhere
 NEARLY = 0.98  # of the friction limit, from which contact is where it is when the finger slides
 MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
 WIDER = 6.0  # the same where contact was met at the end of that skin
@@ -230,7 +231,8 @@ def climbed(
 
     With `sizing` on the mesh of `sized_together`. It is begun at the state `below`, or at what that has changed by
     since `before`, of a surface that shares the rough mesh, added to the state found then; a
-    course has so many `times` the usual load steps. Raises NoSteadyState, NotConverged, Cancelled.
+    course has so many `times` the usual load steps. Where friction is steep a mesh may have no state, its last node
+    neither open nor touching: then one with nodes elsewhere is asked. Raises NoSteadyState, NotConverged, Cancelled.
     """
     near = before if before is not None and before.foot.finger is below.finger else None
     sizing = sizing or sized(fineness, below)
@@ -241,6 +243,13 @@ def climbed(
             return replace(begun, shape=shape)
         sizing = replace(sizing, at_cut=AT_CUT, sharing=None)
     begun = _begun(scene, sizing, below, make, near)
+    try:
+        return replace(begun, shape=settled(begun.finger, scene, stop, begun.shape, times))
+    except NotConverged:
+        if not steep(pull_sliding(scene)):
+            raise
+    beside = sized(BESIDE * fineness, below)
+    begun = _begun(scene, replace(beside, at_cut=beside.at_cut and AT_CUT), below, make, None)
     return replace(begun, shape=settled(begun.finger, scene, stop, begun.shape, times))
 
 

@@ -41,7 +41,6 @@ FROM_FORCE = 10.0  # of the SED under a given force at finite strain, likewise
 FROM_LIMIT, CALM = 3.0, 2.0  # of the mesh's own part, for every relative change by friction's beyond that many
 FROM_BOUND = {"small": 0.2, "finite": 0.16}  # of an element that touches, in the drag under a bound
 FROM_EDGE = 0.12  # the same in all numbers, at finite strain where skin slips at the bound up to an edge of contact
-FROM_STEEP = 0.3  # and where its coefficient is so large that a node more that touches holds itself there
 OF_DEPTH = 0.5  # of what the mesh alone decides, in a depth that is found at finite strain
 FROM_WIDTH = {
     "small": 0.12,
@@ -150,10 +149,7 @@ def _off(
     else:
         of_bound[2] = _of_bound(scene, fineness, float(size[1]), float(size[2]))
         if kind == "finite" and np.any(felt):
-            from solver.kernels import STEEP  # loaded at finite strain alone
-
-            by = FROM_STEEP if scene.friction.mu > STEEP else FROM_EDGE
-            of_edge = by * scene.friction.cap * _element(scene, fineness) / size[2] * np.abs(felt)
+            of_edge = FROM_EDGE * scene.friction.cap * _element(scene, fineness) / size[2] * np.abs(felt)
     from_meshes = (FROM_NAIL if scene.finger.nail_length > 0.0 else FROM_MESHES)[kind]
     return np.linalg.norm([from_meshes * largest, part * size, of_bound * size, of_edge * size], axis=0)
 

@@ -43,7 +43,7 @@ def audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: Newton) -> 
     normal, tangential = shape.reaction[:, 1], shape.reaction[:, 0]
     push = max(float(normal.max(initial=0.0)), np.finfo(float).tiny)
     # Open skin may hang over, its length along the surface negative: no limit of it is meant.
-    length = np.maximum(kernels_numpy.tributary(shape.place(body)[:, 0]), 0.0)
+    length = np.maximum(kernels_numpy.rubbed(shape.place(body)[:, 0], shape.touching, shape.pull.mu), 0.0)
     limit = FrictionLaw(float(scene.friction.mu), scene.friction.cap).limit(normal, length)
     return {
         "equilibrium_x": abs(float(bone[0] + shape.force[0])) / total,

@@ -38,7 +38,7 @@ def _followed(newton: Newton, shape: Shape) -> Array:
     body, pull, size = newton.body, shape.pull, len(shape.state)
     felt = newton.reaction(np.zeros(2 * size)).ravel()
     length, place = np.empty(size), shape.place(body)
-    kernels.tributary(place[:, 0], body.middle, length)
+    kernels.rubbed(place[:, 0], body.middle, shape.state, pull.mu, length)
     free, matrix = np.zeros(2 * size, np.int32), np.zeros(4 * size * size)
     right, steps = np.zeros((2 * size, 4)), np.zeros((2 * size, 4))
     still = np.zeros(size)  # on the surface, and nowhere else than where it sticks

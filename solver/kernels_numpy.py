@@ -8,7 +8,7 @@ from solver.finite_body import FiniteBody
 from solver.friction import CAP, OPEN, SLIP, STICK, FrictionLaw
 from solver.hyperelastic import shape, slopes
 from solver.kernels.skin import STEEP
-from solver.mesh import Array, Indices
+from solver.mesh import Array, Flags, Indices
 
 IMAGINARY = 1e-30  # step whose square is nothing [-]
 
@@ -139,6 +139,23 @@ def tributary(x: Array) -> Array:
     slopes = np.array([[-1.5, 2.0, -0.5], [-0.5, 0.0, 0.5], [0.5, -2.0, 1.5]])
     for start in range(0, len(x) - 2, 2):
         out[start : start + 3] += np.array([1.0, 4.0, 1.0]) / 3.0 * (slopes @ x[start : start + 3])
+    return out
+
+
+def rubbed(x: Array, touching: Flags, mu: float) -> Array:
+    """Return the length of skin on which a bound acts that each node stands for (k,).
+
+    Where friction is steep, without edges whose middle does not touch, but for nodes beside no other.
+    """
+    if mu <= STEEP:
+        return tributary(x)
+    out = np.zeros(len(x))
+    beside = np.r_[False, touching, False]
+    alone = ~beside[:-2] & ~beside[2:]
+    alone[1::2] = True
+    for start in range(0, len(x) - 2, 2):
+        edge = slice(start, start + 3)
+        out[edge] += np.where(touching[start + 1] | alone[edge], tributary(x[edge]), 0.0)
     return out
 
 

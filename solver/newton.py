@@ -220,6 +220,6 @@ class Newton:
         state, sense = start.state.copy(), start.sense.copy()
         x = self.skin_x + start.u[self.body.skin, 0]
         above = self.skin_y + start.u[self.body.skin, 1] - pull.depth
-        kernels.tributary(x, self.body.middle, self.length)
+        kernels.rubbed(x, self.body.middle, state, pull.mu, self.length)
         kernels.restate(state, sense, start.reaction, above, x - x, self.length, pull.mu, pull.tau, pull.sense)
         return replace(start, state=state, sense=sense)

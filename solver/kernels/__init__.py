@@ -11,7 +11,7 @@ from solver.kernels.fronts import condense, eliminate, unfold
 from solver.kernels.iterating import move, touch
 from solver.kernels.outline import crosses, pinched
 from solver.kernels.overstress import add_overstress
-from solver.kernels.skin import STEEP, impose, restate, solve, tributary
+from solver.kernels.skin import STEEP, impose, restate, rubbed, solve, tributary
 
 __all__ = [
     "CAP",
@@ -34,6 +34,7 @@ __all__ = [
     "move",
     "pinched",
     "restate",
+    "rubbed",
     "solve",
     "touch",
     "tributary",

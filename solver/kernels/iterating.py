@@ -9,7 +9,7 @@ import numpy as np
 from solver.kernels.compiling import Array, Narrow, Wide, compiled
 from solver.kernels.elements import advance
 from solver.kernels.fronts import condense, unfold
-from solver.kernels.skin import restate, settle, tributary
+from solver.kernels.skin import restate, rubbed, settle
 
 
 @compiled
@@ -117,5 +117,5 @@ def move(
     for i in range(size):
         x[i] = place[skin[i], 0] + u_new[skin[i], 0]
         above[i] = place[skin[i], 1] + u_new[skin[i], 1] - depth
-    tributary(x, at, length)
+    rubbed(x, at, state, mu, length)
     return largest, restate(state, sense, reaction, above, x - anchor, length, mu, tau, direction)

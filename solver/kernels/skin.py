@@ -27,6 +27,33 @@ def tributary(x: Array, at: Narrow, out: Array) -> None:
 
 
 @compiled
+def rubbed(x: Array, at: Narrow, state: Narrow, mu: float, out: Array) -> None:
+    """Fill `out` (k,) with the length of skin on which a bound acts that each node stands for.
+
+    That is its `tributary` length, less what `rubs` not.
+    """
+    out[:] = 0.0
+    for i in range(at.shape[0]):
+        if at[i] == 1:
+            for n in range(3):
+                if rubs(state, i, i - 1 + n, mu):
+                    row = _LENGTHS[n]
+                    out[i - 1 + n] += row[0] * x[i - 1] + row[1] * x[i] + row[2] * x[i + 1]
+
+
+@compiled
+def rubs(state: Narrow, edge: int, node: int, mu: float) -> bool:
+    """Return whether a bound acts on the part of an edge, told by its middle, that one of its nodes stands for.
+
+    Where friction is steep, skin slips at the bound up to where contact ends, which is where a line of the mesh lies:
+    an edge beyond, whose middle is open, is not rubbed. A node that touches alone stands for what touches, however
+    little that is. Where friction is not, pressure limits it there, and contact may end anywhere.
+    """
+    other = 2 * node - edge
+    return mu <= STEEP or state[edge] != OPEN or other < 0 or other >= state.shape[0] or state[other] == OPEN
+
+
+@compiled
 def impose(
     stiffness: Array,
     force: Array,
@@ -48,8 +75,8 @@ def impose(
 
     `stiffness` (2 k, 2 k) and `force` (2 k,) are the body's as its skin feels them: x, y of one node, x, y of the next.
     `held` (k,) says along what a node is fixed (HELD_X, HELD_Y, their sum), `above` (k,) heights over the surface,
-    `behind` (k,) distances of stuck nodes from where they stick, `length` from `tributary`. The columns of `right` are
-    the step to equilibrium, and its derivatives with respect to depth, mu and travel of the surface along +x. `steps`
+    `behind` (k,) distances of stuck nodes from where they stick, `length` from `rubbed`. The columns of `right` are the
+    step to equilibrium, and its derivatives with respect to depth, mu and travel of the surface along +x. `steps`
     (2 k, 4) is filled where the contact's conditions prescribe displacements; what is unknown is listed in `free`
     (f,).
     """
@@ -105,7 +132,7 @@ def impose(
             drag = sense[i] * tau
             right[r, 0] += drag * length[i]
             for edge in range(max(i - 1, 0), min(i + 2, size)):
-                if at[edge] != 1:
+                if at[edge] != 1 or not rubs(state, edge, i, mu):
                     continue
                 for n in range(3):
                     x = 2 * (edge - 1 + n)
@@ -248,9 +275,9 @@ def settle(
     size = state.shape[0]
     entered = np.zeros(size, np.int32)  # how often each node came to touch
     before = np.empty_like(state)
-    tributary(x, at, length)
     for turn in range(rounds + 1):
         before[:] = state
+        rubbed(x, at, state, mu, length)
         count = impose(
             stiffness, force, held, at, state, sense, mu, tau, above, x - anchor, length, free, matrix, right, steps
         )
@@ -266,12 +293,8 @@ def settle(
         if turn == rounds:
             break
         ahead = x + steps[::2, 0]
-        if (
-            restate(
-                state, sense, reaction, above + steps[1::2, 0], ahead - anchor, _lengths(ahead, at), mu, tau, direction
-            )
-            == 0
-        ):
+        reached, lengths = above + steps[1::2, 0], _lengths(ahead, at, state, mu)
+        if restate(state, sense, reaction, reached, ahead - anchor, lengths, mu, tau, direction) == 0:
             break
         for i in range(size):
             if before[i] == OPEN and state[i] == CAP:
@@ -281,7 +304,7 @@ def settle(
 
 
 @compiled
-def _lengths(x: Array, at: Narrow) -> Array:
+def _lengths(x: Array, at: Narrow, state: Narrow, mu: float) -> Array:
     out = np.empty_like(x)
-    tributary(x, at, out)
+    rubbed(x, at, state, mu, out)
     return out

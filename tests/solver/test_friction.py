@@ -120,7 +120,7 @@ def finite(law, newton):
     out, shapes = [], dragged(newton, law)
     for before, now in pairwise(shapes):
         place, moved = now.place(newton.body), now.pull.travel - before.pull.travel
-        length = np.maximum(kernels_numpy.tributary(place[:, 0]), 0.0)
+        length = np.maximum(kernels_numpy.rubbed(place[:, 0], now.touching, law.mu), 0.0)
         slid = place[:, 0] - before.place(newton.body)[:, 0] - moved
         drag, push = now.reaction.T
         touching = now.state != OPEN  # elsewhere the body's own unbalanced forces, round-off of the iterations
