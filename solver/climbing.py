@@ -248,8 +248,7 @@ def climbed(
     except NotConverged:
         if not steep(pull_sliding(scene)):
             raise
-    beside = sized(BESIDE * fineness, below)
-    begun = _begun(scene, replace(beside, at_cut=beside.at_cut and AT_CUT), below, make, None)
+    begun = _begun(scene, replace(sized(BESIDE * fineness, below), at_cut=sizing.at_cut), below, make, None)
     return replace(begun, shape=settled(begun.finger, scene, stop, begun.shape, times))
 
 

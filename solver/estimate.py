@@ -40,7 +40,10 @@ FROM_COARSE = 1.0  # of both forces at small strain, by fineness to the fourth p
 FROM_FORCE = 10.0  # of the SED under a given force at finite strain, likewise
 FROM_LIMIT, CALM = 3.0, 2.0  # of the mesh's own part, for every relative change by friction's beyond that many
 FROM_BOUND = {"small": 0.2, "finite": 0.16}  # of an element that touches, in the drag under a bound
-FROM_EDGE = 0.12  # the same in all numbers, at finite strain where skin slips at the bound up to an edge of contact
+FROM_EDGE = {  # the same in all numbers where skin slips at the bound up to an edge of contact
+    "small": 0.8,  # where friction is steep
+    "finite": 0.12,
+}
 OF_DEPTH = 0.5  # of what the mesh alone decides, in a depth that is found at finite strain
 FROM_WIDTH = {
     "small": 0.12,
@@ -65,17 +68,25 @@ DEPTH = slice(3, 4)  # place of the indentation among the numbers
 UNKNOWN = Errors(1.0, 1.0, 1.0, 1.0, None, 1.0)
 
 
-def errors(scene: Scene, fineness: float, numbers: Array, others: Array, felt: Array, steps: Steps | None) -> Errors:
+def errors(
+    scene: Scene,
+    fineness: float,
+    numbers: Array,
+    others: Array,
+    felt: Array,
+    steps: Steps | None,
+    bounded: Array | float = 0.0,
+) -> Errors:
     """Return the errors of SED, normal and tangential force, indentation, shift and contact width, `numbers` (6,).
 
-    `others` (n, 6) and `felt` (6,) are as for `estimates`; but at the end of a course that depends on its way, which
-    has taken `steps`, what is felt is the traction bound at both kinematics.
+    `others` (n, 6), `felt` and `bounded` (6,) are as for `estimates`; but at the end of a course that depends on its
+    way, which has taken `steps`, what is felt is the traction bound at both kinematics.
     """
     if not len(others):
         return _given_none(scene, UNKNOWN)
     driven = scene.driven(float(numbers[3]))
     forced = scene.normal_force is not None
-    off = _off(driven, fineness, numbers, others, felt, marched=steps is not None, forced=forced)
+    off = _off(driven, fineness, numbers, others, felt, bounded, marched=steps is not None, forced=forced)
     off[5] += 2.0 * FROM_WIDTH[scene.solve.kinematics] * _element(driven, fineness)
     of_light, of_width = _of_light(scene, float(numbers[5]))
     off[0] = np.hypot(off[0], of_light * abs(numbers[0]))
@@ -102,18 +113,27 @@ def _given_none(scene: Scene, found: Errors) -> Errors:
     )
 
 
-def estimates(scene: Scene, fineness: float, numbers: Array, others: Array, felt: Array | float = 0.0) -> Array:
+def estimates(
+    scene: Scene,
+    fineness: float,
+    numbers: Array,
+    others: Array,
+    felt: Array | float = 0.0,
+    bounded: Array | float = 0.0,
+) -> Array:
     """Return the estimated errors (3,), relative, of SED, normal and tangential force `numbers` (3,) of a slide.
 
     `others` (n, 3) are those of the other meshes; where there are none, so near a limit that a coarser mesh has no
     state, nothing is known of the errors. `felt` (3,) is the relative change of each by that of the friction
-    coefficient (small strain) or, where skin slips at the bound up to an edge of contact, of the bound (finite strain).
-    A number that is 0 on all meshes, as the drag without friction, is exact.
+    coefficient (small strain) or, where skin slips at the bound up to an edge of contact, of the bound (finite strain);
+    `bounded` (3,) is the latter at small strain. A number that is 0 on all meshes, as the drag without friction, is
+    exact.
     """
     if not len(others):
         return np.ones(len(numbers))
     size = np.maximum(np.abs(numbers), np.finfo(float).tiny)
-    return np.minimum(_off(scene, fineness, numbers, others, np.broadcast_to(felt, numbers.shape)) / size, 1.0)
+    off = _off(scene, fineness, numbers, others, np.broadcast_to(felt, numbers.shape), bounded)
+    return np.minimum(off / size, 1.0)
 
 
 def _off(
@@ -122,6 +142,7 @@ def _off(
     numbers: Array,
     others: Array,
     felt: Array,
+    bounded: Array | float,
     *,
     marched: bool = False,
     forced: bool = False,
@@ -148,8 +169,9 @@ def _off(
         of_bound = FROM_BOUND[kind] * _element(scene, fineness) / contact * np.abs(felt)
     else:
         of_bound[2] = _of_bound(scene, fineness, float(size[1]), float(size[2]))
-        if kind == "finite" and np.any(felt):
-            of_edge = FROM_EDGE * scene.friction.cap * _element(scene, fineness) / size[2] * np.abs(felt)
+        at_edge = np.abs(felt if kind == "finite" else bounded)
+        if np.any(at_edge):
+            of_edge = FROM_EDGE[kind] * scene.friction.cap * _element(scene, fineness) / size[2] * at_edge
     from_meshes = (FROM_NAIL if scene.finger.nail_length > 0.0 else FROM_MESHES)[kind]
     return np.linalg.norm([from_meshes * largest, part * size, of_bound * size, of_edge * size], axis=0)
 

@@ -42,7 +42,7 @@ def steady(
     if proof.lost:
         raise NotConverged(
             f"At {pull.depth:.3g} mm of indentation settled sliding was followed up to mu = {proof.value:.3g} and lost "
-            f"there; whether there is any at mu = {pull.mu:.3g} is not known"
+            f"there; whether there is any at mu = {pull.mu:.3g} is not known: ask for less friction or depth"
         )
     if proof.limited:
         raise _refused(finger.scene, pull, proof, stop)
@@ -52,7 +52,7 @@ def steady(
     if steep(pull):
         raise NotConverged(
             f"At {pull.depth:.3g} mm of indentation there is settled sliding at mu = {pull.mu:.3g}, nearly all of the "
-            "skin slipping at the bound, and this mesh does not find it"
+            "skin slipping at the bound, and this mesh does not find it: another tolerance has another mesh"
         )
     begin = settled(finger.newton, pull._replace(mu=0.0), None, tolerance, stop)
     branch = follow(finger, begin, BY_FRICTION, pull.mu, 0.0, stop)
@@ -62,7 +62,7 @@ def steady(
             return shape
     raise NotConverged(
         f"At {pull.depth:.3g} mm of indentation and mu = {pull.mu:.3g} there is settled sliding, but near the limit of "
-        "friction, and this mesh does not find it"
+        "friction, and this mesh does not find it: ask for a little less friction, or another tolerance"
     )
 
 

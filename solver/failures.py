@@ -74,5 +74,22 @@ class NotConverged(SolveFailure):
     kind = "not_converged"
 
 
+def followed_to(depth: float, travel: float, reason: object) -> NotConverged:
+    """Return the failure of a course that could be followed to a `depth` after a `travel` [mm] and not beyond.
+
+    >>> str(followed_to(1.5, -0.2, "no equilibrium"))[:67]
+    'the course was followed to 1.5 mm of indentation and 0.2 mm of slid'
+    >>> str(followed_to(-4.754, 0.0, "no equilibrium"))[:75]
+    'the course was followed to where the drag holds the bone 4.754 mm above fir'
+    """
+    lifted = f"where the drag holds the bone {-depth:.4g} mm above first touch"
+    there = f"{depth:.4g} mm of indentation" if depth >= 0.0 else lifted
+    slid = f" and {abs(travel):.4g} mm of sliding" if travel else ""
+    return NotConverged(
+        f"the course was followed to {there}{slid}, and in the smallest steps no further: {reason}; ask for less "
+        "friction, drag or depth."
+    )
+
+
 class Cancelled(Exception):
     """The caller asked to stop."""

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.failures import Cancelled, NotConverged
+from solver.failures import Cancelled, NotConverged, followed_to
 from solver.kernels import SLIP, STICK
 from solver.meeting import UNMET, met
 from solver.mesh import Array
@@ -145,10 +145,7 @@ def march(
             except NotConverged as reason:
                 part /= 2.0
                 if part < 0.5**HALVINGS:
-                    raise NotConverged(
-                        f"the course ended at {shape.pull.depth:.3g} mm of indentation and "
-                        f"{abs(shape.pull.travel):.3g} mm of travel: {reason}, in steps down to the smallest"
-                    ) from reason
+                    raise followed_to(shape.pull.depth, shape.pull.travel, reason) from reason
             else:
                 done = there
         begin = aim

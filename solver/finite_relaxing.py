@@ -11,7 +11,7 @@ from math import ceil
 import numpy as np
 
 from solver import finite_forced, kernels, kernels_numpy, overstress
-from solver.failures import Cancelled, NotConverged
+from solver.failures import Cancelled, NotConverged, followed_to
 from solver.finite_body import FiniteBody, FiniteProbes
 from solver.finite_finger import FiniteFinger
 from solver.finite_forced import Given
@@ -163,7 +163,10 @@ class RelaxingCourse:
             step = min(1.2 * step, LARGEST / self._times * depth)
             if not (self.shapes[-1].state == STICK).any():
                 return
-        raise NotConverged(f"after {distance:.3g} mm of sliding some skin still stuck: no settled state was reached")
+        raise NotConverged(
+            f"after {distance:.3g} mm of sliding some skin still stuck: no settled state was reached; ask for less "
+            "friction or depth"
+        )
 
     def _wait(self, speed: float) -> None:
         """Go on until all terms have relaxed: a body that yields meanwhile does so the slower, the less of it stays."""
@@ -187,10 +190,7 @@ class RelaxingCourse:
         except NotConverged as reason:
             if halvings == 0:
                 last = self.shapes[-1].pull
-                raise NotConverged(
-                    f"the course ended at {last.depth:.3g} mm of indentation after {abs(last.travel):.3g} mm of "
-                    f"sliding: {reason}, in steps down to the smallest"
-                ) from reason
+                raise followed_to(last.depth, last.travel, reason) from reason
             self._go(self._aim.towards(aim, 0.5), halvings - 1)
             self._go(aim, halvings - 1)
             return

@@ -179,7 +179,7 @@ def _at_force(newton: Newton, start: Shape, force: float, stop: Callable[[], boo
         if not stiffness > 0.0:
             break
         depth += float(np.clip((force - shape.force[1]) / stiffness, -FURTHEST * depth, FURTHEST * depth))
-    raise NotConverged(f"No depth was found at which the finger presses with {force:.4g} N/mm.")
+    raise NotConverged(f"No depth was found at which the finger presses with {force:.4g} N/mm: give a depth instead.")
 
 
 def _deeper(finger: FiniteFinger, shape: Shape, force: float, stop: Callable[[], bool]) -> Shape:
@@ -246,7 +246,7 @@ def _settle(way: "_Driven | _Forced", scene: Scene, direction: int) -> None:
             return
     raise NotConverged(
         f"After {LONGEST * depth:.3g} mm of sliding at {depth:.3g} mm of indentation and mu = {scene.friction.mu:.3g} "
-        "the response still changes: no settled state was reached."
+        "the response still changes: no settled state was reached; ask for less friction or depth."
     )
 
 

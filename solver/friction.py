@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 OPEN, STICK, SLIP, CAP = 0, 1, 2, 3  # as the compiled loops number them, which a plain solve does not load
+STEEP = 1.0  # coefficient from which skin that slips at a bound does so up to where contact ends, likewise
 NAMES = {OPEN: "open", STICK: "stick", SLIP: "slip", CAP: "cap"}
 
 

@@ -1,9 +1,8 @@
 """The course in time: pressing, sticking, partial slip, sliding, turning round, one equilibrium after another."""
 
 from collections.abc import Callable, Iterable, Iterator
-from math import ceil
 
-from solver.failures import Cancelled, NotConverged
+from solver.failures import Cancelled, NotConverged, followed_to
 from solver.newton import Newton, Pull, Shape
 
 SMALLEST = 1.0 / 256.0  # part of a step below which a failing one is given up
@@ -48,11 +47,7 @@ def march(
             except NotConverged as reason:
                 part /= 2.0
                 if part < SMALLEST:
-                    raise NotConverged(
-                        f"the course ended at {shape.pull.depth:.3g} mm of indentation after "
-                        f"{abs(shape.pull.travel):.3g} mm of sliding: {reason}, "
-                        f"in steps of 1/{ceil(1 / part)} of the one asked for"
-                    ) from reason
+                    raise followed_to(shape.pull.depth, shape.pull.travel, reason) from reason
             else:
                 done = aim
         yield shape

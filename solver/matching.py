@@ -70,6 +70,11 @@ def within_reach(scene: Scene, depth: float, most: float | None = None) -> None:
     force, room = scene.normal_force, scene.finger.pulp_thickness()
     if force is None or SHALLOW <= depth < room:
         return
+    if depth < 0.0:
+        raise NotConverged(
+            f"Under a normal force of {force:.3g} N/mm the drag holds the bone {-depth:.3g} mm above first touch: ask "
+            "for more force, or less friction or drag."
+        )
     if depth < SHALLOW:
         raise NotConverged(
             f"A normal force of {force:.3g} N/mm presses the finger {depth:.1g} mm deep only: below {SHALLOW:g} mm "

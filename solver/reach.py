@@ -174,7 +174,8 @@ def _start(finger: FiniteFinger, asked: _Question) -> Shape:
         if sound(finger, start):
             return start
     raise NotConverged(
-        f"no sliding state was found at mu = {asked.pull.mu:.3g} even at {STARTS[-1] * asked.target:.3g} mm"
+        f"no sliding state was found at mu = {asked.pull.mu:.3g} even at {STARTS[-1] * asked.target:.3g} mm: ask for "
+        "less friction"
     )
 
 

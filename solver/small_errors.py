@@ -12,6 +12,7 @@ from solver.scene import Scene
 from solver.small_states import (
     NUDGE,
     all_numbers,
+    bounded_more,
     end,
     felt_of_bound,
     law_of,
@@ -51,11 +52,15 @@ def error_estimates(
     the edges of contact fall differently between nodes. `steps` are those taken where they depend on their way. Beside
     the errors: its numbers there (1, 6), or none where it has no state.
     """
+    felt, bounded = np.zeros(6), np.zeros(6)
     try:
-        others, felt = _settled(scene, coarse) if steps is None else _on_way(scene, coarse, steps)
+        if steps is None:
+            others, felt, bounded = _settled(scene, coarse)
+        else:
+            others, felt = _on_way(scene, coarse, steps)
     except LOST:
-        others, felt = np.empty((0, 6)), np.zeros(6)
-    return errors(scene, fineness, numbers, others, felt, steps), others
+        others = np.empty((0, 6))
+    return errors(scene, fineness, numbers, others, felt, steps, bounded), others
 
 
 def others_on(scene: Scene, mesh: FingerModel, steps: Steps | None) -> Array:
@@ -67,12 +72,15 @@ def others_on(scene: Scene, mesh: FingerModel, steps: Steps | None) -> Array:
     return (numbers if steps is None else steps.taken(numbers))[None]
 
 
-def _settled(scene: Scene, coarse: FingerModel) -> tuple[Array, Array]:
+def _settled(scene: Scene, coarse: FingerModel) -> tuple[Array, Array, Array]:
     state = nearest(scene, coarse)
-    other, felt = all_numbers(scene, coarse, state), np.zeros(6)
+    other, felt, bounded = all_numbers(scene, coarse, state), np.zeros(6), np.zeros(6)
     if (beside := rubbed_more(scene, coarse, state)) is not None:
         felt[:3] = (numbers_on(coarse, [beside])[0] / other[:3] - 1.0) / NUDGE
-    return other[None], felt
+    if (beside := bounded_more(scene, coarse, state)) is not None:
+        bounded = (all_numbers(scene, coarse, beside) / np.where(other == 0.0, 1.0, other) - 1.0) / NUDGE
+        bounded[other == 0.0] = 0.0
+    return other[None], felt, bounded
 
 
 def _on_way(scene: Scene, coarse: FingerModel, steps: Steps) -> tuple[Array, Array]:

@@ -5,7 +5,6 @@ where tissues relax, in time (`solver.relaxing`).
 """
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -13,10 +12,10 @@ import numpy as np
 from numpy.linalg import LinAlgError
 
 from solver.audits import audits, course_audits, forces_missed, inside_out
-from solver.contact import SLIP, STICK, Contact, ContactLost
+from solver.contact import SLIP, STICK, Contact
 from solver.differences import those_of, together
 from solver.evidence import model, warnings
-from solver.failures import Cancelled, NoSteadyState, NotConverged, SolveFailure
+from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.finger import FingerModel
 from solver.friction import NAMES, FrictionLaw
 from solver.grid import MeshError
@@ -27,21 +26,20 @@ from solver.prediction import History, Prediction, Row, Skin
 from solver.receptor import ROW
 from solver.scene import Scene, SceneError
 from solver.small_errors import error_estimates, others_on, steps_asked, times_on_way
+from solver.small_existence import direct
 from solver.small_states import (
     all_numbers,
     depends_on_way,
-    followed_under,
     gives_way,
     in_tissue,
     indentation,
     laid,
     law_of,
     marched,
-    settled,
     shift_of,
 )
 from solver.stepping import March
-from solver.wedging import WIDE, followed, limits
+from solver.wedging import WIDE
 
 MIXED = "nearly incompressible tissues, or ones whose stiffnesses differ by many orders of magnitude,"
 UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]
@@ -135,7 +133,10 @@ def answers(
             done.append(answer)
         if all(answer is not None for answer in done):
             break
-    lost = NotConverged("The skin touched the surface beyond every part of it where contact was looked for.")
+    lost = NotConverged(
+        "The drag lays more skin on the surface than the finger's palmar side has, where contact is looked for: ask "
+        "for less friction, drag or depth."
+    )
     return [lost if answer is None else answer for answer in done]
 
 
@@ -166,49 +167,19 @@ def _meshed(scene: Scene, sizing: Sizing, in_loops: bool) -> FingerModel:
         raise NotConverged(f"Round-off has swallowed the finger's stiffness ({bad}): {MIXED} do that.") from bad
 
 
-def _direct(scene: Scene, shared: _Shared, times: float = 1.0) -> Contact | None:
-    """Return the settled state; None where contact must be looked for on more of the skin.
-
-    Where it depends on its way, that takes so many `times` the usual load steps. Near a limit, or beyond it, guesses
-    can end in states that no sliding leads to. Where none was found, or one that is folded, only what is reached by
-    following the state from mu = 0 counts. Raises NoSteadyState, NotConverged.
-    """
-    finger, direction = shared.fine, scene.loading.direction
-    contact: Contact | None = None
-    try:
-        contact = settled(scene, finger, times)
-        on_way = direction == 0 or bool((contact.state == STICK).any())
-        if on_way or not _folded(finger, contact):
-            return contact
-        why = "the state found is folded"
-    except ContactLost as lost:
-        why = str(lost)
-    if not shared.widest:
-        return None
-    if direction == 0:
-        raise _no_answer(scene, why, 0.0, finger)
-    if scene.normal_force is None:
-        reached, limit = followed(finger.body.touchable, law_of(scene), scene.loading.depth, direction)
-    else:
-        reached, limit = followed_under(scene, finger)
-    if reached is None:
-        raise _no_answer(scene, why, limit, finger)
-    return reached
-
-
 def _in_steps(scene: Scene, shared: _Shared) -> tuple[Contact | None, Steps | None]:
-    """Return the settled state as `_direct` does, and the load steps it took where it depends on its way.
+    """Return the settled state as `direct` does, and the load steps it took where it depends on its way.
 
     Where the course is asked for, an earlier slide that never settles is refused as the last one is, with its limits.
     """
     before = scene.earlier_slides() if scene.solve.course == "history" else ()
-    if any(_direct(leg, shared) is None for leg in before):
+    if any(direct(leg, shared.fine, widest=shared.widest) is None for leg in before):
         return None, None
-    contact = _direct(scene, shared)
+    contact = direct(scene, shared.fine, widest=shared.widest)
     if contact is None or not depends_on_way(scene, contact):
         return contact, None
     steps = steps_asked(scene, shared.coarse)
-    return (contact if steps.times == 1 else _direct(scene, shared, steps.times)), steps
+    return (contact if steps.times == 1 else direct(scene, shared.fine, steps.times, widest=shared.widest)), steps
 
 
 def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[Prediction, March | None] | None:
@@ -361,41 +332,4 @@ def _history(scene: Scene, finger: FingerModel, way: March, over_time: Array | N
         tangential_force=np.array([_drag(scene, c.tangential.sum()) for c in contacts]),
         contact_width=np.array([finger.contact_width(c, np.concatenate([c.gap, c.shift])) for c in contacts]),
         slipping=slipping / np.maximum(touching, 1),
-    )
-
-
-def _folded(finger: FingerModel, contact: Contact) -> bool:
-    """Return whether tissue is turned inside out somewhere, as in states that no sliding leads to."""
-    return bool(np.prod(finger.stretches(finger.displacement(contact)), axis=0).min() <= 0.0)
-
-
-def _pressed(scene: Scene) -> str:
-    """Say how hard or deep the finger is pressed."""
-    force = scene.normal_force
-    return f"{scene.loading.depth:g} mm indentation" if force is None else f"a normal force of {force:g} N/mm"
-
-
-def _no_answer(scene: Scene, why: str, limit_mu: float, finger: FingerModel) -> NoSteadyState | NotConverged:
-    """Return the failure that says what is known."""
-    mu = float(scene.friction.mu)
-    at = f"{_pressed(scene)} and mu = {mu:g}"
-    if scene.friction.tau_max is not None:
-        at += f" with tau_max = {scene.friction.tau_max:g} MPa"
-    if scene.loading.direction == 0 or limit_mu <= 0.0:
-        return NotConverged(f"No settled state was found at {at}, from any first guess: {why}.")
-    limit_force = limit_depth = None
-    with suppress(LinAlgError, ContactLost):  # of stiffnesses that a mesh for less depth does not stand
-        limit_force, limit_depth = limits(scene, law_of(scene), in_loops=finger.body.touchable.in_loops)
-    known = ((limit_force, "N/mm"), (limit_depth, "mm"))
-    others = " and ".join(f"{limit:.3g} {unit}" for limit, unit in known if limit is not None)
-    along = "+x" if scene.loading.direction > 0 else "-x"
-    given = "at this depth" if scene.normal_force is None else "under this force"
-    message = (
-        f"There is no steady sliding along {along} at {at}: the drag presses the finger against the surface faster "
-        f"than it yields, so it wedges; followed from mu = 0, steady sliding {given} ends at mu = {limit_mu:.3g}"
-    )
-    if others:
-        message += f", and with this friction at {others}"
-    return NoSteadyState(
-        f"{message}.", limit_mu=limit_mu, limit_indentation=limit_depth, limit_normal_force=limit_force
     )

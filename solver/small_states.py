@@ -9,7 +9,7 @@ import numpy as np
 from solver.contact import CAP, STICK, Contact, ContactLost, Course, forced
 from solver.failures import NoSteadyState, beyond_friction
 from solver.finger import FingerModel
-from solver.friction import FrictionLaw
+from solver.friction import STEEP, FrictionLaw
 from solver.load_steps import HALF
 from solver.matching import DEEPEST, within_reach
 from solver.mesh import Array
@@ -21,7 +21,7 @@ from solver.tissues import relaxing_laws
 from solver.wedging import followed
 
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
-NUDGE = 1e-4  # of the coefficient of friction, to see what it does
+NUDGE = 1e-4  # of the coefficient of friction, or of the bound of a settled slide, to see what it does
 FURTHER = 1e-2  # of the traction bound, to see what it does on a whole course
 
 
@@ -165,6 +165,25 @@ def rubbed_more(scene: Scene, finger: FingerModel, contact: Contact) -> Contact 
     more = replace(law, mu=(1.0 + NUDGE) * law.mu)
     try:
         return Course(finger.body.touchable, more).sliding(scene.loading.depth, direction, contact.state)
+    except ContactLost:
+        return None
+
+
+def bounded_more(scene: Scene, finger: FingerModel, contact: Contact) -> Contact | None:
+    """Return the state beside a settled slide, its bound a little larger; None where there is none, or it matters not.
+
+    It does where friction is so steep that skin slips at the bound up to an edge of contact.
+    """
+    law, direction, force = law_of(scene), scene.loading.direction, scene.normal_force
+    on = np.flatnonzero(contact.touching)
+    last = contact.state[np.concatenate([on[:2], on[-2:]])]
+    if law.mu <= STEEP or direction == 0 or not (last == CAP).any():
+        return None
+    touch, depth = finger.body.touchable, scene.loading.depth
+    if force is not None:
+        touch, depth = forced(touch, force), 0.0
+    try:
+        return Course(touch, replace(law, tau_max=(1.0 + NUDGE) * law.tau_max)).sliding(depth, direction, contact.state)
     except ContactLost:
         return None
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.contact import CAP, SLIP, STICK, Contact, ContactLost, Course, Touchable, forced, untouched
-from solver.failures import Cancelled, NotConverged
+from solver.failures import Cancelled, NotConverged, followed_to
 from solver.friction import FrictionLaw
 from solver.meeting import UNMET, met
 from solver.scene import Loading
@@ -125,11 +125,7 @@ class Way:
             contact = self.found(before, aim)
         except ContactLost as lost:
             if halvings == 0:
-                start = self.instants[-1]
-                place = f"at {start.depth:.4g} mm indentation, after {abs(start.travel):.4g} mm of sliding"
-                raise NotConverged(
-                    f"No state of contact was found {place}: {lost}, in steps down to the smallest."
-                ) from lost
+                raise followed_to(self.instants[-1].depth, self.instants[-1].travel, lost) from lost
             self.go(self.aim.towards(aim, 0.5), halvings - 1)
             self.go(aim, halvings - 1)
             return
@@ -189,7 +185,9 @@ def slide(way: Way, direction: int, speed: float, progress: Progress | None, tim
         step = min(step * 1.2, largest)
         _report(progress, 0.5 + 0.5 * min(distance / (LONG * depth), 1.0))
     message = f"sliding had not settled after {distance:.1f} mm at {depth:.4g} mm indentation"
-    raise NotConverged(f"{message}: the drag still grew, as it does where the finger wedges itself in.")
+    raise NotConverged(
+        f"{message}: the drag still grew, as it does where the finger wedges itself in; ask for less friction or depth."
+    )
 
 
 def _settled(contact: Contact, direction: int, law: FrictionLaw) -> bool:

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from solver import kernels, kernels_numpy
+from solver import friction, kernels, kernels_numpy
 from solver.contact import Contact, Course, Touchable, untouched
 from solver.finite_body import FiniteBody
 from solver.friction import CAP, LAWS, NAMES, OPEN, SLIP, STICK, FrictionLaw
@@ -141,6 +141,7 @@ def course(request, cushion):
 def test_every_law_of_the_list_is_tested_here():
     assert {type(law) for law in MEMBERS} == set(LAWS)
     assert (OPEN, STICK, SLIP, CAP) == (kernels.OPEN, kernels.STICK, kernels.SLIP, kernels.CAP)
+    assert friction.STEEP == kernels.STEEP
 
 
 @pytest.mark.parametrize("law", MEMBERS, ids=str)
