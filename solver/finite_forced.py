@@ -38,17 +38,18 @@ class Given(NamedTuple):
 
 
 def corrected(
-    newton: Newton, shape: Shape, given: Given, origin: Array, before: float
+    newton: Newton, shape: Shape, given: Given, origin: Array, before: float, *, kept: bool = False
 ) -> tuple[Shape, float, int] | None:
     """Return the shape after one iteration towards the forces, its largest displacement, and changed contact states.
 
-    `origin` (k,) are the positions along x where the skin's nodes were when the surface had travelled `before`. None
-    where there is no way.
+    `origin` (k,) are the positions along x where the skin's nodes were when the surface had travelled `before`. With
+    `kept` the tangent is the last one. None where there is no way.
     """
     pull = shape.pull
     if given.tangential is None:
         pull = pull._replace(travel=given.travel)
-    if not newton.linearise(shape, pull, origin + pull.travel - before):
+    linearise = newton.relinearise if kept else newton.linearise
+    if not linearise(shape, pull, origin + pull.travel - before, 0):
         return None
     steps = newton.steps
     here = newton.reaction(steps[:, EQUILIBRIUM]).sum(axis=0)

@@ -100,7 +100,7 @@ class Newton:
             self.core, self.volume = np.zeros((count, 3)), np.zeros((count, 3))
         self.steps = np.zeros((2 * skin, 4))  # of the skin
         self.length = np.zeros(skin)
-        self._bulk = float((body.lame / body.shear).max())  # how much stiffer the body is to a change of volume [-]
+        self.bulk = float((body.lame / body.shear).max())  # how much stiffer the body is to a change of volume [-]
         self.skin_x, self.skin_y = body.mesh.nodes[body.skin].T.copy()
         self._reaction = np.zeros((skin, 2))
         self._state, self._sense = np.zeros(skin, np.int32), np.zeros(skin, np.int32)
@@ -211,7 +211,7 @@ class Newton:
             new = not kept
             still = largest < NEAR if last == 0.0 else fall < SLOW
             # A step along a tangent that has turned changes volume to second order, and a stiff body answers strongly.
-            kept = (still if kept else fall < FAST and scale == 1.0) and self._bulk * largest < TURNED
+            kept = (still if kept else fall < FAST and scale == 1.0) and self.bulk * largest < TURNED
             last = largest
         raise NotConverged(f"no equilibrium within {limit} iterations")
 

@@ -1,7 +1,8 @@
 """The warm stepper that a live view calls: time a reading, and how far the response is off while forces come in.
 
-The truth is a course driven by depth on a finer mesh, pressing and then sliding; its forces, without noise and without
-a bound on traction, are what the stepper is given. A busy machine stops a process for milliseconds now and then: so
+The truth is a course driven by depth on a finer mesh: the finger is pressed, slides, and lifts off while it slides, in
+so few readings that each moves it far. Its forces, without noise and without a bound on traction, are what the stepper
+is given. A busy machine stops a process for milliseconds now and then: so
 each reading counts with its median over several passes, and the percentile of one pass stands beside.
 """
 
@@ -16,11 +17,14 @@ from daq_app.accuracy.truth import cases
 from solver.contact import Course, untouched
 from solver.friction import FrictionLaw
 from solver.march import march, press_and_slide
+from solver.newton import Pull
 from solver.scene import Friction, Scene
+from solver.sliding import settled
 from solver.stepper import Stepper, stepper
 
 PASSES, QUICK_PASSES = 5, 3
 PRESS, SLIDES, DISTANCE = 200, 60, 6.0  # readings of the press and of the slide, and how far it goes [mm]
+LIFTS = 8  # readings in which it lifts off: 40 ms at 200 Hz
 FINER: dict[Kinematics, float] = {"small": 10.0, "finite": 8.0}  # fineness of the truth's mesh
 SURFACES = ("slipperiness 100", "slipperiness 55", "slipperiness 0", "stickiness 0")
 FULL: dict[Kinematics, tuple[str, ...]] = {"small": SURFACES, "finite": SURFACES}
@@ -89,7 +93,8 @@ def _small(scene: Scene) -> Iterator[Reading]:
     depth, direction = scene.loading.depth, scene.loading.direction
     press = [(depth * (n + 1) / PRESS, 0.0) for n in range(PRESS)]
     slide = [(depth, direction * DISTANCE * (n + 1) / SLIDES) for n in range(SLIDES)]
-    for down, along in press + slide:
+    lift = [(down, direction * (DISTANCE + depth * (n + 1))) for n, down in enumerate(_lifts(depth))]
+    for down, along in press + slide + lift:
         state = course.step(state, down, along)
         sed = finger.sed_ending(finger.displacement(state))
         yield float(state.normal.sum()), float(state.tangential.sum()), sed
@@ -101,3 +106,12 @@ def _finite(scene: Scene) -> Iterator[Reading]:
     course = press_and_slide(depth, mu, np.inf, direction, press=PRESS, slides=SLIDES, distance=DISTANCE)
     for shape in march(finger.newton, course, tolerance=1e-6):
         yield float(shape.force[1]), float(shape.force[0]), finger.sed_ending(shape)
+    shape = None
+    for down in _lifts(depth):
+        shape = settled(finger.newton, Pull(down, mu, np.inf, -direction), shape)
+        yield float(shape.force[1]), float(shape.force[0]), finger.sed_ending(shape)
+
+
+def _lifts(depth: float) -> list[float]:
+    """Return the depths of a finger that lifts off, at each of whose readings it slides as if settled."""
+    return [depth * (1.0 - n / LIFTS) for n in range(1, LIFTS)]
