@@ -6,10 +6,32 @@ import threading
 import time
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, TextIO
+
+from solver.telling import listening
 
 _MOST_DIGITS = 9  # of a range whose ends read alike with fewer
 PATIENCE = 1.0  # of people, before they want to see that something is going on [s]
+
+
+@dataclass(slots=True)
+class Underway:
+    """What work is at whose end nobody knows: half of what is left of the whole is thought to be what it is at."""
+
+    doing: str
+    part: float = 0.0  # of the whole, as shown
+    _begun: float = 0.0  # the part when it began what it is doing
+
+    def hear(self, doing: str, part: float) -> None:
+        """Take what is being done, and which part of that is done."""
+        if doing != self.doing:
+            self.doing, self._begun = doing, self.part
+        self.reach(self._begun + 0.5 * part * (1.0 - self._begun))
+
+    def reach(self, part: float) -> None:
+        """Move on to this part of the whole; the end is only there when it is there."""
+        self.part = max(self.part, min(part, 0.99))
 
 
 class Console:
@@ -53,27 +75,29 @@ class Console:
 
     @contextmanager
     def working(self, text: str) -> Generator[Callable[[float], bool]]:
-        """Show from the second second on how long work has taken whose end nobody knows, whatever it is busy with.
+        """Show from the second second on what work is busy with whose end nobody knows, and how long it has taken.
 
-        Yields what the work may tell the part done (0 to 1), where it knows it; the answer is always to go on.
+        Yields what the work may tell the part done (0 to 1), where it knows it; the answer is always to go on. Of what
+        is left of the whole, half is thought to be what the solver is at: so the part shown moves, and never back.
         """
         begun, over = time.monotonic(), threading.Event()
-        part = [0.0]
+        at = Underway(text)
 
         def told(done: float) -> bool:
-            part[0] = done
+            at.reach(done)
             return True
 
         def show() -> None:
             pause = PATIENCE
             while not over.wait(pause):
-                self.progress(part[0], f"{text}, {time.monotonic() - begun:.0f} s so far; Ctrl-C stops")
+                self.progress(at.part, f"{at.doing}, {time.monotonic() - begun:.0f} s so far; Ctrl-C stops")
                 pause = 0.2
 
         shower = threading.Thread(target=show, name="progress", daemon=True)
         shower.start()
         try:
-            yield told
+            with listening(at.hear):
+                yield told
         finally:
             over.set()
             shower.join()

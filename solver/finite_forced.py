@@ -15,6 +15,7 @@ from solver.kernels import SLIP, STICK
 from solver.meeting import UNMET, met
 from solver.mesh import Array
 from solver.newton import BY_DEPTH, BY_TRAVEL, EQUILIBRIUM, Newton, Pull, Shape
+from solver.telling import tell
 
 STRIDE = 0.3  # largest change of depth or travel in one iteration [mm]
 HALVINGS = 8  # how often a step that failed is cut in two before it is given up
@@ -135,7 +136,9 @@ def march(
     A step that fails is cut in two. Raises NotConverged, saying where, and Cancelled where `stop` says so.
     """
     shape = start
-    for aim in course:
+    for number, aim in enumerate(aims := list(course)):
+        if len(aims) > 1:
+            tell("letting the forces grow step by step", number / len(aims))
         done, part = 0.0, 1.0
         while done < 1.0:
             if stop():

@@ -31,6 +31,7 @@ from solver.newton import EQUILIBRIUM, Newton, Shape
 from solver.prediction import History, Prediction, Row, Skin
 from solver.receptor import ROW
 from solver.scene import Scene
+from solver.telling import tell
 
 ROUGH = 1e-8  # unbalanced part of the forces from which displacements are corrected further [-]
 CORRECTIONS = 4  # at most
@@ -63,6 +64,7 @@ def answers(
             if stop():
                 raise Cancelled
             begun = perf_counter()
+            tell("finding where contact ends, on a rough mesh")
             try:
                 low = foot(scenes[number], expected, fineness, stop, meshes.make, low)
                 feet[number] = low, perf_counter() - begun
@@ -74,6 +76,7 @@ def answers(
             if stop():
                 raise Cancelled
             begun = perf_counter() - took
+            tell(f"solving on a mesh of {fineness:g} elements to the tip radius")
             try:
                 before = risen(scenes[number], fineness, below, stop, meshes.make, before, sizing)
                 found[number] = _predicted(scenes[number], before, fineness, stop, begun)
@@ -134,6 +137,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         checks["course_against_direct"] = abs(finger.sed_ending(at.shape) / sed - 1.0)
     held = scene.loading.dragged and _sticking(shape) > 0.0  # sliding, a finger may have shifted by anything
     solved = perf_counter()
+    tell("estimating errors, on a coarser mesh")
     errors, others, stays = error_estimates(scene, fineness, way_up, numbers, stop)
     estimated = perf_counter()
     model = evidence.finite_model(

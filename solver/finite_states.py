@@ -15,6 +15,7 @@ from solver.kernels import STICK
 from solver.march import march
 from solver.newton import BY_DEPTH, Newton, Pull, Shape
 from solver.scene import Scene
+from solver.telling import tell
 
 FEW = 10  # iterations from a state nearby to one that is simple to find: 4 to 7 are usual
 LEADING = 1e-3  # tolerance of states that only lead to others [mm]
@@ -239,7 +240,9 @@ def _settle(way: "_Driven | _Forced", scene: Scene, direction: int) -> None:
     """Slide until the response does not change any more. Raises NotConverged where it still does."""
     depth = way.shapes[-1].pull.depth
     sed = way.finger.sed_ending(way.shapes[-1])
-    for _ in range(int(LONGEST / STRIDE * way.times)):
+    longest = int(LONGEST / STRIDE * way.times)
+    for number in range(longest):
+        tell("sliding until nothing changes", number / longest)
         way.slide(direction * STRIDE / way.times * depth)
         before, sed = sed, way.finger.sed_ending(way.shapes[-1])
         if not (way.shapes[-1].state == STICK).any() and abs(sed - before) * way.times <= SETTLED * sed:

@@ -16,6 +16,7 @@ from solver.failures import Cancelled
 from solver.finite_finger import FiniteFinger
 from solver.mesh import Array
 from solver.newton import BY_FRICTION, EQUILIBRIUM, Newton, Pull, Shape
+from solver.telling import tell
 
 LARGEST_MU = 2.0  # beyond this a coefficient of friction is not looked for
 TOLERANCE = 1e-6  # of a point on the branch [mm]
@@ -57,13 +58,17 @@ def follow(
     where `stop` says so.
     """
     way = [_Point(start, finger.pinch(start), value_of(start.pull, by))]
+    if way[0].value >= target * (1.0 - 1e-12):
+        return Branch((start,), way[0].value, limited=False)
     best = 0  # of them, by value
     reach = min(abs(target - way[0].value), LARGEST_MU)
     length = FIRST * reach
     direction, rate = _tangent(finger.newton, start, by)
+    doing = f"following sliding to its {'largest friction' if by == BY_FRICTION else 'largest depth'}"
     for _ in range(MOST):
         if stop():
             raise Cancelled
+        tell(doing, abs(way[best].value - way[0].value) / reach)
         step = _further(finger, way[-1], by, direction, rate, length, target, SHORTEST * reach)
         if step is None:
             lost = rate > STEEP and way[-1].pinch.least > folds + APART

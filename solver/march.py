@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 from solver.failures import Cancelled, NotConverged, followed_to
 from solver.newton import Newton, Pull, Shape
+from solver.telling import tell
 
 SMALLEST = 1.0 / 256.0  # part of a step below which a failing one is given up
 
@@ -36,7 +37,9 @@ def march(
     and Cancelled where `stop` says so.
     """
     shape = Shape.undeformed(newton.body) if start is None else start
-    for pull in course:
+    for number, pull in enumerate(pulls := list(course)):
+        if len(pulls) > 1:
+            tell("pressing and sliding step by step", number / len(pulls))
         begin, done, part = shape.pull, 0.0, 1.0
         while done < 1.0:
             if stop():

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from solver.failures import Cancelled, NotConverged
 from solver.newton import Newton, Pull, Shape
+from solver.telling import tell
 
 FIRST_TOLERANCE = 1e-3  # of the steps that only lead to the last one [mm]; looser ones go astray near nu = 0.5
 WORK = 80  # tangents after which no more steps are halved: a state that is there takes 5 to 30
@@ -29,6 +30,8 @@ def settled(
     while done < 1.0:
         if stop():
             raise Cancelled
+        if part < 1.0:
+            tell(f"coming to sliding at mu = {pull.mu:.3g} in small steps", done)
         aim = min(done + part, 1.0)
         try:
             shape = newton.settle(shape, _between(begin, pull, aim), tolerance if aim == 1.0 else FIRST_TOLERANCE)

@@ -15,6 +15,7 @@ from solver.prediction import Prediction
 from solver.scene import Scene
 from solver.small_solution import Answer, Fingers, Progress, Watch
 from solver.stepping import March
+from solver.telling import tell
 
 KNOWN = 0.03  # of a limit of friction, to which it is known
 WORTH = 0.1  # error estimate up to which a coarser mesh's number near a limit is worth more than the limit alone
@@ -116,10 +117,12 @@ def _with_evidence(found: Answer, progress: Progress | None, in_loops: bool) -> 
     """Return the answer with its evidence marched, and measured where its scene asks for that."""
     if not isinstance(found, Prediction) or found.scene.solve.evidence == "quick":
         return found
+    tell("estimating what the model leaves out")
     found = with_held(found, lambda: progress is not None and not progress(1.0), in_loops=in_loops)
     found = _with_earlier_slides(found, lambda scenes: _answers(scenes, progress, in_loops=in_loops))
     if found.scene.solve.evidence == "estimated":
         return found
+    tell("measuring what the model leaves out")
     return measured(found, lambda scenes: _answers(scenes, progress, in_loops=in_loops))
 
 

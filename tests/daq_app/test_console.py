@@ -4,7 +4,8 @@ import threading
 
 import pytest
 
-from daq_app.console import Console
+from daq_app.console import Console, Underway
+from solver.telling import listening, tell
 
 
 def console(*, as_json):
@@ -33,6 +34,18 @@ def test_a_number_that_is_none_never_becomes_json():
     speaker, _, _ = console(as_json=True)
     with pytest.raises(ValueError, match="not JSON compliant"):
         speaker.result({"a": float("nan")})
+
+
+def test_the_part_shown_of_work_whose_end_nobody_knows_moves_and_never_goes_back_nor_ends_before_it():
+    work, shown = Underway("solving"), []
+    for doing, part in [("solving on a mesh", 0.0), ("following", 0.5), ("following", 1.0), ("following", 0.2)]:
+        with listening(work.hear):
+            tell(doing, part)
+        shown.append((work.doing, work.part))
+    work.hear("estimating", 0.5)
+    work.reach(1.0)
+    assert shown == [("solving on a mesh", 0.0), ("following", 0.25), ("following", 0.5), ("following", 0.5)]
+    assert (work.doing, work.part) == ("estimating", 0.99)
 
 
 def test_work_whose_end_nobody_knows_shows_how_long_it_has_taken_and_can_still_be_left(monkeypatch):

@@ -76,6 +76,9 @@ def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
     pull = Pull(1.0, 0.5, 0.03, TOWARDS_TIP)
     start = settled(finger.newton, pull._replace(mu=0.0))
     branch = follow(finger, start, BY_FRICTION, pull.mu, 0.54)
+    again = follow(finger, branch.last, BY_FRICTION, pull.mu, 0.54)  # nothing is left to follow
+    assert again.states == (branch.last,)
+    assert not again.limited
     assert not branch.limited
     np.testing.assert_allclose(branch.last.u, settled(finger.newton, pull).u, atol=1e-6)
 
