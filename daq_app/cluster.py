@@ -4,10 +4,10 @@ import asyncio
 import importlib
 import logging
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from daq_app.computing import Answer, computed_from, content_of
 from sessions.pooling.visit import VisitOptions
@@ -46,14 +46,33 @@ def by_cluster(folders: Sequence[Path], options: VisitOptions, address: str) -> 
 
 def refuse_other_versions(answer: Answer, address: str) -> None:
     """Raise SchedulerError for what was computed by other versions: one study holds the numbers of one program."""
-    if isinstance(answer[1], str):
-        return
-    here, there = software_versions(), answer[1]["made_by"]
+    if not isinstance(answer[1], str):
+        _refuse_unlike(answer[1]["made_by"], address, "a worker")
+
+
+def refuse_other_workers(client: Any, workers: Sequence[str], address: str) -> None:  # noqa: ANN401
+    """Raise SchedulerError where one of the workers at some addresses would compute with other versions, or cannot.
+
+    A worker that has gone by now says nothing.
+    """
+    answers: dict[str, Any] = client.run(software_versions, workers=list(workers), on_error="return")
+    for worker, versions in answers.items():
+        if isinstance(versions, ImportError):
+            raise SchedulerError(
+                f"{address}: the worker {worker} has no daq-app ({versions}); install it there, in the version that "
+                "is here, and run this again: what is done is kept"
+            )
+        if isinstance(versions, dict):
+            _refuse_unlike(cast("dict[str, str]", versions), address, f"the worker {worker}")
+
+
+def _refuse_unlike(there: Mapping[str, Any], address: str, who: str) -> None:
+    here = software_versions()
     differ = [name for name in NUMBERS_BY if there.get(name) != here.get(name)]
     if differ:
         other = ", ".join(f"{name} {there.get(name)} (here {here.get(name)})" for name in differ)
         raise SchedulerError(
-            f"{address}: a worker computes with {other}; give every worker the versions that are here and "
+            f"{address}: {who} computes with {other}; give every worker the versions that are here and "
             "run this again: what is done is kept"
         )
 
@@ -81,10 +100,16 @@ def _by_client(
     names: dict[Any, str] = {}
     waiting = list(reversed(folders))
     under_way: dict[str, Any] = {}
+    checked = set[str]()  # workers whose versions are ours
     seen = time.monotonic()  # when a worker was last there
     try:
         while waiting or under_way:
-            threads = sum(client.nthreads().values())
+            there: dict[str, int] = client.nthreads()
+            threads = sum(there.values())
+            joined = [worker for worker in there if worker not in checked]
+            if joined:  # before it is given anything to compute, also where it comes later
+                refuse_other_workers(client, joined, address)
+                checked.update(joined)
             seen = time.monotonic() if threads else seen
             if time.monotonic() - seen > WITHOUT_WORKERS:
                 raise SchedulerError(

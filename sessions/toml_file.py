@@ -35,20 +35,27 @@ def load_toml(path: Path, cls: type[T]) -> T:
 
     Raises FileNotFoundError where there is none, SettingsError for anything wrong in it.
     """
+    return from_toml(text_of(path), cls, str(path))
+
+
+def text_of(path: Path) -> str:
+    """Return the text of a TOML file. Raises as `load_toml` does."""
     if not path.is_file():
         found = "this is a folder" if path.is_dir() else "there is no such file"
         raise FileNotFoundError(f"{path}: {found}; give the path of a TOML file")
     try:
-        text = path.read_bytes().decode()
+        return path.read_bytes().decode()
     except UnicodeDecodeError as error:
         raise SettingsError(f"{path}: byte {error.start} is no UTF-8 text; save the file as UTF-8") from error
-    return from_toml(text, cls, str(path))
 
 
-def from_toml(text: str, cls: type[T], where: str) -> T:
-    """Return the dataclass that a TOML text describes; `where` is how messages call it. Raises SettingsError."""
+def from_toml(text: str, cls: type[T], where: str, instead: Mapping[str, Any] | None = None) -> T:
+    """Return the dataclass that a TOML text describes; `where` is how messages call it. Raises SettingsError.
+
+    `instead` are tables and values that count in place of the text's own, or of those that it lacks.
+    """
     try:
-        return from_table(tomllib.loads(text), cls, where)
+        return from_table({**tomllib.loads(text), **(instead or {})}, cls, where)
     except tomllib.TOMLDecodeError as error:
         raise SettingsError(f"{where}: this is not TOML: {error}") from error
     except _Wrong as wrong:

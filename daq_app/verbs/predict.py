@@ -17,11 +17,9 @@ from daq_app.console import Console, number, span, table
 from daq_app.derived import analysed, predicted, visit
 from sessions.afferent import AfferentSettings, firing_document, settings_with
 from sessions.alternative import Alternative
-from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction
+from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction, finger_in
 from sessions.sealing import SEAL, seal_prediction
 from sessions.sed_interval import SedInterval
-from sessions.toml_file import load_toml
-from solver.scene import Scene
 
 EXAMPLE = "daq-app predict recordings/P07 --tau as-printed"
 HEAD = ["trial", "surface", "mu", "tau_max [kPa]", "SED [kPa]", "error", "model N [N]", "measured [N]", "match [mm]"]
@@ -46,7 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="computed",
         help="reading of the traction bound: force over area, or a hundredth of it, as the paper's tables are headed",
     )
-    parser.add_argument("--scene", type=Path, metavar="FILE", help="scene file with another finger")
+    parser.add_argument(
+        "--scene",
+        type=Path,
+        metavar="FILE",
+        help="scene file with another finger; friction and loading are the trials'",
+    )
     parser.add_argument("--indentation", type=float, metavar="MM", help="instead of each block's own")
     parser.add_argument(
         "--beside",
@@ -85,9 +88,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.afferent_seed < 0:
         raise WrongValue(f"--afferent-seed {options.afferent_seed} is not allowed: a whole number from 0 on")
     afferent = _afferent(options)
+    scene, ignored = (None, "") if options.scene is None else finger_in(options.scene)
+    if ignored:
+        console.note(ignored)
     asked = PredictionOptions(
         tau_reading=options.tau,
-        scene=None if options.scene is None else load_toml(options.scene, Scene),
+        scene=scene,
         indentation=options.indentation,
         kinematics=options.kinematics,
         beside=options.beside,

@@ -61,7 +61,9 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
         keywords=["friction", "touch", "psychophysics", *(["SIMULATED"] if mark else [])],
         source_script=f"daq-app {source.analysis['made_by'].get('daq-app', '')}",
         source_script_file_name="daq-app export",
-        notes=json_text({**told, "log": [asdict(event) for event in recording.events]}),  # all that the file lacks
+        notes=json_text(  # all that the file lacks
+            {**told, "log": [asdict(event) for event in recording.events], "calibration_error": _calibration(source)}
+        ),
         subject=Subject(
             subject_id=plan.subject,
             species="Homo sapiens",
@@ -85,6 +87,12 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     with pynwb.NWBHDF5IO(folder / FILE, "w") as io:
         io.write(file)
     progress(1.0)
+
+
+def _calibration(source: ExportSource) -> dict[str, Any]:
+    """Return how uncertain each axis' gain is, which the intervals hold, and whether somebody set that."""
+    drawn: Mapping[str, Any] = (source.analysis.get("bootstrap") or {}).get("settings") or {}
+    return {name: drawn.get(name) for name in ("gain_error", "gain_error_origin")}
 
 
 def _add_readings(file: "NWBFile", recording: Recording, first_ns: int, mark: str) -> None:
@@ -203,5 +211,7 @@ def _values(column: Column) -> list[str] | list[int] | list[float]:
 def _utc(recording: Recording, instant_ns: int) -> datetime:
     """Return the date of an instant of the session clock; told time that moves when waited on passes as the date's."""
     known = datetime.fromisoformat(str(recording.provenance["created_utc"]))
-    clock = recording.provenance["clock"]
+    clock = recording.provenance.get("clock")
+    if clock is None:  # how the session clock goes with the date was not recorded: only when it began
+        return known
     return known + timedelta(seconds=(instant_ns - int(clock["now_ns"])) * 1e-9 / (float(clock["factor"]) or 1.0))

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from sessions.exports.report_tables.paths import paths_sentence
-from sessions.exports.wording import correlation, digits, plural
+from sessions.exports.wording import correlation, digits, plural, significant
 from sessions.pooling.exclusions import Exclusion
 from sessions.pooling.findings import DescriptorFindings, StudyFindings
 from sessions.recording.provenance import software_versions
 from sessions.report import Fact
 from sessions.report.commands import area_words, calibration_words, model_words
+from sessions.report.predictions import UNKNOWNS
 
 _FEW = 12  # trials named one by one
 
@@ -128,7 +129,38 @@ def remarks(study: StudyFindings) -> list[str]:
         "used backwards."
         for subject, descriptor, r in study.reversed
     ]
-    return said
+    return [*said, *_meshes(study)]
+
+
+def _meshes(study: StudyFindings) -> list[str]:
+    """Return what it makes of the SEDs that sessions were not all solved on one mesh; nothing where they were."""
+    solved: defaultdict[str, list[str]] = defaultdict(list)
+    for visit in study.visits:
+        for name, value, _ in visit.model:
+            if name == UNKNOWNS:
+                solved[value].append(visit.session)
+    errors = [row.error_estimate for visit in study.visits for row in visit.rows if row.error_estimate is not None]
+    if len(solved) < 2 or not errors:
+        return []
+    meshes = "; ".join(f"{value}: {_listed(sessions)}" for value, sessions in solved.items())
+    said = (
+        f"The sessions were solved on meshes of {len(solved)} finenesses ({meshes}), each as fine as telling its own "
+        "trials apart asks for. Within a subject all trials share one mesh; between subjects an SED may differ for its "
+        f"mesh alone by as much as its estimated error, {_range_of(errors)} of it."
+    )
+    spreads = [
+        s.sed.sd / s.sed.mean for one in study.descriptors for s in one.surfaces if s.sed is not None and s.sed.sd
+    ]
+    if spreads:
+        said += (
+            f" Standard deviations between subjects are {_range_of(spreads)} of the SED of a surface: where they are "
+            "no larger than that error, part of them may be the mesh."
+        )
+    return [said]
+
+
+def _range_of(shares: Sequence[float]) -> str:
+    return f"{significant(100 * min(shares), 2)} to {significant(100 * max(shares), 2)} %"
 
 
 def _whats(one: Exclusion) -> str:

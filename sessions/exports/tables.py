@@ -198,8 +198,14 @@ def _strokes(analysis: Mapping[str, Any]) -> list[dict[str, Any]]:
     told: Sequence[Mapping[str, Any]] = held.get("strokes") or ()
     if not told:
         return list(strokes)
+    drawn: Mapping[str, Any] = held["settings"]
+    calibration = {name: drawn[name] for name in ("gain_error", "gain_error_origin")}
     ends: list[dict[str, Any]] = [
-        {**{f"{name}_bootstrap": one[name] for name in NUMBERS}, "direction_agrees": one["direction_agrees"]}
+        {
+            **{f"{name}_bootstrap": one[name] for name in NUMBERS},
+            "direction_agrees": one["direction_agrees"],
+            **calibration,
+        }
         for one in told
     ]
     return [{**stroke, **end} for stroke, end in zip(strokes, ends, strict=True)]
@@ -292,6 +298,8 @@ _STROKE = {
             "slide_onset": "s",
         }.items()
     },
+    "gain_error": ("", "calibration: standard uncertainty of each axis' gain, which the bootstrap intervals hold"),
+    "gain_error_origin": ("", "of that: set, or assumed where nobody stated it"),
     "contact_area": ("mm2", "by which tau_max was told"),
     "area_exponent": ("", "with which that area follows the normal force"),
     "number": ("", "of the stroke within its trial, from 1"),

@@ -3,6 +3,7 @@
 Each trial becomes a scene: its measured friction, its block's indentation, its direction and speed, and one finger.
 """
 
+from sessions.prediction.finger_file import finger_in
 from sessions.prediction.options import PredictionOptions, tau_scale, with_own_finger
 from sessions.prediction.predicting import Way, predict
 from sessions.prediction.scenes import DEFAULT_SPEED, SLIDES, scene_along, scenes_of, with_loads
@@ -35,6 +36,7 @@ __all__ = [
     "Way",
     "derivatives_by",
     "doubt_of",
+    "finger_in",
     "predict",
     "scene_along",
     "scenes_of",

@@ -19,6 +19,7 @@ _READINGS = {
     "computed": "greatest tangential force over the contact area",
     "as-printed": "a hundredth of that, as the paper's tables are headed",
 }
+UNKNOWNS = "unknowns"  # of the mesh: the name of that fact
 _NUMBER = re.compile(r"\d+(\.\d+)?(e[-+]?\d+)?")
 _AUDITS = {  # 0 is perfect, but for the volume
     "equilibrium_x": "forces along the surface out of balance by, of the contact force",
@@ -112,7 +113,7 @@ def modelled(found: SessionPrediction | None) -> tuple[Fact, ...]:
     facts += [Fact(name, _values(asdict(getattr(first.scene, name))), units) for name, units in _SCENE.items()]
     facts.append(Fact("finger's width", f"{found.width:g} mm", found.width_origin))
     facts.append(Fact("τ max", _READINGS[found.options.tau_reading]))
-    facts.append(Fact("unknowns", f"{first.dofs} displacements", "one mesh for all trials"))
+    facts.append(Fact(UNKNOWNS, f"{first.dofs} displacements", "one mesh for all trials"))
     audits = "; ".join(
         f"{_AUDITS.get(name, name.replace('_', ' '))}: {_worst(name, [p.audits for p in solved]):.2g}"
         for name in first.audits

@@ -23,10 +23,11 @@ from daq_app.pooling import Shelf
 from sessions.analysis import AnalysisSettings, analyse
 from sessions.gain_error import gain_error_set
 from sessions.pooling.visit import VisitOptions, visit_of
-from sessions.prediction import PredictionOptions
+from sessions.prediction import PredictionOptions, finger_in
 from sessions.recording import Recording
 from sessions.recording.archive import seal
 from sessions.report import findings
+from sessions.toml_file import SettingsError
 
 ROOT = Path(__file__).parents[2]
 
@@ -68,6 +69,31 @@ def test_every_number_of_a_reported_session_has_a_unit_and_an_interval(reported)
         ("mean score", "one subject alone has no interval"),
         ("depth to match", "no interval: found on a rough mesh"),
     }
+
+
+def test_exports_carry_the_error_of_calibration_that_their_intervals_hold(reported, tmp_path):
+    pynwb = pytest.importorskip("pynwb")
+    for form in ("csv", "nwb"):
+        assert run(["export", str(reported), "--format", form, "--out", str(tmp_path / form)]) == 0
+    with (tmp_path / "csv" / "strokes.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {(row["gain_error"], row["gain_error_origin"]) for row in rows} == {("0.003", "set")}
+    with pynwb.NWBHDF5IO(tmp_path / "nwb" / "session.nwb", "r") as io:
+        assert json.loads(io.read().notes)["calibration_error"] == {"gain_error": 0.003, "gain_error_origin": "set"}
+
+
+def test_a_finger_alone_does_for_a_scene_and_what_is_not_taken_is_said(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text("[finger]\ntip_radius = 5.5\n")
+    scene, ignored = finger_in(file)
+    assert (scene.finger.tip_radius, ignored) == (5.5, "")
+    file.write_text("[finger]\ntip_radius = 5.5\n[friction]\nmu = 0.3\n[solve]\ncourse = 'steady'\ntolerance = 0.01\n")
+    scene, ignored = finger_in(file)
+    assert scene.solve.tolerance == 0.01
+    assert ignored.startswith(f"{file}: [friction], solve.course are not taken")
+    file.write_text("title = 'mine'\n[finger]\ntip_radius = -1.0\n")
+    with pytest.raises(SettingsError, match=r"line 3: finger\.tip_radius"):
+        finger_in(file)
 
 
 def printed(capsys):

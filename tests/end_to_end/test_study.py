@@ -255,6 +255,53 @@ def test_a_scheduler_that_is_killed_ends_a_study_in_a_sentence(study, tmp_path, 
             scheduler.kill()
 
 
+class Workers:
+    """A client of a cluster whose workers answer with these versions, or with the exception they raise."""
+
+    def __init__(self, **there):
+        self.there = there
+
+    def run(self, _, workers, on_error):
+        assert on_error == "return"
+        return {name: self.there[name] for name in workers}
+
+
+def test_every_worker_is_asked_for_its_versions_before_it_computes():
+    here = software_versions()
+    older = here | {"numpy": "1.0"}
+    client = Workers(one=here | {"blas": "that of another processor"}, two=here, old=older, gone=OSError("closed"))
+    cluster.refuse_other_workers(client, ["one", "two", "gone"], "tcp://host:1")
+    with pytest.raises(cluster.SchedulerError, match=r"the worker old computes with numpy 1\.0"):
+        cluster.refuse_other_workers(client, ["one", "old"], "tcp://host:1")
+    bare = Workers(bare=ModuleNotFoundError("No module named 'sessions'"))
+    with pytest.raises(cluster.SchedulerError, match="the worker bare has no daq-app"):
+        cluster.refuse_other_workers(bare, ["bare"], "tcp://host:1")
+
+
+@pytest.mark.slow
+def test_a_worker_of_another_version_that_joins_later_is_refused(study, tmp_path, monkeypatch):
+    import distributed
+
+    asked = cluster.refuse_other_workers
+    seen = []
+
+    def told(client, workers, address):
+        seen.extend(workers)
+        if len(seen) > 1:
+            asked(Workers(**{workers[-1]: {"numpy": "1.0"}}), workers[-1:], address)
+        asked(client, workers, address)
+        if len(seen) == 1:
+            cluster_of.scale(2)
+
+    monkeypatch.setattr(cluster, "refuse_other_workers", told)
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster_of:
+        folders = [study / "S01", study / "S02"]
+        call = (folders, STEADY, Shelf(tmp_path, STEADY), Console(as_json=True))
+        with pytest.raises(cluster.SchedulerError, match=r"computes with .*numpy 1\.0"):
+            visits(*call, scheduler=cluster_of.scheduler_address)
+    assert len(seen) == 2
+
+
 def test_what_another_version_computed_is_refused_in_a_sentence_and_not_mixed_in():
     here = software_versions()
     cluster.refuse_other_versions(("S01", {"made_by": here | {"blas": "that of another processor"}}), "tcp://host:1")

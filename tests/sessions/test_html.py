@@ -4,9 +4,11 @@ import re
 import shutil
 import subprocess
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from html.parser import HTMLParser
 from unittest.mock import patch
 
+import numpy as np
 import pytest
 from browser import CHROMIUM, FLAGS, PAPER_HEIGHT, opened
 from hypothesis import given
@@ -18,9 +20,11 @@ from study_example import study
 
 from sessions.exports.figures import plates
 from sessions.exports.figures.labels import spread
+from sessions.exports.figures.scores import _free_place
 from sessions.exports.html import ReportError, page, write_figures, write_report
 from sessions.exports.report_tables import tables
 from sessions.exports.study_page import study_page
+from sessions.exports.study_prose import remarks
 
 PDFTOTEXT = shutil.which("pdftotext")
 SVG = "{http://www.w3.org/2000/svg}"
@@ -289,6 +293,39 @@ def test_the_numbers_of_a_picture_are_on_the_page_itself(made, drawn):
 @pytest.fixture(scope="module", params=["session", "study"])
 def text(request, made):
     return made if request.param == "session" else study_page(study(), "example")
+
+
+def test_the_words_on_the_line_of_figure_1_lie_free_of_dots():
+    made = example().experiments[0]
+    draw, found = np.random.default_rng(5), 0
+    for _ in range(40):
+        spread_of = draw.uniform(0.0, 25.0)
+        answers = tuple(
+            replace(a, scores=tuple(np.clip(np.array(made.indices) + draw.normal(0, spread_of, 5), 0, 100).tolist()))
+            for a in made.answers
+        )
+        place = _free_place(replace(made, answers=answers, scores=()))
+        if place is None:
+            continue
+        found += 1
+        # The words, 60 by 9 pixels in a picture of some 2.2 pixels a point, turned by 45 degrees.
+        start, side = place[0], 1 if place[1] else -1
+        for answer in answers:
+            for index, score in zip(made.indices, answer.scores, strict=True):
+                x, y = index - 3.0 - start, score - start
+                along, across = (x + y) / np.sqrt(2.0), side * (y - x) / np.sqrt(2.0)
+                assert not (-1.0 < along < 28.0 and 1.0 < across < 7.0)
+    assert found > 10
+
+
+def test_a_study_solved_on_several_meshes_says_so_and_what_it_makes_of_the_seds():
+    made = study()
+    assert not any("meshes" in sentence for sentence in remarks(made))
+    model = [(("unknowns", f"{4212 * (1 + n % 2)} displacements", ""),) for n in range(len(made.visits))]
+    visits = tuple(replace(visit, model=m) for visit, m in zip(made.visits, model, strict=True))
+    (told,) = [sentence for sentence in remarks(replace(made, visits=visits)) if "meshes" in sentence]
+    assert "2 finenesses (4212 displacements: S01" in told
+    assert "0.20 to 0.20 % of it" in told  # the estimated error of every SED of the example
 
 
 def test_every_number_of_a_table_has_a_unit_and_an_interval_or_says_why_it_has_none(text):

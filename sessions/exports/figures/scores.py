@@ -3,8 +3,41 @@
 # pyright: reportUnknownMemberType=false
 # matplotlib does not type the keyword arguments it passes on.
 
+import numpy as np
+
 from sessions.exports.figures.style import GREY, INK, PALE, Panel, sheet, svg
 from sessions.report import Experiment
+
+_LONG, _HIGH = 22.0, 6.0  # of the words along the line and across it [points of either axis]
+_AWAY = 3.0  # that no dot may come nearer [points]
+
+
+def _free_place(experiment: Experiment) -> tuple[float, bool] | None:
+    """Return where on the line of equal score and index its words may begin, and whether above it; None: nowhere.
+
+    That is where dots and bars lie farthest from them.
+    """
+    dots = [
+        (index - 3.0, score)
+        for answers in experiment.answers
+        for index, score in zip(experiment.indices, answers.scores, strict=True)
+        if score is not None
+    ]
+    for mean in experiment.scores:
+        low, high = (mean.mean if end is None else end for end in (mean.low, mean.high))
+        dots += [(mean.index, y) for y in np.linspace(low, high, 9).tolist()]
+    along = np.array([(x + y) / 2.0 for x, y in dots])
+    across = np.array([y - x for x, y in dots])
+
+    def room(start: float, *, above: bool) -> float:
+        beside = np.maximum(np.maximum(start - along, along - start - _LONG), 0.0)
+        low, high = (1.0, 2.0 * _HIGH) if above else (-2.0 * _HIGH, -1.0)  # y - x grows twice as fast as the way across
+        over = np.maximum(np.maximum(low - across, across - high), 0.0) / 2.0
+        return float(np.hypot(beside, over).min(initial=np.inf))
+
+    places = [(start, above) for start in range(2, 70) for above in (True, False)]
+    best = max(places, key=lambda place: room(float(place[0]), above=place[1]))
+    return (float(best[0]), best[1]) if room(float(best[0]), above=best[1]) >= _AWAY else None
 
 
 def score_panel(experiment: Experiment, *, simulated: bool) -> Panel:
@@ -12,17 +45,21 @@ def score_panel(experiment: Experiment, *, simulated: bool) -> Panel:
     drawn = sheet(328, 280)
     (axes,) = drawn.axes
     axes.plot([0, 100], [0, 100], color=PALE, linewidth=0.8, zorder=0)
-    axes.text(
-        24,
-        27,
-        "score = index",
-        color=GREY,
-        rotation=45,
-        rotation_mode="anchor",
-        transform_rotates_text=True,
-        va="bottom",
-        fontsize=7.5,
-    )
+    place = _free_place(experiment)
+    if place is not None:
+        start, above = place
+        off = 1.5 if above else -1.5
+        axes.text(
+            start - off,
+            start + off,
+            "score = index",
+            color=GREY,
+            rotation=45,
+            rotation_mode="anchor",
+            transform_rotates_text=True,
+            va="bottom" if above else "top",
+            fontsize=7.5,
+        )
     for answers in experiment.answers:
         places = [
             index - 3.0 for index, score in zip(experiment.indices, answers.scores, strict=True) if score is not None
