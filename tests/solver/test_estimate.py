@@ -11,7 +11,7 @@ from solver.estimate import DEFAULT, FINENESS, coarsest_for, estimates
 from solver.finite_errors import error_estimates
 from solver.mesher import AT_CUT
 from solver.reference import STICKINESS, scene
-from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
+from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
 from solver.solution import solve
 from tests.solver.drawn_scenes import DRAWN, HELD_OUT
 
@@ -33,6 +33,17 @@ def test_estimates_lie_above_the_errors_of_scenes_drawn_at_random_and_mostly_bel
         assert np.all(errors <= estimates)
         close.extend((estimates < 10.0 * np.maximum(errors, 2e-4)).tolist())
     assert np.mean(close) >= 0.75
+
+
+@pytest.mark.parametrize(  # SED: the mean of three meshes of 23 and 26, which agree to 0.15 and 0.05 %
+    ("depth", "ending", "truth"), [(1.425, (0.0035, 0.0017), 2.14183e-3), (1.9, (0.001, 0.001), 3.00454e-3)]
+)
+def test_the_estimate_of_an_ending_that_is_hardly_more_than_a_point_knows_that_nothing_is_smoothed(
+    depth, ending, truth
+):
+    asked = Solve(tolerance=0.01, evidence="quick")
+    found = solve(Scene(friction=Friction(0.6), loading=Loading(1.0), receptor=Receptor(depth, ending), solve=asked))
+    assert abs(found.sed_ending / truth - 1.0) <= found.error_estimate <= 0.01
 
 
 def test_a_drag_that_cannot_be_is_exactly_none():
