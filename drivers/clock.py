@@ -72,3 +72,20 @@ class ToldClock:
     def sleep(self, seconds: float) -> None:
         """Let `seconds` of told time pass at once."""
         self._now_ns += int(max(seconds, 0.0) * 1e9)
+
+
+class StillClock:
+    """A clock that stands, for what is read back and happens no more."""
+
+    factor = 1.0
+
+    def __init__(self, at_ns: int) -> None:
+        """Stand at `at_ns` [ns]."""
+        self._at_ns = at_ns
+
+    def now_ns(self) -> int:
+        """Return where it stands [ns]."""
+        return self._at_ns
+
+    def sleep(self, seconds: float) -> None:
+        """Pass no time: there is nothing to wait for."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.calibration import Calibration
+from drivers.clock import StillClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.analysis import ZERO_SETTING, ZERO_STATED
@@ -86,7 +87,7 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
     raw = rows[:, list(told.axes)]
     block = _block(time, raw)
     digest = hashlib.sha256(content).hexdigest()
-    clock = _FileClock(int(block.received_ns[-1]))
+    clock = StillClock(int(block.received_ns[-1]))
     source = {
         "file": path.name,
         "bytes": len(content),
@@ -116,21 +117,6 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
     writer.event("ended", data={"reason": "the file ends", "cause": "finished", "readings": len(block)})
     writer.close()
     return Imported(folder, len(block), rate, _defaults(frame), told.extra)
-
-
-class _FileClock:
-    """The session clock of an import: it stands where the file ends, for nobody knows when that was."""
-
-    factor = 1.0
-
-    def __init__(self, end_ns: int) -> None:
-        self._end_ns = end_ns
-
-    def now_ns(self) -> int:
-        return self._end_ns
-
-    def sleep(self, seconds: float) -> None:
-        """Pass no time: there is nothing to wait for."""
 
 
 def _table(path: Path, content: bytes, stated: ImportOptions) -> tuple[Columns, Array, list[int]]:

@@ -5,7 +5,6 @@ here and nowhere else. How long a jam must be, and how long the transducer is de
 """
 
 import struct
-import threading
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from drivers.clock import Clock
 from simulators.bench import Bench
 from simulators.faults import Faults
 from simulators.gauges import FT32831
+from simulators.line_box import LineBox
 from simulators.pseudo_terminal import ROOM, PseudoTerminal
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ _SHORTEST_NAP = 0.001
 _BURST = ROOM // 13  # packets at one go after the computer was busy: as many as are kept for a late reader
 
 
-class DigitalFtBox:
+class DigitalFtBox(LineBox):
     """A transducer with a simulated bench behind it. Its time, and the bench's, begins when it is started.
 
     It holds one calibration, as number 1, whose part number tells that it is simulated.
@@ -48,17 +48,13 @@ class DigitalFtBox:
         streaming: bool = False,
     ) -> None:
         """Set up a transducer whose sampling is wrong by `rate_error` [-], perhaps left `streaming` by somebody."""
+        super().__init__("ttyDigitalFT", clock)
         self._bench = bench
-        self._clock = clock
         self._rate = RATE * (1.0 + rate_error)
         self._faults = faults or Faults()
         self._rated = np.array(bench.settings.rated)
         self._gauges = np.linalg.inv(FT32831) * COUNTS_PER_VOLT  # counts for one N or N mm
         self._stored = self._calibration()
-        self._closing = threading.Event()
-        self._thread: threading.Thread | None = None
-        self._port: PseudoTerminal | None = None
-        self._origin_ns = 0
         self._power_up(0.0)
         self._deaf_until = 0.0
         self._streaming_since = 0.0 if streaming else None
@@ -66,28 +62,7 @@ class DigitalFtBox:
     @property
     def uri(self) -> str:
         """The address to open it at; known once it is started. Pseudo-terminals carry no parity."""
-        assert self._port is not None
-        return f"digital-ft://{self._port.path}?parity=none"
-
-    def now(self) -> float:
-        """Return the box's and the bench's time [s]: 0 when it was started."""
-        return (self._clock.now_ns() - self._origin_ns) * 1e-9
-
-    def start(self) -> None:
-        """Make the port and begin to serve."""
-        self._port = PseudoTerminal("ttyDigitalFT")
-        self._origin_ns = self._clock.now_ns()
-        self._thread = threading.Thread(target=self._serve, args=(self._port,), name="simulated digital-ft box")
-        self._thread.start()
-
-    def close(self) -> None:
-        """Switch the box off and remove its port. Harmless when repeated."""
-        self._closing.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
-        if self._port is not None:
-            self._port.close()
+        return f"digital-ft://{self.path}?parity=none"
 
     def _calibration(self) -> bytes:
         """Return the registers of calibration 1."""

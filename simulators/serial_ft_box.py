@@ -5,7 +5,6 @@ nowhere else. The wording of the banner and of refusals, and the error digit of 
 """
 
 import struct
-import threading
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from drivers.clock import Clock
 from simulators.bench import Bench
 from simulators.faults import Faults
+from simulators.line_box import LineBox
 from simulators.pseudo_terminal import PseudoTerminal
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ _START_UP = 0.2  # from power to prompt [s]
 _TAKEN = (b"CV", b"CL", b"CR", b"CP", b"SM", b"SP", b"SR", b"CF", b"SF", b"CS", b"CE", b"RS", b"RL", b"%")
 
 
-class SerialFtBox:
+class SerialFtBox(LineBox):
     """A controller with a simulated bench behind it. Its time, and the bench's, begins when it is started.
 
     A pseudo-terminal carries bytes at any speed; here they leave no faster than the line would carry them, and come
@@ -37,48 +37,23 @@ class SerialFtBox:
 
     def __init__(self, bench: Bench, clock: Clock, *, baud: int = 38400, faults: Faults | None = None) -> None:
         """Set up a controller whose line runs at `baud` bits a second."""
+        super().__init__("ttyFT", clock)
         self._bench = bench
-        self._clock = clock
         self._baud = baud
         self._faults = faults or Faults()
         self._rated = np.array(bench.settings.rated)
         self._counts = np.repeat([COUNTS_PER_N, COUNTS_PER_NM / 1000.0], 3)  # in one N or N mm
-        self._closing = threading.Event()
-        self._thread: threading.Thread | None = None
-        self._port: PseudoTerminal | None = None
-        self._origin_ns = 0
         self._power_up(0.0)
 
     @property
     def uri(self) -> str:
         """The address to open it at; known once it is started."""
-        assert self._port is not None
         force, torque = self._rated[0], self._rated[3] / 1000.0
         return (
-            f"serial-ft://{self._port.path}?baud={self._baud}&counts_per_N={COUNTS_PER_N:g}"
+            f"serial-ft://{self.path}?baud={self._baud}&counts_per_N={COUNTS_PER_N:g}"
             f"&counts_per_Nm={COUNTS_PER_NM:g}&range_N={force:g}&range_Nm={torque:g}"
             f"&serial={self._serial}&simulated=1"
         )
-
-    def now(self) -> float:
-        """Return the box's and the bench's time [s]: 0 when it was started."""
-        return (self._clock.now_ns() - self._origin_ns) * 1e-9
-
-    def start(self) -> None:
-        """Make the port and begin to serve."""
-        self._port = PseudoTerminal("ttyFT")
-        self._origin_ns = self._clock.now_ns()
-        self._thread = threading.Thread(target=self._serve, args=(self._port,), name="simulated serial-ft box")
-        self._thread.start()
-
-    def close(self) -> None:
-        """Switch the box off and remove its port. Harmless when repeated."""
-        self._closing.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
-        if self._port is not None:
-            self._port.close()
 
     @property
     def _serial(self) -> str:

@@ -1,5 +1,9 @@
 """What holds for every test."""
 
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the program has it; read when NumPy is loaded
+
 from hypothesis import HealthCheck, settings
 
 # Machines that run the tests are shared: how long an example takes says nothing about the code.

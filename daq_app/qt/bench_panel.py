@@ -8,13 +8,12 @@ from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
     QLabel,
-    QScrollArea,
     QVBoxLayout,
     QWidget,
 )
 
 from daq_app.qt.indicators import Lamp, LoadBar
-from daq_app.qt.parts import Shortened, button, choice, label, regrade, say
+from daq_app.qt.parts import Shortened, button, choice, label, regrade, say, scrolled
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.window.bench_load import AXES
@@ -156,14 +155,7 @@ class BenchPanel(QFrame):
         row.addWidget(self.connect_button, 1)
         row.addWidget(self.search, 1)
         layout.addLayout(row)
-        scroll = QScrollArea()
-        scroll.setWidget(inside)
-        scroll.setWidgetResizable(True)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        inside.setObjectName("inside")
-        scroll.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")
-        return scroll
+        return scrolled(inside)
 
 
 class BenchStrip(QFrame):

@@ -14,12 +14,11 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QRadioButton,
-    QScrollArea,
     QVBoxLayout,
     QWidget,
 )
 
-from daq_app.qt.parts import button, choice, label, regrade, say
+from daq_app.qt.parts import button, choice, label, regrade, say, scrolled
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.tokens import GRID, TARGET
@@ -212,7 +211,6 @@ class NewSessionPage(QFrame):
 
     def _build(self, scale: float) -> None:
         inside = QWidget()
-        inside.setObjectName("inside")
         layout = QVBoxLayout(inside)
         layout.setContentsMargins(int(1.5 * GRID), GRID, int(1.5 * GRID), GRID)
         layout.setSpacing(4)
@@ -268,15 +266,9 @@ class NewSessionPage(QFrame):
         cut_short.addWidget(self._resume)
         cut_short.addWidget(self._go_on)
         layout.addWidget(self._unfinished)
-        scroll = QScrollArea()
-        scroll.setWidget(inside)
-        scroll.setWidgetResizable(True)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        scroll.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")
         outer = QVBoxLayout(self)
         outer.setContentsMargins(2, 2, 2, 2)
-        outer.addWidget(scroll)
+        outer.addWidget(scrolled(inside))
         self.setMinimumWidth(round(280 * min(scale, 1.25)))
 
     def _field(self, layout: QVBoxLayout, name: str, words: str, field: QWidget | QHBoxLayout) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QComboBox, QFrame, QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QFrame, QLabel, QPushButton, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
 
 from daq_app.qt.tokens import GRID, TARGET
 
@@ -100,6 +100,18 @@ def choice(name: str) -> QComboBox:
     made.setMinimumHeight(TARGET)
     made.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
     return made
+
+
+def scrolled(inside: QWidget) -> QScrollArea:
+    """Return a frameless area in which `inside` moves up and down where it is taller than its room."""
+    area = QScrollArea()
+    area.setWidget(inside)
+    area.setWidgetResizable(True)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    inside.setObjectName("inside")
+    area.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")
+    return area
 
 
 def panel(name: str) -> tuple[QFrame, QVBoxLayout]:

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, cast
 
+from drivers.clock import StillClock
 from drivers.readings import ReadingBlock
 from sessions.decisions import DECISIONS
 from sessions.gain_error import GAIN_ERROR
@@ -82,7 +83,7 @@ def restore(exported: ExportedSession, folder: Path) -> tuple[str, ...]:
         info,
         {**head.provenance, "restored_from": [*earlier, source]},
         subject_simulated="subject" in (head.simulated or ""),
-        clock=_StillClock(exported.events[-1].time_ns if exported.events else 0),
+        clock=StillClock(exported.events[-1].time_ns if exported.events else 0),
     )
     try:
         _write(exported, writer)
@@ -124,18 +125,3 @@ def _write(exported: ExportedSession, writer: SessionWriter) -> None:
     writer.readings(waiting)
     for block in blocks:
         writer.readings(block)
-
-
-class _StillClock:
-    """The session clock of a restoration: it stands where the log ends, for nothing happens any more."""
-
-    factor = 1.0
-
-    def __init__(self, end_ns: int) -> None:
-        self._end_ns = end_ns
-
-    def now_ns(self) -> int:
-        return self._end_ns
-
-    def sleep(self, seconds: float) -> None:
-        """Pass no time: there is nothing to wait for."""
