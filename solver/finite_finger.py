@@ -14,7 +14,7 @@ from solver.edges import edges, width
 from solver.finite_body import FiniteBody, FiniteProbes
 from solver.grid import MeshError
 from solver.kernels import CAP
-from solver.mesh import Array
+from solver.mesh import Array, Indices
 from solver.mesher import FingerMesh, Sizing, finger_mesh
 from solver.newton import Newton, Shape
 from solver.receptor import ROW, endings, middle
@@ -114,8 +114,12 @@ class FiniteFinger:
         """Return how far the skin is squeezed, and whether it has a crease."""
         geometry = self.geometry
         touching = np.zeros(len(geometry.whole), bool)
-        touching[np.searchsorted(geometry.whole, geometry.mesh.skin)] = shape.touching
+        touching[self._may_touch] = shape.touching
         return Pinch(*kernels.pinched(geometry.mesh.nodes, shape.u, geometry.whole, geometry.loose, touching))
+
+    @cached_property
+    def _may_touch(self) -> Indices:
+        return np.searchsorted(self.geometry.whole, self.geometry.mesh.skin)
 
     def crosses(self, shape: Shape) -> bool:
         """Return whether the skin crosses itself."""

@@ -6,7 +6,7 @@ pressure in the geometric stiffness is the linearised prediction of the iteratio
 Magisano, Leonetti and Garcea 2017), which lets a nearly incompressible body take the whole depth in a step or two.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -222,4 +222,4 @@ class Newton:
         above = self.skin_y + start.u[self.body.skin, 1] - pull.depth
         kernels.rubbed(x, self.body.middle, state, pull.mu, self.length)
         kernels.restate(state, sense, start.reaction, above, x - x, self.length, pull.mu, pull.tau, pull.sense)
-        return replace(start, state=state, sense=sense)
+        return Shape(start.u, start.pressure, state, sense, start.reaction, start.pull, start.iterations)

@@ -78,7 +78,8 @@ def of_depth(scene: Scene, pull: Pull, stop: Callable[[], bool] = lambda: False)
 
 def sound(finger: FiniteFinger, shape: Shape) -> bool:
     """Return whether the skin is nowhere squeezed so far that it may have folded, and does not cross itself."""
-    return finger.pinch(shape).lowest >= SOUND and not folded(finger, shape)
+    pinch = finger.pinch(shape)
+    return pinch.lowest >= SOUND and pinch.kink <= CREASE and not finger.crosses(shape)
 
 
 def folded(finger: FiniteFinger, shape: Shape) -> bool:

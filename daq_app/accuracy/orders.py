@@ -110,12 +110,9 @@ def pressed(quick: bool) -> Iterator[Order]:
 
 def small_finger(quick: bool) -> Iterator[Order]:
     """Yield the SED of the finger's ending at small strain: order 2, over shifted meshes of nearly one size."""
-    models: dict[tuple[float, bool], FingerModel] = {}
 
     def sed(asked: Scene, fineness: float, shift: bool) -> float:
-        if (fineness, shift) not in models:  # both surfaces are those of one finger
-            models[fineness, shift] = FingerModel.of(asked, Sizing(fineness, 2.0, shift), in_loops=True)
-        model = models[fineness, shift]
+        model = FingerModel.of(asked, Sizing(fineness, 2.0, shift), in_loops=True)
         return float(numbers_on(model, [settled(asked, model)])[0, 0])
 
     overkill, finenesses = (14.0, (3.0, 4.0, 5.0, 7.0)) if quick else (20.0, (3.0, 4.0, 5.0, 7.0, 10.0))
