@@ -8,6 +8,7 @@ from solver.differences import TOLD, Off
 from solver.estimate import DEFAULT, FINENESS, coarsest_for, finer_than
 from solver.failures import NotConverged, SolveFailure
 from solver.finger import FingerModel
+from solver.friction import STEEP
 from solver.holding import with_held
 from solver.matching import expected_depth
 from solver.measured import COARSE, Answers, measured
@@ -242,7 +243,10 @@ def _refined(
 def _fallen_back(
     scenes: list[Scene], found: dict[int, Answer], first: float, on_mesh: "_Meshing"
 ) -> dict[int, SolveFailure]:
-    """Put answers of coarser meshes in place of what the `first` mesh has none of; return what that made of them."""
+    """Put answers of coarser meshes in place of what the `first` mesh has none of; return what that made of them.
+
+    Where friction is steep any one mesh may have no state, and the next finer one is asked at last.
+    """
     lost: dict[int, SolveFailure] = {}
     for i, scene in enumerate(scenes):
         coarser = [n for n in FINENESS["finite"] if n < first]
@@ -250,6 +254,9 @@ def _fallen_back(
             answer = on_mesh([scene], coarser.pop(), None)[0]
             if _stands(answer, failure):
                 found[i], lost[i] = answer, failure
+        finer = [n for n in FINENESS["finite"] if n > first]
+        if finer and isinstance(found[i], NotConverged) and scene.friction.mu > STEEP:
+            found[i] = on_mesh([scene], finer[0], None)[0]
     return lost
 
 
