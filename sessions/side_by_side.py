@@ -21,6 +21,7 @@ from sessions.prediction import (
     tau_scale,
     traction_reached,
 )
+from sessions.sed_interval import SedInterval
 from sessions.uncertainty import Drawn, draws_of, intervals_of
 
 
@@ -74,11 +75,16 @@ def _along(
 ) -> tuple[Alternative, ...]:
     """Return what each trial gives in one variant, with intervals where draws of its friction are given."""
     rows, options = prediction.trials, prediction.options
-    found = _known(prediction, variant) or _solved(prediction, variant, _part(progress, 0.0, 0.8))
+    known = _known(prediction, variant)
+    found = known or _solved(prediction, variant, _part(progress, 0.0, 0.8))
     out = [_alternative(row, variant, tau_max, one) for row, (tau_max, one) in zip(rows, found, strict=True)]
     if drawn is not None:
-        scale = tau_scale(replace(options, tau_reading=variant.tau_reading))
-        intervals = intervals_of([one for _, one in found], drawn, scale, _part(progress, 0.8, 1.0))
+        before = [row.interval if variant.driven == "depth" else row.opposite_interval for row in rows]
+        if known is not None and None not in before:  # they are those of the trials themselves
+            intervals: Sequence[SedInterval | None] = before
+        else:
+            scale = tau_scale(replace(options, tau_reading=variant.tau_reading))
+            intervals = intervals_of([one for _, one in found], drawn, scale, _part(progress, 0.8, 1.0))
         out = [replace(one, interval=interval) for one, interval in zip(out, intervals, strict=True)]
     return tuple(out)
 
