@@ -5,14 +5,16 @@ import argparse
 from daq_app.cli import WrongValue
 from sessions.analysis.area import FIXED, HERTZ, PLANNED_AT, AreaLaw
 
+AS_BEFORE = "as the session was analysed before, or else fixed"
 
-def add_area(parser: argparse.ArgumentParser) -> None:
-    """Declare --area and --area-force."""
+
+def add_area(parser: argparse.ArgumentParser, otherwise: str = AS_BEFORE) -> None:
+    """Declare --area and --area-force; `otherwise` says what holds without."""
     parser.add_argument(
         "--area",
         metavar="LAW",
         help="contact area by which tau_max is told: fixed (the plan's), hertz (grows as N^(2/3)), or an exponent of "
-        "N; where none is given as the session was analysed before, or else fixed",
+        f"N; where none is given {otherwise}",
     )
     parser.add_argument(
         "--area-force",

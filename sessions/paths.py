@@ -17,6 +17,7 @@ import numpy as np
 from sessions.analysis import Analysis, FrictionParameters, analyse
 from sessions.analysis.area import FIXED, HERTZ, AreaLaw
 from sessions.analysis.friction import Rule
+from sessions.analysis.levelled import surface_means
 from sessions.analysis.scores import pearson
 from sessions.analysis.settings import AnalysisSettings, WindowRule
 from sessions.analysis.within import repeated_correlation
@@ -230,13 +231,12 @@ class PathTrial:
 
 def path_findings(
     trials: Sequence[PathTrial],
-    means: Mapping[int, float],
     kinematics: str,
     law: AreaLaw = FIXED,
     *,
     within: bool,
 ) -> tuple[PathFinding, ...]:
-    """Return how predictions go with scores along each path, `means` being the mean score of each index.
+    """Return how predictions go with scores along each path.
 
     Correlations within subjects are taken where `within` says so. Empty where no trial went along the paths.
     """
@@ -245,35 +245,25 @@ def path_findings(
         return ()
     rule, gone = held[0].rule, min(len(trial.seds) for trial in held)
     return tuple(
-        _finding(n, path, held, means, usual=path.usual(rule, kinematics, law), within=within)
+        _finding(n, path, held, usual=path.usual(rule, kinematics, law), within=within)
         for n, path in enumerate(PATHS[:gone])
     )
 
 
-def _finding(
-    number: int, path: Path, trials: Sequence[PathTrial], means: Mapping[int, float], *, usual: bool, within: bool
-) -> PathFinding:
-    own: defaultdict[int, defaultdict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
-    pairs: list[tuple[str, float, float]] = []
-    count = 0
-    for trial in trials:
-        sed = trial.seds[number]
-        if sed is None:
-            continue
-        count += 1
-        own[trial.index][trial.subject].append(sed)
-        if trial.score is not None:
-            pairs.append((trial.subject, sed, trial.score))
-    seds = {index: float(np.mean([np.mean(all_of) for all_of in own[index].values()])) for index in sorted(own)}
-    both = [index for index in seds if index in means]
+def _finding(number: int, path: Path, trials: Sequence[PathTrial], *, usual: bool, within: bool) -> PathFinding:
+    held = [(trial, sed) for trial in trials if (sed := trial.seds[number]) is not None]
+    points = [(trial, sed, trial.score) for trial, sed in held if trial.score is not None]
+    pairs = [(trial.subject, sed, score) for trial, sed, score in points]
+    seds = surface_means([(trial.subject, trial.index, sed) for trial, sed, _ in points]) or {}
+    scores = surface_means([(trial.subject, trial.index, score) for trial, _, score in points]) or {}
     inner = repeated_correlation(*zip(*pairs, strict=True)) if within and pairs else None
     low, high = (None, None) if inner is None or inner.people is None else inner.people
     return PathFinding(
         path=path,
         usual=usual,
-        surfaces=len(seds),
-        trials=count,
-        r=pearson([seds[i] for i in both], [means[i] for i in both]),
+        surfaces=len({trial.index for trial, _ in held}),
+        trials=len(held),
+        r=pearson(list(seds.values()), list(scores.values())),
         within=None if inner is None else inner.r,
         low=low,
         high=high,

@@ -71,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what the uncertainty of friction makes of each SED (usual at small strain, not at finite strain, where "
         "it takes longer)",
     )
-    add_area(parser)
+    add_area(parser, "fixed for all sessions, however each was analysed before")
     add_calibration(parser)
 
 

@@ -29,6 +29,8 @@ ZERO_SETTING = "zero"  # of `TransducerInfo.settings`: who says that the recordi
 ZERO_STATED = "as recorded, stated to be true"
 RAW_WRENCH = "N, N mm"  # raw unit of readings that came as a wrench
 
+_BESIDE = 2.5  # readings: a contact so near to unsound ones may go on in them
+
 
 @dataclass(frozen=True, slots=True)
 class Analysis:
@@ -260,7 +262,7 @@ def _general_zero(span: Span, info: TransducerInfo, settings: AnalysisSettings, 
         return recorded_zero(span, stated=True)
     first = span.windows.after(-np.inf, settings.zero_stretch)
     if first is not None:
-        return ZeroInForce(first.level, first.noise, first.error, "", None, (0.0, 0.0), None)
+        return ZeroInForce(first.level, first.noise, first.noise[:3], 0.0, first.error, "", None, (0.0, 0.0), None)
     return recorded_zero(span, stated=False) if info.calibration.raw_unit == RAW_WRENCH else None
 
 
@@ -310,12 +312,21 @@ def _worth_measuring(
     """Leave out taps and light touches, and name them."""
     peaks = [float(np.nanmax(smooth[piece.start : piece.stop], initial=0.0)) for piece in pieces]
     greatest = max(peaks, default=0.0)
+    near = _BESIDE / span.rate
     kept: list[Contact] = []
     flaws: list[Flaw] = []
     for piece, peak in zip(pieces, peaks, strict=True):
         start, stop = span.time[piece.start], span.time[piece.stop - 1]
         if stop - start >= settings.shortest_stroke and peak >= settings.light_share * greatest:
             kept.append(piece)
+            continue
+        beside = [gap for gap in span.soundness.gaps if abs(gap.stop - start) < near or abs(gap.start - stop) < near]
+        if beside:
+            sentence = (
+                f"What presses from {start:.2f} to {stop:.2f} s goes on where readings are not sound "
+                f"({beside[0].cause}): how long is not known, and nothing of it is measured."
+            )
+            flaws.append(Flaw(beside[0].cause, sentence, "doubtful"))
         else:
             tapped = stop - start < settings.shortest_stroke
             what, name = ("tap", FlawName.TAP) if tapped else ("light touch", FlawName.LIGHT_TOUCH)

@@ -191,14 +191,10 @@ class _Repeats:
         n = settings.repeats
         self._step = float(np.median(np.diff(curve.time)))
         self._gain_t, self._gain_n, self._gain_torque = 1.0 + settings.gain_error * draw.standard_normal((3, n))
-        quiet = curve.time < (curve.time[0] if stroke.onset is None else stroke.onset - _BEFORE)
-        enough = int(quiet.sum()) >= _FEWEST_QUIET
-        # Before the onset nothing presses: T is the length of two noises, N one.
-        self._noise_n = float(np.nanstd(curve.normal[quiet])) if enough else 0.0
-        self._noise_t = float(np.sqrt(np.nanmean(curve.tangential[quiet] ** 2) / 2.0)) if enough else 0.0
+        self._noise_t, self._noise_n = curve.noise
         # The zero's drift was seen as one length of three axes; within it the zero may lie anywhere.
         drift = (stroke.zero_drift or 0.0) / np.sqrt(3.0 * 12.0)
-        few = np.sqrt(max(1.0, quiet.sum() * self._step / settings.block)) if enough else 1.0
+        few = np.sqrt(max(1.0, curve.quiet / settings.block))
         self._zero_t_sd = float(np.hypot(drift, self._noise_t / few))
         self._zero_t = self._zero_t_sd * draw.standard_normal(n)
         self._zero_n = np.hypot(drift, self._noise_n / few) * draw.standard_normal(n)
@@ -305,7 +301,8 @@ class _Repeats:
             columns = (curve.time[part], curve.ratio[part], curve.normal[part])
             shortest = stroke.steady[1] - self._settings.inwards * (stroke.steady[1] - stroke.steady[0])
             zero = (self._zero_t, self._zero_n)
-            draws = break_away_draws(columns, shortest, self._settings.block, zero, self._draw)
+            peaked = stroke.mu_static is not None
+            draws = break_away_draws(columns, shortest, self._settings.block, zero, self._draw, peaked=peaked)
             found |= {} if draws is None else {"break_away": draws}
         if stroke.slide_onset is not None and speed is not None and "slide_onset" not in stroke.decided:
             part = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[0])

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.analysis.onset import DetectorSettings, onset_threshold
-from sessions.analysis.stick import climb
+from sessions.analysis.stick import climb, few, fitted, settled
 
 Array = NDArray[np.float64]
 
@@ -21,7 +21,6 @@ _FEWEST = 3  # readings that tell how steeply the force climbs
 _MOST = 400  # readings about the crossing in which noise is drawn
 _LEAST_STEEP = 0.2  # of its mean steepness, to which a force that bends may be told to have climbed there
 _REACH = 4.0  # standard deviations of the noise within which it may move the crossing
-_NEAREST, _FARTHEST, _CANDIDATES = 1e-4, 0.4, 50  # how far off the break-away may lie [s]; how many places a side
 
 
 def onset_draws(
@@ -61,41 +60,42 @@ def break_away_draws(
     block: float,
     zero: tuple[Array, Array],
     draw: np.random.Generator,
+    *,
+    peaked: bool,
 ) -> Array | None:
     """Return where T/N may have stopped climbing (repeats,) [s]; None where too few readings tell.
 
     `columns` are time [s], T/N [-] and N [N] (n,) from the contact to the end of the steady window; the fit ends at one
     of some instants from there back to `shortest` [s]. `zero` is how wrong the zero of T and of N may be (repeats,)
-    [N]; `block` [s] is how long neighbours are alike.
+    [N]; `block` [s] is how long neighbours are alike. `peaked` where a static peak was found. Each repeat moves the
+    break-away as its deviations move the fit, to first order.
     """
-    time, ratio, normal = (column[np.isfinite(columns[1])] for column in columns)
+    last = float(columns[0][-1])
+    held = np.isfinite(columns[1])
+    time, ratio, normal = (column[held] for column in columns)
+    whole = climb(few(time), few(ratio), block, peaked=peaked)
+    if whole is None:
+        return None
+    bends = whole.bend != 1.0
     found: list[Array] = []
     parts = np.array_split(np.arange(len(zero[0])), _ENDS)
-    last = float(columns[0][-1])
     for number, part in enumerate(parts):
-        stop = last + (shortest - last) * number / (_ENDS - 1)
-        held = time <= stop
-        t, y = time[held], ratio[held]
-        fit = climb(t, y)
-        if fit is None or fit.slope <= 0.0:
+        inside = time <= last + (shortest - last) * number / (_ENDS - 1)
+        t, y, n = few(time[inside]), few(ratio[inside]), few(normal[inside])
+        fit = settled(whole, t, y, bends=bends)
+        if fit.rise <= 0.0:
             return None
-        off = np.geomspace(_NEAREST, _FARTHEST, _CANDIDATES)
-        places = fit.meets + np.concatenate([-off[::-1], [0.0], off])
-        places = places[(places > t[1]) & (places < t[-2])]
-        short = np.maximum(places[:, None] - t, 0.0)
-        off_mean = short - short.mean(axis=1)[:, None]
-        unit = -off_mean / np.sqrt((off_mean**2).sum(axis=1))[:, None]  # (k, n): the better T/N goes with it the better
         edges = np.flatnonzero(np.diff(np.floor((t - t[0]) / block), prepend=-1.0))
-        blocks = np.add.reduceat(unit * (y - fit.at(t)), edges, axis=1)  # (k, blocks)
-        moved = np.column_stack([unit @ (1.0 / normal[held]), -(unit @ (y / normal[held]))])  # by the zero of T, of N
-        climbing = float(np.searchsorted(t[edges], fit.meets))
-        # Two numbers were fitted to the climb's few blocks: what is left is less, and tells little of its own size.
-        free = max(climbing - 2.0, 1.0)
-        few = np.sqrt(climbing / draw.chisquare(free, len(part)))
-        factors = few[:, None] * draw.standard_normal((len(part), len(edges)))
-        wrong = np.column_stack([each[part] for each in zero])
-        fits = unit @ fit.at(t) + factors @ blocks.T + wrong @ moved.T  # (repeats, k)
-        found.append(places[np.argmax(fits, axis=1)])
+        climbing = float(np.searchsorted(t[edges], fit.meets) - np.searchsorted(t[edges], fit.begins))
+        # Two or three numbers were fitted to the climb's few blocks: what is left is less, and tells little of itself.
+        free = max(climbing - 2.0 - bends, 1.0)
+        wild = np.sqrt(max(climbing, 1.0) / draw.chisquare(free, len(part)))[:, None]
+        factors = wild * draw.standard_normal((len(part), len(edges)))
+        told = fitted(fit, t, bends=bends)
+        moves = np.linalg.pinv(fit.slopes(t)[:, told])[told.index(1)]  # (n,) [s] by T/N
+        by_blocks = np.add.reduceat(moves * (y - fit.at(t)), edges)
+        wrong_t, wrong_n = (each[part] for each in zero)
+        found.append(fit.meets + factors @ by_blocks + wrong_t * (moves @ (1.0 / n)) - wrong_n * (moves @ (y / n)))
     return np.concatenate(found)
 
 

@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 _AFTER_PEAK = 0.2  # what a static peak is held against [s]
 _LATE_PEAK = 0.1  # a static peak may come so long after the slide began [s]
+_SLIDES_BEFORE = "the contact slides before T/N stops climbing"
 _NO_PEAK = "no static peak stands out"
 _STICK_WITHOUT = (_NO_PEAK, FlawName.NO_STEADY_SLIDING, FlawName.RATIO_ABOVE_ONE)  # a stick phase needs none of these
 
@@ -51,8 +52,8 @@ def measured(
         _take_slide_onset(found, decided)
         if window is not None:
             _friction(found, track, window, zero, settings)
-            _static_peak(found, track, window, zero, settings)
-            found.numbers["break_away"] = break_away(track.time[: window.stop], track.ratio[: window.stop], settings)
+            _static_peak(found, track, window, zero, settings, turned=contact.start in contact.turns)
+            _break_away(found, track, window, settings)
             _judge_way(found, track, window, settings)
         _take_decided(found, track, decided)
         _judge_drift(found, zero, settings)
@@ -252,8 +253,13 @@ def _judge_task(found: Findings, trial: Trial) -> None:
         found.flaw(FlawName.WRONG_DIRECTION, sentence, "doubtful")
 
 
-def _static_peak(found: Findings, track: Track, window: slice, zero: ZeroInForce, settings: AnalysisSettings) -> None:
-    """Give the static peak where one stands out of what follows it by its noise and by a share."""
+def _static_peak(
+    found: Findings, track: Track, window: slice, zero: ZeroInForce, settings: AnalysisSettings, *, turned: bool
+) -> None:
+    """Give the static peak where one stands out of what follows it by its noise and by a share.
+
+    The filter overshoots a sudden change by 3.5 % of it, which is twice the level where the finger `turned`.
+    """
     began = found.numbers.get("slide_onset", track.time[window.start])
     last = int(np.searchsorted(track.time, float(began + _LATE_PEAK)))
     before = track.ratio[:last]
@@ -266,10 +272,21 @@ def _static_peak(found: Findings, track: Track, window: slice, zero: ZeroInForce
     level = float(np.nanmedian(follows))
     noise = float(np.hypot(*zero.noise[:2])) / np.sqrt(2.0)
     sd = np.hypot(noise, level * float(zero.noise[2])) / float(track.normal[top])
-    if before[top] - level > max(settings.static_noise * sd, settings.static_share * level):
+    share = settings.static_share * (2.0 if turned else 1.0)
+    if before[top] - level > max(settings.static_noise * sd, share * level):
         found.numbers["mu_static"] = float(before[top])
         if found.reasons["mu_static"] == _NO_PEAK:
             del found.reasons["mu_static"]
+
+
+def _break_away(found: Findings, track: Track, window: slice, settings: AnalysisSettings) -> None:
+    """Give the end of the stick phase, unless the contact slides before it."""
+    peaked = "mu_static" in found.numbers
+    away = break_away(track.time[: window.stop], track.ratio[: window.stop], settings, peaked=peaked)
+    found.numbers["break_away"] = away
+    # The speed's filter may tell the onset of a slide early by half of its period.
+    if away is not None and away > found.numbers.get("slide_onset", np.inf) + 0.5 / settings.speed_cut_off:
+        found.reasons["break_away"] = _SLIDES_BEFORE
 
 
 def _take_slide_onset(found: Findings, decided: Decided) -> None:

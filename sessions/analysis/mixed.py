@@ -55,9 +55,9 @@ def mixed_model(
 
     With `slopes_differ` each subject also has its own slope on the first covariate. Without it the interval of that
     slope is too narrow where subjects use more or less of the scale. Intervals are then t intervals, with as many
-    degrees of freedom as subjects less one for terms that differ between subjects, and for the others as many as a fit
-    to each subject alone would leave; without it they are Wald's. The first covariate counts from its mean, so that an
-    offset of it changes nothing.
+    degrees of freedom as subjects less one for the level, as subjects in whom the covariate varies less one for the
+    slope, and for the others as many as a fit to each subject alone would leave; without it they are Wald's. The first
+    covariate counts from its mean, so that an offset of it changes nothing.
 
     Carry-over and drift enter as covariates: the index scored before, and the trial's place in its block. Where
     nothing can be said a sentence says why.
@@ -72,18 +72,18 @@ def mixed_model(
     scale = np.abs(columns).max(axis=0)  # covariates in any unit are fitted alike well
     if not scale.all() or np.linalg.matrix_rank(columns / scale) < len(names):
         return "a term does not vary, or others determine it"
+    varies = sum(float(np.ptp(columns[np.array(subjects) == one, 1])) > 0.0 for one in set(subjects))
+    if slopes_differ and varies < 2:
+        return f"{names[1]} varies between the scores of {varies} of {count} subjects, and it takes two"
     own = 2 if slopes_differ else 1
     if _exact(np.array(score, np.float64), columns / scale, subjects):
         return "all scores lie on the line but for round-off: there is nothing to tell an error from"
     fit: Fit = restricted_fit(np.array(score, np.float64), columns / scale, np.array(subjects), own)
     spread = np.sqrt(np.diag(fit.among)) / scale[:own]
-    dof = max(len(score) - len(names) - (count - 1) * own, 1)
-    terms = tuple(
-        _term(name, b, e, dof if i >= own else count - 1) if slopes_differ else _term(name, b, e, None)
-        for i, (name, b, e) in enumerate(
-            zip(names, (fit.estimates / scale).tolist(), (fit.errors / scale).tolist(), strict=True)
-        )
-    )
+    others = max(len(score) - len(names) - (count - 1) * own, 1)
+    free = [count - 1, varies - 1, *([others] * len(names))] if slopes_differ else [None] * len(names)
+    found = zip(names, (fit.estimates / scale).tolist(), (fit.errors / scale).tolist(), free, strict=False)
+    terms = tuple(_term(name, estimate, error, dof) for name, estimate, error, dof in found)
     first, *common = covariates.values()
     differ = spreads(subjects, score, common, first) if slopes_differ else spreads(subjects, score, [first, *common])
     return MixedModel(

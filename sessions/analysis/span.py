@@ -12,7 +12,7 @@ from sessions.analysis.flaws import FlawName
 from sessions.analysis.forces import Filter, in_face_frame, levelled
 from sessions.analysis.settings import AnalysisSettings
 from sessions.analysis.soundness import Soundness
-from sessions.analysis.zero import QuietWindows, quiet_windows
+from sessions.analysis.zero import QuietWindows, Zero, quiet_windows
 from sessions.plan import Frame
 
 Array = NDArray[np.float64]
@@ -79,6 +79,8 @@ class ZeroInForce:
 
     level: Array  # (6,) face frame [N, N mm]
     noise: Array  # (6,) [N, N mm]
+    filtered: Array  # (3,) noise of the filtered forces [N]
+    lasts: float  # what the noise was told from [s]
     error: Array  # (6,) standard uncertainty of the level during the stroke [N, N mm]
     origin: str  # where it came from, for people
     drift: Array | None  # (6,) after minus before; None where one of the two was not seen
@@ -103,16 +105,33 @@ def zero_for(span: Span, contact: Contact, idle: Mask, settings: AnalysisSetting
         error = np.sqrt(noise / 4.0 + np.maximum(drift**2 - noise, 0.0) / 12.0)
         origin = f"half-way from unloaded before contact, {before.when}, to after it, {after.when}"
         unsure = _unsure(span, contact, idle, level, drift, settings)
-        return ZeroInForce(level, before.noise, error, origin, drift, unsure, None)
+        return ZeroInForce(level, before.noise, *_filtered(span, before), error, origin, drift, unsure, None)
     if before is not None:
         origin = f"unloaded before contact, {before.when}"
         unsure = _unsure(span, contact, idle, before.level, None, settings)
-        return ZeroInForce(before.level, before.noise, before.error, origin, None, unsure, None)
+        return ZeroInForce(
+            before.level, before.noise, *_filtered(span, before), before.error, origin, None, unsure, None
+        )
     if after is not None:
         origin = f"unloaded after contact, {after.when}"
         unsure = _unsure(span, contact, idle, after.level, None, settings)
-        return ZeroInForce(after.level, after.noise, after.error, origin, None, unsure, FlawName.ZERO_AFTER_CONTACT)
+        return ZeroInForce(
+            after.level,
+            after.noise,
+            *_filtered(span, after),
+            after.error,
+            origin,
+            None,
+            unsure,
+            FlawName.ZERO_AFTER_CONTACT,
+        )
     return None
+
+
+def _filtered(span: Span, zero: Zero) -> tuple[Array, float]:
+    """Return the noise (3,) of filtered forces [N] where nothing pressed, and how long that was seen [s]."""
+    part = (span.time >= zero.start) & (span.time <= zero.stop)
+    return np.nanstd(span.smooth[part, :3], axis=0), zero.stop - zero.start
 
 
 def _unsure(
@@ -137,4 +156,4 @@ def recorded_zero(span: Span, *, stated: bool) -> ZeroInForce:
     noise = 1.4826 / np.sqrt(2.0) * np.median(steps, axis=0) if len(steps) else np.zeros(6)
     origin = "as recorded, stated to be true" if stated else "as recorded, unknown"
     flaw = None if stated else FlawName.NO_UNLOADED_STRETCH
-    return ZeroInForce(np.zeros(6), noise, np.zeros(6), origin, None, (0.0, 0.0), flaw)
+    return ZeroInForce(np.zeros(6), noise, noise[:3], 0.0, np.zeros(6), origin, None, (0.0, 0.0), flaw)

@@ -23,10 +23,12 @@ class StrokeCurve:
     ratio: Array  # (n,) T/N [-]
     position: Array  # (n, 2) centre of pressure [mm]
     speed: Array  # (n,) of the centre of pressure [mm/s]
+    noise: tuple[float, float]  # standard deviations of each force sideways, and along the normal, unloaded [N]
+    quiet: float  # how long that was seen [s]
 
     def __post_init__(self) -> None:
         """Make the columns read-only views."""
-        for column in fields(self):
+        for column in fields(self)[:8]:
             view = getattr(self, column.name).view()
             view.flags.writeable = False
             object.__setattr__(self, column.name, view)

@@ -79,5 +79,6 @@ def curve_of(span: Span, contact: Contact, zero: ZeroInForce, height: float, set
     shown = track_of(span, Contact(first, last, None, None), zero, height, settings)
     force = shown.wrench[:, :2]
     felt = zero.level[2] - span.wrench[first:last, 2]
-    way = shown.position, shown.speed
-    return StrokeCurve(shown.time, shown.normal, felt, shown.tangential, force, shown.ratio, *way)
+    columns = (shown.time, shown.normal, felt, shown.tangential, force, shown.ratio, shown.position, shown.speed)
+    sideways = float(np.sqrt((zero.filtered[:2] ** 2).mean()))
+    return StrokeCurve(*columns, noise=(sideways, float(zero.filtered[2])), quiet=zero.lasts)

@@ -34,7 +34,8 @@ class RepeatedCorrelation:
     high: float
     p: float  # two-sided
     dof: int  # N - k - 1 for N pairs from k subjects
-    people: tuple[float, float] | None  # 95 % interval for other subjects who meet the same stimuli; None of two
+    subjects: int  # with two pairs or more: one alone tells nothing of what goes on within its subject
+    people: tuple[float, float] | None  # 95 % interval for other such subjects who meet the same stimuli; None of two
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +84,9 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
     It is the correlation of what is left of x and y when each subject's own means are taken away, tested with
     N - k - 1 degrees of freedom (Bland & Altman 1995; Bakdash & Marusich 2017, Front. Psychol. 8:456). Their interval
     takes every pair for a draw of its own. Subjects who all meet the same stimuli share how y bends against x there,
-    and that is no chance: `people` leaves out each subject in turn (Tukey's jackknife of Fisher's z, t with k - 1
-    degrees of freedom: Miller 1974, Biometrika 61:1). Neither is for other stimuli, where these are few and shared.
+    and that is no chance: `people` leaves out each subject of two pairs or more in turn (Tukey's jackknife of Fisher's
+    z, t with one degree of freedom less than such subjects: Miller 1974, Biometrika 61:1). Neither is for other
+    stimuli, where these are few and shared.
     """
     codes = np.unique(np.array(subjects), return_inverse=True)[1]
     dof = len(codes) - (int(codes.max()) + 1 if len(codes) else 0) - 1
@@ -95,17 +97,19 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
     if size < 1e-12 * (1.0 + float(np.abs(x).max()) * float(np.abs(y).max())):
         return None
     r = float(np.clip(left_x @ left_y / size, -1.0, 1.0))
+    several = np.bincount(codes) > 1
+    k = int(several.sum())
     if 1.0 - abs(r) < 1e-12:
-        return RepeatedCorrelation(r, r, r, 0.0, dof, (r, r))
+        return RepeatedCorrelation(r, r, r, 0.0, dof, k, (r, r))
     t = r * math.sqrt(dof / (1.0 - r * r))
     from scipy import stats
 
     half = float(stats.norm.ppf((1 + CONFIDENCE) / 2)) / math.sqrt(dof - 1)
     z = math.atanh(r)
     p = 2.0 * float(stats.t.sf(abs(t), dof))
-    xy, xx, yy = (np.bincount(codes, of).astype(np.float64) for of in (left_x * left_y, left_x**2, left_y**2))
+    xy, xx, yy = (np.bincount(codes, of).astype(np.float64)[several] for of in (left_x * left_y, left_x**2, left_y**2))
     people = _jackknifed(xy, xx, yy)
-    return RepeatedCorrelation(r, math.tanh(z - half), math.tanh(z + half), p, dof, people)
+    return RepeatedCorrelation(r, math.tanh(z - half), math.tanh(z + half), p, dof, k, people)
 
 
 def _jackknifed(xy: Array, xx: Array, yy: Array) -> tuple[float, float] | None:

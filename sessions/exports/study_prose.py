@@ -2,7 +2,7 @@
 
 import re
 import shlex
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -42,9 +42,9 @@ def _related(one: DescriptorFindings, strain: str) -> list[str]:
     name = one.descriptor[:1].upper() + one.descriptor[1:]
     other = "finite" if strain == "small" else "small"
     if one.repeated is None:
-        return [f"{name}: too few subjects with scores and strokes of their own for a correlation within subjects."]
+        return [f"{name}: {_unrelated(one)}"]
     r = one.repeated
-    interval = "no interval from two subjects"
+    interval = f"no interval from {plural(r.subjects, 'subject')} with two trials or more"
     if r.people is not None:
         low, high = r.people
         interval = f"95 % interval for other people on these surfaces {correlation(low)} to {correlation(high)}"
@@ -52,6 +52,14 @@ def _related(one: DescriptorFindings, strain: str) -> list[str]:
         f"{name}: within subjects, score and the SED predicted at {strain} strain go together by "
         f"r = {correlation(r.r)}, {interval}; {_otherwise(one, other)}."
     ]
+
+
+def _unrelated(one: DescriptorFindings) -> str:
+    """Say why there is no correlation within subjects."""
+    trials = Counter(subject for subject, *_ in one.points)
+    if sum(trials.values()) - len(trials) - 1 < 2:
+        return "too few subjects with scores and strokes of their own for a correlation within subjects."
+    return "no correlation within subjects, in none of whom score and SED both vary."
 
 
 def _otherwise(one: DescriptorFindings, other: str) -> str:

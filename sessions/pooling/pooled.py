@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from sessions.analysis.levelled import surface_means
 from sessions.analysis.mixed import MixedModel, mixed_model
 from sessions.analysis.scores import (
     Relation,
@@ -114,7 +115,6 @@ def _descriptor(
     level = standardised(matrix)
     points = [(v.subject, r, r.sed, r.score) for v, r in trials if r.sed is not None and r.score is not None]
     scored = [(v.subject, r, r.score) for v, r in trials if r.score is not None]
-    score_of = {mean.index: mean.mean for mean in means}
     return DescriptorFindings(
         descriptor=name,
         indices=indices,
@@ -137,7 +137,6 @@ def _descriptor(
         fingers=_fingers([(v.subject, row.index, row.mu) for v, row in trials if row.mu is not None]),
         paths=path_findings(
             [PathTrial(v.subject, row.index, row.score, row.rule, row.paths) for v, row in trials],
-            score_of,
             options.prediction.kinematics,
             options.area,
             within=True,
@@ -190,13 +189,11 @@ def _surface(index: int, trials: Sequence[tuple[Visit, TrialRow]]) -> SurfaceMea
 
 def _related(points: Sequence[tuple[str, int, float, float]]) -> Relation | None:
     """Return how mean scores go with mean SEDs, of points that have both: subject, index, SED and score."""
-    if not points:
+    seds = surface_means([(subject, index, sed) for subject, index, sed, _ in points])
+    scores = surface_means([(subject, index, score) for subject, index, _, score in points])
+    if seds is None or scores is None:
         return None
-    indices = sorted({index for _, index, _, _ in points})
-    each = [[(subject, sed, score) for subject, i, sed, score in points if i == index] for index in indices]
-    seds = [float(np.mean(by_subject([(subject, sed) for subject, sed, _ in own]))) for own in each]
-    scores = [float(np.mean(by_subject([(subject, score) for subject, _, score in own]))) for own in each]
-    return relation(seds, scores, indices)
+    return relation(list(seds.values()), list(scores.values()), list(seds))
 
 
 def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[str, float], ...]:

@@ -38,7 +38,8 @@ def _experiment(
 ) -> Experiment:
     descriptor = block.trials[0].stimulus.descriptor
     indices = tuple(sorted({trial.stimulus.known_index for trial in block.trials}))
-    own = tuple(mean for mean in means if mean.descriptor == descriptor and mean.index in indices)
+    told = tuple(mean for mean in means if mean.descriptor == descriptor and mean.index in indices)
+    score_of = {mean.index: mean.mean for mean in told}
     predicted = {index: seds[block.name, index] for index in indices if (block.name, index) in seds}
     return Experiment(
         name=block.name,
@@ -48,19 +49,19 @@ def _experiment(
         indentation=block.indentation,
         scale_ends=block.scale_ends,
         indices=indices,
-        scores=own,
+        scores=told,
         answers=tuple(
             Answers(subject, tuple(given.get(index) for index in indices))
             for subject, given in score_matrix(tables, descriptor).items()
         ),
-        score_relation=_related({mean.index: mean.mean for mean in own}, predicted),
+        score_relation=_related(score_of, predicted),
         index_relation=_related({index: float(index) for index in indices}, predicted),
         paths=path_findings(
             [
-                PathTrial("", trial.stimulus.known_index, None, rule_for(trial), paths.get(trial.number, ()))
+                PathTrial("", index, score_of.get(index), rule_for(trial), paths.get(trial.number, ()))
                 for trial in block.trials
+                for index in [trial.stimulus.known_index]
             ],
-            {mean.index: mean.mean for mean in own},
             "small",
             law,
             within=False,

@@ -81,8 +81,10 @@ def experiment(descriptor, score_tables):
         score_relation=relation([m.mean for m in means], seds, [m.index for m in means]) if means else None,
         index_relation=relation(list(rows), [row[3] for row in rows.values()], list(rows)),
         paths=path_findings(
-            [PathTrial("", i, None, "maximum", along(i, row[3])) for i, row in rows.items()],
-            {mean.index: mean.mean for mean in means},
+            [
+                PathTrial("", i, {mean.index: mean.mean for mean in means}.get(i), "maximum", along(i, row[3]))
+                for i, row in rows.items()
+            ],
             "small",
             within=False,
         ),

@@ -88,7 +88,8 @@ def test_a_movement_nearly_across_leaves_its_sign_in_doubt():
     way = np.array([0.5, np.sqrt(0.75)])  # at 60 degrees: as far along x as the analysis asks for
     position = 25.0 * t[:, None] * way + rng.normal(0.0, 0.3, (400, 2))
     full = np.ones(400)
-    curve = StrokeCurve(t, 2.0 * full, 2.0 * full, full, np.outer(full, way), 0.5 * full, position, 25.0 * full)
+    columns = (t, 2.0 * full, 2.0 * full, full, np.outer(full, way), 0.5 * full, position, 25.0 * full)
+    curve = StrokeCurve(*columns, noise=(0.0, 0.0), quiet=0.0)
     crossing = replace(
         planted_truth.visit(1).analysed().strokes[0],
         curve=curve,

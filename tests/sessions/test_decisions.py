@@ -13,6 +13,7 @@ from made_strokes import INFO, SETTINGS, block, felt, plan, stroke, times, trape
 from recordings import ended
 
 from sessions.analysis.analysis import analyse_blocks
+from sessions.analysis.bootstrap import stroke_intervals
 from sessions.analysis.decided import with_old
 from sessions.decisions import DECISIONS, Decision, DecisionError, Decisions, append, parsed, read
 from sessions.plan import Frame
@@ -215,6 +216,13 @@ def test_a_window_decided_where_nothing_touches_gives_no_number_and_says_so():
     found = decided(replace(WINDOW, new=(3.2, 3.6)))
     assert found.strokes[0].mu_dynamic is None
     assert found.strokes[0].reasons["mu_dynamic"] == "decision"
+
+
+def test_an_onset_decided_later_leaves_the_intervals_what_they_are():
+    found, cut = (one.strokes[0] for one in (decided(), decided(Decision("E02", "seen", "onset", 1, 1, None, 1.3))))
+    plain, late = stroke_intervals(found, 0).mu_dynamic, stroke_intervals(cut, 0).mu_dynamic
+    assert cut.onset == 1.3
+    assert late[1] - late[0] == pytest.approx(plain[1] - plain[0], rel=0.2)
 
 
 def test_the_stick_phase_decided_gives_static_friction_and_break_away():

@@ -96,7 +96,7 @@ def planted():
             ending, middle = 8.0 + 0.01 * index, 9.0 - 0.01 * index
             seds = tuple(ending if path.receptor == "ending" else middle for path in SMALL)
             trials.append(PathTrial(subject, index, float(index), "maximum", seds))
-    return path_findings(trials, {i: float(i) for i in (0, 20, 50, 100)}, "small", within=True)
+    return path_findings(trials, "small", within=True)
 
 
 def test_the_choice_that_turns_the_correlation_is_seen_and_the_others_are_not():
@@ -118,7 +118,7 @@ def test_one_path_is_the_usual_one_and_the_distribution_counts_them_all():
 
 def test_a_path_that_leaves_too_few_surfaces_gives_no_correlation_and_is_counted():
     trials = [PathTrial("A", i, float(i), "maximum", (8.0 + i, *(None for _ in SMALL[1:]))) for i in (0, 20, 50)]
-    found = path_findings(trials, {0: 1.0, 20: 2.0, 50: 4.0}, "small", within=False)
+    found = path_findings(trials, "small", within=False)
     assert [one.surfaces for one in found[:2]] == [3, 0]
     whole = spread(correlations(found))
     assert (whole.paths, whole.told) == (len(SMALL), 1)

@@ -72,6 +72,19 @@ def test_a_flat_top_is_named_as_saturation_and_no_peak_of_it_is_given(axis, low,
         assert stroke.mu_dynamic is None or stroke.mu_dynamic == pytest.approx(MU, rel=0.01)
 
 
+def test_a_stroke_whose_middle_is_clipped_is_not_told_as_two_taps():
+    t = times(5.0)
+    rise, lift = (np.clip(way / 0.12, 0.0, 1.0) for way in (t - 1.0, 3.5 - t))
+    press = 2.0 * (rise**2 * (3.0 - 2.0 * rise)) * (lift**2 * (3.0 - 2.0 * lift)) * (1.0 + 0.05 * np.sin(19.5 * t))
+    ratio = 0.5 * np.clip((t - 1.12) / 0.25, 0.0, 1.0)
+    pressed = felt(wrench(t, press, ratio, 20.0 * np.maximum(t - 1.37, 0.0)))
+    pressed[:, FZ] = np.maximum(pressed[:, FZ], -1.9)
+    found = analysed(block(t, pressed), info=UNRATED)
+    assert found.strokes == ()
+    assert "tap" not in names(found)
+    assert len([one for one in told(found, "saturated") if "goes on" in one.sentence]) == 2
+
+
 def test_one_axis_frozen_while_the_others_move_is_named_and_left_out():
     found = of(with_axis(FZ, frozen))
     assert told(found, "frozen_sensor")[0].sentence.startswith("Fz")
@@ -114,7 +127,7 @@ def test_coarse_steps_are_neither_clipped_nor_frozen_nor_wild(step, noise):
 
 def in_coarse_steps(frozen=None):
     """Return a slanting stroke from 1.5 to 3.5 s of 5 in steps of 50 mN and 0.5 N mm; at rest nothing ever changes."""
-    t = times(5.0)
+    t = times(6.0)
     clean = made_strokes.stroke(t, mu=MU, begin=1.5, end=3.5)
     clean[:, 1] += 0.1 * clean[:, 0]
     clean[:, 3] -= HEIGHT * 0.1 * clean[:, 0]

@@ -59,6 +59,23 @@ def test_the_interval_for_other_people_is_that_of_the_jackknife_over_them():
     assert repeated_correlation(names, x, y).people == pytest.approx(tuple(expected))
 
 
+def test_subjects_with_one_trial_tell_nothing_of_what_goes_on_within_them():
+    who, x, y = list("aaabbbccc"), [1.0, 2.0, 3.0] * 3, [1.0, 2.5, 3.1, 2.0, 2.2, 4.0, 0.0, 1.5, 1.2]
+    alone = repeated_correlation(who, x, y)
+    more = repeated_correlation([*who, *"defgh"], [*x, 1.0, 2.0, 3.0, 1.0, 2.0], [*y, 5.0, 1.0, 4.0, 2.0, 3.0])
+    assert more == alone
+    assert alone.subjects == 3
+    first = mixed_model(who, y, {"x": x}, slopes_differ=True).term("x")
+    second = mixed_model(
+        [*who, *"defgh"], [*y, 5.0, 1.0, 4.0, 2.0, 3.0], {"x": [*x, 1.0, 2.0, 3.0, 1.0, 2.0]}, slopes_differ=True
+    ).term("x")
+    assert (first.high - first.estimate) / (second.high - second.estimate) < 3.0
+    one_varies = mixed_model(
+        [*"aaabbcc"], [1.0, 2.0, 3.5, 2.0, 2.1, 4.0, 4.2], {"x": [1, 2, 3, 2, 2, 1, 1]}, slopes_differ=True
+    )
+    assert one_varies == "x varies between the scores of 1 of 3 subjects, and it takes two"
+
+
 def test_levels_of_subjects_do_not_matter_within_them():
     x, y = [1, 2, 3, 1, 2, 3], [1.0, 2.5, 3.0, 101.0, 102.5, 103.0]
     found = repeated_correlation(["a"] * 3 + ["b"] * 3, x, y)

@@ -15,7 +15,7 @@ _WITHOUT = {
     "slide_onset": "too few readings tell the speed",
 }
 _MISSING = {
-    "break_away": "the ratio does not climb before the slide, so there is no stick phase",
+    "break_away": "the ratio does not climb before the slide, so there is no stick phase, or climbs on while it slides",
     "slide_onset": "nothing tells when the slide begins",
 }
 _OF_DECISION = {"onset": "onset", "break_away": "stick", "slide_onset": "slide_onset"}
