@@ -32,10 +32,11 @@ class RepeatedCorrelation:
     r: float
     low: float  # 95 % interval by Fisher's z, for `dof` degrees of freedom: for pairs that are all drawn anew
     high: float
-    p: float  # two-sided
+    p: float  # two-sided, of the same
     dof: int  # N - k - 1 for N pairs from k subjects
     subjects: int  # with two pairs or more: one alone tells nothing of what goes on within its subject
     people: tuple[float, float] | None  # 95 % interval for other such subjects who meet the same stimuli; None of two
+    people_p: float | None  # two-sided, of the same
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +101,7 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
     several = np.bincount(codes) > 1
     k = int(several.sum())
     if 1.0 - abs(r) < 1e-12:
-        return RepeatedCorrelation(r, r, r, 0.0, dof, k, (r, r))
+        return RepeatedCorrelation(r, r, r, 0.0, dof, k, (r, r), 0.0)
     t = r * math.sqrt(dof / (1.0 - r * r))
     from scipy import stats
 
@@ -108,22 +109,28 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
     z = math.atanh(r)
     p = 2.0 * float(stats.t.sf(abs(t), dof))
     xy, xx, yy = (np.bincount(codes, of).astype(np.float64)[several] for of in (left_x * left_y, left_x**2, left_y**2))
-    people = _jackknifed(xy, xx, yy)
-    return RepeatedCorrelation(r, math.tanh(z - half), math.tanh(z + half), p, dof, k, people)
+    low, high, people_p = _jackknifed(xy, xx, yy) or (None, None, None)
+    people = None if low is None or high is None else (low, high)
+    return RepeatedCorrelation(r, math.tanh(z - half), math.tanh(z + half), p, dof, k, people, people_p)
 
 
-def _jackknifed(xy: Array, xx: Array, yy: Array) -> tuple[float, float] | None:
-    """Return the jackknife's interval of r from each subject's sums (k); None for two, or where r is ±1 without one."""
+def _jackknifed(xy: Array, xx: Array, yy: Array) -> tuple[float, float, float] | None:
+    """Return the jackknife's interval of r, and its p, from each subject's sums (k).
+
+    None of two subjects, or where r is ±1 without one of them.
+    """
     k = len(xy)
     others_xy, size = xy.sum() - xy, np.sqrt((xx.sum() - xx) * (yy.sum() - yy))
     if k < 3 or not (np.abs(others_xy) < (1.0 - 1e-12) * size).all():
         return None
     z = math.atanh(float(xy.sum()) / math.sqrt(float(xx.sum()) * float(yy.sum())))
     pseudo = k * z - (k - 1) * np.arctanh(others_xy / size)
+    mean, error = float(pseudo.mean()), float(pseudo.std(ddof=1)) / math.sqrt(k)
     from scipy import stats
 
-    half = float(stats.t.ppf((1 + CONFIDENCE) / 2, k - 1)) * float(pseudo.std(ddof=1)) / math.sqrt(k)
-    return math.tanh(float(pseudo.mean()) - half), math.tanh(float(pseudo.mean()) + half)
+    half = float(stats.t.ppf((1 + CONFIDENCE) / 2, k - 1)) * error
+    p = 2.0 * float(stats.t.sf(abs(mean) / error, k - 1)) if error > 0.0 else 0.0
+    return math.tanh(mean - half), math.tanh(mean + half), p
 
 
 def agreement(table: Table) -> Agreement | None:

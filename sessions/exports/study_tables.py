@@ -334,7 +334,7 @@ def _relation(study: StudyFindings) -> Table:
                 correlations(*(found.people or (None, None))),
                 Cell(NONE),
                 Cell(NONE),
-                Cell(p_value(found.p)),
+                Cell(NONE if found.people_p is None else p_value(found.people_p)),
                 Cell(NONE if adjusted is None else p_value(adjusted)),
                 _without(without),
             )
@@ -364,9 +364,10 @@ def _relation(study: StudyFindings) -> Table:
         f"Predicted SED ({model_in_short(study)}) with scores. Means: Pearson's r of means over the subjects who have "
         "both, interval by Fisher's z; Spearman's rho with an interval likewise (Bonett and Wright 2000) and exact p. "
         "Within subjects: repeated-measures correlation of each subject's scores with the SEDs of its own strokes "
-        "(Bakdash and Marusich 2017), with an interval for other people who meet these very surfaces (jackknife of "
-        "Fisher's z over subjects, Miller 1974). Of other surfaces only the intervals of means speak. Confirmatory are "
-        "these correlations of scores as given alone, one for each descriptor: they are the family of p, Holm (Holm "
+        "(Bakdash and Marusich 2017), with an interval and a p for other people who meet these very surfaces "
+        "(jackknife of Fisher's z over subjects, Miller 1974). Of other surfaces only the intervals of means speak. "
+        "Confirmatory are these correlations of scores as given alone, one for each descriptor: they are the family "
+        "of p, Holm (Holm "
         "1979). Every other p, of means, of standardised scores and of estimates, is exploratory and not corrected; "
         "nor are the intervals. Last column: least and greatest r when one surface, or one subject, is left out, and "
         "which."

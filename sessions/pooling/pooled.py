@@ -93,8 +93,9 @@ def _copies(visits: Sequence[Visit]) -> dict[str, str]:
 
 
 def _with_holm(found: Sequence[DescriptorFindings]) -> tuple[DescriptorFindings, ...]:
-    tested = [one.descriptor for one in found if one.repeated is not None]
-    adjusted = dict(zip(tested, holm([one.repeated.p for one in found if one.repeated is not None]), strict=True))
+    ps = {one.descriptor: one.repeated.people_p for one in found if one.repeated is not None}
+    told = {descriptor: p for descriptor, p in ps.items() if p is not None}
+    adjusted = dict(zip(told, holm(list(told.values())), strict=True))
     return tuple(replace(one, repeated_holm=adjusted.get(one.descriptor)) for one in found)
 
 

@@ -55,8 +55,10 @@ def test_the_interval_for_other_people_is_that_of_the_jackknife_over_them():
 
     whole = z(np.ones(30, bool))
     pseudo = [6 * whole - 5 * z(names != name) for name in "abcdef"]
-    expected = np.tanh(stats.ttest_1samp(pseudo, 0.0).confidence_interval(0.95))
-    assert repeated_correlation(names, x, y).people == pytest.approx(tuple(expected))
+    test = stats.ttest_1samp(pseudo, 0.0)
+    found = repeated_correlation(names, x, y)
+    assert found.people == pytest.approx(tuple(np.tanh(test.confidence_interval(0.95))))
+    assert found.people_p == pytest.approx(test.pvalue)
 
 
 def test_subjects_with_one_trial_tell_nothing_of_what_goes_on_within_them():
