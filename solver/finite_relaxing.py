@@ -6,7 +6,6 @@ nothing flows through it, so that a settled slide stands still in the tissue and
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from math import ceil
 
 import numpy as np
 
@@ -20,12 +19,11 @@ from solver.materials import Prony
 from solver.mesh import Array, Indices
 from solver.newton import Newton, Shape
 from solver.overstress import Past
+from solver.relaxing import wait
 from solver.scene import Scene
 from solver.stepping import DRAGGING_STEPS, DRAGGING_TIME, HALVINGS, LONG, PRESSING_STEPS, PRESSING_TIME, Aim
 from solver.tissues import relaxing_laws
 
-RELAXED = 14.0  # times after which tissue counts as relaxed: e^-14 is 8e-7
-EQUAL_STEPS = 6  # steps of equal length while nothing but relaxation goes on, before they are doubled
 FIRST, LARGEST = 0.02, 0.1  # steps of a slide, by the indentation; each a fifth longer than the one before
 GOOD, CLOSE = 1e-8, 1e-7  # tolerance of displacements [mm], and by the indentation where that is less
 
@@ -169,15 +167,13 @@ class RelaxingCourse:
         )
 
     def _wait(self, speed: float) -> None:
-        """Go on until all terms have relaxed: a body that yields meanwhile does so the slower, the less of it stays."""
+        """Go on until all terms have relaxed."""
         self._sense = -int(np.sign(speed))  # by now all that touches slips, whatever comes to touch
-        step = self.times[-1] - self.times[-2]
-        stays = min(law.stays for law in self._laws)
-        end = self._aim.time + RELAXED * self._scene.materials.longest_relaxation / stays
-        while self._aim.time < end:
-            for _ in range(ceil(EQUAL_STEPS * self._times)):
-                self._go(Aim(self._aim.time + step, self._aim.press, self._aim.along + speed * step))
-            step *= 2.0
+
+        def go(step: float) -> None:
+            self._go(Aim(self._aim.time + step, self._aim.press, self._aim.along + speed * step))
+
+        wait(go, self.times[-1] - self.times[-2], self._scene.materials.longest_creep, self.sed, self._times)
 
     def _go(self, aim: Aim, halvings: int = HALVINGS) -> None:
         """Append the state at `aim`, in smaller steps where one of that size fails."""

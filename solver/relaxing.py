@@ -11,7 +11,7 @@ A step is then elastic, with the moduli `Prony.within(dt)` and what is left of t
 stored in all springs of the solid, G (1 - sum g) e:e + sum g G h:h + K/2 theta^2, e being the strain's deviator.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 
@@ -27,8 +27,10 @@ from solver.scene import Loading
 from solver.stepping import PRESSING_STEPS, PRESSING_TIME, Aim, Progress, Way, course
 from solver.stiffness import Elastic, Probes
 
-RELAXED = 14.0  # longest relaxation times after which a body counts as relaxed: e^-14 is 8e-7
+RELAXED = 14.0  # times of the slowest tissue after which a body may count as relaxed: e^-14 is 8e-7
 EQUAL_STEPS = 6  # steps of equal length while nothing but relaxation goes on, before they are doubled
+STILL = 1e-6  # change of the SED over such steps from which on it counts as relaxed [-]
+DOUBLINGS = 60  # of the steps at most
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -200,18 +202,35 @@ class RelaxingWay(Way):
 
 
 def march_relaxing(
-    way: RelaxingWay, loading: Loading, longest: float, progress: Progress | None = None, times: float = 1.0
+    way: RelaxingWay, loading: Loading, slowest: float, progress: Progress | None = None, times: float = 1.0
 ) -> None:
-    """Press, slide or drag as `stepping.march` does, and go on until terms of up to `longest` [s] have relaxed.
+    """Press, slide or drag as `stepping.march` does, and go on until the `slowest` tissue [s] has relaxed.
 
     Raises as `stepping.march`.
     """
     course(way, loading, progress, times)
-    step = way.instants[-1].time - way.instants[-2].time
-    end = way.aim.time + RELAXED * longest
     speed = 0.0 if loading.dragged else loading.direction * loading.speed
-    while way.aim.time < end:
+
+    def go(step: float) -> None:
+        way.go(Aim(way.aim.time + step, way.aim.press, way.aim.along + speed * step))
+
+    wait(go, way.instants[-1].time - way.instants[-2].time, slowest, way.sed, times)
+
+
+def wait(
+    go: Callable[[float], None], step: float, slowest: float, sed: Sequence[tuple[float, float]], times: float
+) -> None:
+    """Go on in steps that double, the first of `step` [s], until all has relaxed.
+
+    That is RELAXED times of the `slowest` tissue [s], and longer where the energy at the ending, the first of `sed`'s
+    last, still moves: near a limit of sliding a body settles more slowly than any of its tissues.
+    """
+    waited = 0.0
+    for _ in range(DOUBLINGS):
+        before = sed[-1][0]
         for _ in range(ceil(EQUAL_STEPS * times)):
-            aim = way.aim
-            way.go(Aim(aim.time + step, aim.press, aim.along + speed * step))
+            go(step)
+            waited += step
+        if waited >= RELAXED * slowest and abs(sed[-1][0] - before) <= STILL * abs(sed[-1][0]):
+            return
         step *= 2.0

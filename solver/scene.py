@@ -177,6 +177,23 @@ class Materials:
         return max((term.tau for tissue in self.by_region for term in tissue.prony), default=0.0)
 
     @property
+    def longest_creep(self) -> float:
+        """In how long a held load deforms the slowest tissue, at most [s]: the less stays, the slower it yields.
+
+        For one term of a series tau / (1 - g) exactly (the retardation time of Zener's solid: Findley, Lai and Onaran
+        1976, chapter 5); for several none is longer than the longest tau by what stays.
+        """
+        return (
+            max(
+                (max(t.tau for t in tissue.prony) / (1.0 - sum(t.g for t in tissue.prony)))
+                for tissue in self.by_region
+                if tissue.prony
+            )
+            if self.relax
+            else 0.0
+        )
+
+    @property
     def relax(self) -> bool:
         """Whether any of the tissues relaxes."""
         return self.longest_relaxation > 0.0

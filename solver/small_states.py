@@ -116,7 +116,7 @@ def marched(
     body = RelaxingBody(finger.geometry.mesh, laws, in_loops=in_loops)
     first = PRESSING_TIME / round(PRESSING_STEPS * times)
     way = RelaxingWay(body, law, loading, finger.ending, finger.point, first)
-    march_relaxing(way, loading, scene.materials.longest_relaxation, progress, times)
+    march_relaxing(way, loading, scene.materials.longest_creep, progress, times)
     return way.march(), np.array(way.sed)
 
 

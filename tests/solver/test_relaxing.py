@@ -128,3 +128,9 @@ def test_a_given_force_presses_a_relaxing_finger_deeper_with_time():
     np.testing.assert_allclose(found.history.normal_force[time >= 1.0], 0.05, rtol=1e-9)
     assert (np.diff(depth[time >= 1.0]) > -1e-12).all()
     assert depth[-1] > 1.1 * depth[np.argmin(np.abs(time - 1.0))]
+
+
+def test_a_held_force_is_waited_for_as_long_as_the_softened_tissue_creeps():
+    found = solve(published(of_layers(Relaxation(0.9, 1.0)), indentation=None, normal_force=0.01))
+    assert found.audits["course_against_direct"] < 1e-6
+    assert found.history.time[-1] > 14.0 * 1.0 / (1.0 - 0.9)
