@@ -240,7 +240,7 @@ class Loading:
             allowed = "give either an indentation or a normal force"
             raise SceneError("loading.indentation", self.indentation, allowed)
         if self.indentation is not None:
-            _within("loading.indentation", self.indentation, SHALLOW, 20.0, "mm")
+            _within("loading.indentation", self.indentation, SHALLOW, 200.0, "mm")
         if self.normal_force is not None:
             _within("loading.normal_force", self.normal_force, 1e-9, 1e6)
         if self.force_unit not in ("N/mm", "N"):
