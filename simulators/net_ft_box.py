@@ -145,11 +145,11 @@ class NetFtBox:
         self._on = on
         return on
 
-    def _send_due(self, now: float) -> None:
-        """Send the records that are due, at most a burst of them, and whatever was delayed until now."""
+    def _send_due(self, now: float) -> bool:
+        """Send the records due, at most a burst, and whatever was delayed until now; tell whether more are due."""
         stream = self._stream
         if stream is None:
-            return
+            return False
         step = self._inside.pages.step
         due = (self._inside.tick(now) - stream.tick) // step + 1
         count = min(max(due, 0), _BURST if stream.left is None else stream.left)
@@ -168,10 +168,11 @@ class NetFtBox:
             self._stream = None
         if self._faults.active("steal", now):  # another client has it; whoever asks next takes it back
             self._stream = None
-            return
+            return False
         for datagram in self._faults.route(now, datagrams):
             with contextlib.suppress(BlockingIOError, ConnectionError):  # a network drops what it cannot carry
                 self._bound[0].sendto(datagram, stream.to)
+        return self._stream is not None and count < due
 
     def _heard(self) -> tuple[bytes, tuple[str, int]] | None:
         """Return the next request and who asked, if there is one."""
@@ -189,12 +190,15 @@ class NetFtBox:
             return
         command, count = struct.unpack(">HI", request[2:])
         pages = self._inside.pages
+        now = self.now()
+        while self._send_due(now):
+            pass  # what a box that is never busy has sent before it hears the request
         starts = (0x0001, 0x0002, 0x0003) if pages.product is AXIA else (0x0002, 0x0003)
         if command == 0x0000:
             self._stream = None
         elif command in starts and pages.streams:
             size = pages.buffered if command == 0x0003 else 1
-            tick = (self._inside.tick(self.now()) // pages.step + 1) * pages.step  # the same ticks whenever it is asked
+            tick = (self._inside.tick(now) // pages.step + 1) * pages.step  # the same ticks whenever it is asked
             self._stream = _Stream(asker, tick, self._first_record, count or None, size)
             self._first_record = 1
         elif command == 0x0042:

@@ -5,6 +5,7 @@ import re
 import socket
 import struct
 import threading
+import time
 import urllib.error
 import urllib.request
 
@@ -136,6 +137,27 @@ def test_a_stop_stops_and_a_new_start_begins_at_1(box):
         again = records(udp, 1)
     assert again[0][0] == 1
     assert again[0][1] > first[-1][1], "the tick counter is not reset by a request"
+
+
+def test_a_box_on_a_busy_computer_sends_what_is_due_before_it_hears_another_start(box):
+    one, held = box(), threading.Event()
+    with client(one) as udp:
+        udp.send(START)
+        told = records(udp, 5)
+        until_due = one._until_due
+
+        def late():
+            if not held.is_set():
+                held.set()
+                time.sleep(0.1)
+            return until_due()
+
+        one._until_due = late
+        held.wait()
+        udp.send(START)
+        told += records(udp, 300)
+    assert set(np.diff([ticks for _, ticks, *_ in told]).tolist()) == {35}
+    assert [number for number, *_ in told].count(1) == 2
 
 
 def test_a_second_client_takes_the_stream(box):

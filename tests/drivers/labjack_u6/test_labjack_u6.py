@@ -179,19 +179,19 @@ def test_it_says_who_it_is_and_what_it_rests_on(plugged, cal):
 
 
 def test_an_undisturbed_stream_is_whole_evenly_timed_and_feels_what_the_bench_exerts(plugged, cal):
-    clock = PacedClock(4.0)
+    clock = PacedClock(2.0)  # so that the converter's memory lasts for 0.4 s of a busy computer
     device = plugged(box(clock))
-    transducer = open_transducer(f"labjack-u6://?cal={cal}&rate=500", clock)
+    transducer = open_transducer(f"labjack-u6://?cal={cal}&rate=200", clock)
     transducer.start()
     device.bench.mount(paper_surfaces()["stickiness", 80])
-    planted = device.bench.begin_stroke(Stroke(7.81, 17.5, approach=0.3, stick=0.3, slide=1.0), device.now() + 0.6)
+    planted = device.bench.begin_stroke(Stroke(7.81, 17.5, approach=0.2, stick=0.2, slide=0.8), device.now() + 0.5)
     block = readings(transducer, device, planted.end + 0.3)
     transducer.close()
     info, health = transducer.info, transducer.health
     assert health.received == len(block)
     assert health.lost == health.malformed == health.restarted == health.saturated == 0
     assert block.sequence.tolist() == list(range(1, len(block) + 1))
-    np.testing.assert_allclose(np.diff(block.time), 1.0 / 500.0, rtol=1e-9)
+    np.testing.assert_allclose(np.diff(block.time), 1.0 / 200.0, rtol=1e-9)
     bias = block.raw[block.time < 0.4].mean(axis=0)
     assert np.abs(bias).max() > 0.5, "gauges are never at 0 V when mounted"
     wrench = info.calibration.wrench(block.raw, bias)

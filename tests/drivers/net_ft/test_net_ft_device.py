@@ -150,7 +150,8 @@ def test_every_reading_is_received_or_named_as_lost_whatever_befalls_it(timetabl
     transducer = opened(link)
     block = all_readings(transducer, link)
 
-    whole = [d for d in faults.delivered if d in set(faults.made)]
+    made = set(faults.made)
+    whole = [d for d in faults.delivered if d in made]
     numbers = [int.from_bytes(d[:4], "big") for d in whole]
     kept = sorted({n for i, n in enumerate(numbers) if n == max(numbers[: i + 1])})
     health = transducer.health

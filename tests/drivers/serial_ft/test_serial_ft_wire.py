@@ -67,6 +67,7 @@ def test_the_golden_answers_to_one_request_are_whole():
 
 @pytest.mark.parametrize("form", DECODERS)
 @given(cuts=st.lists(st.integers(0, 45 * 40), max_size=30).map(sorted), seed=st.integers(0, 20), hurt=st.booleans())
+@settings(max_examples=40)
 def test_readings_do_not_depend_on_how_the_stream_was_cut(form, cuts, seed, hurt):
     stream = bytearray(sent(form, course(40, seed)))
     if hurt:
@@ -88,7 +89,7 @@ def test_no_garbage_raises(form, garbage):
 
 @pytest.mark.parametrize("form", DECODERS)
 @given(lost=st.integers(1, 60), at=st.integers(300, 900), seed=st.integers(0, 50))
-@settings(max_examples=60)
+@settings(max_examples=40)
 def test_lost_bytes_cost_the_records_they_belonged_to_and_no_wrong_reading_comes_out(form, lost, at, seed):
     values = course(80, seed, size=3000.0)
     stream = sent(form, values)
