@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 _AFTER_PEAK = 0.2  # what a static peak is held against [s]
 _LATE_PEAK = 0.1  # a static peak may come so long after the slide began [s]
 _SLIDES_BEFORE = "the contact slides before T/N stops climbing"
+_DRAG = 0.1  # share of the greatest tangential force from which on its direction is asked [-]
 _NO_PEAK = "no static peak stands out"
 _STICK_WITHOUT = (_NO_PEAK, FlawName.NO_STEADY_SLIDING, FlawName.RATIO_ABOVE_ONE)  # a stick phase needs none of these
 
@@ -316,8 +317,11 @@ def _take_decided(found: Findings, track: Track, decided: Decided) -> None:
 
 
 def _judge_way(found: Findings, track: Track, window: slice, settings: AnalysisSettings) -> None:
-    """Say where the tangential force turns: then there is no one direction, or this is not one stroke."""
-    held = np.isfinite(track.ratio)
+    """Say where the tangential force turns: then there is no one direction, or this is not one stroke.
+
+    A finger that rests has hardly a drag, and its noise points anywhere.
+    """
+    held = np.isfinite(track.ratio) & (track.tangential >= _DRAG * np.nanmax(track.tangential, initial=0.0))
     way = track.wrench[:, :2] / np.where(held, track.tangential, np.nan)[:, None]
     inside = float(np.linalg.norm(mean_vector(way[window])))
     overall = float(np.linalg.norm(mean_vector(way)))

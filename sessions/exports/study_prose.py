@@ -123,6 +123,13 @@ def remarks(study: StudyFindings) -> list[str]:
         if not visit.complete
     ]
     said += [f"Session {visit.session}: {loss}." for visit in study.visits for loss in visit.losses]
+    for visit in study.visits:
+        choices = sum(row.choice is not None for row in visit.rows)
+        if choices:
+            said.append(
+                f"The answers of session {visit.session} are {choices} choices of one of two: they stand in the table "
+                "of trials, no mean or correlation of scores is taken of them, and its strokes count as any other."
+            )
     for outcome, words in (("not answered", "No score, for the subject did not answer"), ("open", "Not done")):
         places = [f"{v.session} trial {r.trial}" for v in study.visits for r in v.rows if r.outcome == outcome]
         said += [f"{words}: {_listed(places)}."] if places else []

@@ -55,6 +55,7 @@ class TrialRow:
     outcome: str
     score: float | None
     estimate: float | None = None  # on a scale of the subject's own
+    choice: str | None = None  # of the two compared: first or second
     rule: str = ""  # which mu the model got
     mu: float | None = None
     mu_low: float | None = None  # 95 % bootstrap interval of mu, as of all that was measured: `BootstrapSettings.kind`
@@ -179,6 +180,7 @@ def _row(
         outcome=record.outcome,
         score=record.score,
         estimate=record.number,
+        choice=record.choice,
     )
     told = {flaw.name: None for flaw in analysis.flaws if flaw.trial == trial.number and flaw.grade != "note"}
     flaws = tuple(str(name) for name in told)

@@ -90,6 +90,24 @@ def test_visits_that_only_scored_give_means_and_no_relation():
     assert [mean.n for mean in found.scores] == [4] * 5
 
 
+def test_choices_of_one_of_two_stand_in_the_table_and_are_told_to_count_for_no_mean():
+    compared = visit(2)
+    rows = tuple(replace(row, outcome="chosen", score=None, choice="first") for row in compared.rows)
+    found = pooled([visit(1), replace(compared, rows=rows)])
+    assert [one for one in remarks(found) if "S02" in one and f"{len(rows)} choices of one of two" in one]
+    table = list(csv.DictReader(io.StringIO(trials_csv(found))))
+    assert {row["choice"] for row in table if row["session"] == "S02"} == {"first"}
+
+
+def test_a_surface_that_some_missed_has_the_mean_of_all_subjects():
+    level = {"S01": 10.0, "S02": 50.0, "S03": 90.0}
+    made = [visit(number, gain=0.0, noise=0.0) for number in (1, 2, 3)]
+    flat = [replace(one, rows=tuple(replace(row, score=level[one.subject]) for row in one.rows)) for one in made]
+    flat[2] = replace(flat[2], rows=flat[2].rows[1:])
+    (found,) = pooled(flat).descriptors
+    assert found.mean_relation.pearson is None  # nothing within anybody varies
+
+
 def test_repeats_of_one_subject_are_averaged_and_make_no_subjects():
     again = replace(visit(1), session="S01-again")
     assert all(mean.n == 1 for mean in pooled([visit(1), again]).descriptors[0].scores)
