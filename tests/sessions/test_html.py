@@ -413,7 +413,10 @@ def test_every_word_of_every_table_is_on_the_printed_a4_pages(text, tmp_path):
     sizes = re.findall(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", (tmp_path / "page.pdf").read_bytes())
     assert {(round(float(w) / 72 * 25.4), round(float(h) / 72 * 25.4)) for w, h in sizes} == {(210, 297)}
     printed = subprocess.run([PDFTOTEXT, tmp_path / "page.pdf", "-"], capture_output=True, text=True, check=True).stdout
-    cells = re.findall(r"<td[^>]*>([^<]+)<", text)
+    cells = re.findall(r'(?:<td[^>]*>|<span class="ends">)([^<]+)<', text)
     words = {word for cell in cells for word in cell.split() if "&" not in word}
     assert words
-    assert words - set(re.split(r"\s+", printed)) == set()
+    lost = words - set(re.split(r"\s+", printed))
+    long = {word for word in lost if len(word) > 60}  # longer than a line: it goes on in the next
+    assert lost - long == set()
+    assert {word for word in long if word not in re.sub(r"\s+", "", printed)} == set()
