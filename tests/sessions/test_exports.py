@@ -390,6 +390,16 @@ def test_nwb_holds_what_was_recorded(sources, exports):
             assert json.loads(file.notes)["plan"]["subject"] == "S01"
 
 
+def test_nwb_tells_the_error_of_calibration_that_the_intervals_hold(sources, tmp_path):
+    pynwb = pytest.importorskip("pynwb")
+    drawn = {"gain_error": 0.003, "gain_error_origin": "set"}
+    whole = sources["whole"]
+    analysis = {**whole.analysis, "bootstrap": {"settings": drawn, "strokes": []}}
+    export(replace(whole, analysis=analysis), "nwb", tmp_path / "out")
+    with pynwb.NWBHDF5IO(tmp_path / "out" / "session.nwb", "r") as io:
+        assert json.loads(io.read().notes)["calibration_error"] == drawn
+
+
 def test_a_session_in_told_time_that_moves_when_waited_on_opens_as_nwb(sources, tmp_path):
     pynwb = pytest.importorskip("pynwb")
     recording = sources["whole"].recording

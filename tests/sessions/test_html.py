@@ -290,9 +290,14 @@ def test_the_numbers_of_a_picture_are_on_the_page_itself(made, drawn):
     assert rows[2:] == [[str(value) for value in row] for row in panel.rows]
 
 
+@pytest.fixture(scope="module")
+def pooled_study():
+    return study()
+
+
 @pytest.fixture(scope="module", params=["session", "study"])
-def text(request, made):
-    return made if request.param == "session" else study_page(study(), "example")
+def text(request, made, pooled_study):
+    return made if request.param == "session" else study_page(pooled_study, "example")
 
 
 def test_the_words_on_the_line_of_figure_1_lie_free_of_dots():
@@ -318,8 +323,8 @@ def test_the_words_on_the_line_of_figure_1_lie_free_of_dots():
     assert found > 10
 
 
-def test_a_study_solved_on_several_meshes_says_so_and_what_it_makes_of_the_seds():
-    made = study()
+def test_a_study_solved_on_several_meshes_says_so_and_what_it_makes_of_the_seds(pooled_study):
+    made = pooled_study
     assert not any("meshes" in sentence for sentence in remarks(made))
     model = [(("unknowns", f"{4212 * (1 + n % 2)} displacements", ""),) for n in range(len(made.visits))]
     visits = tuple(replace(visit, model=m) for visit, m in zip(made.visits, model, strict=True))
