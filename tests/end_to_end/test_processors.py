@@ -26,6 +26,7 @@ AGAINST_ONE = (
     "p_holm",
     "page_p",
     "pearson",
+    "people_p",
     "r",
     "repeated_holm",
     "spearman_p",
