@@ -179,9 +179,8 @@ def bounded_more(scene: Scene, finger: FingerModel, contact: Contact) -> Contact
     last = contact.state[np.concatenate([on[:2], on[-2:]])]
     if law.mu <= STEEP or direction == 0 or not (last == CAP).any():
         return None
-    touch, depth = finger.body.touchable, scene.loading.depth
-    if force is not None:
-        touch, depth = forced(touch, force), 0.0
+    touch = finger.body.touchable
+    touch, depth = (touch, scene.loading.depth) if force is None else (forced(touch, force), 0.0)
     try:
         return Course(touch, replace(law, tau_max=(1.0 + NUDGE) * law.tau_max)).sliding(depth, direction, contact.state)
     except ContactLost:

@@ -51,6 +51,12 @@ def test_under_a_force_a_refusal_tells_the_largest_friction_force_and_depth_and_
     assert told.to_dict()["error"]["limit_normal_force"] == told.limit_normal_force
 
 
+def test_a_given_force_that_drags_skin_at_the_bound_up_to_an_edge_has_its_estimate():
+    found = solve(pressed(0.1, 2.0, "+x", 0.03))
+    assert found.normal_force == pytest.approx(0.1, rel=1e-9)
+    assert found.error_estimate > 0.0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("tau_max", [None, 0.03])
 @pytest.mark.parametrize("slide", ["+x", "-x"])
