@@ -18,10 +18,11 @@ NEAR = 1e-12
 # A mean, its spread and its interval, or an effect and its interval, are one quantity: each counts against the largest.
 ONE_QUANTITY = ("estimate", "mean", "sd", "low", "high")
 SPREAD_OF = {"between_sd": 0, "slope_sd": 1}  # in a mixed model: of which term, whose spread between subjects it is
-# Probabilities, correlations, and the estimated error of an SED as a part of it: numbers that are counted against 1.
+# Probabilities, correlations, and estimated errors of SEDs and forces as parts of them: counted against 1.
 AGAINST_ONE = (
     "error_estimate",
     "friedman_p",
+    "model_normal_force_error",
     "p",
     "p_holm",
     "page_p",
