@@ -142,7 +142,7 @@ def _interval(found: Prediction, slide: Nearby | None, drawn: Drawn, scale: floa
     some = solved(_spread_out(carried))
     lost = int(np.isnan(some).sum())
     if lost:
-        reason = f"{lost} of {SAMPLES} draws of the friction have no settled state"
+        reason = f"{lost} of {SAMPLES} draws of the friction have no settled state, or lie too near the limit to tell"
         return replace(whole, low=None, high=None, method="sampling", reason=reason)
     low, high = np.quantile(some, _QUANTILES, method="hazen").tolist()  # each stands for the middle of its share
     return replace(whole, low=low, high=high, method="sampling")

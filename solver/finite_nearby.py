@@ -16,6 +16,7 @@ from solver.mesh import Array
 from solver.nearby import states
 from solver.newton import Pull, Shape
 from solver.prediction import Prediction
+from solver.reach import sound
 from solver.scene import Scene
 
 GOOD = 1e-8  # tolerance of the displacements [mm]: far less than a difference of friction that anybody could tell
@@ -66,4 +67,7 @@ class FiniteNearby:
         except NotConverged:
             return None
         reaches_out = (there.touching & ~here.touching)[[0, -1]].any()  # then skin may touch that nobody looked at
-        return None if reaches_out or leapt(self.finger, here, there) else there
+        beyond = there.pull.mu > here.pull.mu or there.pull.depth > here.pull.depth
+        # Skin that may have folded since: whether the branch goes on as far as that, this mesh cannot tell.
+        unproven = beyond and not sound(self.finger, there)
+        return None if reaches_out or unproven or leapt(self.finger, here, there) else there
