@@ -4,8 +4,6 @@ import hashlib
 import json
 import multiprocessing
 import os
-import signal
-import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -18,6 +16,7 @@ from typing import Any
 from daq_app.cluster import by_cluster
 from daq_app.computing import Answer, computed, content_of
 from daq_app.console import Console
+from daq_app.workers import attend
 from sessions.pooling.visit import FORM, Visit, VisitOptions
 from sessions.recording import RecordingError
 from sessions.recording.provenance import software_versions
@@ -138,7 +137,7 @@ def _in_pool(folders: Sequence[Path], options: VisitOptions, workers: int) -> It
     # Threads of the linear algebra would change the last bits, and cost more than they bring at these sizes.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     fresh = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=fresh, initializer=_attend)
+    pool = ProcessPoolExecutor(workers, mp_context=fresh, initializer=attend)
     try:
         waiting: set[Future[Answer]] = {pool.submit(computed, folder, options) for folder in folders}
         while waiting:
@@ -154,16 +153,3 @@ def _in_pool(folders: Sequence[Path], options: VisitOptions, workers: int) -> It
         for process in ended:
             process.join(LOOK)
         raise
-
-
-def _attend() -> None:
-    """Leave Ctrl-C to the process that was asked to stop, and end where that one was killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)  # nobody is left to hand anything to

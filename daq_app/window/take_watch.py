@@ -11,6 +11,7 @@ from daq_app.window.messages import DrawingFailed, Judged
 from daq_app.window.priority import give_way
 from daq_app.window.state import AppState
 from daq_app.window.stroke_quality import Quality, in_newtons, stroke_quality
+from daq_app.workers import attend
 from sessions import steps
 from sessions.recording import LoggedEvent
 
@@ -31,7 +32,7 @@ class Judge:
     def prepare(self) -> None:
         """Start the process, so that the first stroke need not wait for it."""
         if self._worker is None:
-            self._worker = ProcessPoolExecutor(1, get_context("spawn"))
+            self._worker = ProcessPoolExecutor(1, get_context("spawn"), initializer=attend)
             self._worker.submit(_warm)
 
     def close(self) -> None:
