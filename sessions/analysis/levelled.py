@@ -15,7 +15,8 @@ def surface_means(points: Sequence[tuple[str, int, float]]) -> dict[int, float] 
     by all it is the plain mean. None of nothing, and where subjects who met some surfaces met none of the others:
     nothing compares them.
 
-    >>> surface_means([("a", 0, 1.0), ("a", 50, 2.0), ("b", 0, 11.0)])
+    >>> means = surface_means([("a", 0, 1.0), ("a", 50, 2.0), ("b", 0, 11.0)])
+    >>> {index: round(mean, 9) for index, mean in means.items()}
     {0: 6.0, 50: 7.0}
     """
     own: defaultdict[tuple[str, int], list[float]] = defaultdict(list)

@@ -175,13 +175,14 @@ def test_a_log_whose_tail_was_cut_gives_its_whole_commits_and_names_the_rest(cra
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """The bytes of file and log of a recording with 3 commits of 100 readings, its writer not yet closed."""
-    folder = tmp_path_factory.mktemp("written") / "s"
+    """A folder with file and log of a recording with 3 commits of 100 readings, its writer not yet closed."""
+    folder, kept = tmp_path_factory.mktemp("written") / "s", tmp_path_factory.mktemp("kept")
     writer = begun(folder)
     for i in range(3):
         writer.readings(readings(100 * i, 100))
         writer.commit()
-    yield {path.name: path.read_bytes() for path in folder.iterdir() if not path.name.endswith("-shm")}
+    shutil.copytree(folder, kept, ignore=shutil.ignore_patterns("*-shm"), dirs_exist_ok=True)
+    yield kept
     writer.close()
 
 
@@ -189,11 +190,11 @@ def written(tmp_path_factory):
 @settings(max_examples=60, deadline=None)
 def test_a_flipped_bit_in_the_log_is_never_taken_for_a_reading(written, tmp_path_factory, place, bit):
     folder = tmp_path_factory.mktemp("flipped")
-    for name, content in written.items():
-        changed = bytearray(content)
-        if name.endswith("-wal"):
+    for path in written.iterdir():
+        changed = bytearray(path.read_bytes())
+        if path.name.endswith("-wal"):
             changed[int(place * len(changed))] ^= 1 << bit
-        (folder / name).write_bytes(changed)
+        (folder / path.name).write_bytes(changed)
     try:
         recording = Recording.open(folder)
     except RecordingError:
