@@ -31,24 +31,34 @@ def log_tail(log: bytes) -> LogTail:
     if magic not in (BIG_ENDIAN_SUMS, LITTLE_ENDIAN_SUMS) or sums != (sum_1, sum_2):
         return LogTail(0, len(log))
     commits, position, end = 0, HEADER.size, HEADER.size
+    mislabelled = None
     while position + FRAME.size + page_size <= len(log):
         _, pages, *salts, frame_1, frame_2 = FRAME.unpack_from(log, position)
         sums = _sums(log[position : position + 8], order, sums)
         sums = _sums(log[position + FRAME.size : position + FRAME.size + page_size], order, sums)
-        if salts != [salt_1, salt_2] or sums != (frame_1, frame_2):
+        if sums != (frame_1, frame_2):
+            break
+        if salts != [salt_1, salt_2]:  # the sums, which leave salts out, go on: damaged, and not of an earlier run
+            mislabelled = position
             break
         position += FRAME.size + page_size
         if pages:
             commits, end = commits + 1, position
-    return LogTail(commits, _of_this_run(log, end, page_size, (salt_1, salt_2)) - end)
+    return LogTail(commits, _of_this_run(log, end, page_size, (salt_1, salt_2), mislabelled) - end)
 
 
-def _of_this_run(log: bytes, start: int, page_size: int, salts: tuple[int, int]) -> int:
-    """Return where the frames carrying `salts` end; those after it were left over from an earlier run of the log."""
-    position = start
-    while position + FRAME.size <= len(log) and FRAME.unpack_from(log, position)[2:4] == salts:
+def _of_this_run(log: bytes, start: int, page_size: int, salts: tuple[int, int], mislabelled: int | None) -> int:
+    """Return where the last frame carrying `salts` ends, or the one that does not and should, from `start` on.
+
+    Frames after it were left over from an earlier run of the log: those of one run lie together, at its head.
+    """
+    position = end = start
+    while position + FRAME.size <= len(log):
+        this_run = position == mislabelled or FRAME.unpack_from(log, position)[2:4] == salts
         position += FRAME.size + page_size
-    return position if position + FRAME.size <= len(log) else len(log)
+        if this_run:
+            end = position
+    return end if end < position else len(log)
 
 
 def _sums(data: bytes, order: str, sums: tuple[int, int]) -> tuple[int, int]:

@@ -204,6 +204,20 @@ def test_a_flipped_bit_in_the_log_is_never_taken_for_a_reading(written, tmp_path
     assert len(sequence) == 300 or any("hold no whole commit" in loss for loss in recording.losses)
 
 
+def test_a_damaged_salt_makes_no_frame_one_of_an_earlier_run(written):
+    log = bytearray((written / "session.sqlite-wal").read_bytes())
+    page = int.from_bytes(log[8:12], "big")
+    frames = range(32, len(log), 24 + page)
+    assert log_tail(bytes(log)).torn_bytes == 0
+    for frame in frames:
+        for salt in (8, 15):
+            log[frame + salt] ^= 4
+            tail = log_tail(bytes(log))
+            log[frame + salt] ^= 4
+            assert tail.commits < 4  # the tables, and three of readings
+            assert tail.torn_bytes > 0
+
+
 def test_frames_left_over_from_an_earlier_run_of_the_log_are_no_loss(tmp_path):
     writer = begun(tmp_path / "s")
     for i in range(30):
