@@ -25,6 +25,7 @@ from made_strokes import (
 from sessions.analysis import ZERO_SETTING, ZERO_STATED, FlawName
 from sessions.analysis.friction import rule_for
 from sessions.analysis.measure import EVERYTHING
+from sessions.analysis.stick import Climb
 from sessions.plan import Frame
 
 T = times()
@@ -95,6 +96,17 @@ def test_a_climb_that_bends_as_edges_of_contact_slip_first_ends_where_all_of_it_
     done = np.clip((T - 1.0) / 0.4, 0.0, 1.0)
     found = climbing(0.5 * (1.0 - (1.0 - done) ** bend), 1.4)
     assert found.break_away == pytest.approx(1.4, abs=0.01)
+
+
+@pytest.mark.parametrize("fall", [0.0, 0.08])
+def test_the_slopes_of_a_climb_are_those_of_differences(fall):
+    told = np.array([1.1, 1.42, 1.7, fall, 0.05, 0.4, 0.1 if fall else 0.0])
+    times = np.linspace(1.0, 2.0, 37)
+    slopes = Climb(*told).slopes(times)
+    for number in [0, 1, 2, 3, 4, 5, 6] if fall else [0, 1, 2, 4, 5]:
+        step = 1e-6 * np.eye(7)[number]
+        change = (Climb(*(told + step)).at(times) - Climb(*(told - step)).at(times)) / 2e-6
+        np.testing.assert_allclose(slopes[:, number], change, atol=1e-6)
 
 
 @pytest.mark.parametrize("peak", [0.1, 0.3])
