@@ -183,15 +183,8 @@ class Materials:
         For one term of a series tau / (1 - g) exactly (the retardation time of Zener's solid: Findley, Lai and Onaran
         1976, chapter 5); for several none is longer than the longest tau by what stays.
         """
-        return (
-            max(
-                (max(t.tau for t in tissue.prony) / (1.0 - sum(t.g for t in tissue.prony)))
-                for tissue in self.by_region
-                if tissue.prony
-            )
-            if self.relax
-            else 0.0
-        )
+        series = [tissue.prony for tissue in self.by_region if tissue.prony]
+        return max((max(t.tau for t in terms) / (1.0 - sum(t.g for t in terms)) for terms in series), default=0.0)
 
     @property
     def relax(self) -> bool:

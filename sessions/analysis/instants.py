@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.analysis.onset import DetectorSettings, onset_threshold
-from sessions.analysis.stick import climb, few, fitted, settled
+from sessions.analysis.stick import climb, few, movable, settled
 
 Array = NDArray[np.float64]
 
@@ -91,8 +91,8 @@ def break_away_draws(
         free = max(climbing - 2.0 - bends, 1.0)
         wild = np.sqrt(max(climbing, 1.0) / draw.chisquare(free, len(part)))[:, None]
         factors = wild * draw.standard_normal((len(part), len(edges)))
-        told = fitted(fit, t, bends=bends)
-        moves = np.linalg.pinv(fit.slopes(t)[:, told])[told.index(1)]  # (n,) [s] by T/N
+        numbers = movable(fit, t, bends=bends)
+        moves = np.linalg.pinv(fit.slopes(t)[:, numbers])[numbers.index(1)]  # (n,) [s] by T/N
         by_blocks = np.add.reduceat(moves * (y - fit.at(t)), edges)
         wrong_t, wrong_n = (each[part] for each in zero)
         found.append(fit.meets + factors @ by_blocks + wrong_t * (moves @ (1.0 / n)) - wrong_n * (moves @ (y / n)))

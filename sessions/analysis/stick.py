@@ -91,8 +91,8 @@ def climb(t: Array, y: Array, block: float, *, peaked: bool) -> Climb | None:
         return None
     falls = _FALLS if peaked else (0.0,)
     at = _first(t, y)
-    straight = min((settled(_fitted(at, t, y, 1.0, fall), t, y) for fall in falls), key=lambda one: _left(one, t, y))
-    starts = [_fitted(at, t, y, bend, straight.fall) for bend in _BENDS]
+    straight = min((settled(_guess(at, t, y, 1.0, fall), t, y) for fall in falls), key=lambda one: _left(one, t, y))
+    starts = [_guess(at, t, y, bend, straight.fall) for bend in _BENDS]
     bent = min((settled(one, t, y, bends=True) for one in starts), key=lambda one: _left(one, t, y))
     free = max((float(t[-1]) - float(t[0])) / block - 5.0, 1.0)
     surely = (_left(straight, t, y) - _left(bent, t, y)) * free > _SURELY * _left(bent, t, y)
@@ -103,7 +103,7 @@ def settled(fit: Climb, t: Array, y: Array, *, bends: bool = False) -> Climb:
     """Return the fit that leaves least of `y` (n,) at `t` (n,) near a first one (Levenberg 1944, Marquardt 1963)."""
     least, damping = _left(fit, t, y), 1e-3
     for _ in range(_STEPS):
-        free = fitted(fit, t, bends=bends)
+        free = movable(fit, t, bends=bends)
         slopes = fit.slopes(t)[:, free]
         normal, right = slopes.T @ slopes, slopes.T @ (y - fit.at(t))
         moved = np.array(fit)
@@ -119,7 +119,7 @@ def settled(fit: Climb, t: Array, y: Array, *, bends: bool = False) -> Climb:
     return fit
 
 
-def fitted(fit: Climb, t: Array, *, bends: bool) -> list[int]:
+def movable(fit: Climb, t: Array, *, bends: bool) -> list[int]:
     """Return which of the seven numbers of a climb readings at `t` (n,) [s] tell."""
     free = [1, 4, 5]
     free += [0] if fit.begins > t[0] else []
@@ -146,7 +146,7 @@ def _first(t: Array, y: Array) -> tuple[float, float]:
     return float(begins[best]), float(meets[best])
 
 
-def _fitted(at: tuple[float, float], t: Array, y: Array, bend: float, fall: float) -> Climb:
+def _guess(at: tuple[float, float], t: Array, y: Array, bend: float, fall: float) -> Climb:
     """Return a climb of a kind between two instants, its heights fitted."""
     begins, meets = at[0], min(at[1] + (bend - 1.0) * (at[1] - at[0]), float(t[-_FEWEST - 1]))
     kind = Climb(begins, meets, bend, fall, 0.0, 1.0, 0.0)

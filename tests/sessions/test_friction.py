@@ -25,7 +25,6 @@ from made_strokes import (
 from sessions.analysis import ZERO_SETTING, ZERO_STATED, FlawName
 from sessions.analysis.friction import rule_for
 from sessions.analysis.measure import EVERYTHING
-from sessions.analysis.stick import Climb
 from sessions.plan import Frame
 
 T = times()
@@ -70,61 +69,6 @@ def test_without_a_static_peak_there_is_none_and_the_reason_says_so():
     (one,) = analysed(block(T, felt(sticking()))).strokes
     assert one.mu_static is None
     assert one.reasons["mu_static"] == "no static peak stands out"
-
-
-@pytest.mark.parametrize("climb", [0.15, 0.3, 0.6])
-def test_break_away_is_where_the_ratio_stops_climbing(climb):
-    ratio = 0.5 * np.clip((T - 1.0) / climb, 0.0, 1.0)
-    found = analysed(block(T, felt(wrench(T, N, ratio, 25.0 * np.maximum(T - 1.0 - climb, 0.0)))))
-    assert found.strokes[0].break_away == pytest.approx(1.0 + climb, abs=0.005)
-
-
-def climbing(ratio, slip):
-    """Return strokes whose T/N climbs by `ratio` (n,) until the `slip` [s], the finger moving from there on."""
-    return analysed(block(T, felt(wrench(T, N, ratio, 25.0 * np.maximum(T - slip, 0.0))))).strokes[0]
-
-
-@pytest.mark.parametrize("rest", [0.1, 0.5, 1.0])
-def test_a_finger_that_rests_before_it_is_moved_breaks_away_no_earlier(rest):
-    slip = 1.1 + rest + 0.25
-    found = climbing(0.5 * np.clip((T - slip) / 0.25 + 1.0, 0.0, 1.0), slip)
-    assert found.break_away == pytest.approx(slip, abs=0.005)
-
-
-@pytest.mark.parametrize("bend", [1.5, 2.0, 3.0])
-def test_a_climb_that_bends_as_edges_of_contact_slip_first_ends_where_all_of_it_slips(bend):
-    done = np.clip((T - 1.0) / 0.4, 0.0, 1.0)
-    found = climbing(0.5 * (1.0 - (1.0 - done) ** bend), 1.4)
-    assert found.break_away == pytest.approx(1.4, abs=0.01)
-
-
-@pytest.mark.parametrize("fall", [0.0, 0.08])
-def test_the_slopes_of_a_climb_are_those_of_differences(fall):
-    told = np.array([1.1, 1.42, 1.7, fall, 0.05, 0.4, 0.1 if fall else 0.0])
-    times = np.linspace(1.0, 2.0, 37)
-    slopes = Climb(*told).slopes(times)
-    for number in [0, 1, 2, 3, 4, 5, 6] if fall else [0, 1, 2, 4, 5]:
-        step = 1e-6 * np.eye(7)[number]
-        change = (Climb(*(told + step)).at(times) - Climb(*(told - step)).at(times)) / 2e-6
-        np.testing.assert_allclose(slopes[:, number], change, atol=1e-6)
-
-
-@pytest.mark.parametrize("peak", [0.1, 0.3])
-def test_a_static_peak_is_where_the_finger_breaks_away_but_for_what_the_filter_rounds(peak):
-    above = 1.0 + peak * np.exp(-np.maximum(T - 1.4, 0.0) / 0.08)
-    found = climbing(0.5 * np.clip((T - 1.0) / 0.4, 0.0, 1.0) * above, 1.4)
-    assert found.break_away == pytest.approx(1.4, abs=0.02)
-
-
-def test_no_break_away_is_told_after_the_slide_began():
-    found = climbing(0.5 * np.clip((T - 1.0) / 1.0, 0.0, 1.0), 1.4)
-    assert found.slide_onset == pytest.approx(1.4, abs=0.05)
-    assert found.break_away is None
-    assert found.reasons["break_away"] == "the contact slides before T/N stops climbing"
-
-
-def test_a_ratio_that_does_not_climb_has_no_stick_phase():
-    assert analysed(block(T, felt(PLAIN))).strokes[0].break_away is None
 
 
 def test_the_slide_begins_where_the_finger_begins_to_move():

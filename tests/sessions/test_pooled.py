@@ -99,7 +99,7 @@ def test_choices_of_one_of_two_stand_in_the_table_and_are_told_to_count_for_no_m
     assert {row["choice"] for row in table if row["session"] == "S02"} == {"first"}
 
 
-def test_a_surface_that_some_missed_has_the_mean_of_all_subjects():
+def test_who_missed_a_surface_does_not_make_it_look_scored_low():
     level = {"S01": 10.0, "S02": 50.0, "S03": 90.0}
     made = [visit(number, gain=0.0, noise=0.0) for number in (1, 2, 3)]
     flat = [replace(one, rows=tuple(replace(row, score=level[one.subject]) for row in one.rows)) for one in made]
