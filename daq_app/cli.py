@@ -42,7 +42,7 @@ _WRONG = (
     "sessions.decisions.DecisionError",
     "sessions.toml_file.SettingsError",
     "simulators.timetable.TimetableError",
-    "solver.scene.SceneError",
+    "solver.scene_tables.SceneError",
 )
 _FAILED = (
     "daq_app.cluster.SchedulerError",
