@@ -15,7 +15,8 @@ from sessions.machine import advance, interrupted, start
 from sessions.plan import SessionPlan
 from sessions.recording import LoggedEvent, Recording, RecordingError
 from sessions.recording.head import calibration_hash
-from sessions.steps import Command, Refuse, State
+from sessions.states import State
+from sessions.steps import Command, Refuse
 
 CUT_SHORT = "the recording was cut short in the middle of it"
 OF_TAKES = frozenset({"take_started", "take_kept", "take_discarded", "left_out"})

@@ -15,23 +15,8 @@ from sessions.machine import advance, start, trial_in_hand
 from sessions.plan import SessionPlan
 from sessions.recording import Acknowledged, RecordingError, SessionWriter
 from sessions.resuming import Resumption, Seam
-from sessions.steps import (
-    Abort,
-    AskRest,
-    Command,
-    Ended,
-    Event,
-    MeasureZero,
-    Ready,
-    Refuse,
-    Resting,
-    RestOver,
-    Scoring,
-    Settling,
-    Stroking,
-    Taring,
-    Tell,
-)
+from sessions.states import Ended, Ready, Resting, Scoring, Settling, Stroking, Taring
+from sessions.steps import Abort, AskRest, Command, Event, MeasureZero, Refuse, RestOver, Tell
 
 Cause = Literal["finished", "aborted", "stopped", "device", "client", "disk", "program"]
 STOPPED = "stopped by the user"

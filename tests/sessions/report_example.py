@@ -311,3 +311,12 @@ def _made():
         "interval_kind": "95 % percentile interval of made-up repeats",
         "afferent": (Fact("static gain", "20 imp/s", "assumed"),),
     }
+
+
+def bare(**changes):
+    """A report without pictures, which is quick to write."""
+    empty = {
+        name: ()
+        for name in ("experiments", "strokes", "predictions", "fields", "planted", "flaws", "excluded", "again")
+    }
+    return example(**{**empty, "course": None, **changes})

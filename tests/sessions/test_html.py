@@ -8,20 +8,15 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from unittest.mock import patch
 
-import numpy as np
 import pytest
 from browser import CHROMIUM, FLAGS, PAPER_HEIGHT, opened
-from hypothesis import given
-from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from page_numbers import estimates
-from report_example import TABLES, example
+from report_example import TABLES, bare, example
 from study_example import study
 
 from sessions.exports.figures import plates
-from sessions.exports.figures.labels import spread
-from sessions.exports.figures.scores import _free_place
-from sessions.exports.html import ReportError, page, write_figures, write_report
+from sessions.exports.html import page, write_figures
 from sessions.exports.report_tables import tables
 from sessions.exports.study_page import study_page
 from sessions.exports.study_prose import remarks
@@ -53,15 +48,6 @@ class Words(HTMLParser):
     def handle_data(self, data):
         if not self._hidden and data.strip():
             self.words.append(data.strip())
-
-
-def bare(**changes):
-    """A report without pictures, which is quick to write."""
-    empty = {
-        name: ()
-        for name in ("experiments", "strokes", "predictions", "fields", "planted", "flaws", "excluded", "again")
-    }
-    return example(**{**empty, "course": None, **changes})
 
 
 @pytest.fixture(scope="module")
@@ -207,42 +193,6 @@ def test_planted_and_recovered_friction_stand_side_by_side(made):
     assert "<td>−0.5</td>" in table  # recovered 0.995 of it
 
 
-def test_writing_replaces_an_older_page_and_leaves_nothing_beside_it(tmp_path):
-    path = tmp_path / "deep" / "report.html"
-    write_report(bare(title="older"), path)
-    write_report(bare(), path)
-    assert "older" not in path.read_text(encoding="utf-8")
-    assert [file.name for file in path.parent.iterdir()] == ["report.html"]
-
-
-def test_a_file_that_is_no_report_is_left_alone(tmp_path):
-    path = tmp_path / "session.sqlite"
-    path.write_bytes(b"SQLite format 3\x00")
-    with pytest.raises(ReportError, match="is no report"):
-        write_report(bare(), path)
-    assert path.read_bytes() == b"SQLite format 3\x00"
-
-
-def test_a_page_that_cannot_be_written_is_refused_in_one_sentence_and_the_old_one_stays(tmp_path, monkeypatch):
-    path = tmp_path / "report.html"
-    write_report(bare(title="older"), path)
-
-    def full(_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("os.fsync", full)
-    with pytest.raises(ReportError, match=r"cannot be written \(No space left on device\)"):
-        write_report(bare(), path)
-    assert "older" in path.read_text(encoding="utf-8")
-    assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
-
-
-def test_a_place_that_is_no_folder_is_refused_in_one_sentence(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(ReportError, match="cannot be"):
-        write_report(bare(), tmp_path / "file" / "report.html")
-
-
 @pytest.mark.usefixtures("drawn_before")
 def test_every_picture_is_a_file_with_its_numbers_beside_it(tmp_path, report):
     written = write_figures(report, tmp_path)
@@ -269,19 +219,6 @@ def test_the_numbers_beside_a_picture_are_those_of_the_report(tmp_path, report):
     assert (min(inside), max(inside)) == (pytest.approx(0.8), pytest.approx(2.0))
 
 
-@given(
-    st.lists(st.floats(-50, 150), max_size=12),
-    st.floats(0.1, 8),
-)
-def test_labels_keep_their_distance_their_order_and_their_place_where_there_is_room(wanted, gap):
-    placed = spread(wanted, gap, 0.0, 100.0)
-    by_wish = [place for _, place in sorted(zip(wanted, placed, strict=True), key=lambda pair: pair[0])]
-    assert all(b - a >= gap * (1 - 1e-9) for a, b in zip(sorted(placed), sorted(placed)[1:], strict=False))
-    assert by_wish == sorted(by_wish) or len(set(wanted)) < len(wanted)
-    if len(wanted) * gap < 100:
-        assert all(-1e-6 <= place <= 100 + 1e-6 for place in placed)
-
-
 def test_the_numbers_of_a_picture_are_on_the_page_itself(made, drawn):
     (panel,) = [p for plate in drawn for p in plate.panels if p.name == "relation-stickiness"]
     link = re.search(r'download="relation-stickiness.csv" href="data:text/csv;charset=utf-8;base64,([^"]*)"', made)
@@ -298,29 +235,6 @@ def pooled_study():
 @pytest.fixture(scope="module", params=["session", "study"])
 def text(request, made, pooled_study):
     return made if request.param == "session" else study_page(pooled_study, "example")
-
-
-def test_the_words_on_the_line_of_figure_1_lie_free_of_dots():
-    made = example().experiments[0]
-    draw, found = np.random.default_rng(5), 0
-    for _ in range(40):
-        spread_of = draw.uniform(0.0, 25.0)
-        answers = tuple(
-            replace(a, scores=tuple(np.clip(np.array(made.indices) + draw.normal(0, spread_of, 5), 0, 100).tolist()))
-            for a in made.answers
-        )
-        place = _free_place(replace(made, answers=answers, scores=()))
-        if place is None:
-            continue
-        found += 1
-        # The words, 60 by 9 pixels in a picture of some 2.2 pixels a point, turned by 45 degrees.
-        start, side = place[0], 1 if place[1] else -1
-        for answer in answers:
-            for index, score in zip(made.indices, answer.scores, strict=True):
-                x, y = index - 3.0 - start, score - start
-                along, across = (x + y) / np.sqrt(2.0), side * (y - x) / np.sqrt(2.0)
-                assert not (-1.0 < along < 28.0 and 1.0 < across < 7.0)
-    assert found > 10
 
 
 def test_a_study_solved_on_several_meshes_says_so_and_what_it_makes_of_the_seds(pooled_study):

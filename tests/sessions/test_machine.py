@@ -5,6 +5,7 @@ from walks import CODES, FIRST, FORCES, NUMBERS, PAIRS, RESTFUL, SCORES, made_pl
 
 from sessions.machine import advance, interrupted, start, trial_in_hand
 from sessions.plan import Frame, Rests, SessionPlan
+from sessions.states import Ended, Mounting, Resting, Scoring, Settling, Stroking, Taring
 from sessions.steps import (
     Abort,
     AskBegin,
@@ -19,33 +20,26 @@ from sessions.steps import (
     Chosen,
     ContactOnset,
     DiscardTake,
-    Ended,
     EndSession,
     FingerLifted,
     Finish,
     KeepTake,
     LeaveOut,
     MeasureZero,
-    Mounting,
     Note,
     NumberGiven,
     Pause,
     Redo,
     Refuse,
-    Resting,
     RestOver,
     Resume,
     Scored,
-    Scoring,
     Settled,
-    Settling,
     ShowInstruction,
     Skip,
     StartTake,
     StimulusMounted,
     StrokeDone,
-    Stroking,
-    Taring,
     Tell,
     Zeroed,
 )

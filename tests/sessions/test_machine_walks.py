@@ -4,18 +4,8 @@ from hypothesis import given, settings
 from walks import meant, steps, walks
 
 from sessions.machine import advance, start
-from sessions.steps import (
-    Abort,
-    AskMount,
-    Closing,
-    DiscardTake,
-    Ended,
-    KeepTake,
-    LeaveOut,
-    Note,
-    Refuse,
-    StartTake,
-)
+from sessions.states import Closing, Ended
+from sessions.steps import Abort, AskMount, DiscardTake, KeepTake, LeaveOut, Note, Refuse, StartTake
 
 
 @given(walk=walks())

@@ -5,32 +5,24 @@ from hypothesis import strategies as st
 from sessions.machine import advance, start
 from sessions.plan import Block, Frame, Rests, SessionPlan, Stimulus, Trial
 from sessions.protocols import plan, protocol
+from sessions.states import Closing, Mounting, Paused, Ready, Resting, Scoring, Settling, Stroking, Taring
 from sessions.steps import (
     Begin,
     Chosen,
-    Closing,
     ContactOnset,
     FingerLifted,
     Finish,
-    Mounting,
     Note,
     NumberGiven,
     Pause,
-    Paused,
-    Ready,
     Redo,
-    Resting,
     RestOver,
     Resume,
     Scored,
-    Scoring,
     Settled,
-    Settling,
     Skip,
     StimulusMounted,
     StrokeDone,
-    Stroking,
-    Taring,
     Zeroed,
 )
 
@@ -80,6 +72,9 @@ EVENTS = st.one_of(
     st.builds(Skip, st.sampled_from(["", "dirty"])),
 )
 PLANS = st.sampled_from(PLANS_OF_ALL_KINDS)
+# None stands for the event that leads on. Drawn in two steps: in one of many kinds it would come once in ten times,
+# and hardly a walk would leave its beginning.
+CHANCES = st.booleans().flatmap(lambda on: st.none() if on else EVENTS)
 
 
 def meant(state):
@@ -107,11 +102,11 @@ def meant(state):
 
 @st.composite
 def walks(draw):
-    """A plan and events, at least half of which lead on."""
+    """A plan and events, about half of which lead on."""
     plan = draw(PLANS)
     state, _ = start(plan)
     events = []
-    for chance in draw(st.lists(st.none() | EVENTS, max_size=80)):
+    for chance in draw(st.lists(CHANCES, max_size=80)):
         event = meant(state) if chance is None else chance
         events.append(event)
         state, _ = advance(state, event)
