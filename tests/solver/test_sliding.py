@@ -70,14 +70,14 @@ def test_forces_of_touching_points_obey_the_friction_law(capped):
 
 
 @pytest.mark.parametrize("name", ["press d2.0", "slip 100", "stick 0"])
-def test_incompressible_tissue_takes_at_most_one_iteration_more_and_has_its_own_limit(name):
+def test_incompressible_tissue_takes_as_many_iterations_and_has_its_own_limit(name):
     iterations, sed = [], []
     for nu in (0.48, 0.49, 0.4999, 0.4999999):
-        newton, probes, _ = finger(5, nu=nu)
+        newton, probes, _ = finger(8, nu=nu)
         shape = settled(newton, REFERENCE[name][0])
         iterations.append(shape.iterations)
         sed.append(probes.average(newton.body, shape.u)[0])
-    assert max(iterations) <= iterations[0] + 1
+    assert len(set(iterations)) == 1
     assert sed[-1] == pytest.approx(sed[-2], rel=3e-3)
 
 
