@@ -3,14 +3,13 @@
 Run from the repository's root: python -m benchmarks.analysis [SESSION]; without one a simulated one is recorded first.
 """
 
-import sys
 import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 
-from daq_app.cli import run
+from benchmarks.given_session import given_session
 from sessions.analysis import analyse
 from sessions.analysis.bootstrap import intervals_of
 from sessions.prediction import PredictionOptions, predict
@@ -24,10 +23,7 @@ RUNS = 9
 def main() -> None:
     """Print the medians."""
     with tempfile.TemporaryDirectory() as room:
-        folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(room) / "session"
-        if len(sys.argv) < 2:
-            words = ["run", "sensotact-friction", "--device", "sim:?seed=7&rate=200", "--subject", "P01", "--headless"]
-            run([*words, "--simulate-subject", "1", "--seed", "3", "--pace", "20", "--out", str(folder)])
+        folder = given_session(Path(room))
         recording = Recording.open(folder)
         analysis = analyse(recording)  # what is loaded once is loaded now
         strokes = analysis.strokes

@@ -3,13 +3,12 @@
 Run from the repository's root: python -m benchmarks.replay [SESSION]; without one a simulated one is recorded first.
 """
 
-import sys
 import tempfile
 import time
 from pathlib import Path
 from statistics import median
 
-from daq_app.cli import run
+from benchmarks.given_session import given_session
 from sessions.analysis import analyse
 from sessions.recording import Recording
 from sessions.replay import different_events, different_readings, replay
@@ -20,11 +19,7 @@ RUNS = 7
 def main() -> None:
     """Print the medians."""
     with tempfile.TemporaryDirectory() as room:
-        folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(room) / "session"
-        if len(sys.argv) < 2:
-            words = ["run", "sensotact-friction", "--device", "sim:?seed=7&rate=200", "--subject", "P01", "--headless"]
-            run([*words, "--simulate-subject", "1", "--seed", "3", "--pace", "20", "--out", str(folder)])
-        recording = Recording.open(folder)
+        recording = Recording.open(given_session(Path(room)))
         lasted = (recording.events[-1].time_ns - recording.events[0].time_ns) * 1e-9
         replayed: list[float] = []
         compared: list[float] = []

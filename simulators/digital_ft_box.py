@@ -48,10 +48,9 @@ class DigitalFtBox(LineBox):
         streaming: bool = False,
     ) -> None:
         """Set up a transducer whose sampling is wrong by `rate_error` [-], perhaps left `streaming` by somebody."""
-        super().__init__("ttyDigitalFT", clock)
+        super().__init__("ttyDigitalFT", clock, faults)
         self._bench = bench
         self._rate = RATE * (1.0 + rate_error)
-        self._faults = faults or Faults()
         self._rated = np.array(bench.settings.rated)
         self._gauges = np.linalg.inv(FT32831) * COUNTS_PER_VOLT  # counts for one N or N mm
         self._stored = self._calibration()
@@ -88,32 +87,19 @@ class DigitalFtBox(LineBox):
         self._deaf_until = now + _START_UP
         self._last = bytes(13)
 
-    def _serve(self, port: PseudoTerminal) -> None:
-        """Be the transducer until closed."""
-        while not self._closing.is_set():
-            now = self.now()
-            if self._faults.active("unplug", now):
-                port.unplug()
-                self._closing.wait(_NAP)
-                continue
-            port.plug_in()
-            if self._faults.active("reboot", now):
-                self._on = False
-                port.heard(_NAP)
-                continue
-            if not self._on:
-                self._power_up(now)
-            self._send_due(port, now)
-            wait = _NAP if self._streaming_since is None else _SHORTEST_NAP
-            heard = port.heard(wait)
-            if self._streaming_since is not None:
-                self._jammed_by += len(heard)
-                if self._jammed_by >= _JAM:
-                    self._streaming_since = None
-                    self._deaf_until = self.now() + _DEAF
-            elif self.now() >= self._deaf_until:
-                self._heard += heard
-                port.say(self._answers())
+    def _work(self, port: PseudoTerminal, now: float) -> None:
+        """Send packets and answer requests; while it streams, whatever is heard jams it."""
+        self._send_due(port, now)
+        wait = _NAP if self._streaming_since is None else _SHORTEST_NAP
+        heard = port.heard(wait)
+        if self._streaming_since is not None:
+            self._jammed_by += len(heard)
+            if self._jammed_by >= _JAM:
+                self._streaming_since = None
+                self._deaf_until = self.now() + _DEAF
+        elif self.now() >= self._deaf_until:
+            self._heard += heard
+            port.say(self._answers())
 
     def _send_due(self, port: PseudoTerminal, now: float) -> None:
         """Send the packets that are due, and whatever was delayed until now."""

@@ -3,16 +3,22 @@
 import threading
 
 from drivers.clock import Clock
+from simulators.faults import Faults
 from simulators.pseudo_terminal import PseudoTerminal
+
+_NAP = 0.01  # of a box without its line or its power [real s]
 
 
 class LineBox:
     """One box. Its time, and the bench's, begins when it is started."""
 
-    def __init__(self, name: str, clock: Clock) -> None:
+    _on: bool  # by `_power_up`; False: without power
+
+    def __init__(self, name: str, clock: Clock, faults: Faults | None) -> None:
         """Set up a box whose port's path ends with `name`."""
         self._name = name
         self._clock = clock
+        self._faults = faults or Faults()
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
         self._port: PseudoTerminal | None = None
@@ -45,5 +51,26 @@ class LineBox:
             self._port.close()
 
     def _serve(self, port: PseudoTerminal) -> None:
-        """Be the box until closed."""
+        """Be the box until closed: unplugged, without power, powered up again, or at work."""
+        while not self._closing.is_set():
+            now = self.now()
+            if self._faults.active("unplug", now):
+                port.unplug()
+                self._closing.wait(_NAP)
+                continue
+            port.plug_in()
+            if self._faults.active("reboot", now):
+                self._on = False
+                port.heard(_NAP)
+                continue
+            if not self._on:
+                self._power_up(now)
+            self._work(port, now)
+
+    def _power_up(self, now: float) -> None:
+        """Forget what is not kept over power-off; the box is on."""
+        raise NotImplementedError
+
+    def _work(self, port: PseudoTerminal, now: float) -> None:
+        """Send what is due, then listen for a short while and answer."""
         raise NotImplementedError

@@ -37,10 +37,9 @@ class SerialFtBox(LineBox):
 
     def __init__(self, bench: Bench, clock: Clock, *, baud: int = 38400, faults: Faults | None = None) -> None:
         """Set up a controller whose line runs at `baud` bits a second."""
-        super().__init__("ttyFT", clock)
+        super().__init__("ttyFT", clock, faults)
         self._bench = bench
         self._baud = baud
-        self._faults = faults or Faults()
         self._rated = np.array(bench.settings.rated)
         self._counts = np.repeat([COUNTS_PER_N, COUNTS_PER_NM / 1000.0], 3)  # in one N or N mm
         self._power_up(0.0)
@@ -71,28 +70,15 @@ class SerialFtBox(LineBox):
         self._last = (0, [0] * 6)
         self._ready_at: float | None = now + _START_UP  # when the banner comes, after power-up
 
-    def _serve(self, port: PseudoTerminal) -> None:
-        """Be the controller until closed."""
-        while not self._closing.is_set():
-            now = self.now()
-            if self._faults.active("unplug", now):
-                port.unplug()
-                self._closing.wait(_NAP)
-                continue
-            port.plug_in()
-            if self._faults.active("reboot", now):
-                self._on = False
-                port.heard(_NAP)
-                continue
-            if not self._on:
-                self._power_up(now)
-            if self._ready_at is not None and now >= self._ready_at:
-                self._ready_at = None
-                self._say(port, BANNER % self._serial.encode() + b">")
-            self._send_due(port, now)
-            for byte in port.heard(self._until_due()):
-                if self._ready_at is None:
-                    self._on_byte(port, byte if port.baud == self._baud else byte ^ 0x55)
+    def _work(self, port: PseudoTerminal, now: float) -> None:
+        """Send the banner and records that are due, and answer bytes as they come."""
+        if self._ready_at is not None and now >= self._ready_at:
+            self._ready_at = None
+            self._say(port, BANNER % self._serial.encode() + b">")
+        self._send_due(port, now)
+        for byte in port.heard(self._until_due()):
+            if self._ready_at is None:
+                self._on_byte(port, byte if port.baud == self._baud else byte ^ 0x55)
 
     def _say(self, port: PseudoTerminal, data: bytes) -> None:
         """Send `data`, garbled where the reader listens at another speed."""

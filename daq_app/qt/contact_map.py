@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap, QResizeEvent
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap
 
+from daq_app.qt.painted_widget import PaintedWidget
 from daq_app.qt.shapes import blank, lines
 from daq_app.qt.tokens import MU, SMALL, Tokens, font
 
@@ -16,34 +16,24 @@ MARGIN = 4  # [pixels]
 TOO_SMALL = 0.2  # a picture with fewer pixels to the millimetre is left out
 
 
-class ContactMap(QWidget):
+class ContactMap(PaintedWidget):
     """Where the finger presses now, and where it came from. The drawing is of the face's middle, not to its edges."""
 
     def __init__(self, tokens: Tokens, scale: float) -> None:
         """Show an untouched sample."""
-        super().__init__()
-        self._tokens = tokens
+        super().__init__(tokens)
         self._scale = scale
         self._trail: Array = np.empty((0, 2))
-        self._ground: QPixmap | None = None  # what stands still
+        self._touching = False
         self._direction = 0
-        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # nothing behind it needs painting
         self.setMinimumSize(100, 60)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("centre of pressure on the sample: nothing touches")
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._tokens = tokens
-        self._ground = None
-        self.update()
 
     def show_direction(self, direction: int) -> None:
         """Show which way the stroke is to go: +1 away from the subject, -1 towards, 0 none."""
         if direction != self._direction:
             self._direction = direction
-            self._ground = None
-            self.update()
+            self._anew()
 
     def show_trail(self, position: Array) -> None:
         """Show the last positions (n, 2) [mm], the newest last; nan where nothing presses."""
@@ -57,19 +47,9 @@ class ContactMap(QWidget):
         self.setAccessibleName(f"centre of pressure on the sample: {where}")
         self.update()
 
-    _touching = False
-
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
-        """Draw the sample anew."""
-        super().resizeEvent(event)
-        self._ground = None
-
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Copy the sample, and paint the trail upon it."""
-        if self._ground is None or self._ground.devicePixelRatio() != self.devicePixelRatioF():
-            self._ground = self._painted_ground()
-        painter = QPainter(self)
-        painter.drawPixmap(0, 0, self._ground)
+        painter = self._upon_ground()
         per_mm = self._per_mm()
         if not len(self._trail) or per_mm <= TOO_SMALL:
             return

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QPixmap, QResizeEvent, QStaticText
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QPixmap, QStaticText
 
 from daq_app.qt.curve import Curve
+from daq_app.qt.painted_widget import PaintedWidget
 from daq_app.qt.shapes import blank, draw_line, fine
 from daq_app.qt.tokens import SMALL, Tokens, font
 from daq_app.window.course_state import Mark
@@ -27,7 +27,7 @@ DASHES = 45  # times two thirds of a dash in the stretch that is shown
 FAR = 1e4  # a value so many pixels away is as good as any beyond it
 
 
-class LivePlot(QWidget):
+class LivePlot(PaintedWidget):
     """A plot whose time axis stands still: 0 is now."""
 
     def __init__(
@@ -40,12 +40,11 @@ class LivePlot(QWidget):
         channels: Sequence[str] = CHANNELS,
     ) -> None:
         """Show nothing yet; `channels` names the rows of what will be shown."""
-        super().__init__()
+        super().__init__(tokens)
         self._name = name
         self._rows = tuple(tuple(channels).index(curve.channel) for curve in curves)
         self._curves = tuple(curves)
         self._scale = scale
-        self._tokens = tokens
         self._type_scale = type_scale
         self._seconds = 10.0
         self._times_shown = True
@@ -53,16 +52,8 @@ class LivePlot(QWidget):
         self._columns = Columns(np.empty(0), np.empty((len(tuple(channels)), 0)))
         self._marks: tuple[Mark, ...] = ()
         self._words = {kind: QStaticText(kind) for kind in ("onset", "lift")}
-        self._ground: QPixmap | None = None  # what stands still
-        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # nothing behind it needs painting
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(40, 32)
         self.setAccessibleName(f"plot of {name}")
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._tokens = tokens
-        self._anew()
 
     def show_seconds(self, seconds: float) -> None:
         """Show the last so many seconds."""
@@ -86,17 +77,9 @@ class LivePlot(QWidget):
         self._scale = scale
         self.update()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
-        """Show as many numbers as there is room for."""
-        super().resizeEvent(event)
-        self._ground = None
-
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Copy what stands still, and draw the rest upon it."""
-        if self._ground is None or self._ground.devicePixelRatio() != self.devicePixelRatioF():
-            self._ground = self._painted_ground()
-        painter = QPainter(self)
-        painter.drawPixmap(0, 0, self._ground)
+        painter = self._upon_ground()
         inside = self._inside()
         painter.setClipRect(inside)
         self._paint_marks(painter, inside)
@@ -110,10 +93,6 @@ class LivePlot(QWidget):
                 y = np.where(np.floor(self._columns.time * DASHES / self._seconds) % 3 < 2, y, np.nan)
             painter.setPen(fine(self._colour(curve.colour)))
             draw_line(painter, x, np.clip(y, -FAR, FAR))
-
-    def _anew(self) -> None:
-        self._ground = None
-        self.update()
 
     def _inside(self) -> QRectF:
         """Return where the curves are."""

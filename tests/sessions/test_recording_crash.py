@@ -1,14 +1,13 @@
 """A recording whose writer is killed, or whose disk is full: nothing that was acknowledged is lost."""
 
-import json
 import os
 import random
 import shutil
-import signal
-import time
+from functools import partial
 
 import numpy as np
 import pytest
+from killed_process import forked, killed, reported, whole_session
 from recordings import begun, readings
 from told_session import Session
 
@@ -17,50 +16,6 @@ from sessions.recording.torn import log_tail
 
 resource = pytest.importorskip("resource", reason="limits a file's size, which needs POSIX")
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="kills a process of its own, which needs fork")
-
-
-def forked(work):
-    """Start `work(report)` in a process of its own; what it reports comes down the pipe that is returned."""
-    reading, writing = os.pipe()
-    process = os.fork()
-    if process == 0:
-        try:
-            os.close(reading)
-            work(lambda *numbers: os.write(writing, (json.dumps(numbers) + "\n").encode()))
-        finally:
-            os._exit(0)
-    os.close(writing)
-    return process, reading
-
-
-def killed(process, reading, events, later):
-    """Kill a process `later` seconds after it said that so many events are safe, or ended; return all it reported."""
-    said = b""
-    while (more := os.read(reading, 65536)) and _safe_events(said := said + more) < events:
-        pass
-    time.sleep(later)
-    kill(process)
-    with os.fdopen(reading, "rb") as pipe:
-        return _lines(said + pipe.read())
-
-
-def kill(process):
-    os.kill(process, signal.SIGKILL)
-    os.waitpid(process, 0)
-
-
-def reported(reading):
-    """Return everything reported in whole lines."""
-    with os.fdopen(reading, "rb") as pipe:
-        return _lines(pipe.read())
-
-
-def _lines(said):
-    return [json.loads(line) for line in said.split(b"\n")[:-1]]
-
-
-def _safe_events(said):
-    return max((line[1] for line in _lines(said) if len(line) == 2), default=-1)
 
 
 def test_nothing_acknowledged_is_lost_when_the_writer_is_killed_and_when_its_log_is_cut_as_well(tmp_path):
@@ -113,13 +68,7 @@ def test_a_session_killed_at_any_moment_leaves_a_beginning_of_the_whole_session(
     lengths = set()
     for run in range(12):
         folder = tmp_path / str(run)
-
-        def work(report, folder=folder):
-            session = Session(folder)
-            report("begun")
-            session.run(progress=lambda status: report(status.safe.readings, status.safe.events))
-
-        process, reading = forked(work)
+        process, reading = forked(partial(whole_session, folder))
         said = killed(process, reading, chance.randrange(-1, len(whole.events)), chance.uniform(0.0, 0.005))
         safe = [line for line in said if len(line) == 2]
         recording = Recording.open(folder)

@@ -1,13 +1,13 @@
 import dataclasses
-import json
 import os
 import random
 from datetime import UTC, datetime, timedelta
+from functools import partial
 
 import pytest
 from hypothesis import given, settings
+from killed_process import forked, kill, lines_of, reported, whole_session
 from stand_ins import INFO, Hands, StandIn, ToldClock
-from test_recording_crash import forked, kill, reported
 from told_session import Session
 from walks import FORCES, steps, walks
 
@@ -113,27 +113,13 @@ def resume(folder, **transducer):
     return end, Recording.open(folder)
 
 
-def lines_of(reading, count):
-    """Return so many lines of what is reported, or as many as there are."""
-    told = b""
-    while told.count(b"\n") < count and (part := os.read(reading, 1)):
-        told += part
-    return [json.loads(line) for line in told.splitlines()]
-
-
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="kills a process of its own, which needs fork")
 def test_a_killed_session_goes_on_at_the_same_trial_and_nothing_acknowledged_is_lost(tmp_path):
     chance = random.Random(4)
     resumed_at = set()
     for run in range(8):
         folder = tmp_path / str(run)
-
-        def work(report, folder=folder):
-            session = Session(folder)
-            report("begun")
-            session.run(progress=lambda status: report(status.safe.readings, status.safe.events))
-
-        process, reading = forked(work)
+        process, reading = forked(partial(whole_session, folder))
         # Lines, not seconds: how busy the machine is decides nothing.
         first = lines_of(reading, chance.randrange(1, 120))
         kill(process)
