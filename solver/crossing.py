@@ -14,6 +14,9 @@ SQUEEZED = 0.85  # stretch of skin, on one side at least, in which a kink is tol
 def crosses_itself(outline: Array) -> bool:
     """Return whether a polyline (n, 2) meets itself other than at the points that join its pieces.
 
+    In a straight line each point lies on either side of each piece, by rounding: only pieces that overlap along x and
+    y can meet.
+
     >>> bool(crosses_itself(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, -1.0]])))
     True
     >>> bool(crosses_itself(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 0.5]])))
@@ -24,8 +27,10 @@ def crosses_itself(outline: Array) -> bool:
     side = along[:, :1] * outline[:, 1] - along[:, 1:] * outline[:, 0]
     side -= (along[:, 0] * start[:, 1] - along[:, 1] * start[:, 0])[:, None]
     apart = side[:, :-1] * side[:, 1:] < 0.0
-    crossing = apart & apart.T
-    return bool(crossing.any()) and bool(np.triu(crossing, 2).any())
+    low, high = np.minimum(start, outline[1:]), np.maximum(start, outline[1:])
+    overlap = (high[:, None] >= low).all(axis=2)
+    crossing = apart & apart.T & overlap & overlap.T
+    return bool(np.triu(crossing, 2).any())
 
 
 class Pinch(NamedTuple):

@@ -20,8 +20,9 @@ from solver.newton import BY_DEPTH, Pull, Shape
 SLIDING = 0.995  # part of the friction limit beyond which the tangential force means sliding
 LIGHT = 1e-7  # N/mm: less than this is no touch
 MET = 0.02  # part of the normal force by which a state may miss the forces and still be told of
-EASED = 0.7  # of the normal force at which the state was lost: from there it is sought again [-]
+EASED = 0.7  # of the normal force at which the state was lost and led to in vain: from there it is sought again [-]
 STAIRS, LEADING = 12, 3  # that lead a finger from nothing to forces it bears already, and iterations on each
+ARRIVING, NEAR = 8, 0.01  # iterations on the last, as after a state that was not told of, until one is so small [mm]
 FOLDING = 0.65  # least stretch of the skin that is told of: it folds from 0.544 on, and a coarse mesh squeezes it less
 FAR, HURRIED = 0.15, 3  # displacement in one iteration from which on there is another [mm], and how many at most
 STIFF = 1e3  # bulk over shear stiffness from which on a tangent from elsewhere leads astray (nu 0.4995)
@@ -38,6 +39,8 @@ class FiniteStepper:
         self.mu, self.tau = mu, tau
         self.shape = Shape.undeformed(newton.body)
         self._lost_at: float | None = None  # normal force [N/mm]
+        self._hopeless = False  # whether these forces were led to in vain
+        self._behind = False  # whether the last state had not caught up with its forces
         self._stiffness = 0.0  # of the finger pressed deeper, in the last iteration [N/mm per mm]
 
     @property
@@ -53,15 +56,16 @@ class FiniteStepper:
     def forget(self) -> None:
         """Start afresh from the untouched finger."""
         self.shape = Shape.undeformed(self._newton.body)
-        self._lost_at = None
+        self._lost_at, self._hopeless, self._behind = None, False, False
 
     def step(self, normal: float, tangential: float, iterations: int = 1) -> float:
         """Take one reading and return the SED averaged over the ending [MPa]; nan where no state can be told of.
 
         `normal` [N/mm] presses the finger, `tangential` [N/mm] is the surface's pull on it along +x. A state is lost
-        where contact leaves the skin that may touch, and where skin is squeezed so far that it may have folded: it is
-        sought again once the normal force has eased. One that has not caught up with the forces is not told of. A
-        reading that is no number is nan too, and leaves the state as it was.
+        where contact leaves the skin that may touch, and where skin is squeezed so far that it may have folded: with
+        the next reading it is led to from nothing, and where that is in vain again once the normal force has eased. One
+        that has not caught up with the forces is not told of. A reading that is no number is nan too, and leaves the
+        state as it was.
         """
         if not isfinite(normal + tangential):
             return float("nan")
@@ -70,18 +74,19 @@ class FiniteStepper:
             return 0.0
         if self._lost_at is None:
             return self._followed(normal, tangential, iterations)
-        if normal >= EASED * self._lost_at:
+        if self._hopeless and normal >= EASED * self._lost_at:
             return float("nan")
-        return self._led(normal, tangential, max(iterations, LEADING))
+        return self._led(normal, tangential)
 
-    def _led(self, normal: float, tangential: float, iterations: int) -> float:
+    def _led(self, normal: float, tangential: float) -> float:
         """Return what `step` does of a finger led from nothing to these forces."""
         self.forget()
         sed = float("nan")
         for part in np.linspace(1.0 / STAIRS, 1.0, STAIRS).tolist():
-            sed = self._followed(part * normal, part * tangential, iterations)
+            self._behind = part == 1.0
+            sed = self._followed(part * normal, part * tangential, LEADING)
             if self.lost:
-                self._lost_at = normal
+                self._lost_at, self._hopeless = normal, True
                 break
         return sed
 
@@ -98,7 +103,8 @@ class FiniteStepper:
         shape = self._ready(normal, pull_back)
         origin, before = shape.place(newton.body)[:, 0], shape.pull.travel
         given, hurried = Given(normal, pull_back), self._goes_far(normal)
-        for number in range(1, max(iterations, HURRIED) + 1):
+        far, turns = (NEAR, ARRIVING) if self._behind else (FAR, HURRIED)
+        for number in range(1, max(iterations, turns) + 1):
             kept = hurried and number == 1
             done = corrected(newton, shape, given, origin, before, kept=kept)
             if kept and (done is None or done[1] > FURTHEST):
@@ -106,7 +112,7 @@ class FiniteStepper:
             if done is None or done[1] > FURTHEST or done[0].state[0] != OPEN or done[0].state[-1] != OPEN:
                 return self._lose(normal)
             shape = done[0]
-            if number >= iterations and not kept and done[1] < FAR:
+            if number >= iterations and not kept and done[1] < far:
                 break
         self._stiffness = float(newton.reaction(newton.steps[:, BY_DEPTH], still=True)[:, 1].sum())
         pinch = self._finger.pinch(shape)
@@ -115,7 +121,8 @@ class FiniteStepper:
         self.shape = shape
         x, y = shape.force
         behind = max(abs(y - normal), abs(x - pull_back) if (shape.state == STICK).any() else 0.0)
-        if behind > MET * normal:
+        self._behind = behind > MET * normal
+        if self._behind:
             return float("nan")
         if pinch.lowest < FOLDING or pinch.kink > CREASE:
             return self._lose(normal)

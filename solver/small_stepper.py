@@ -125,6 +125,7 @@ class SmallStepper:
         point sticks where it was, or slips from there against its friction force. A lost state starts afresh from the
         untouched finger with the next reading; a reading that is no number is nan too, and leaves the state as it was.
         """
+        normal, tangential = float(normal), float(tangential)  # loops are compiled for these alone
         if not isfinite(normal + tangential):
             return float("nan")
         if normal < LIGHT:

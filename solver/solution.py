@@ -23,6 +23,7 @@ WORTH = 0.1  # error estimate up to which a coarser mesh's number near a limit i
 NEAR_LIMIT = "That mesh ends settled sliding at mu = {:.3g}, which is known to {:.0f} %: this state may lie beyond."
 MISSES = "The finest mesh leaves an error estimate above the tolerance asked for."
 STAYS = "Where the cut meets the bone tissue is squeezed so far that no mesh meets the tolerance asked for."
+UNKNOWN = "How far this is off is not known, since a coarser mesh has no such state: ask for less friction or depth."
 FINEST_HAS = 0.5  # of an error that meshes have in common, the part that is there on the finest of them too
 Rough = Callable[[Prediction], None]  # told an answer before more is made of it: what there is, should work be stopped
 
@@ -198,7 +199,7 @@ class _Refined:
 def _refined(
     scenes: list[Scene], fineness: float, on_mesh: "_Meshing", watch: Watch | None, rough: Rough | None
 ) -> _Refined:
-    """Refine until every scene's estimate meets its tolerance and surfaces are told apart, or no mesh is finer.
+    """Refine until every estimate is known and meets its tolerance and surfaces are told apart, or no mesh is finer.
 
     Scenes that share a mesh are solved again together on the finer one. Where that has no answer, the coarser mesh's
     is told if it `_stands`.
@@ -235,7 +236,7 @@ def _refined(
     if kind == "finite":  # where a fine mesh may lose its way
         lost |= _fallen_back(scenes, found, first, on_mesh)
     of = {i: off for together, off in zip(surfaces, apart, strict=True) for i in together}
-    left = [(STAYS if _stays(found[i]) else MISSES) if missed[i] else "" for i in range(len(scenes))]
+    left = [_left(found[i]) if missed[i] else "" for i in range(len(scenes))]
     told = [_undone(of.get(i), left[i], lost.get(i)) for i in range(len(scenes))]
     return _Refined([found[i] for i in range(len(scenes))], told, fineness)
 
@@ -317,10 +318,18 @@ class _Meshing:
 
 
 def _misses(answer: Answer) -> bool:
-    """Return whether an answer has not met the tolerance of its scene."""
-    if not isinstance(answer, Prediction) or answer.scene.solve.tolerance is None:
+    """Return whether an answer has not met the tolerance of its scene, or where none is asked has no estimate."""
+    if not isinstance(answer, Prediction):
         return False
-    return answer.error_estimate > answer.scene.solve.tolerance
+    asked = answer.scene.solve.tolerance
+    return answer.error_estimate > asked if asked is not None else answer.error_estimate >= 1.0
+
+
+def _left(answer: Answer) -> str:
+    """Return what is to be said of an answer that misses."""
+    if isinstance(answer, Prediction) and answer.error_estimate >= 1.0:
+        return UNKNOWN
+    return STAYS if _stays(answer) else MISSES
 
 
 def _stays(answer: Answer) -> bool:

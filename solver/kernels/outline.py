@@ -55,7 +55,16 @@ def crosses(nodes: Array, u: Array, outline: Wide) -> bool:
                 ex, ey = x[j + 1] - x[j], y[j + 1] - y[j]
                 one = ex * (y[i] - y[j]) - ey * (x[i] - x[j])
                 other = ex * (y[i + 1] - y[j]) - ey * (x[i + 1] - x[j])
-                if one * other < 0.0:
+                if one * other < 0.0 and _overlap(x, i, j) and _overlap(y, i, j):
                     return True
             before = side
     return False
+
+
+@compiled
+def _overlap(at: Array, i: int, j: int) -> bool:
+    """Return whether the pieces that begin at points `i` and `j` share positions along one axis.
+
+    Pieces of a straight line do not; on which sides of each other they lie is told by rounding alone.
+    """
+    return max(at[i], at[i + 1]) >= min(at[j], at[j + 1]) and max(at[j], at[j + 1]) >= min(at[i], at[i + 1])

@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 
 from daq_app.accuracy.methods import climbed_twice
+from solver import finite_errors
 from solver.climbing import ascended
-from solver.failures import NoSteadyState
+from solver.failures import NoSteadyState, NotConverged
 from solver.finite_audits import audits
 from solver.finite_finger import FiniteFinger
 from solver.newton import Pull
 from solver.reference import SLIPPERINESS, STICKINESS, scene
 from solver.scene import Friction, Loading, Scene, Solve
 from solver.sliding import settled
-from solver.solution import answers, solve, solve_together
+from solver.solution import UNKNOWN, answers, solve, solve_together
 from tests.solver.finite_examples import published
 
 # Ending-averaged SED [MPa], normal and tangential force [N/mm] of the published finger: means of two independent codes
@@ -144,3 +145,20 @@ def test_small_and_finite_strain_agree_where_the_press_is_shallow():
     small, large = (solve(replace(pressed, solve=Solve(kinematics))) for kinematics in ("small", "finite"))
     assert large.normal_force == pytest.approx(small.normal_force, rel=0.02)
     assert large.sed_ending == pytest.approx(small.sed_ending, rel=0.03)
+
+
+@pytest.mark.parametrize(("lost_below", "known"), [(10.0, True), (1e9, False)])
+def test_an_answer_that_no_coarser_mesh_has_is_solved_on_a_finer_one_or_said_to_be_of_unknown_error(
+    monkeypatch, lost_below, known
+):
+    nearest = finite_errors.climbed
+
+    def lost(scene, fineness, *more):
+        if fineness < lost_below:
+            raise NotConverged("lost")
+        return nearest(scene, fineness, *more)
+
+    monkeypatch.setattr(finite_errors, "climbed", lost)
+    found = solve(Scene(friction=Friction(0.3), loading=Loading(0.5, "+x"), solve=Solve("finite", evidence="quick")))
+    assert (found.error_estimate < 0.01) == known
+    assert (UNKNOWN in found.warnings) == (not known)

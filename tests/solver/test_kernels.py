@@ -6,6 +6,8 @@ import sys
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from solver import kernels, kernels_numpy
 from solver.crossing import crosses_itself, pinched
@@ -206,6 +208,18 @@ def test_the_compiled_outline_is_squeezed_and_crosses_itself_where_the_plain_one
         assert kernels.crosses(nodes, u, outline) == crosses_itself(after)
         seen.add(kernels.crosses(nodes, u, outline))
     assert seen == {True, False}
+
+
+@given(
+    st.floats(0.0, np.pi), st.lists(st.floats(0.01, 1.0), min_size=4, max_size=40), st.floats(-20.0, 20.0),
+    st.floats(0.0, 1e-15),
+)  # fmt: skip
+def test_a_straight_line_does_not_cross_itself_whatever_its_rounding(angle, pieces, away, noise):
+    way = np.concatenate([[0.0], np.cumsum(pieces)])
+    nodes = away + np.stack([way * np.cos(angle), way * np.sin(angle)], axis=1)
+    u = noise * np.random.default_rng(len(pieces)).normal(size=nodes.shape)
+    assert not crosses_itself(nodes + u)
+    assert not kernels.crosses(nodes, u, np.arange(len(nodes)))
 
 
 @pytest.mark.slow

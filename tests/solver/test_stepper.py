@@ -15,6 +15,7 @@ from solver.finite_forced import march as forced_march
 from solver.finite_forced import untouched as at_rest
 from solver.finite_stepper import FiniteStepper
 from solver.friction import FrictionLaw
+from solver.kernels.following import follow
 from solver.march import march, press_and_slide
 from solver.mesher import Sizing
 from solver.receptor import ROW
@@ -136,6 +137,37 @@ def test_a_state_that_has_not_caught_up_with_its_forces_is_not_told_of():
     assert np.isfinite(told[-1])
     for sed in told:
         assert np.isnan(sed) or sed == pytest.approx(told[-1], rel=0.05)
+
+
+@pytest.mark.parametrize("knock", [0.3, 10.0, 1e300])  # N/mm
+def test_one_reading_of_a_knock_costs_that_reading_alone(knock):
+    follows = made("finite", 0.3)
+    for part in np.linspace(1 / 80, 1.0, 80):
+        held = follows.step(0.08 * part, 0.023 * part)
+    assert np.isnan(follows.step(knock, 0.023))
+    told = [follows.step(0.08, 0.023) for _ in range(4)]
+    np.testing.assert_allclose(told, held, rtol=0.005)  # shared out anew between stick and slip
+
+
+@pytest.mark.parametrize("readings_of_turn", [1, 2, 10])
+def test_a_drag_that_turns_within_one_reading_ends_where_one_that_never_turned_does(readings_of_turn):
+    turned, straight = made("finite", 0.44), made("finite", 0.44)
+    for part in np.linspace(1 / 80, 1.0, 80):
+        turned.step(0.08 * part, 0.0352 * part)
+        straight.step(0.08 * part, -0.0352 * part)
+    for part in np.linspace(1.0, -1.0, readings_of_turn + 1)[1:]:
+        turned.step(0.08, 0.0352 * part)
+    assert turned.step(0.08, -0.0352) == pytest.approx(straight.step(0.08, -0.0352), rel=1e-3)
+
+
+def test_a_reading_may_be_a_number_of_any_kind_without_another_loop_being_compiled():
+    follows, plain = made("small", 0.3), made("small", 0.3)
+    assert follows.step(0.05, 0.01) == plain.step(0.05, 0.01)
+    before = len(follow._entries)
+    for kind in (np.float32, np.float64, np.array):
+        assert follows.step(kind(0.0625), kind(0.015625)) == plain.step(0.0625, 0.015625)
+    follows.step(1, 0)
+    assert len(follow._entries) == before
 
 
 @pytest.mark.parametrize("readings_of_lift", [4, 8])  # 20 and 40 ms at 200 Hz
