@@ -29,11 +29,6 @@ class RateWatch:
         self._ends = 0.0  # of this window
         self._last = 0.0  # arrival
 
-    @property
-    def is_off(self) -> bool:
-        """Tell whether the rate is another than the one set."""
-        return self.rate != self.asked
-
     def take(self, count: int, received_ns: int) -> bool:
         """Take how far the device has counted by something that arrived; tell whether its rate is found to be another.
 

@@ -36,7 +36,6 @@ class March:
     """The way from first touch to the last state."""
 
     instants: tuple[Instant, ...]
-    settled_after: float | None  # travel of the last slide after which nothing changed [mm]; None without a slide
     iterations: int
 
 
@@ -85,7 +84,7 @@ def course(way: "Way", loading: Loading, progress: Progress | None = None, times
             _report(progress, (1.0 + part) / 2.0)
     else:
         for direction in loading.directions:
-            way.settled = slide(way, direction, loading.speed, progress, times)
+            slide(way, direction, loading.speed, progress, times)
 
 
 def _report(progress: Progress | None, part: float) -> None:
@@ -112,11 +111,10 @@ class Way:
         self.course = Course(body, law)
         self.instants = [Instant(0.0, 0.0, 0.0, start)]
         self.aim = Aim(0.0, 0.0, 0.0)
-        self.settled: float | None = None  # travel of the last slide after which nothing changed [mm]
 
     def march(self) -> March:
         """Return the way so far."""
-        return March(tuple(self.instants), self.settled, sum(i.contact.iterations for i in self.instants))
+        return March(tuple(self.instants), sum(i.contact.iterations for i in self.instants))
 
     def go(self, aim: Aim, halvings: int = HALVINGS) -> None:
         """Append the state at `aim`, in smaller steps where one of that size fails."""
@@ -165,8 +163,8 @@ class Way:
         return met(at, -float(before.motion[1]), UNMET * self.course.law.mu * aim.press)
 
 
-def slide(way: Way, direction: int, speed: float, progress: Progress | None, times: float) -> float:
-    """Append the sliding states and return the travel after which they did not change."""
+def slide(way: Way, direction: int, speed: float, progress: Progress | None, times: float) -> None:
+    """Append the sliding states until they do not change, and a stretch of them beyond."""
     begun, depth = way.aim, way.instants[-1].depth
     step, distance = 0.01 / times * depth, 0.0
     largest = 0.06 / times * depth
@@ -179,7 +177,7 @@ def slide(way: Way, direction: int, speed: float, progress: Progress | None, tim
             plateau = max(1.3 * distance, distance + depth)
             for part in np.linspace(distance, plateau, 5)[1:]:
                 way.go(at(float(part)))
-            return distance
+            return
         distance += step
         way.go(at(distance))
         step = min(step * 1.2, largest)

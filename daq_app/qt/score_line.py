@@ -62,11 +62,6 @@ class ScoreLine(QWidget):
         """Return the answer so far."""
         return self._answer
 
-    @property
-    def pixels_per_mm(self) -> float:
-        """Return device-independent pixels in a millimetre of this screen."""
-        return self._pixels_per_mm
-
     def set_pixels_per_mm(self, pixels: float) -> None:
         """Be as long as `LENGTH` says on a screen with so many device-independent pixels a millimetre."""
         if pixels != self._pixels_per_mm:

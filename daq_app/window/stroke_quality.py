@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
@@ -14,8 +13,6 @@ from sessions.analysis.analysis import analyse_blocks
 from sessions.analysis.flaws import Flaw
 from sessions.analysis.stroke import Stroke
 from sessions.plan import SessionPlan, Trial
-
-Array = NDArray[np.float64]
 
 FELL = 0.5  # a normal force that falls by this share along the steady window is worth a word [-]
 

@@ -15,8 +15,6 @@ from drivers.calibration import Calibration
 from drivers.records import Records
 from drivers.transducer import SetupError
 
-Array = NDArray[np.float64]
-
 ADDRESS = 10
 READ, WRITE, START_STREAM, UNLOCK = 0x03, 0x10, 0x46, 0x6A  # function codes
 START_KEY, UNLOCK_KEY, LOCK_KEY = 0x55, 0xAA, 0x18

@@ -1,7 +1,6 @@
 """The numbers of one stroke, and what forbids some of them."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sessions.analysis.contacts import Contact
 from sessions.analysis.findings import COEFFICIENTS, DIRECTION, EVERYTHING, PEAKS, SPEED, Findings
@@ -15,8 +14,6 @@ from sessions.analysis.stroke import Stroke
 from sessions.analysis.track import Track, curve_of, mean_vector, track_of
 from sessions.decisions import Decided
 from sessions.plan import PROXIMAL_TO_DISTAL, Frame, Trial
-
-Array = NDArray[np.float64]
 
 _AFTER_PEAK = 0.2  # what a static peak is held against [s]
 _LATE_PEAK = 0.1  # a static peak may come so long after the slide began [s]

@@ -1,7 +1,6 @@
 """Where a stroke slides steadily, how fast and which way; and what forbids saying so."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sessions.analysis.findings import COEFFICIENTS, DIRECTION, SPEED, Findings
 from sessions.analysis.flaws import FlawName
@@ -10,8 +9,6 @@ from sessions.analysis.span import Span
 from sessions.analysis.steady import FEWEST, Movement, displacement, movement, steady_window
 from sessions.analysis.track import Track, mean_vector
 from sessions.plan import Frame
-
-Array = NDArray[np.float64]
 
 _ROUNDING = 1e-9  # instants are told to the last bit, or rounded by people [s]
 

@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sessions.analysis.contacts import Contact
 from sessions.analysis.settings import AnalysisSettings
@@ -19,7 +18,6 @@ from sessions.analysis.steady import block_means, displacement
 from sessions.analysis.track import track_of
 from sessions.plan import Frame
 
-Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
 _FEWEST = 3  # presses, or blocks of one press, of which an interval is told

@@ -9,7 +9,6 @@ from sessions.analysis.onset import onset_threshold
 from sessions.analysis.settings import AnalysisSettings
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _HOPS = 6  # windows start at every sixth of their length
 _FORCES = slice(0, 3)

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from solver.body import Body
 from solver.contact import OPEN, SLIP, Contact, States
-from solver.elements import Q2P1
 from solver.grid import grid_mesh, quality
 from solver.mesh import Array, Indices, Mesh
 from solver.stiffness import Probes, local_coordinates
@@ -205,8 +204,3 @@ def skin_motion(body: Body, found: Contact) -> Array:
 def touching_within(body: Body, half_width: float) -> States:
     """Return first states: points whose |x| is below `half_width` slip, the others are open."""
     return np.where(np.abs(body.mesh.nodes[body.mesh.skin, 0]) < half_width, SLIP, OPEN).astype(np.int8)
-
-
-def local_corners(mesh: Mesh) -> tuple[Indices, Array]:
-    """Return an element number and local corner for each corner of each element."""
-    return np.repeat(np.arange(len(mesh.elements)), 4), np.tile(Q2P1.corners, (len(mesh.elements), 1))

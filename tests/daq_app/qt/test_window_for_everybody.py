@@ -197,7 +197,7 @@ def shown_line(driver):
 
 def test_a_click_is_answered_where_it_was_seen_at_every_place_of_the_line(driver):
     line = shown_line(driver)
-    half_a_pixel = 100 * 0.5 / (score_line.LENGTH * line.pixels_per_mm)
+    half_a_pixel = 100 * 0.5 / (score_line.LENGTH * line._pixels_per_mm)
     for position in (0.0, 12.5, 50.0, 87.5, 100.0):
         QTest.mouseClick(line, Qt.MouseButton.LeftButton, pos=line.place_of(position).toPoint())
         assert line.answer.score == pytest.approx(position, abs=half_a_pixel + 0.06)
