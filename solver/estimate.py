@@ -36,7 +36,6 @@ FROM_NAIL = {"small": 2.5, "finite": 4.0}  # the same where a nail ends: errors 
 FROM_FINENESS = {"small": ((0.08, 2.0),), "finite": ((0.15, 2.0), (0.0215, 1.1))}  # the largest, by the power given
 OF_OTHERS = ((0.115, 2.0), (0.8, 3.0))  # the same at small strain of any finger but the published one
 THIN = 0.75  # power with which those grow as the bone gets thinner by the tissue below it: fat is sheared most there
-SMALL, OF_SMALL = (0.01, 0.05), 6.0  # endings smaller across or along the skin, by tip radius; how their SEDs suffer
 OF_STEEP = 2.0  # times what the mesh alone decides at small strain where friction is steep
 FROM_ROOT = 0.05  # of both forces at small strain where a nail ends, by fineness
 FROM_COARSE = 1.0  # of both forces at small strain, by fineness to the fourth power
@@ -154,7 +153,6 @@ def _off(
     kind = scene.solve.kinematics
     size, largest = np.abs(numbers), np.abs(others - numbers).max(axis=0)
     part = np.full(len(numbers), _least(scene, fineness))
-    part[0] *= _of_ending(scene)
     if kind == "finite":
         part[DEPTH] *= OF_DEPTH
     if kind == "small":
@@ -187,7 +185,7 @@ def coarsest_for(scene: Scene, tolerance: float) -> float:
     In a light touch that is one beyond which the smallest elements, along the skin, are as small as they get.
     """
     kind = scene.solve.kinematics
-    meets = (n for n in FINENESS[kind] if _of_ending(scene) * _least(scene, n) <= 0.9 * tolerance)
+    meets = (n for n in FINENESS[kind] if _least(scene, n) <= 0.9 * tolerance)
     return next(meets, next(n for n in FINENESS[kind] if n >= DEFAULT[kind] and not finer_than(scene, n)))
 
 
@@ -204,18 +202,6 @@ def _least(scene: Scene, fineness: float) -> float:
         return max(part / resolved**order for part, order in FROM_FINENESS[kind])
     thinner = _around_bone(scene.finger) / _around_bone(Finger())
     return thinner**THIN * max(part / resolved**order for part, order in OF_OTHERS)
-
-
-def _of_ending(scene: Scene) -> float:
-    """Return how many times as much the mesh may leave in the SED of an ending that is small beside elements.
-
-    Averages over whole elements smooth what they have wrong; in a point there is nothing to smooth, and two meshes have
-    that point at the same place of an element.
-    """
-    least = (size * scene.finger.tip_radius for size in SMALL)
-    return 1.0 + OF_SMALL * max(
-        1.0 - min(1.0, own / size) for own, size in zip(scene.receptor.ending, least, strict=True)
-    )
 
 
 def _around_bone(finger: Finger) -> float:

@@ -25,6 +25,8 @@ TALL = 1.7  # across the skin at the surface, by that along it
 BULK = 1.5  # across the tissue, at most
 AT_BONE, FROM_BONE = 0.45, 6.0  # across at the bone, where fat is sheared most; growth from there, by tip radius
 ENDING, FROM_ENDING = 0.7, 3.0  # the same for the ending
+POINT = (0.02, 0.1)  # endings smaller across or along the skin, by tip radius, are hardly more than points
+AT_POINT, FROM_POINT = 0.1, 0.5  # the element that has them in its middle; growth from there [-]
 GROWTH = 0.2  # of elements smaller than that, at the surface, with the depth below it [-]
 SHORT = (0.56, 0.4)  # half contacts shorter than that, by tip radius, have smaller elements: overlaps, known contacts
 NEAR = 0.15  # a line nearer to another, by the element's size, is left out
@@ -224,9 +226,11 @@ class _Row:
             least = _fold(outline.finger)
             from_fold = np.maximum(np.abs(arc - sizing.fold) - AROUND * least, 0.0)
             asked = np.minimum(asked, least + FROM_FOLD * from_fold)
-        half = receptor.ending[1] / 2.0
-        frame = outline.along(0.0, receptor.depth, np.array([-half, half])).tolist()
-        ends = [outline.palmar_cut, outline.palmar, *frame, outline.dorsal, outline.dorsal_cut]
+        near, far = outline.along(0.0, receptor.depth, receptor.ending[1] * np.array([-0.5, 0.5])).tolist()
+        if receptor.ending[1] < POINT[1] * outline.finger.tip_radius:
+            near, far, largest = _around_point(arc, near, far, AT_POINT * outline.finger.tip_radius * scale)
+            asked = np.minimum(asked, largest)
+        ends = [outline.palmar_cut, outline.palmar, near, far, outline.dorsal, outline.dorsal_cut]
         if outline.finger.nail_length > 0.0:
             ends.append(outline.nail_end)
         ends = _distinct(*ends)
@@ -324,15 +328,32 @@ def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: 
     of_ending = ENDING + FROM_ENDING * np.abs(depth - receptor.depth) / finger.tip_radius
     asked = np.minimum(size * np.minimum(BULK, np.minimum(of_bone, of_ending)), TALL * (fine + GROWTH * depth))
     asked = np.minimum(asked, thin + FROM_FOLD * depth)
-    half = receptor.ending[0] / 2.0
-    ends = _distinct(0.0, finger.epidermis, skin, skin + thick, receptor.depth - half, receptor.depth + half)
+    near, far = receptor.depth - receptor.ending[0] / 2.0, receptor.depth + receptor.ending[0] / 2.0
+    if receptor.ending[0] < POINT[0] * finger.tip_radius:
+        top, bottom = (0.0, finger.epidermis) if receptor.depth < finger.epidermis else (finger.epidermis, skin)
+        above, below, largest = _around_point(depth, near, far, AT_POINT * size)
+        near, far = min(near, max(above, top)), max(far, min(below, bottom))
+        asked = np.minimum(asked, largest)
+    ends = _distinct(0.0, finger.epidermis, skin, skin + thick, near, far)
     # one element between epidermis and ending would be too stiff in shear whatever its size
-    least = [2 if end < receptor.depth - half <= after and end > 0.0 else 1 for end, after in pairwise(ends[:-1])]
+    least = [2 if end < near <= after and end > 0.0 else 1 for end, after in pairwise(ends[:-1])]
     row = _Row(depth, _counted(depth, asked), ends, (*least, 2), 0.1)
     gaps = row.gaps()
     every = row.lines(gaps)
     lines, fat = every[: -gaps[-1]], every[-gaps[-1] - 1 :]
     return lines[::-1].copy(), (1.0 - (fat - skin) / thick)[::-1].copy()
+
+
+def _around_point(place: Array, near: float, far: float, size: float) -> tuple[float, float, Array]:
+    """Return what lines frame around an ending between `near` and `far`, and how large elements may be (n,) [mm].
+
+    Averages over whole elements smooth what they have wrong. In an ending that is hardly more than a point nothing is
+    smoothed: it lies in the middle of an element of `size`, where strains are truer than at its ends, and elements grow
+    from there.
+    """
+    middle, size = (near + far) / 2.0, max(far - near, size)
+    largest = size + FROM_POINT * np.maximum(np.abs(place - middle) - size / 2.0, 0.0)
+    return middle - size / 2.0, middle + size / 2.0, largest
 
 
 def _distinct(*ends: float) -> tuple[float, ...]:

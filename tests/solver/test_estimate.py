@@ -35,19 +35,17 @@ def test_estimates_lie_above_the_errors_of_scenes_drawn_at_random_and_mostly_bel
     assert np.mean(close) >= 0.75
 
 
-@pytest.mark.parametrize(  # SED: the mean of three meshes of 23 and 26, which agree to 0.15 and 0.05 %
+@pytest.mark.parametrize(  # SED: meshes of 23 to 40; without small elements there, 40 is 0.03 % below
     ("depth", "ending", "truth"),
     [
-        (1.425, (0.0035, 0.0017), 2.14183e-3),
-        pytest.param(1.9, (0.001, 0.001), 3.00454e-3, marks=pytest.mark.slow),
+        (1.425, (0.0035, 0.0017), 2.1443e-3),
+        pytest.param(1.9, (0.001, 0.001), 3.0087e-3, marks=pytest.mark.slow),
     ],
 )
-def test_the_estimate_of_an_ending_that_is_hardly_more_than_a_point_knows_that_nothing_is_smoothed(
-    depth, ending, truth
-):
-    asked = Solve(tolerance=0.01, evidence="quick")
+def test_an_ending_that_is_hardly_more_than_a_point_is_as_true_as_any_and_its_estimate_lies_above(depth, ending, truth):
+    asked = Solve(evidence="quick")
     found = solve(Scene(friction=Friction(0.6), loading=Loading(1.0), receptor=Receptor(depth, ending), solve=asked))
-    assert abs(found.sed_ending / truth - 1.0) <= found.error_estimate <= 0.01
+    assert abs(found.sed_ending / truth - 1.0) <= found.error_estimate <= 0.002
 
 
 def test_a_drag_that_cannot_be_is_exactly_none():

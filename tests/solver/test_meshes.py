@@ -65,6 +65,21 @@ def test_lines_between_elements_frame_the_ending_and_lie_on_the_layers():
         assert np.abs(made.arcs - arc).min() < 1e-9
 
 
+@pytest.mark.parametrize("depth", [1.3, 0.003, 0.748, 0.752, 1.997])  # at the skin, and beside lines between layers
+@pytest.mark.parametrize("fineness", [2.5, 8.0, 24.0])
+def test_an_ending_that_is_hardly_more_than_a_point_lies_in_one_small_element_and_those_around_it_grow(depth, fineness):
+    made = finger_mesh(Finger(), Receptor(depth, (0.004, 0.004)), Sizing(fineness, 2.0))
+    size = 0.1 * 5.0 / fineness
+    half = 0.002 * 5.0 / (5.0 - depth)  # of the ending, by the skin above it
+    for lines, low, high in ((-made.depths, -depth - 0.002, -depth + 0.002), (made.arcs, -half, half)):
+        first = int(np.searchsorted(lines, (low + high) / 2.0)) - 1
+        assert lines[first] <= low + 1e-9
+        assert lines[first + 1] >= high - 1e-9
+        assert lines[first + 1] - lines[first] <= size * (1 + 1e-9)
+        assert np.diff(lines[max(first - 1, 0) : first + 3]).max() <= 3.0 * size
+    assert made.arcs[first] == pytest.approx(-size / 2)  # in the middle of it, where no layer ends
+
+
 def test_lines_lie_where_contact_ends_and_elements_are_shortest_there():
     made = finger_mesh(Finger(), Receptor(), Sizing(10, 1.5, margin=3.0, edges=(-3.2, 1.4)))
     for edge in (-3.2, 1.4):
