@@ -1,4 +1,4 @@
-"""Builds real or simulated parts; the only file that knows the simulators."""
+"""Builds real or simulated parts. Whoever runs a session reaches the simulators through here alone."""
 
 from collections.abc import Callable, Generator
 from contextlib import contextmanager

@@ -1,4 +1,4 @@
-"""Ways for bytes to reach a device and come back. The only file that opens ports."""
+"""What a link to a device is, and those over the network. Only this, `serial_link` and `usb_link` open ports."""
 
 import contextlib
 import socket

@@ -157,7 +157,7 @@ class Work:
         self._say(m.Drawn(name, "" if panel is None else panel.title, png))
 
     def _panel(self, name: str) -> "tuple[Panel | None, bytes]":
-        """Return a picture and its PNG; `shown.session_pictures` and `shown.row_pictures` tell the names."""
+        """Return a picture and its PNG; `shown.session_pictures` tells those of the session."""
         from sessions.exports.figures import picture  # slow to load, and many never look at one
         from sessions.exports.figures.finger import common_levels, finger_panels
         from sessions.exports.figures.style import in_pixels, look

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from sessions.plan import SessionPlan
 from sessions.recording.errors import RecordingError
+from sessions.recording.schema import BYTES_A_READING
 
-READING_BYTES = 88  # six columns of eight bytes, of which the raw numbers are six
 RATE_UNKNOWN = 1000.0  # readings a second assumed of a device that does not tell [Hz]
 TRIAL_TIME = 90.0  # mounting, zero, stroke and score, with a redo now and then [s]
 BLOCK_TIME = 300.0  # instruction, questions, a rest [s]
@@ -32,7 +32,7 @@ class Need:
     def sentence(self) -> str:
         """Return the arithmetic."""
         return (
-            f"{self.duration / 60:.0f} min at {self.rate:g} readings a second of {READING_BYTES} bytes, "
+            f"{self.duration / 60:.0f} min at {self.rate:g} readings a second of {BYTES_A_READING} bytes, "
             f"kept twice, and {MARGIN / 1e6:.0f} MB beside: {self.size / 1e6:.0f} MB"
         )
 
@@ -41,7 +41,7 @@ def need(plan: SessionPlan, rate: float | None) -> Need:
     """Return what a session is expected to take, `rate` [Hz] being nan where unknown, None without a transducer."""
     duration = len(plan.trials) * TRIAL_TIME + len(plan.blocks) * BLOCK_TIME
     told = 0.0 if rate is None else rate if isfinite(rate) else RATE_UNKNOWN
-    return Need(duration, told, round(COPIES * duration * told * READING_BYTES) + MARGIN)
+    return Need(duration, told, round(COPIES * duration * told * BYTES_A_READING) + MARGIN)
 
 
 def check_room(folder: Path, wanted: Need) -> None:

@@ -166,7 +166,7 @@ class Field:
     contact: tuple[tuple[float, float], ...]  # skin points in and beside the contact
     pressure: Numbers  # at those [MPa]
     traction: Numbers  # along +x, on the skin [MPa]
-    state: tuple[str, ...]  # "stick", "slip" or "open"
+    state: tuple[str, ...]  # "open", "stick", "slip" or "cap": slips at the bound
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,7 +55,6 @@ PAUSED = (*MOUNT, logged("pause", 1))
 CLOSING = (*BEGUN, steps.AskFinish())
 END = SessionEnd("every trial is done", "finished", True, 100, Health())
 LOST = SessionEnd("the cable was pulled", "device", False, 100, Health(lost=3))
-TOO_MUCH = Load((0.0, 0.0, 1.2, 0.0, 0.0, 0.0), 1.2)
 CODE = FIRST.stimulus.code
 
 
