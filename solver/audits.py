@@ -13,6 +13,10 @@ from solver.scene import Scene
 from solver.stepping import March
 
 MISSED = 1e-5  # of forces that are given, by which a state may miss them
+UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]
+DOUBTED = 1e-8  # and from which it is told
+PIERCED = 1e-7  # part of the indentation by which skin may lie too low without it being told [-]
+MIXED = "nearly incompressible tissues, or ones whose stiffnesses differ by many orders of magnitude,"
 
 
 def audits(
@@ -21,7 +25,8 @@ def audits(
     """Return the checks of one state of contact; `displacement` (nodes, 2) relative to the bone [mm].
 
     `equilibrium_x`, `equilibrium_y`: bone reaction plus contact force, by the contact force.
-    `inner_forces`: largest unbalanced force on a node that is neither held nor touching, by the contact force.
+    `inner_forces`: largest unbalanced force on a node that is not held, the surface's own on skin that touches
+    included, by the contact force.
     `work_balance`: work of the contact forces against the elements' stored energy (Clapeyron), relative.
     `penetration`: of any skin node, by the indentation. `tension`: largest pull on a touching point, by the largest
     push. `cone_violation`: |t| beyond min(mu p, tau_max), by the largest push. `smallest_det_F`: of the displacements.
@@ -30,9 +35,10 @@ def audits(
     inner = body.reactions(displacement[:, :, None])[:, :, 0]
     total = max(float(contact.normal.sum()), np.finfo(float).tiny)
     bone = inner[mesh.held].sum(axis=0)
-    free = np.ones(len(mesh.nodes), bool)
-    free[mesh.held] = free[mesh.skin] = False
     forces = np.stack([contact.tangential, contact.normal], axis=1)
+    left = inner.copy()
+    left[mesh.skin] -= forces
+    left[mesh.held] = 0.0
     work = 0.5 * float(np.sum(forces * displacement[mesh.skin]))
     stored = 0.5 * float(np.sum(inner * displacement))
     whole = model.geometry.whole
@@ -42,7 +48,7 @@ def audits(
     return {
         "equilibrium_x": abs(float(bone[0] + contact.tangential.sum())) / total,
         "equilibrium_y": abs(float(bone[1] + contact.normal.sum())) / total,
-        "inner_forces": float(np.abs(inner[free]).max()) / total,
+        "inner_forces": float(np.abs(left).max()) / total,
         "work_balance": abs(work - stored) / max(stored, np.finfo(float).tiny),
         "penetration": max(-float(height.min()), 0.0) / depth,
         "tension": max(-float(contact.normal.min(initial=0.0)), 0.0) / push,
@@ -66,6 +72,30 @@ def forces_missed(scene: Scene, normal: float, tangential: float) -> dict[str, f
     if max(missed.values()) > MISSED:
         raise NotConverged("No state was found that has the forces given: give others, or a depth.")
     return missed
+
+
+def unbalanced(checks: Mapping[str, float]) -> float:
+    """Return what `audits` leave unbalanced at most, of forces and of work."""
+    return max(checks[name] for name in ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance"))
+
+
+def refuse_unsound(checks: Mapping[str, float], depth: float) -> None:
+    """Raise NotConverged where round-off has spoilt the answer at `depth` [mm]."""
+    if (left := unbalanced(checks)) > UNSOUND:
+        raise NotConverged(
+            f"Forces balance to {left:.1g} only at {depth:g} mm indentation: round-off has swallowed the answer; "
+            f"contacts far smaller than the mesh, {MIXED} do that."
+        )
+
+
+def rounding(checks: Mapping[str, float]) -> tuple[str, ...]:
+    """Return a sentence for each of `audits` that shows more round-off than answers usually have."""
+    told: list[str] = []
+    if (left := unbalanced(checks)) > DOUBTED:
+        told.append(f"Forces balance to {left:.1g} only: {MIXED} magnify round-off.")
+    if (low := checks["penetration"]) > PIERCED:
+        told.append(f"The skin lies {low:.1g} of the indentation too low: stiff layers magnify round-off.")
+    return tuple(told)
 
 
 def inside_out(checks: Mapping[str, float]) -> str:

@@ -19,11 +19,11 @@ def audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: Newton) -> 
     `newton` is the finger's own, or that of its tissues as they relax.
 
     `equilibrium_x`, `equilibrium_y`: bone reaction plus contact force, by the contact force. `inner_forces`: largest
-    unbalanced force on a node that is neither held nor touching. `work_balance`: were the displacement to grow by a
-    part of itself, by how much the stored energy would grow (from the energy alone, but for terms that relax) against
-    the work of the contact forces, relative. At small strain that is Clapeyron's theorem. It balances the state, not a
-    way there: a state found directly has none. `penetration`, `tension`, `cone_violation`: as at small strain, the
-    bound on the deformed length.
+    unbalanced force on a node that is not held, the surface's own on skin that touches included. `work_balance`: were
+    the displacement to grow by a part of itself, by how much the stored energy would grow (from the energy alone, but
+    for terms that relax) against the work of the contact forces, relative. At small strain that is Clapeyron's theorem.
+    It balances the state, not a way there: a state found directly has none. `penetration`, `tension`,
+    `cone_violation`: as at small strain, the bound on the deformed length.
     """
     body, mesh = finger.newton.body, finger.geometry.mesh
     element_forces = kernels_numpy.forces(body, shape.u)
@@ -36,8 +36,9 @@ def audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: Newton) -> 
     np.add.at(inner, body.nodes, element_forces.reshape(-1, 9, 2))
     total = max(float(shape.force[1]), np.finfo(float).tiny)
     bone = inner[mesh.held].sum(axis=0)
-    free = np.ones(len(mesh.nodes), bool)
-    free[mesh.held] = free[mesh.skin] = False
+    left = inner.copy()
+    left[mesh.skin] -= shape.reaction
+    left[mesh.held] = 0.0
     work = float(np.sum(shape.reaction * shape.u[mesh.skin]))
     height = mesh.nodes[finger.geometry.whole, 1] + shape.u[finger.geometry.whole, 1] - shape.pull.depth
     normal, tangential = shape.reaction[:, 1], shape.reaction[:, 0]
@@ -48,7 +49,7 @@ def audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: Newton) -> 
     return {
         "equilibrium_x": abs(float(bone[0] + shape.force[0])) / total,
         "equilibrium_y": abs(float(bone[1] + shape.force[1])) / total,
-        "inner_forces": float(np.abs(inner[free]).max()) / total,
+        "inner_forces": float(np.abs(left).max()) / total,
         "work_balance": abs(work - grown) / max(abs(grown), np.finfo(float).tiny),
         "penetration": max(-float(height.min()), 0.0) / scene.loading.depth,
         "tension": max(-float(normal.min(initial=0.0)), 0.0) / push,

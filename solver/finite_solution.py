@@ -12,7 +12,7 @@ from time import perf_counter
 import numpy as np
 
 from solver import differences, evidence, kernels_numpy
-from solver.audits import forces_missed
+from solver.audits import forces_missed, refuse_unsound, rounding, unbalanced
 from solver.climbing import Ascent, Climbed, foot, risen, sized_together
 from solver.existence import doubts
 from solver.failures import Cancelled, NotConverged, SolveFailure
@@ -127,6 +127,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
     body = finger.newton.body
     newton = finger.newton if relaxing is None else relaxing.newton
     shape, checks = _balanced(newton, shape, lambda found: audits(driven, finger, found, newton))
+    refuse_unsound(checks, shape.pull.depth)
     numbers = finger.all_numbers(shape)
     sed, normal, tangential, depth, shift, width = (float(number) for number in numbers)
     skin = _skin(finger, shape)
@@ -172,7 +173,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         geometry=finger.geometry,
         displacement=shape.u,
         history=_history(scene, finger, way, relaxing, times) if way else None,
-        warnings=(*evidence.warnings(driven, model["left_out"]), *doubts(finger, shape, stop)),
+        warnings=(*evidence.warnings(driven, model["left_out"]), *doubts(finger, shape, stop), *rounding(checks)),
     )
 
 
@@ -215,7 +216,7 @@ def _balanced(
     """
     checks = audits(shape)
     for _ in range(CORRECTIONS):
-        if _unbalanced(checks) <= ROUGH:
+        if unbalanced(checks) <= ROUGH:
             break
         x = shape.place(newton.body)[:, 0]
         if not newton.linearise(shape, shape.pull, x):
@@ -223,14 +224,10 @@ def _balanced(
         after, _, _ = newton.moved(shape, shape.pull, newton.steps[:, EQUILIBRIUM].copy(), x)
         after = replace(after, state=shape.state, sense=shape.sense)  # a step of nanometres turns no slip into stick
         better = audits(after)
-        if _contradicting(better) > max(_contradicting(checks), ROUGH) or _unbalanced(better) >= _unbalanced(checks):
+        if _contradicting(better) > max(_contradicting(checks), ROUGH) or unbalanced(better) >= unbalanced(checks):
             break
         shape, checks = after, better
     return shape, checks
-
-
-def _unbalanced(checks: dict[str, float]) -> float:
-    return max(checks[name] for name in ("equilibrium_x", "equilibrium_y", "inner_forces"))
 
 
 def _contradicting(checks: dict[str, float]) -> float:

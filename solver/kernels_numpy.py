@@ -24,6 +24,14 @@ def _gradient(body: FiniteBody, u: Array) -> Array:
     return np.stack([body.grad_x @ local, body.grad_y @ local], axis=-1)
 
 
+def _turned(H: Array) -> tuple[Array, Array]:
+    """Return the transposed inverse of F = 1 + H and what F exceeds it by (e, 9, 2, 2), that to its own digits."""
+    grown = (H[..., 0, 0] + H[..., 1, 1] + np.linalg.det(H))[..., None, None]
+    across = np.stack([H[..., 1, 1], -H[..., 1, 0], -H[..., 0, 1], H[..., 0, 0]], axis=-1).reshape(H.shape)
+    F = np.eye(2) + H
+    return (np.eye(2) + across) / (1.0 + grown), (H - across + grown * F) / (1.0 + grown)
+
+
 def _logarithm(body: FiniteBody, H: Array) -> tuple[Array, Array]:
     """Return ln J (e, 9) and its modes (e, 3) for F = 1 + H."""
     grown = H[..., 0, 0] + H[..., 1, 1] + (H[..., 0, 0] * H[..., 1, 1] - H[..., 0, 1] * H[..., 1, 0])
@@ -69,16 +77,13 @@ def _stored(body: FiniteBody, H: Array) -> complex:
 def forces(body: FiniteBody, u: Array) -> Array:
     """Return the internal forces (e, 18) of the elements, ordered x, y, x, y, ..."""
     H = _gradient(body, u)
-    F = np.eye(2) + H
     log, volume = _logarithm(body, H)
-    inverse = np.swapaxes(np.linalg.inv(F), -1, -2)
+    inverse, exceeds = _turned(H)
     G = body.shear[:, None] * slopes(body.stiffening[:, None], _excess(H, log))[0]
     pressure = body.lame[:, None] * (body.modes @ volume[:, :, None])[:, :, 0]
-    stress = body.weight[:, :, None, None] * (
-        G[:, :, None, None] * (F - inverse) + pressure[:, :, None, None] * inverse
-    )
-    gradient = np.stack([body.grad_x, body.grad_y], axis=-1).reshape(len(F), 9, 9, 2)
-    return (gradient @ np.swapaxes(stress, -1, -2)).sum(axis=1).reshape(len(F), 18)
+    stress = body.weight[:, :, None, None] * (G[:, :, None, None] * exceeds + pressure[:, :, None, None] * inverse)
+    gradient = np.stack([body.grad_x, body.grad_y], axis=-1).reshape(len(H), 9, 9, 2)
+    return (gradient @ np.swapaxes(stress, -1, -2)).sum(axis=1).reshape(len(H), 18)
 
 
 def forces_and_tangents(body: FiniteBody, u: Array, pressure: Array) -> tuple[Array, Array]:
@@ -87,16 +92,15 @@ def forces_and_tangents(body: FiniteBody, u: Array, pressure: Array) -> tuple[Ar
     `pressure` (e, 3) is what the geometric part of the tangent sees; the forces follow from `u` alone.
     """
     H = _gradient(body, u)
-    F = np.eye(2) + H
     log, _ = _logarithm(body, H)
-    inverse = np.swapaxes(np.linalg.inv(F), -1, -2)
+    inverse, exceeds = _turned(H)
     gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
     w = body.weight
     grown, growth = slopes(body.stiffening[:, None], _excess(H, log))
     G = body.shear[:, None] * grown
     spatial = np.einsum("eqaA,eqiA->eqia", inverse, gradient)  # gradients in the deformed body
     dilate = np.einsum("eq,eqm,eqia->emia", w, body.modes, spatial)
-    excess = np.einsum("eqaA,eqiA->eqia", F - inverse, gradient)
+    excess = np.einsum("eqaA,eqiA->eqia", exceeds, gradient)
     geometric = w * (G - np.einsum("eqm,em->eq", body.modes, pressure))
     tangent = np.einsum("eq,eqiA,eqjA,ab->eiajb", w * G, gradient, gradient, np.eye(2))
     tangent += np.einsum("eq,eqja,eqib->eiajb", geometric, spatial, spatial)

@@ -11,7 +11,16 @@ from time import perf_counter
 import numpy as np
 from numpy.linalg import LinAlgError
 
-from solver.audits import audits, course_audits, forces_missed, inside_out
+from solver.audits import (
+    MIXED,
+    audits,
+    course_audits,
+    forces_missed,
+    inside_out,
+    refuse_unsound,
+    rounding,
+    unbalanced,
+)
 from solver.contact import SLIP, STICK, Contact
 from solver.differences import those_of, together
 from solver.evidence import model, warnings
@@ -41,10 +50,6 @@ from solver.small_states import (
 from solver.stepping import March
 from solver.wedging import WIDE
 
-MIXED = "nearly incompressible tissues, or ones whose stiffnesses differ by many orders of magnitude,"
-UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]
-DOUBTED = 1e-8  # and from which it is told
-PIERCED = 1e-7  # part of the indentation by which skin may lie too low without it being told [-]
 ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements once more
 
 YIELDS = (
@@ -207,13 +212,8 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
         return None
     free = way is None and scene.normal_force is None and not (contact.state == STICK).any()
     contact, displacement, checks = _balanced(finger, law, contact, depth, displacement, slides=free)
-    unbalanced = _unbalanced(checks)
     sed = finger.sed_ending(displacement)
-    if unbalanced > UNSOUND:
-        message = f"Forces balance to {unbalanced:.1g} only at {depth:g} mm indentation"
-        raise NotConverged(
-            f"{message}: round-off has swallowed the answer; contacts far smaller than the mesh, {MIXED} do that."
-        )
+    refuse_unsound(checks, depth)
     checks |= forces_missed(scene, float(contact.normal.sum()), float(contact.tangential.sum()))
     if way is not None:
         checks |= course_audits(finger, way)
@@ -261,7 +261,8 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
         warnings=(
             *warnings(scene, left["left_out"]),
             *filter(None, [inside_out(checks)]),
-            *_doubts(unbalanced, checks["penetration"], yields=gives_way(scene, finger, contact)),
+            *([YIELDS] if gives_way(scene, finger, contact) else []),
+            *rounding(checks),
         ),
     )
     return found, way if over_time is None else None
@@ -274,26 +275,13 @@ def _balanced(
     if slides:
         contact, displacement = laid(finger, law, contact, depth, displacement)
     checks = audits(finger, law, contact, depth, displacement)
-    if _unbalanced(checks) > ROUGH:
+    if unbalanced(checks) > ROUGH:
         if slides:
             contact, displacement = laid(finger, law, contact, depth, displacement)
         else:
             displacement = finger.balanced(contact, displacement)
         checks = audits(finger, law, contact, depth, displacement)
     return contact, displacement, checks
-
-
-def _unbalanced(checks: dict[str, float]) -> float:
-    return max(checks[name] for name in ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance"))
-
-
-def _doubts(unbalanced: float, penetration: float, *, yields: bool) -> tuple[str, ...]:
-    told = [YIELDS] if yields else []
-    if unbalanced > DOUBTED:
-        told.append(f"Forces balance to {unbalanced:.1g} only: {MIXED} magnify round-off.")
-    if penetration > PIERCED:
-        told.append(f"The skin lies {penetration:.1g} of the indentation too low: stiff layers magnify round-off.")
-    return tuple(told)
 
 
 def _drag(scene: Scene, tangential: float) -> float:

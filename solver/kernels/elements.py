@@ -81,15 +81,15 @@ def assemble(
                 f01 += ux[i] * gy[i]
                 f10 += uy[i] * gx[i]
                 h11 += uy[i] * gy[i]
-            grown = h00 + h11 + h00 * h11 - f01 * f10  # det F - 1, to its own digits: stiff tissue multiplies them
-            f00, f11, j = 1.0 + h00, 1.0 + h11, 1.0 + grown
+            swollen = h00 + h11 + h00 * h11 - f01 * f10  # det F - 1, to its own digits: stiff tissue multiplies them
+            f00, f11, j = 1.0 + h00, 1.0 + h11, 1.0 + swollen
             least = min(least, j)
             if not j > 0.0:
                 return least
             w = weight[e, q]
             w0, w1, w2 = w * modes[e, q, 0], w * modes[e, q, 1], w * modes[e, q, 2]
             wide[q, 0], wide[q, 1], wide[q, 2] = w0, w1, w2
-            log = np.log1p(grown)
+            log = np.log1p(swollen)
             v0 += w0 * log
             v1 += w1 * log
             v2 += w2 * log
@@ -103,13 +103,15 @@ def assemble(
             bend[q] = wg - (w0 * p0 + w1 * p1 + w2 * p2)
             over = 1.0 / j
             a00, a01, a10, a11 = f11 * over, -f10 * over, -f01 * over, f00 * over  # inverse transposed
+            b00, b11 = (h00 - h11 + swollen * f00) * over, (h11 - h00 + swollen * f11) * over  # F less it, as exactly
+            b01, b10 = f01 - a01, f10 - a10
             for i in range(8):
                 x, y = a00 * gx[i] + a01 * gy[i], a10 * gx[i] + a11 * gy[i]
                 h[q, i], h[q, 8 + i] = x, y
-                s[q, i], s[q, 8 + i] = f00 * gx[i] + f01 * gy[i] - x, f10 * gx[i] + f11 * gy[i] - y
+                s[q, i], s[q, 8 + i] = b00 * gx[i] + b01 * gy[i], b10 * gx[i] + b11 * gy[i]
             x, y = a00 * gx[8] + a01 * gy[8], a10 * gx[8] + a11 * gy[8]
             h[q, 16], h[q, 17] = x, y
-            s[q, 16], s[q, 17] = f00 * gx[8] + f01 * gy[8] - x, f10 * gx[8] + f11 * gy[8] - y
+            s[q, 16], s[q, 17] = b00 * gx[8] + b01 * gy[8], b10 * gx[8] + b11 * gy[8]
         lam = lame[e]
         volume[e, 0], volume[e, 1], volume[e, 2] = v0, v1, v2
         for c in range(18):
@@ -267,7 +269,8 @@ def forces(
                 g *= stiffened(stiffening[e], excess)[0]
             a00, a01, a10, a11 = f11 / j, -f10 / j, -f01 / j, f00 / j
             inverse[q, 0], inverse[q, 1], inverse[q, 2], inverse[q, 3] = a00, a01, a10, a11
-            p00, p01, p10, p11 = g * (f00 - a00), g * (f01 - a01), g * (f10 - a10), g * (f11 - a11)
+            p00, p11 = g * (h00 - h11 + grown * f00) / j, g * (h11 - h00 + grown * f11) / j  # as exactly
+            p01, p10 = g * (f01 - a01), g * (f10 - a10)
             for i in range(9):
                 fx[i] += p00 * gx[i] + p01 * gy[i]
                 fy[i] += p10 * gx[i] + p11 * gy[i]

@@ -8,6 +8,7 @@ import pytest
 
 from daq_app.accuracy.methods import climbed_twice
 from solver import finite_errors
+from solver.audits import refuse_unsound, rounding
 from solver.climbing import ascended
 from solver.failures import NoSteadyState, NotConverged
 from solver.finite_audits import audits
@@ -65,6 +66,25 @@ def test_a_force_told_one_percent_wrong_does_other_work_than_the_body_stores(wro
     planted = audits(asked, finger, replace(shape, reaction=np.array(wrong) * shape.reaction), finger.newton)
     assert told < 1e-9
     assert left < planted["work_balance"] < 0.01
+
+
+def test_a_force_told_of_the_neighbouring_node_is_unbalanced_there():
+    asked = finite(STICKINESS[0])
+    finger = published(4)
+    shape = settled(finger.newton, Pull(2.0, float(asked.friction.mu), asked.friction.cap, -1))
+    told = audits(asked, finger, shape, finger.newton)
+    reaction, middle = shape.reaction.copy(), int(np.argmax(shape.reaction[:, 1]))
+    moved = 0.2 * reaction[middle]
+    reaction[middle] -= moved
+    reaction[middle + 1] += moved
+    planted = audits(asked, finger, replace(shape, reaction=reaction), finger.newton)
+    assert planted["equilibrium_y"] < 1e-9
+    assert told["inner_forces"] < 1e-9
+    assert planted["inner_forces"] == pytest.approx(float(np.abs(moved).max()) / shape.force[1], rel=1e-6)
+    with pytest.raises(NotConverged, match=r"Forces balance to 0\.\d+ only"):
+        refuse_unsound(planted, 2.0)
+    assert rounding(told) == ()
+    assert rounding(told | {"inner_forces": 2e-8})[0].startswith("Forces balance to 2e-08 only")
 
 
 DIFFERENT = 0.05  # part of the range of several surfaces that differences between them may be off

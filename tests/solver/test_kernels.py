@@ -71,6 +71,20 @@ def test_forces_for_a_tangent_kept_from_another_state_agree_with_the_plain_ones(
 
 
 @pytest.mark.parametrize("law", LAWS, ids=str)
+def test_forces_of_a_strain_that_is_nearly_nothing_keep_their_own_digits(law):
+    """They are those of the undeformed body's stiffness, but for the strain itself: stiff bone has such."""
+    body, u = distorted(law)
+    small = 1e-12 * u
+    _, tangent = kernels_numpy.without_centres(body, np.zeros_like(u), np.zeros((len(body.nodes), 3)))
+    newton, _ = assembled(body, small, newton_pressure(body, small))
+    at = body.unknown.reshape(-1, 16)
+    moved = np.where(at >= 0, small[body.nodes[:, :8]].reshape(-1, 16), 0.0)
+    expected = np.zeros(body.size)
+    np.add.at(expected, at[at >= 0], (tangent @ moved[:, :, None])[:, :, 0][at >= 0])
+    np.testing.assert_allclose(newton.force, expected, atol=1e-10 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("law", LAWS, ids=str)
 def test_forces_are_the_derivative_of_the_energy_and_the_tangent_that_of_the_forces(law):
     body, u = distorted(law)
     way = np.random.default_rng(3).normal(size=u.shape)

@@ -8,9 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from solver.audits import audits
 from solver.body import skin_lengths
+from solver.contact import Course
 from solver.failures import Cancelled, NoSteadyState, SolveFailure
 from solver.fields import fields_of
+from solver.finger import FingerModel
+from solver.friction import FrictionLaw
+from solver.mesher import Sizing
 from solver.reference import SLIPPERINESS, STICKINESS, scene, scenes
 from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
 from solver.solution import answers, solve, solve_together
@@ -93,6 +98,22 @@ def test_the_estimate_lies_above_the_error_and_below_one_per_cent(ten):
     for title, (sed, *_) in REFERENCE.items():
         error = abs(ten[title].sed_ending / sed - 1.0)
         assert error < ten[title].error_estimate < 0.01
+
+
+def test_a_force_told_of_the_neighbouring_node_is_unbalanced_there():
+    asked = Scene(friction=Friction(0.44, 0.02), loading=Loading(1.0, "-x"))
+    finger = FingerModel.of(asked, Sizing(5, 1.0, margin=3.0))
+    law = FrictionLaw(0.44, 0.02)
+    contact = Course(finger.body.touchable, law).sliding(1.0, -1)
+    displacement = finger.displacement(contact)
+    normal, middle = contact.normal.copy(), int(np.argmax(contact.normal))
+    moved = 0.2 * normal[middle]
+    normal[middle] -= moved
+    normal[middle + 1] += moved
+    told = audits(finger, law, contact, 1.0, displacement)
+    planted = audits(finger, law, replace(contact, normal=normal), 1.0, displacement)
+    assert max(told["inner_forces"], planted["equilibrium_y"]) < 1e-10
+    assert planted["inner_forces"] == pytest.approx(moved / normal.sum(), rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -82,12 +82,14 @@ def _tissues(make: _Maker) -> list[HardScene]:
     limit = [HardScene(f"nu {nu}", make(nu=nu), ANSWER, "nu 0.4999", 2e-3) for nu in (0.49999, 0.499999, 0.4999999)]
     soft = Material(0.034, 0.48)
     stiff = make(materials=Materials(Material(3.4e4, 0.48), soft, soft))
-    ratio = make(materials=Materials(Material(0.136, 0.48), Material(0.08, 0.48), soft, Material(3.4e8, 0.3)))
+    rigid = Materials(Material(0.136, 0.48), Material(0.08, 0.48), soft, Material(3.4e8, 0.3))
+    ratio, light = (make(depth=d, materials=rigid, finger=Finger(bone="meshed")) for d in (1.5, 1e-5))
     return [
         *plain,
         *limit,
         HardScene("nu 0.4999999 at 1e-05 mm", make(depth=1e-5, nu=0.4999999), ANSWER),
         HardScene("bone 1e10 times stiffer than fat", ratio, ANSWER, "nu 0.48", 1e-3),
+        HardScene("bone 1e10 times stiffer than fat at 1e-05 mm", light, ANSWER, "depth 1e-05 mm", 1e-3),
         HardScene("epidermis 1e6 times stiffer than fat", stiff, EITHER, slow=True),
     ]
 
