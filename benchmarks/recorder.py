@@ -1,6 +1,6 @@
 """What the recorder's process costs, and how old a reading is when the client has it: at 200 and 7000 Hz, in a session.
 
-The simulated box runs in this process, so that the recorder's own cost is seen. Run: python benchmarks/recorder.py
+The simulated box runs in this process, so that the recorder's own cost is seen. Run: python -m benchmarks.recorder
 """
 
 import argparse

@@ -1,6 +1,6 @@
 """What recording costs: an hour's worth of readings at 7000 Hz written, opened, read and sealed (or `--seconds N`).
 
-Run: python benchmarks/recording.py
+Run: python -m benchmarks.recording
 """
 
 import argparse

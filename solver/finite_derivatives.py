@@ -9,11 +9,10 @@ from solver.finite_finger import FiniteFinger
 from solver.hyperelastic import slopes
 from solver.kernels import CAP
 from solver.mesh import Array
-from solver.newton import Newton, Shape
+from solver.newton import BY_DEPTH, BY_FRICTION, Newton, Shape
 from solver.scene import Scene
 
 MU, TAU_MAX, DEPTH = range(3)
-_BY_DEPTH, _BY_FRICTION = 1, 2  # columns of `kernels.impose`
 
 
 def of_shape(finger: FiniteFinger, scene: Scene, shape: Shape) -> Derivatives:
@@ -47,11 +46,11 @@ def _followed(newton: Newton, shape: Shape) -> Array:
         still, length, free, matrix, right, steps,
     )  # fmt: skip
     free, by = free[:count], np.zeros((count, 3))
-    by[:, MU], by[:, DEPTH] = right[:count, _BY_FRICTION], right[:count, _BY_DEPTH]
+    by[:, MU], by[:, DEPTH] = right[:count, BY_FRICTION], right[:count, BY_DEPTH]
     at, along = np.divmod(free, 2)
     by[:, TAU_MAX] = np.where((shape.state[at] == CAP) & (along == 0), shape.sense[at] * length[at], 0.0)
     out = np.zeros((3, 2 * size))
-    out[DEPTH] = steps[:, _BY_DEPTH]
+    out[DEPTH] = steps[:, BY_DEPTH]
     out[:, free] = np.linalg.solve(matrix[: count * count].reshape(count, count), by).T
     return out
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_calibration_file import GAMMA, NANO43, parsed
+from calibration_files import GAMMA, NANO43, parsed
 
 from daq_app.wiring import connected
 from drivers.address import parse_address

@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from failing_session import RESERVE, OnADisk, failing_from, failing_once
 from faulty_disk import IOERR_FSYNC, IOERR_WRITE, library
-from test_full_disk import RESERVE, OnADisk, failing_from, failing_once
 
 from sessions.recording import Recording
 from sessions.recording.archive import problems, seal
@@ -18,7 +18,7 @@ FULL = """
 import sys, shutil
 from pathlib import Path
 sys.path[:0] = ["tests/sessions"]
-from test_full_disk import PLAN, RESERVE
+from failing_session import PLAN, RESERVE
 from stand_ins import INFO, Hands, StandIn, ToldClock
 from sessions.recording import SessionWriter, provenance
 from sessions.runner import run_session

@@ -3,91 +3,12 @@
 import itertools
 
 import pytest
-from faulty_disk import FULL, IOERR_FSYNC, IOERR_WRITE, OK, faulty_disk, library
-from stand_ins import INFO, Hands, StandIn, ToldClock
+from failing_session import OnADisk, Quota, failing_from, failing_once
+from faulty_disk import IOERR_FSYNC, IOERR_WRITE, library
 
-from sessions.protocols import plan, protocol
-from sessions.recording import Recording, RecordingError, SessionWriter, provenance
 from sessions.recording.archive import problems, seal
-from sessions.recording.schema import event_row
-from sessions.resuming import check_resumable, resumption
-from sessions.runner import run_session
 
 pytestmark = pytest.mark.skipif(library() is None, reason="Python's SQLite is built in: no layer fits under it")
-
-PLAN = plan(protocol("sensotact-friction"), "S01", 3)
-RESERVE = 2**20
-
-
-class OnADisk:
-    """A session in told time on a disk that fails as `fail` says; `acknowledged` is what was last said to be safe."""
-
-    def __init__(self, folder, fail):
-        self.folder = folder
-        self.end = self.error = None
-        self.safe_events = []
-        self.acknowledged = 0
-        clock = ToldClock()
-        with faulty_disk(fail) as disk:
-            try:
-                writer = SessionWriter.create(folder, PLAN, INFO, provenance(clock), clock=clock, reserve=RESERVE)
-                writer.safe = self.safe_events.extend
-                device = StandIn(clock)
-                self.end = run_session(
-                    PLAN, writer, Hands(clock, device), device, clock, progress=lambda status: self.told(status)
-                )
-            except RecordingError as error:
-                self.error = str(error)
-            self.calls = disk.calls
-
-    def told(self, status):
-        self.acknowledged = status.safe.readings
-
-    def check(self):
-        """Check that nothing acknowledged is lost and that the session goes on where it was."""
-        try:
-            recording = Recording.open(self.folder)
-        except RecordingError:
-            assert self.safe_events == []
-            assert self.error is not None
-            return None
-        assert list(map(event_row, recording.events[: len(self.safe_events)])) == list(map(event_row, self.safe_events))
-        sequence = recording.readings().sequence.tolist()
-        assert sequence == list(range(len(sequence)))
-        assert len(sequence) >= self.acknowledged
-        if recording.end is None or not recording.end["complete"]:
-            check_resumable(recording)
-            kept = {event.trial for event in recording.events if event.kind == "take_kept"}
-            commands = resumption(recording.plan, recording.events).commands
-            asked = [command.trial.number for command in commands if hasattr(command, "trial")]
-            assert asked in ([len(kept) + 1], [])
-        return recording
-
-
-def failing_once(number, code=IOERR_WRITE):
-    return lambda _what, call, _arguments: code if call == number else OK
-
-
-def failing_from(number, code=FULL):
-    return lambda _what, call, _arguments: code if call >= number else OK
-
-
-class Quota:
-    """So many bytes may be written in all, and as many more as the reserve holds once that is given back."""
-
-    def __init__(self, folder, size):
-        self.folder, self.size, self.ends = folder, size, {}
-
-    def __call__(self, what, _call, arguments):
-        if what != "write":
-            return OK
-        file, _, length, offset = arguments
-        grown = {**self.ends, file: max(self.ends.get(file, 0), offset + length)}
-        reserve = self.folder / "session.reserve"
-        if sum(grown.values()) > self.size + RESERVE - (reserve.stat().st_size if reserve.exists() else 0):
-            return FULL
-        self.ends = grown
-        return OK
 
 
 @pytest.mark.parametrize(("number", "code"), list(itertools.product([3, 60, 140, 260], [IOERR_WRITE, IOERR_FSYNC])))

@@ -5,7 +5,7 @@ from dataclasses import replace as replace_fields
 import pytest
 from recordings import change, rows
 from stand_ins import INFO, Hands, StandIn, ToldClock
-from test_resuming import resume
+from told_session import resume
 
 from drivers.transducer import LinkLost, SetupError
 from sessions.analysis import analyse

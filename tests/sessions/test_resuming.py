@@ -1,14 +1,14 @@
 import dataclasses
 import os
 import random
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from functools import partial
 
 import pytest
 from hypothesis import given, settings
 from killed_process import forked, kill, lines_of, reported, whole_session
-from stand_ins import INFO, Hands, StandIn, ToldClock
-from told_session import Session
+from stand_ins import INFO, ToldClock
+from told_session import Session, resume
 from walks import FORCES, steps, walks
 
 from sessions.event_log import kind_of, line_of
@@ -20,10 +20,8 @@ from sessions.resuming import (
     check_resumable,
     check_same_transducer,
     continued,
-    resumed_data,
     resumption,
 )
-from sessions.runner import Resumed, run_session
 from sessions.states import Ended
 from sessions.steps import Abort, Refuse
 
@@ -95,22 +93,6 @@ def test_a_log_in_which_something_does_not_follow_is_refused():
 
 def start_plan():
     return FORCES, start(FORCES)
-
-
-def resume(folder, **transducer):
-    """Go on with the session in `folder` on a machine that was started anew."""
-    recording = Recording.open(folder)
-    check_resumable(recording)
-    last = recording.last_block()
-    now = datetime.fromisoformat(recording.provenance["created_utc"]) + timedelta(seconds=600)
-    clock, gap = continued(recording, last, ToldClock(5_000), now.astimezone(UTC))
-    told = ToldClock(clock.now_ns())
-    device = StandIn(told, **transducer)
-    at = resumption(recording.plan, recording.events)
-    writer = SessionWriter.open(folder, told)
-    resumed = Resumed(at, resumed_data(gap, device.info, {}), last)
-    end = run_session(recording.plan, writer, Hands(told, device), device, told, resumed=resumed)
-    return end, Recording.open(folder)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="kills a process of its own, which needs fork")

@@ -4,7 +4,7 @@ import json
 from dataclasses import replace
 
 import pytest
-from test_prediction import MEASURED, PLAN, analysis, parameters, stroke
+from paper_friction import MEASURED, PLAN, analysis, parameters, stroke
 
 from sessions import side_by_side
 from sessions.alternative import Variant

@@ -1,10 +1,13 @@
 """A whole session in told time, with stand-ins for people and transducer."""
 
+from datetime import UTC, datetime, timedelta
+
 from stand_ins import INFO, Hands, StandIn, ToldClock
 
 from sessions.protocols import plan, protocol
 from sessions.recording import Recording, SessionWriter, provenance
-from sessions.runner import run_session
+from sessions.resuming import check_resumable, continued, resumed_data, resumption
+from sessions.runner import Resumed, run_session
 
 PAPER = protocol("sensotact-friction")
 
@@ -32,3 +35,19 @@ def once(events):
     """Answer with `events` the first time, as usual afterwards."""
     left = [events]
     return lambda _: left.pop() if left else None
+
+
+def resume(folder, **transducer):
+    """Go on with the session in `folder` on a machine that was started anew."""
+    recording = Recording.open(folder)
+    check_resumable(recording)
+    last = recording.last_block()
+    now = datetime.fromisoformat(recording.provenance["created_utc"]) + timedelta(seconds=600)
+    clock, gap = continued(recording, last, ToldClock(5_000), now.astimezone(UTC))
+    told = ToldClock(clock.now_ns())
+    device = StandIn(told, **transducer)
+    at = resumption(recording.plan, recording.events)
+    writer = SessionWriter.open(folder, told)
+    resumed = Resumed(at, resumed_data(gap, device.info, {}), last)
+    end = run_session(recording.plan, writer, Hands(told, device), device, told, resumed=resumed)
+    return end, Recording.open(folder)
