@@ -9,7 +9,7 @@ from sessions.steps import Abort, AskMount, DiscardTake, KeepTake, LeaveOut, Not
 
 
 @given(walk=walks())
-@settings(max_examples=300)
+@settings(max_examples=200)
 def test_from_any_state_any_event_is_meant_or_refused_with_a_sentence(walk):
     for before, event, state, commands in steps(*walk):
         refusals = [command for command in commands if isinstance(command, Refuse)]
@@ -27,7 +27,7 @@ def test_the_same_plan_and_events_give_the_same_session(walk):
 
 
 @given(walk=walks())
-@settings(max_examples=300)
+@settings(max_examples=200)
 def test_no_walk_brings_the_order_into_disorder_or_confuses_takes(walk):
     kept, open_take, begun, asked, left_out = {}, None, set(), {}, set()
     for _, _, state, commands in steps(*walk):

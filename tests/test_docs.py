@@ -1,0 +1,41 @@
+"""What the docs name is there: files, headings, and in README every verb."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from daq_app.cli import VERBS
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PLACES = ("daq_app", "drivers", "sessions", "simulators", "solver", "tests", "benchmarks", "docs")
+CODE = [path.as_posix() for place in PLACES for path in (ROOT / place).rglob("*.py")]
+
+
+def anchors(page):
+    """Return the names that links can use for the headings of a page."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_link_of_a_page_leads_to_a_file_and_heading_that_is_there(page):
+    for link in re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
+        if link.startswith("http"):
+            continue
+        path, _, heading = link.partition("#")
+        target = page if not path else page.parent / path
+        assert target.exists(), link
+        assert not heading or heading in anchors(target), link
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_file_of_code_that_a_page_names_is_there(page):
+    for name in re.findall(r"`([\w/]+\.py)`", page.read_text(encoding="utf-8")):
+        assert "NAME" in name or any(path.endswith(f"/{name}") for path in CODE), name
+
+
+def test_readme_names_every_verb():
+    told = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert [verb for verb in VERBS if not re.search(rf"`(\w+`, `)*{verb}\b", told)] == []
