@@ -13,8 +13,8 @@ from typing import Any
 
 from daq_app.cli import FLAWED, WrongValue
 from daq_app.console import Console, number, table
+from daq_app.demo_study import Study, StudyCutShort, simulated_study
 from daq_app.derived import analysed, predicted
-from daq_app.study import Study, StudyCutShort, simulated_study
 from drivers.clock import PacedClock, RealClock
 from sessions.analysis import Analysis
 from sessions.analysis.scores import mean_scores

@@ -9,7 +9,7 @@ import secrets
 from pathlib import Path
 from typing import Any
 
-from daq_app.body import add_body_arguments, body_of
+from daq_app.body_option import add_body_arguments, body_of
 from daq_app.cli import DONE, WrongValue
 from daq_app.console import Console, table
 from sessions.protocols import protocol_file

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import get_args
 
 from daq_app.attending import attended, opened
-from daq_app.body import add_body_arguments, body_of, own_sentence
+from daq_app.body_option import add_body_arguments, body_of, own_sentence
 from daq_app.cli import DONE, FLAWED, WrongValue
 from daq_app.console import Console
 from daq_app.recorder.client import Recorder
