@@ -8,7 +8,7 @@ import pytest
 
 from solver.holding import relaxing
 from solver.reference import SLIPPERINESS, STICKINESS, scene
-from solver.scene import Material, Relaxation, SceneError, Solve
+from solver.scene import Friction, Loading, Material, Relaxation, Scene, SceneError, Solve
 from solver.solution import solve
 
 
@@ -42,6 +42,15 @@ def test_the_estimate_stays_beside_the_measured_number_and_the_cost_is_told(meas
     printed = json.loads(json.dumps(measured.to_dict()))
     assert printed["evidence_s"] == measured.evidence_s
     assert any("finite strain" in told and "%" in told for told in measured.warnings)
+
+
+def test_a_difference_that_two_meshes_explain_is_not_told_as_one_of_the_kinematics():
+    touch = Scene(loading=Loading(1e-6, "none"), friction=Friction(0.0), solve=Solve(evidence="measured"))
+    found = solve(touch)
+    told = entry(found, "finite strain")
+    assert told["estimate"] == told["estimated"] < 1e-3  # as small as its strains
+    assert "the estimate stands" in told["how"]
+    assert not any("finite strain" in warning for warning in found.warnings)
 
 
 def test_without_being_asked_nothing_is_measured_but_what_tissues_still_hold_and_that_took_time():
