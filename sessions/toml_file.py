@@ -198,7 +198,8 @@ def _found_at(table: Any, kind: Any, key: str) -> tuple[object, Any]:  # noqa: A
     """Return the value at a dotted key, and the annotation it should have met."""
     for part in re.findall(r"[^.\[\]]+", key):
         if part.isdigit():
-            kinds = [item for item in get_args(kind) if item is not Ellipsis]
+            lists = [choice for choice in (kind, *get_args(kind)) if get_origin(choice) is tuple]
+            kinds = [item for item in get_args(lists[0]) if item is not Ellipsis]
             table, kind = table[int(part)], kinds[min(int(part), len(kinds) - 1)]
         else:
             table, kind = table[part], get_type_hints(_dataclass_in(kind))[part]
@@ -216,6 +217,8 @@ def _shown(value: object) -> str:
     text = {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
     if isinstance(value, str):
         text = f'"{value}"'
+    if isinstance(value, tuple):
+        text = repr(list(cast("tuple[Any, ...]", value)))
     return text if len(text) <= 60 else text[:57] + "..."
 
 

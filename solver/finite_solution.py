@@ -179,7 +179,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
 
 def _drag(scene: Scene, tangential: float) -> float:
     """Return the drag opposing the slide [N/mm]; without a slide, the size of the tangential force."""
-    if scene.friction.mu == 0.0 or scene.friction.cap == 0.0:
+    if scene.friction.mu == 0.0 or scene.friction.cap == 0.0 or scene.tangential_force == 0.0:
         return 0.0  # but for round-off
     return abs(tangential) if scene.loading.direction == 0 else 0.0 - scene.loading.direction * tangential  # never -0
 

@@ -11,6 +11,8 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.materials import lame_modulus, shear_modulus
+
 Array = NDArray[np.float64]
 PLAIN = 2.0  # Ogden's exponent of the neo-Hookean law
 HUMAN_SKIN = 9.0  # and that of human skin (ascribed to Shergold and Fleck 2004; docs/scene-file.md)
@@ -55,13 +57,13 @@ class NeoHooke:
 
     @property
     def shear(self) -> float:
-        """G = E / (2 (1 + nu)) [MPa]."""
-        return self.E / (2.0 * (1.0 + self.nu))
+        """Shear modulus [MPa]."""
+        return shear_modulus(self.E, self.nu)
 
     @property
     def lame(self) -> float:
-        """Lamé's first constant, lambda = E nu / ((1 + nu) (1 - 2 nu)) [MPa]."""
-        return self.E * self.nu / ((1.0 + self.nu) * (1.0 - 2.0 * self.nu))
+        """Lamé's first constant [MPa]."""
+        return lame_modulus(self.E, self.nu)
 
     @property
     def stiffening(self) -> float:
@@ -91,13 +93,13 @@ class Ogden:
 
     @property
     def shear(self) -> float:
-        """G = E / (2 (1 + nu)) [MPa]."""
-        return self.E / (2.0 * (1.0 + self.nu))
+        """Shear modulus [MPa]."""
+        return shear_modulus(self.E, self.nu)
 
     @property
     def lame(self) -> float:
-        """Lamé's first constant, lambda = E nu / ((1 + nu) (1 - 2 nu)) [MPa]."""
-        return self.E * self.nu / ((1.0 + self.nu) * (1.0 - 2.0 * self.nu))
+        """Lamé's first constant [MPa]."""
+        return lame_modulus(self.E, self.nu)
 
 
 def shape(exponent: Array, Q: Array) -> Array:

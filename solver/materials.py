@@ -8,6 +8,24 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+def shear_modulus(E: float, nu: float) -> float:
+    """Return G = E / (2 (1 + nu)) [MPa].
+
+    >>> round(shear_modulus(0.08, 0.48), 8)
+    0.02702703
+    """
+    return E / (2.0 * (1.0 + nu))
+
+
+def lame_modulus(E: float, nu: float) -> float:
+    """Return Lamé's first constant, lambda = E nu / ((1 + nu) (1 - 2 nu)) [MPa].
+
+    >>> round(lame_modulus(0.08, 0.48), 8)
+    0.64864865
+    """
+    return E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+
+
 @dataclass(frozen=True, slots=True)
 class Hooke:
     """Isotropic linear elasticity at small strain, in plane strain."""
@@ -17,21 +35,13 @@ class Hooke:
 
     @property
     def shear(self) -> float:
-        """Shear modulus G = E / (2 (1 + nu)) [MPa].
-
-        >>> round(Hooke(0.08, 0.48).shear, 8)
-        0.02702703
-        """
-        return self.E / (2.0 * (1.0 + self.nu))
+        """Shear modulus [MPa]."""
+        return shear_modulus(self.E, self.nu)
 
     @property
     def lame(self) -> float:
-        """Lamé's first constant lambda = E nu / ((1 + nu) (1 - 2 nu)) [MPa].
-
-        >>> round(Hooke(0.08, 0.48).lame, 8)
-        0.64864865
-        """
-        return self.E * self.nu / ((1.0 + self.nu) * (1.0 - 2.0 * self.nu))
+        """Lamé's first constant [MPa]."""
+        return lame_modulus(self.E, self.nu)
 
     def energy(self, gradient: Array) -> Array:
         """Return the strain-energy density (...) [MPa] for displacement gradients (..., 2, 2).

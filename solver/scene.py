@@ -94,6 +94,9 @@ class Scene:
                 has = " or ".join(f'"{law}"' for law in LAWS_OF[kinematics])
                 allowed = f'with solve.kinematics = "{kinematics}" it must be {has}'
                 raise SceneError(f"materials.{name}.law", tissue.law, allowed)
+        if self.finger.bone == "rigid" and self.materials.bone.prony:
+            allowed = 'a rigid bone does not relax: leave it out, or set finger.bone = "meshed"'
+            raise SceneError("materials.bone.prony", [(t.g, t.tau) for t in self.materials.bone.prony], allowed)
 
     @property
     def normal_force(self) -> float | None:

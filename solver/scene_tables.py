@@ -132,8 +132,8 @@ class Material:
         """Raise SceneError where a value is not allowed; `key` is how the scene calls the tissue."""
         _within(f"{key}.E", self.E, 1e-6, 1e12, "MPa")
         if not 0.0 <= self.nu <= 0.4999999:
-            allowed = "it must lie between 0 and 0.4999999, since a material with nu = 0.5 has no strain energy of "
-            raise SceneError(f"{key}.nu", self.nu, allowed + "volume change to compute")
+            why = ", since at 0.5 a material has no strain energy of volume change to compute" if self.nu > 0.0 else ""
+            raise SceneError(f"{key}.nu", self.nu, f"it must lie between 0 and 0.4999999{why}")
         if self.law not in (None, "hooke", "neo-hookean", "ogden"):
             raise SceneError(f"{key}.law", self.law, 'it must be "hooke", "neo-hookean" or "ogden"')
         if self.stiffening is not None and self.law != "ogden":

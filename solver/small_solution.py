@@ -286,6 +286,8 @@ def _balanced(
 
 def _drag(scene: Scene, tangential: float) -> float:
     """Return the drag opposing the slide [N/mm]; without a slide, the size of the tangential force."""
+    if scene.tangential_force == 0.0:
+        return 0.0  # but for round-off
     if scene.loading.direction == 0:
         return abs(float(tangential))
     return 0.0 - scene.loading.direction * float(tangential)  # never -0

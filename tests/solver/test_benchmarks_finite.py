@@ -11,17 +11,13 @@ from daq_app.accuracy.published.problems import CAPPED, FINITE_PARTS
 from solver import kernels_numpy
 from solver.finite_body import FiniteBody
 from solver.grid import quality
-from solver.hyperelastic import LAWS, NeoHooke, Ogden, energy, stress
+from solver.hyperelastic import LAWS, energy, stress
 from solver.newton import Pull
 from solver.shapes import block
 from solver.sliding import settled
 from tests.solver.finite_examples import finger
 
-MEMBERS = [NeoHooke(0.08, 0.48), NeoHooke(0.08, 0.4999999), Ogden(0.08, 0.48)]
-
-
-def test_every_law_of_the_list_is_tested_here():
-    assert {type(law) for law in MEMBERS} == set(LAWS)
+MEMBERS = [law(0.08, nu) for law in LAWS for nu in (0.48, 0.4999999)]
 
 
 def sheet(kind):

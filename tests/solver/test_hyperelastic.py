@@ -8,15 +8,11 @@ from hypothesis import strategies as st
 
 from solver.hyperelastic import LAWS, NeoHooke, Ogden, energy, stress, tangent
 
-MEMBERS = [NeoHooke(0.08, 0.48), Ogden(0.08, 0.48)]
+MEMBERS = [law(0.08, 0.48) for law in LAWS]
 DERMIS = NeoHooke(0.08, 0.48)
 EPIDERMIS = NeoHooke(0.136, 0.48)
 entries = st.floats(-0.4, 0.4)
 gradients = st.tuples(entries, entries, entries, entries).map(lambda g: np.eye(2) + np.reshape(g, (2, 2)))
-
-
-def test_every_law_of_the_list_is_tested_here():
-    assert {type(law) for law in MEMBERS} == set(LAWS)
 
 
 @pytest.mark.parametrize("law", MEMBERS, ids=lambda law: law.name)

@@ -36,6 +36,49 @@ def test_gradients_of_shape_functions_are_their_differences(element):
         assert np.allclose(slopes[..., axis], difference, atol=1e-9)
 
 
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_shape_functions_hold_every_polynomial_of_their_order(element):
+    at = np.random.default_rng(3).uniform(-1, 1, (20, 2))
+    for i in range(element.order + 1):
+        for j in range(element.order + 1 - i):
+            there, here = (points[:, 0] ** i * points[:, 1] ** j for points in (element.positions, at))
+            np.testing.assert_allclose(element.shape(at)[0] @ there, here, atol=1e-14)
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_quadrature_integrates_the_products_of_two_shape_functions(element):
+    for i in range(2 * element.order + 1):
+        for j in range(2 * element.order + 1):
+            exact = np.prod([2.0 / (n + 1) if n % 2 == 0 else 0.0 for n in (i, j)])
+            x, y = element.points.T
+            assert element.weights @ (x**i * y**j) == pytest.approx(exact, abs=1e-14)
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+@given(st.lists(st.floats(-0.2, 0.2), min_size=10, max_size=10))
+@settings(max_examples=20)
+def test_an_even_stress_on_distorted_quadrilaterals_leaves_no_force_on_nodes_inside(element, moved):
+    corners = np.stack(np.meshgrid(np.arange(3.0), np.arange(3.0), indexing="ij"), axis=-1)
+    corners[1, 1] += moved[:2]  # the corner that all four share, and those in the middle of the sides
+    for number, (i, j) in enumerate([(0, 1), (1, 0), (2, 1), (1, 2)]):
+        corners[i, j] += moved[2 + 2 * number : 4 + 2 * number]
+    left: dict[tuple[float, float], np.ndarray] = {}
+    for i in range(2):
+        for j in range(2):
+            own = corners[[i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]
+            x, y = element.positions.T
+            ways = np.stack([(1 + a * x) * (1 + b * y) / 4 for a, b in element.corners], axis=1)
+            nodes = ways @ own
+            gradients = element.shape(element.points)[1]
+            jacobian = np.einsum("ia,qib->qab", nodes, gradients)
+            true = gradients @ np.linalg.inv(jacobian)
+            force = np.einsum("q,q,qia->ia", element.weights, np.linalg.det(jacobian), true)
+            for place, pull, (a, b) in zip(nodes.round(9).tolist(), force, element.positions, strict=True):
+                if 0 < i + (a + 1) / 2 < 2 and 0 < j + (b + 1) / 2 < 2:
+                    left[tuple(place)] = left.get(tuple(place), np.zeros(2)) + pull
+    np.testing.assert_allclose(list(left.values()), 0.0, atol=1e-13)
+
+
 def areas(made):
     """Area of each region by quadrature."""
     mesh = made.mesh

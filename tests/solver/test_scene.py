@@ -4,7 +4,18 @@ from dataclasses import fields, replace
 import pytest
 
 from solver.reference import SLIPPERINESS, STICKINESS, scene, scenes
-from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, SceneError, Solve
+from solver.scene import (
+    Finger,
+    Friction,
+    Loading,
+    Material,
+    Materials,
+    Receptor,
+    Relaxation,
+    Scene,
+    SceneError,
+    Solve,
+)
 
 
 @pytest.mark.parametrize(
@@ -17,6 +28,14 @@ from solver.scene import Finger, Friction, Loading, Material, Materials, Recepto
         (lambda: Finger(bone_centre=(-1.0, 1.6)), "finger.bone_centre"),
         (lambda: Materials(fat=Material(0.034, 0.5)), "materials.fat.nu"),
         (lambda: Materials(dermis=Material(0.0, 0.48)), "materials.dermis.E"),
+        (
+            lambda: Scene(
+                friction=Friction(0.3),
+                loading=Loading(1.0),
+                materials=Materials(bone=Material(200.0, 0.3, prony=(Relaxation(0.5, 1000.0),))),  # and it is rigid
+            ),
+            "materials.bone.prony",
+        ),
         (lambda: Friction(-0.1), "friction.mu"),
         (lambda: Friction(0.3, -1.0), "friction.tau_max"),
         (lambda: Friction(math.inf), "friction.mu"),
