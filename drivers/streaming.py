@@ -207,8 +207,6 @@ class StreamingTransducer(ThreadedTransducer):
 
     def start(self) -> None:
         """Bring the device to stream. Raises LinkLost, SetupError or DeviceFault when no record comes."""
-        if self._thread is not None:
-            raise SetupError(f"{self._info.uri} is streaming already; stop it before starting it again")
         self._reset()
         self._thread = threading.Thread(target=self._run, name=f"{self._info.driver} {self._info.serial}".strip())
         self._thread.start()
@@ -222,17 +220,13 @@ class StreamingTransducer(ThreadedTransducer):
 
     def _reset(self) -> None:
         """Forget what an earlier stream left."""
+        super()._reset()
         self._pending.clear()
-        self._arrived.clear()
-        self._stopping.clear()
-        self._ended = None
         self._pacing = self._conversation.numbering(self._info.rate, self._clock.factor)
         self._unpaced: list[_Arrived] = []  # arrivals that pacing keeps back
-        self._ready = []
         self._received = self._restarted = self._saturated = 0
         self._malformed_before = 0  # by decoders that have had their day
         self._decoder = self._conversation.decoder()
-        self._lag_ms = 0.0
         self._ever = False  # a record has come
         self._heard = time.monotonic()  # when the last one did
 

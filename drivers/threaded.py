@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 
 from drivers.clock import Clock
 from drivers.readings import ReadingBlock
-from drivers.transducer import LinkLost, TransducerInfo
+from drivers.transducer import LinkLost, SetupError, TransducerInfo
 
 
 class ThreadedTransducer(ABC):
@@ -50,6 +50,16 @@ class ThreadedTransducer(ABC):
             if not streaming or remaining <= 0.0:
                 return ReadingBlock.empty()
             self._arrived.wait(min(remaining, self._tick))
+
+    def _reset(self) -> None:
+        """Forget what an earlier stream left. Raises SetupError while one runs."""
+        if self._thread is not None:
+            raise SetupError(f"{self._info.uri} is streaming already; stop it before starting it again")
+        self._arrived.clear()
+        self._stopping.clear()
+        self._ended = None
+        self._ready = []
+        self._lag_ms = 0.0
 
     def stop(self) -> None:
         """End streaming; what had arrived can still be read. Harmless when repeated."""

@@ -15,7 +15,7 @@ from drivers.rate import RateWatch, rate_words
 from drivers.readings import ReadingBlock
 from drivers.sequence import SequenceAccount
 from drivers.threaded import ThreadedTransducer
-from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, TransducerInfo
+from drivers.transducer import DeviceFault, Health, LinkLost, TransducerInfo
 
 # All in real seconds, since networks know no other.
 _TICK = 0.05  # longest wait for a datagram, and so for a stop
@@ -84,8 +84,6 @@ class NetFtTransducer(ThreadedTransducer):
 
     def start(self) -> None:
         """Ask for the stream until it comes. Raises LinkLost when it does not, DeviceFault when its rate is wrong."""
-        if self._thread is not None:
-            raise SetupError(f"{self._info.uri} is streaming already; stop it before starting it again")
         self._reset()
         link = self._connect()
         self._thread = threading.Thread(target=self._drain, args=(link,), name=f"net-ft {self._info.serial}")
@@ -107,18 +105,14 @@ class NetFtTransducer(ThreadedTransducer):
 
     def _reset(self) -> None:
         """Forget what an earlier stream left."""
+        super()._reset()
         self._pending.clear()
-        self._arrived.clear()
-        self._stopping.clear()
-        self._ended = None
         self._account = SequenceAccount(self._step, self._info.counter_rate)
         self._watch = RateWatch(self._info.counter_rate, self._clock.factor, _SILENT_TICKS * self._clock.factor)
         self._breaks = 0  # in the device's counter, so far
         self._held: list[tuple[bytes, int]] = []
-        self._ready = []
         self._zero: int | None = None  # counter of the first reading
         self._received = self._wrong_length = self._saturated = 0
-        self._lag_ms = 0.0
 
     def _drain(self, link: Link) -> None:
         """Be the receiving thread: ask for the stream, take what comes, ask again when it falls silent, and end it."""
