@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from daq_app.window.live_model import Forces, Kinematics, Picture, Provisional, Settle, Settled, Use
-from sessions.analysis import FrictionParameters
+from sessions.analysis import AnalysisSettings, FrictionParameters
 from sessions.plan import SessionPlan
 from sessions.prediction import DEFAULT_SPEED, SLIDES, PredictionOptions, with_own_finger
 from solver.failures import SolveFailure
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from daq_app.window.live_finite import LiveFinite
 
 TOUCH = 0.05  # less normal force is no touch [N]
-FLOOR = 0.3  # a ratio means nothing below this normal force [N]
+FLOOR = AnalysisSettings().force_floor  # a ratio means nothing below this normal force [N]
 LEAST_MU = 0.05  # before any was measured [-]
 KEPT = 60.0  # predictions that are kept for the difference to the full solve [s]
 SEEN, SEEN_EVERY = 100, 0.1  # states that are kept for a stroke whose full solve fails, and the time between them [s]
