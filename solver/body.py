@@ -60,8 +60,8 @@ class Body:
             check_held(mesh, free)
         whole = _in_loops(mesh, materials) if in_loops else None
         elastic = Elastic.of(mesh, materials) if whole is None else whole.elastic
-        moved = np.zeros(mesh.nodes.shape) if prescribed is None else prescribed.copy()
-        force = np.zeros(mesh.nodes.size) if loads is None else loads.ravel().copy()
+        moved = np.zeros(mesh.nodes.shape) if prescribed is None else np.array(prescribed, np.float64)
+        force = np.zeros(mesh.nodes.size) if loads is None else np.array(loads, np.float64).ravel()
         if prescribed is not None:
             unknowns = _unknowns(mesh)
             pushed = elastic.stiffness @ moved.ravel()[unknowns][:, :, None]

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.friction import CAP, OPEN, SLIP, STICK, FrictionLaw
+from solver.handed_in import finite
 from solver.lapack import dgesv, dgetrf, dgetrs
 
 Array = NDArray[np.float64]
@@ -119,8 +120,11 @@ class Course:
         """Return the settled sliding state of a body driven `depth` [mm] into the surface and along +x or -x.
 
         Every touching point slips, so nothing is left of how it came there. Raises ContactLost where no such state
-        was found.
+        was found, ValueError for a depth or direction that is none.
         """
+        depth = finite("depth", depth)
+        if direction not in (-1, 1):
+            raise ValueError(f"direction = {direction} is not allowed: it must be +1 or -1")
         count = len(self.body.gap)
         sense = np.full(count, -float(direction))
         low = self.body.gap + self.body.normal_free < depth
@@ -188,8 +192,10 @@ class Course:
         """Return the state after the body was driven to `depth` and `travel` along +x [mm], coming from `before`.
 
         Backward Euler: a point sticks where it was, or slips from there against its friction force. `resultants` (r,)
-        [N/mm] take the place of the body's own where the forces along its free motions change with time.
+        [N/mm] take the place of the body's own where the forces along its free motions change with time. Raises
+        ContactLost, and ValueError for a depth or travel that is not finite.
         """
+        depth, travel = finite("depth", depth), finite("travel", travel)
         self._resultants = self.body.resultants if resultants is None else resultants
         try:
             return self._consistent(depth, travel, before.shift, before.state, before.sense, free=True)

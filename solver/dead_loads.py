@@ -29,12 +29,14 @@ def loaded(
     `prescribed` (nodes, 2) is 0 where nothing holds. From undeformed, or from `start` (whose contact states are then
     the first guess), in `steps` equal parts; one that fails is halved. `pull` (its default: no contact depth, no
     friction) stays the same meanwhile. The loads stay on `newton` for what follows. Raises BodyError for arrays of
-    another shape, ValueError for a load on the centre of an element, NotConverged where no equilibrium is found.
+    another shape, ValueError for a load on the centre of an element and for a pull that is none, NotConverged where no
+    equilibrium is found.
     """
     body = newton.body
     check_loads(body.mesh, loads, prescribed)
+    loads, prescribed = (None if given is None else np.asarray(given, np.float64) for given in (loads, prescribed))
     shape = Shape.undeformed(body) if start is None else start
-    pull = shape.pull if pull is None else pull
+    pull = (shape.pull if pull is None else pull).checked()
     shape = replace(shape, pull=pull)
     vector = np.zeros(body.size) if loads is None else _on_unknowns(newton, loads)
     driven = body.mesh.driven

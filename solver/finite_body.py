@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from solver import kernels
 from solver.elements import Q2P1
 from solver.elimination import Plan
-from solver.handed_in import check_body, check_driven
+from solver.handed_in import check_body, check_driven, check_laws
 from solver.hyperelastic import Law
 from solver.kernels import HELD_X, HELD_Y
 from solver.mesh import Array, Indices, Mesh
@@ -52,6 +52,7 @@ class FiniteBody:
         """
         if not checked:
             check_body(mesh, laws)
+            check_laws(laws)
             check_driven(mesh)
         corners = mesh.nodes[mesh.elements]  # (e, 9, 2)
         jacobian = np.swapaxes(corners, 1, 2)[:, None] @ _SLOPES  # (e, q, 2, 2)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.failures import Cancelled, NotConverged, followed_to
+from solver.handed_in import finite
 from solver.kernels import SLIP, STICK
 from solver.meeting import UNMET, met
 from solver.mesh import Array
@@ -27,6 +28,11 @@ class Given(NamedTuple):
     normal: float  # [N/mm]
     tangential: float | None  # [N/mm]; None: `travel` is given instead
     travel: float = 0.0  # of the surface along +x relative to the bone [mm]
+
+    def checked(self) -> "Given":
+        """Return the same of floats alone, as loops take them. Raises ValueError for what is not finite."""
+        drag = None if self.tangential is None else finite("tangential", self.tangential)
+        return Given(finite("normal", self.normal), drag, finite("travel", self.travel))
 
     def towards(self, other: "Given", part: float) -> "Given":
         """Return what lies `part` of the way to `other`, which gives the same kind of thing."""
@@ -133,10 +139,11 @@ def march(
 ) -> Iterator[Shape]:
     """Yield the equilibrium at each aim of `course`, from `start`, which is that at `begin`.
 
-    A step that fails is cut in two. Raises NotConverged, saying where, and Cancelled where `stop` says so.
+    A step that fails is cut in two. Raises NotConverged, saying where, Cancelled where `stop` says so, and ValueError
+    for forces that are none.
     """
-    shape = start
-    for number, aim in enumerate(aims := list(course)):
+    shape, begin = start, begin.checked()
+    for number, aim in enumerate(aims := [aim.checked() for aim in course]):
         if len(aims) > 1:
             tell("letting the forces grow step by step", number / len(aims))
         done, part = 0.0, 1.0
@@ -158,7 +165,7 @@ def march(
 
 def untouched(newton: Newton, mu: float, tau: float) -> Shape:
     """Return the undeformed body over a surface with this friction."""
-    return replace(Shape.undeformed(newton.body), pull=Pull(0.0, mu, tau))
+    return replace(Shape.undeformed(newton.body), pull=Pull(0.0, mu, tau).checked())
 
 
 def lowered(newton: Newton, shape: Shape) -> Shape:

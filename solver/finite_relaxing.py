@@ -14,6 +14,7 @@ from solver.failures import Cancelled, NotConverged, followed_to
 from solver.finite_body import FiniteBody, FiniteProbes
 from solver.finite_finger import FiniteFinger
 from solver.finite_forced import Given
+from solver.handed_in import check_moduli, check_terms
 from solver.kernels import STICK
 from solver.materials import Prony
 from solver.mesh import Array, Indices
@@ -32,8 +33,10 @@ class RelaxingNewton(Newton):
     """The iterations on a body that relaxes, whose own laws are the relaxed ones."""
 
     def __init__(self, body: FiniteBody, laws: Sequence[Prony]) -> None:
-        """Start at rest; `laws` by region, of which the terms and moduli at once are used."""
+        """Start at rest; `laws` by region, of which the terms and moduli at once are used. Raises BodyError."""
         super().__init__(body)
+        check_moduli(body.mesh, laws)
+        check_terms(laws)
         region = body.mesh.region
         self.past = Past.at_rest(*_terms(laws, np.repeat(region, body.weight.shape[1])))
         self._tensor = np.zeros((*body.weight.shape, 4))

@@ -47,6 +47,8 @@ class FrictionLaw:
             raise ValueError(f"mu = {self.mu} is not allowed: a coefficient of friction is a number from 0 on")
         if not self.tau_max >= 0.0:
             raise ValueError(f"tau_max = {self.tau_max} is not allowed: a bound is a traction from 0 on, or infinite")
+        object.__setattr__(self, "mu", float(self.mu))  # whole numbers too: loops are compiled for one kind
+        object.__setattr__(self, "tau_max", float(self.tau_max))
 
     def limit(self, force: Array, length: Array) -> Array:
         """Return the largest tangential force (n,) [N/mm] at points pressed with `force` (n,) [N/mm].

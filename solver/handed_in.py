@@ -1,12 +1,15 @@
 """The door for bodies handed in as arrays: what cannot be solved is refused there with one sentence."""
 
 from collections.abc import Sequence
+from math import isfinite
 from typing import Protocol
 
 import numpy as np
 
 from solver.elements import Q2P1
 from solver.grid import jacobians
+from solver.hyperelastic import STIFFENING, Law
+from solver.materials import Prony
 from solver.mesh import Array, Mesh
 
 HELD = 1e-9  # part of a motion of the body as a whole below which what is held does not move with it [-]
@@ -32,20 +35,44 @@ class Stiff(Protocol):
 
 
 def check_body(mesh: Mesh, materials: Sequence[Stiff]) -> None:
-    """Raise BodyError where numbers of `mesh` or of its `materials` by region make no body.
+    """Raise BodyError where arrays of `mesh` or its `materials` by region make no body.
 
     Raises MeshError where an element is folded at a point of its quadrature, which is all that is asked of it.
     """
+    _check_arrays(mesh)
+    check_moduli(mesh, materials)
+    jacobians(mesh, Q2P1.points)
+    _check_skin(mesh)
+
+
+def _check_arrays(mesh: Mesh) -> None:
+    """Raise BodyError where an array has another shape or other numbers than it must have."""
     count = len(mesh.nodes)
+    if mesh.nodes.shape != (count, 2) or mesh.nodes.dtype != np.float64:
+        raise BodyError(
+            f"mesh.nodes has the shape {mesh.nodes.shape} of {mesh.nodes.dtype}; give every node x and y in mm, (n, 2)"
+        )
+    if mesh.elements.shape != (len(mesh.elements), 9) or not len(mesh.elements):
+        raise BodyError(
+            f"mesh.elements has the shape {mesh.elements.shape}; name nine nodes of each, of one at least, (e, 9)"
+        )
     if not np.isfinite(mesh.nodes).all():
         worst = int(np.argmin(np.isfinite(mesh.nodes).all(axis=1)))
         raise BodyError(f"node {worst} of the mesh has no finite position; give every node two lengths in mm")
-    for name in ("elements", "skin", "held", "held_x", "held_y"):
+    for name in ("elements", "region", "skin", "held", "held_x", "held_y"):
         numbers = getattr(mesh, name)
-        if numbers.size and not (numbers.min() >= 0 and numbers.max() < count):
+        if numbers.dtype != np.int64:
+            raise BodyError(f"mesh.{name} is made of {numbers.dtype}; give whole numbers, counted from 0")
+        if numbers.ndim != 1 and name != "elements":
+            raise BodyError(f"mesh.{name} has the shape {numbers.shape}; give one row of numbers")
+        if name != "region" and numbers.size and not (numbers.min() >= 0 and numbers.max() < count):
             raise BodyError(f"mesh.{name} names a node that is not there; number the {count} nodes from 0")
     if len(mesh.region) != len(mesh.elements):
         raise BodyError(f"mesh.region has {len(mesh.region)} entries for {len(mesh.elements)} elements; give one each")
+
+
+def check_moduli(mesh: Mesh, materials: Sequence[Stiff]) -> None:
+    """Raise BodyError where a region of `mesh` has no material, or one of them is no tissue."""
     if not (mesh.region.min() >= 0 and mesh.region.max() < len(materials)):
         worst = int(mesh.region.max() if mesh.region.min() >= 0 else mesh.region.min())
         raise BodyError(
@@ -61,8 +88,29 @@ def check_body(mesh: Mesh, materials: Sequence[Stiff]) -> None:
                 f"material {number}, {material}, is none that can be computed; E must be above 0 and nu from 0 to "
                 "0.4999999, since nu = 0.5 leaves no energy of volume change"
             )
-    jacobians(mesh, Q2P1.points)
-    _check_skin(mesh)
+
+
+def check_laws(laws: Sequence[Law]) -> None:
+    """Raise BodyError unless `laws` are those of finite strain, their exponents within what the scene file allows."""
+    for number, law in enumerate(laws):
+        if not hasattr(law, "stiffening"):
+            raise BodyError(f"material {number}, {law}, is no law of finite strain; give one of solver.hyperelastic")
+        low, high = STIFFENING
+        if not low <= law.stiffening <= high:
+            raise BodyError(
+                f"material {number}, {law}, stiffens with the exponent {law.stiffening:g}; it must lie between "
+                f"{low:g} and {high:g}"
+            )
+
+
+def check_terms(laws: Sequence[Prony]) -> None:
+    """Raise BodyError where the terms of a series are none that relax."""
+    for number, law in enumerate(laws):
+        if not (all(g >= 0.0 and 0.0 < tau < np.inf for g, tau in law.terms) and law.stays > 0.0):
+            raise BodyError(
+                f"material {number}, {law}, has terms that cannot relax; every g must be 0 or more, all together below "
+                "1, and every tau a time above 0"
+            )
 
 
 def _check_skin(mesh: Mesh) -> None:
@@ -93,17 +141,28 @@ def check_loads(mesh: Mesh, loads: Array | None, prescribed: Array | None) -> No
     for name, given in (("loads", loads), ("prescribed", prescribed)):
         if given is None:
             continue
-        if given.shape != mesh.nodes.shape:
-            raise BodyError(f"{name} has the shape {given.shape}; it must be {mesh.nodes.shape}, a row for every node")
+        given = np.asarray(given)
+        if given.dtype.kind not in "fiu" or given.shape != mesh.nodes.shape:
+            raise BodyError(
+                f"{name} has the shape {given.shape} of {given.dtype}; it must be numbers in {mesh.nodes.shape}, a row "
+                "for every node"
+            )
         if not np.isfinite(given).all():
             row = int(np.argmin(np.isfinite(given).all(axis=1)))
             raise BodyError(f"row {row} of {name} is not finite; give 0 where there is none")
-    if prescribed is not None and prescribed[~mesh.driven].any():
+    if prescribed is not None and np.asarray(prescribed)[~mesh.driven].any():
         row, along = (int(at[0]) for at in np.nonzero(prescribed * ~mesh.driven))
         raise BodyError(
             f"prescribed moves node {row} along {'xy'[along]}, where nothing holds it; name it in mesh.held, or in "
             f"mesh.held_{'xy'[along]}"
         )
+
+
+def finite(name: str, value: float) -> float:
+    """Return `value` as a float. Raises ValueError where it is not finite."""
+    if not isfinite(value):
+        raise ValueError(f"{name} = {value} is not allowed: give a finite number")
+    return float(value)
 
 
 def loose(mesh: Mesh) -> Array:

@@ -132,7 +132,7 @@ def _rough(
     """Return a rough mesh of a finger, settled and relaxing; surfaces of one finger follow each other and share it."""
     scene = Scene(finger=finger, materials=materials, friction=Friction(0.0), loading=Loading(depth), receptor=receptor)
     made = FingerModel.of(scene, Sizing(ROUGH["small"], depth, margin=4.0), in_loops=in_loops)
-    body = RelaxingBody(made.geometry.mesh, relaxing_laws(materials), in_loops=in_loops)
+    body = RelaxingBody(made.geometry.mesh, relaxing_laws(materials), in_loops=in_loops, checked=True)
     body.ready(PRESSING_TIME / STEPS["small"][0])
     return made, body
 

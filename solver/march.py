@@ -34,10 +34,10 @@ def march(
     """Yield the equilibrium at each pull of `course`, from undeformed or `start`; a step that fails is cut in two.
 
     Backward Euler: within a step a point sticks where it was or slips from there. Raises NotConverged, saying where,
-    and Cancelled where `stop` says so.
+    Cancelled where `stop` says so, and ValueError for a pull that is none.
     """
     shape = Shape.undeformed(newton.body) if start is None else start
-    for number, pull in enumerate(pulls := list(course)):
+    for number, pull in enumerate(pulls := [pull.checked() for pull in course]):
         if len(pulls) > 1:
             tell("pressing and sliding step by step", number / len(pulls))
         begin, done, part = shape.pull, 0.0, 1.0

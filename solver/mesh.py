@@ -46,9 +46,16 @@ class Mesh:
     held_y: Indices = field(default_factory=lambda: _NONE)  # the same along y: rollers, and planes of symmetry
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only views."""
+        """Make the arrays read-only, and lengths and whole numbers those that loops take; others are left as they are.
+
+        Those others are refused where a body is made of them (`solver.handed_in`).
+        """
         for f in fields(self):
-            view = getattr(self, f.name).view()
+            given = np.asarray(getattr(self, f.name))
+            kinds, taken = ("fiu", np.float64) if f.name == "nodes" else ("iu", np.int64)
+            if given.dtype.kind in kinds or not given.size:
+                given = np.ascontiguousarray(given, taken)
+            view = given.view()
             view.flags.writeable = False
             object.__setattr__(self, f.name, view)
 

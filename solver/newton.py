@@ -16,6 +16,8 @@ from solver import kernels
 from solver.elimination import Elimination
 from solver.failures import NotConverged
 from solver.finite_body import FiniteBody
+from solver.friction import FrictionLaw
+from solver.handed_in import finite
 from solver.kernels import OPEN, ending
 from solver.mesh import Array
 
@@ -41,6 +43,14 @@ class Pull(NamedTuple):
         0  # +1, -1: the settled sliding state whose friction force on the skin points there; 0: sticks or slips
     )
     travel: float = 0.0  # of the surface along +x relative to the bone [mm]
+
+    def checked(self) -> "Pull":
+        """Return the same of floats alone, as loops take them. Raises ValueError for friction or ways that are none."""
+        law = FrictionLaw(float(self.mu), float(self.tau))
+        if self.sense not in (-1, 0, 1):
+            raise ValueError(f"sense = {self.sense} is not allowed: friction points along +1 or -1, or is found by 0")
+        depth, travel = finite("depth", self.depth), finite("travel", self.travel)
+        return Pull(depth, law.mu, law.tau_max, int(self.sense), travel)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,6 +20,7 @@ import numpy as np
 from solver.body import Body, planned
 from solver.contact import Contact, Course, Touchable, forced
 from solver.friction import FrictionLaw
+from solver.handed_in import check_body, check_driven, check_held, check_terms
 from solver.materials import Moduli, Prony, kept
 from solver.mesh import Array, Mesh
 from solver.receptor import Endings
@@ -44,8 +45,16 @@ class _Ready:
 class RelaxingBody:
     """A held body and its past; e elements, m terms at most in any of its materials."""
 
-    def __init__(self, mesh: Mesh, laws: Sequence[Prony], *, in_loops: bool = False) -> None:
-        """Start at rest; `laws` by region, `in_loops` as in `Body.of`."""
+    def __init__(self, mesh: Mesh, laws: Sequence[Prony], *, in_loops: bool = False, checked: bool = False) -> None:
+        """Start at rest; `laws` by region, `in_loops` as in `Body.of`. Raises BodyError and MeshError unless `checked`.
+
+        It takes no dead loads.
+        """
+        if not checked:
+            check_body(mesh, laws)
+            check_terms(laws)
+            check_driven(mesh)
+            check_held(mesh)
         self.mesh, self._laws, self._in_loops = mesh, laws, in_loops
         self._tree = planned(mesh, in_loops=in_loops)
         count, most = len(mesh.elements), max(len(law.terms) for law in laws)

@@ -8,6 +8,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from solver.hyperelastic import STIFFENING
+
 Slide = Literal["+x", "-x", "none"]
 Law = Literal["hooke", "neo-hookean", "ogden"]
 TISSUES = ("epidermis", "dermis", "fat", "bone")  # in the order of the mesh's regions
@@ -139,7 +141,7 @@ class Material:
         if self.stiffening is not None and self.law != "ogden":
             raise SceneError(f"{key}.stiffening", self.stiffening, 'it belongs to law = "ogden"')
         if self.stiffening is not None:
-            _within(f"{key}.stiffening", self.stiffening, 2.0, 14.0)  # steeper ones contradicted themselves
+            _within(f"{key}.stiffening", self.stiffening, *STIFFENING)
         for number, term in enumerate(self.prony):
             _within(f"{key}.prony[{number}].g", term.g, 0.0, 0.99)
             _within(f"{key}.prony[{number}].tau", term.tau, 1e-6, 1e6, "s")

@@ -21,8 +21,9 @@ def settled(
     """Return the sliding state under `pull` (sense +1 or -1), from undeformed or from `start`, in one step.
 
     A step that fails is halved, depth, friction and bound together. Raises NotConverged where that does not help,
-    Cancelled where `stop` says so.
+    Cancelled where `stop` says so, ValueError for a pull that is none.
     """
+    pull = pull.checked()
     shape = Shape.undeformed(newton.body) if start is None else start
     begin = shape.pull if start is not None else Pull(0.0, pull.mu, pull.tau, pull.sense)
     done, part = 0.0, 1.0

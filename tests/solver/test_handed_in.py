@@ -1,22 +1,42 @@
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from solver.body import Body
+from solver.contact import Course
+from solver.dead_loads import loaded
 from solver.finite_body import FiniteBody
+from solver.finite_forced import Given, untouched
+from solver.finite_relaxing import RelaxingNewton
 from solver.friction import FrictionLaw
 from solver.grid import MeshError
 from solver.handed_in import BodyError
-from solver.hyperelastic import NeoHooke
-from solver.materials import Hooke
+from solver.hyperelastic import NeoHooke, Ogden
+from solver.march import march
+from solver.materials import Hooke, Prony
+from solver.mesh import Mesh
+from solver.newton import Newton, Pull
+from solver.relaxing import RelaxingBody
 from solver.shapes import block
+from solver.sliding import settled
 
 MESH = block(np.linspace(-1.0, 1.0, 3), np.linspace(0.0, 1.0, 3))
 ONE = block(np.array([-1.0, 1.0]), np.array([0.0, 1.0]))
 NOT_HELD = replace(MESH, held=np.empty(0, np.int64))
 NAN = np.full(MESH.nodes.shape, np.nan)
-TISSUE = [Hooke(0.08, 0.48)]
+TISSUE, SKIN = [Hooke(0.08, 0.48)], [NeoHooke(0.08, 0.48)]
+
+
+def relaxes(g, tau):
+    return Prony(0.08, 0.48, ((g, tau),))
+
+
+def as_handed_in(mesh, whole, lengths):
+    """The mesh as another program may give it: numbers of other widths, every second one of a longer array."""
+    parts = {f.name: getattr(mesh, f.name) for f in fields(mesh)}
+    nodes = np.repeat(parts.pop("nodes").astype(lengths), 2, axis=0)[::2]
+    return Mesh(nodes, **{name: np.repeat(part.astype(whole), 2, axis=0)[::2] for name, part in parts.items()})
 
 
 @pytest.mark.parametrize(
@@ -39,6 +59,36 @@ TISSUE = [Hooke(0.08, 0.48)]
         (lambda: Body.of(replace(MESH, skin=MESH.elements[0][[2, 6, 3]]), TISSUE), "are no free side of an element"),
         (lambda: FiniteBody.of(replace(MESH, skin=MESH.skin[:4]), [NeoHooke(0.08, 0.48)]), "mesh.skin has 4 nodes"),
         (lambda: Body.of(replace(ONE, skin=ONE.elements[0][[0, 4, 1, 5, 2, 6, 3, 7, 0]]), TISSUE), "a node twice"),
+        (lambda: Body.of(replace(MESH, region=MESH.region.astype(float)), TISSUE), "mesh.region is made of float64"),
+        (lambda: Body.of(replace(MESH, held=MESH.held[:, None]), TISSUE), "mesh.held has the shape"),
+        (lambda: Body.of(replace(MESH, elements=MESH.elements[:, :8]), TISSUE), "nine nodes of each"),
+        (lambda: Body.of(replace(MESH, elements=MESH.elements[:0], region=MESH.region[:0]), TISSUE), "of one at least"),
+        (lambda: Body.of(replace(MESH, nodes=np.c_[MESH.nodes, MESH.nodes[:, 0]]), TISSUE), "every node x and y"),
+        (lambda: Body.of(replace(MESH, nodes=MESH.nodes.astype(str)), TISSUE), "every node x and y"),
+        (lambda: Body.of(MESH, TISSUE, MESH.nodes.astype(str)), "must be numbers"),
+        (lambda: FiniteBody.of(MESH, TISSUE), "no law of finite strain"),
+        (lambda: FiniteBody.of(MESH, [Ogden(0.08, 0.48, 0.0)]), "exponent 0; it must lie between 2 and 14"),
+        (lambda: FiniteBody.of(MESH, [Ogden(0.08, 0.48, 50.0)]), "exponent 50; it must"),
+        (lambda: FiniteBody.of(MESH, [Ogden(0.08, 0.48, np.nan)]), "exponent nan; it must"),
+        (lambda: RelaxingBody(replace(MESH, nodes=NAN), [relaxes(0.3, 1.0)]), "node 0 of the mesh"),
+        (lambda: RelaxingBody(NOT_HELD, [relaxes(0.3, 1.0)]), "nothing holds the body"),
+        (lambda: RelaxingBody(MESH, [Prony(0.08, 0.5)]), "nu = 0.5"),
+        (lambda: RelaxingBody(replace(MESH, region=MESH.region + 1), [relaxes(0.3, 1.0)]), "has no material"),
+        (lambda: RelaxingBody(MESH, [relaxes(1.2, 1.0)]), "terms that cannot relax"),
+        (lambda: RelaxingBody(MESH, [relaxes(-0.1, 1.0)]), "terms that cannot relax"),
+        (lambda: RelaxingBody(MESH, [relaxes(0.3, -1.0)]), "terms that cannot relax"),
+        (lambda: RelaxingNewton(FiniteBody.of(MESH, SKIN), [relaxes(0.3, np.nan)]), "terms that cannot relax"),
+        (lambda: settled(Newton(FiniteBody.of(MESH, SKIN)), Pull(0.1, -1.0, sense=-1)), "mu = -1.0"),
+        (lambda: settled(Newton(FiniteBody.of(MESH, SKIN)), Pull(0.1, 0.3, -1.0, sense=-1)), "tau_max = -1.0"),
+        (lambda: settled(Newton(FiniteBody.of(MESH, SKIN)), Pull(np.nan, 0.3, sense=-1)), "depth = nan"),
+        (lambda: settled(Newton(FiniteBody.of(MESH, SKIN)), Pull(0.1, 0.3, sense=2)), "sense = 2"),
+        (lambda: next(march(Newton(FiniteBody.of(MESH, SKIN)), [Pull(np.inf, 0.3)])), "depth = inf"),
+        (lambda: next(march(Newton(FiniteBody.of(MESH, SKIN)), [Pull(0.1, 0.3, travel=np.nan)])), "travel = nan"),
+        (lambda: loaded(Newton(FiniteBody.of(MESH, SKIN)), pull=Pull(0.0, -0.3)), "mu = -0.3"),
+        (lambda: untouched(Newton(FiniteBody.of(MESH, SKIN)), -0.3, np.inf), "mu = -0.3"),
+        (lambda: Given(0.1, np.nan).checked(), "tangential = nan"),
+        (lambda: Course(Body.of(MESH, TISSUE).touchable, FrictionLaw(0.3, np.inf)).sliding(np.nan, 1), "depth = nan"),
+        (lambda: Course(Body.of(MESH, TISSUE).touchable, FrictionLaw(0.3, np.inf)).sliding(0.1, 0), "direction = 0"),
         (lambda: FrictionLaw(-0.3, np.inf), "mu = -0.3"),
         (lambda: FrictionLaw(np.nan, np.inf), "mu = nan"),
         (lambda: FrictionLaw(0.3, np.nan), "tau_max = nan"),
@@ -54,3 +104,32 @@ def test_an_element_turned_inside_out_is_refused_at_the_door():
     for make in (lambda mesh: Body.of(mesh, TISSUE), lambda mesh: FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)])):
         with pytest.raises(MeshError, match="folded"):
             make(replace(MESH, nodes=nodes))
+
+
+@pytest.mark.parametrize("whole", [np.uint8, np.int16, np.int32, np.uint64, np.int64])
+@pytest.mark.parametrize("lengths", [np.float32, np.float64])
+def test_a_mesh_of_numbers_of_any_width_gives_the_forces_of_the_closed_form(whole, lengths):
+    # a block of 2 x 1 mm on the flat, its top lowered by rollers: Hooke's E/(1 - nu^2) times the strain, and the
+    # neo-Hookean nominal stress at a stretch of 0.9 whose sides are free, 0.012098 MPa
+    top, middle = MESH.held, np.flatnonzero(MESH.nodes[:, 0] == 0.0)
+    rolls = replace(MESH, held=top[:0], held_y=top, held_x=middle)
+    mesh = as_handed_in(rolls, whole, lengths)
+    free = FrictionLaw(0, np.inf)
+    for in_loops in (False, True):
+        found = Course(Body.of(mesh, TISSUE, in_loops=in_loops).touchable, free).sliding(np.float32(0.125), 1)
+        assert found.normal.sum() == pytest.approx(2.0 * 0.125 * 0.08 / (1.0 - 0.48**2), rel=1e-6)
+    force = settled(Newton(FiniteBody.of(mesh, SKIN)), Pull(0.1, 0, sense=1)).force
+    assert force[1] == pytest.approx(2.0 * 0.012098, rel=1e-4)
+
+
+def test_pulls_and_forces_of_whole_numbers_reach_the_loops_as_the_floats_they_are_made_for():
+    assert [type(number) for number in Pull(1, 0, 2, np.int64(-1), np.float32(3.0)).checked()] == [
+        *(float, float, float, int, float)
+    ]
+    assert Given(1, None, 2).checked() == (1.0, None, 2.0)
+    assert type(FrictionLaw(1, 2).mu) is float
+    loads = np.zeros(MESH.nodes.shape, np.int32)
+    loads[MESH.skin[2], 1] = 1  # on the middle of the foot
+    one, other = (Body.of(MESH, TISSUE, of, MESH.nodes * 0.0) for of in (loads, loads.astype(float)))
+    assert np.array_equal(one.touchable.normal_free, other.touchable.normal_free)
+    assert one.touchable.normal_free[2] > 0.0
