@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver import kernels
+from solver.edges import arcs_of
 from solver.elements import Q2P1
 from solver.finite_body import VALUES, FiniteBody, Narrow
 from solver.mesh import Array, Flags, Indices
@@ -32,7 +33,7 @@ class Places:
     def of(finger: FingerMesh, body: FiniteBody) -> "Places":
         """Return the places of a mesh."""
         arcs, heights = with_middles(finger.arcs), _heights(finger)
-        skin = arcs[np.searchsorted(finger.whole, finger.mesh.skin)]
+        skin = arcs_of(finger)
         lengths = np.empty(len(skin))
         kernels.tributary(skin, body.middle, lengths)
         points = VALUES @ finger.mesh.nodes[finger.mesh.elements]
@@ -52,6 +53,7 @@ class Bridge:
     station: Narrow  # (a, 3) old elements along the skin that hold the new quadrature points
     layer: Narrow  # (b, 3) and across it
     onto: Array  # (k, old k) the new skin's values by the old skin's, between whose nodes they are linear
+    forces: Array  # (k, old k) the same of forces, whose values are those by length
     nearest: Indices  # (k,) old node of the skin
     driven: Flags  # (nodes, 2) which components of the new nodes are held
 
@@ -62,42 +64,36 @@ class Bridge:
         station = _piece(old.arcs[::2], new.inner_arcs).astype(np.int32)
         layer = _piece(old.heights[::2], new.inner_heights).astype(np.int32)
         onto = np.stack([np.interp(new.skin, old.skin, one, 0.0, 0.0) for one in np.eye(len(old.skin))], axis=1)
+        forces = new.lengths[:, None] * onto / old.lengths
         nearest = np.abs(new.skin[:, None] - old.skin).argmin(axis=1)
-        return Bridge(old, new, *along, *across, station, layer, onto, nearest, new.body.mesh.driven)
+        return Bridge(old, new, *along, *across, station, layer, onto, forces, nearest, new.body.mesh.driven)
 
     def carried(self, shape: Shape) -> Shape:
-        """Return `shape`, found on the old mesh, as a start on the new one.
+        """Return `shape`, found on the old mesh, as a start on the new one."""
+        return self.touched(shape, *self.fields(shape.u, shape.pressure))
 
-        The states of skin nodes follow from interpolated pressures.
-        """
-        u, pressure = self.fields(shape)
-        values = np.zeros((len(shape.state), 3))
+    def touched(self, shape: Shape, u: Array, pressure: Array) -> Shape:
+        """Return a start on the new mesh of `u` (nodes, 2) and `pressure` (e, 3), touching where `shape` does."""
         touching = shape.touching
-        values[:, :2] = shape.reaction / self.old.lengths[:, None]
-        values[:, 2] = 1.0
-        values[~touching] = 0.0
-        found = self.onto @ values
-        state = np.where(found[:, 2] > 0.5, np.maximum(shape.state[self.nearest], kernels.SLIP), kernels.OPEN)
-        reaction = found[:, :2] * self.new.lengths[:, None]
-        return Shape(
-            u, pressure, state.astype(np.int32), shape.sense[self.nearest], reaction, shape.pull, shape.iterations
-        )
+        state = np.where(self.onto @ touching > 0.5, np.maximum(shape.state[self.nearest], kernels.SLIP), kernels.OPEN)
+        reaction = self.forces @ (shape.reaction * touching[:, None])
+        return Shape(u, pressure, state, shape.sense[self.nearest], reaction, shape.pull, shape.iterations)
 
-    def fields(self, shape: Shape) -> tuple[Array, Array]:
-        """Return displacements (nodes, 2) [mm] and pressure modes (e, 3) of `shape` on the new mesh.
+    def fields(self, u: Array, pressure: Array) -> tuple[Array, Array]:
+        """Return displacements `u` [mm] and modes of `pressure` of the old mesh on the new one, (nodes, 2) and (e, 3).
 
         Displacements are interpolated by the elements' own functions in arc position and height, so a mesh carries its
         state to itself unchanged. Pressures are those of the elements they come from: what interpolated displacements
         change in volume, small as it is, a stiff body would answer strongly.
         """
         old, new = self.old.body, self.new.body
-        u, pressure = np.empty(new.mesh.nodes.shape), np.empty((len(new.nodes), 3))
+        u_new, pressure_new = np.empty(new.mesh.nodes.shape), np.empty((len(new.nodes), 3))
         kernels.carry(
-            shape.u, shape.pressure, old.combination, old.centre, self.along, self.along_parts, self.across,
-            self.across_parts, self.station, self.layer, self.new.points, new.weight, new.modes, u, pressure,
+            u, pressure, old.combination, old.centre, self.along, self.along_parts, self.across, self.across_parts,
+            self.station, self.layer, self.new.points, new.weight, new.modes, u_new, pressure_new,
         )  # fmt: skip
-        u[self.driven] = 0.0
-        return u, pressure
+        u_new[self.driven] = 0.0
+        return u_new, pressure_new
 
 
 def _inner(lines: Array) -> Array:

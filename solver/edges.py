@@ -13,26 +13,25 @@ from solver.mesher import FingerMesh, with_middles
 FEWEST = 5  # touching nodes for which the force can tell
 
 
-def edges(geometry: FingerMesh, force: Array, touching: NDArray[np.bool_]) -> tuple[float, float] | None:
+def edges(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> tuple[float, float] | None:
     """Return the arc positions [mm] where contact ends; None where it is too short to tell.
 
-    `force` (k,) [N/mm] are the normal forces on the nodes that may touch.
+    `force` (k,) [N/mm] are the normal forces on the nodes that may touch, which lie at `arcs` (k,).
     """
-    arcs = arcs_of(geometry)
     high = last_edge(arcs, force, touching)
     low = last_edge(-arcs[::-1], force[::-1], touching[::-1])
     return None if high is None or low is None or high <= -low else (-low, high)
 
 
-def width(geometry: FingerMesh, x: Array, force: Array, touching: NDArray[np.bool_]) -> float:
+def width(arcs: Array, x: Array, force: Array, touching: NDArray[np.bool_]) -> float:
     """Return the distance along the surface from where contact begins to where it ends [mm], 0 where nothing touches.
 
     `x` (k,) are the deformed positions along the surface [mm]. Where contact is too short to tell its edges, a touching
     node stands for half the way to its open neighbours.
     """
-    ends = edges(geometry, force, touching)
+    ends = edges(arcs, force, touching)
     if ends is not None:
-        low, high = np.interp(ends, arcs_of(geometry), x)
+        low, high = np.interp(ends, arcs, x)
         return float(high - low)
     on = np.flatnonzero(touching)
     if not len(on):
@@ -59,10 +58,9 @@ def last_edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float |
         return None
     last = int(on[-1])
     line = last - 2 if last % 2 == 0 else last - 1  # the last line with contact on both sides
-    beyond = np.arange(line, last + 1)
-    pressed = force[beyond].copy()
+    pressed, way = force[line : last + 1].copy(), arcs[line : last + 1] - arcs[line]
     gaps = arcs[line] - arcs[line - 2], arcs[line + 2] - arcs[line]
     pressed[0] *= gaps[1] / (gaps[0] + gaps[1])  # the part of the line's own force that stems from beyond
-    reach = 2.5 * float(pressed @ (arcs[beyond] - arcs[line])) / float(pressed.sum())
+    reach = 2.5 * float(pressed @ way) / float(pressed.sum())
     least = arcs[last] - 0.35 * (arcs[last] - arcs[last - 1])
-    return float(np.clip(arcs[line] + reach, least, arcs[min(last + 1, len(arcs) - 1)]))
+    return float(min(max(arcs[line] + reach, least), arcs[min(last + 1, len(arcs) - 1)]))

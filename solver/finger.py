@@ -9,7 +9,7 @@ import numpy as np
 
 from solver.body import Body, planned
 from solver.contact import Contact
-from solver.edges import width
+from solver.edges import arcs_of, width
 from solver.elements import Q2P1
 from solver.mesh import Array, distinct
 from solver.mesher import FingerMesh, Sizing, finger_mesh
@@ -125,7 +125,7 @@ class FingerModel:
     def contact_width(self, contact: Contact, skin: Array) -> float:
         """Return how long the contact is along the surface [mm]; `skin` (2 k,) its displacement, normal first [mm]."""
         mesh, k = self.geometry.mesh, len(contact.state)
-        return width(self.geometry, mesh.nodes[mesh.skin, 0] + skin[k:], contact.normal, contact.touching)
+        return width(arcs_of(self.geometry), mesh.nodes[mesh.skin, 0] + skin[k:], contact.normal, contact.touching)
 
     def reaches_out(self, contact: Contact, displacement: Array, indentation: float) -> bool:
         """Return whether skin outside the part that may touch would, so that the part must be made larger."""

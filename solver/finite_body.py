@@ -120,7 +120,7 @@ class FiniteProbes:
     modes: Array  # (p, 3)
     weights: Array  # (p,) areas [mm2]
     patch: Indices  # (p,)
-    count: int
+    areas: Array  # (r,) [mm2]; nan where there is no patch
 
     @staticmethod
     def of(body: FiniteBody, endings: Endings) -> "FiniteProbes":
@@ -130,6 +130,7 @@ class FiniteProbes:
         element = probes.element[order]
         modes = (body.combination[element] @ probes.modes[order][:, :, None])[:, :, 0]
         gradient = probes.gradient[order]
+        areas = np.bincount(endings.patch, endings.weights, endings.count)
         return FiniteProbes(
             element.astype(np.int32),
             np.ascontiguousarray(gradient[..., 0]),
@@ -137,7 +138,7 @@ class FiniteProbes:
             modes,
             endings.weights[order],
             endings.patch[order],
-            endings.count,
+            np.where(areas > 0.0, areas, np.nan),
         )
 
     def energy(self, body: FiniteBody, displacement: Array) -> Array:
@@ -151,6 +152,4 @@ class FiniteProbes:
 
     def average(self, body: FiniteBody, displacement: Array) -> Array:
         """Return the SED averaged over each patch (r,) [MPa]; nan where there is no patch."""
-        total = np.bincount(self.patch, self.energy(body, displacement) * self.weights, self.count)
-        area = np.bincount(self.patch, self.weights, self.count)
-        return total / np.where(area > 0.0, area, np.nan)
+        return np.bincount(self.patch, self.energy(body, displacement) * self.weights, len(self.areas)) / self.areas

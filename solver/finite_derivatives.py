@@ -80,10 +80,9 @@ def slope(probes: FiniteProbes, body: FiniteBody, displacement: Array, steps: Ar
     stiff = body.shear[e] * slopes(body.stiffening[e], excess[:, 0])[0]
     energy = stiff[:, None] * (np.einsum("pqaA,pqcaA->pqc", f, df) - dlog)[:, 0]
     energy += (body.lame[e] * fit)[:, None] * dfit
-    area = np.bincount(probes.patch, probes.weights, probes.count)
-    total = np.zeros((probes.count, energy.shape[1]))
+    total = np.zeros((len(probes.areas), energy.shape[1]))
     np.add.at(total, probes.patch, energy * probes.weights[:, None])
-    return total / np.where(area > 0.0, area, np.nan)[:, None]
+    return total / probes.areas[:, None]
 
 
 def _gradients(local: Array, steps: Array, gradient: Array) -> tuple[Array, Array]:

@@ -1,6 +1,6 @@
 """The finger at finite strain on one mesh, ready for any surface."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from weakref import WeakKeyDictionary
 
@@ -13,8 +13,8 @@ from solver.crossing import Pinch
 from solver.edges import edges, width
 from solver.finite_body import FiniteBody, FiniteProbes
 from solver.grid import MeshError
-from solver.kernels import CAP
-from solver.mesh import Array, Indices
+from solver.kernels import CAP, OPEN
+from solver.mesh import Array
 from solver.mesher import FingerMesh, Sizing, finger_mesh
 from solver.newton import Newton, Shape
 from solver.receptor import ROW, endings, middle
@@ -74,7 +74,8 @@ class FiniteFinger:
 
     def numbers(self, shape: Shape) -> Array:
         """Return what errors are estimated of: SED of the ending, normal and tangential force along +x (3,)."""
-        return np.array([self.sed_ending(shape), shape.force[1], shape.force[0]])
+        along, up = shape.force
+        return np.array([self.sed_ending(shape), up, along])
 
     def all_numbers(self, shape: Shape) -> Array:
         """Return them, the depth, the bone's shift along +x and the contact width (6,)."""
@@ -86,10 +87,9 @@ class FiniteFinger:
 
     def brought_on(self, now: Shape, before: Shape, other: "FiniteFinger", top: Shape, finest: "FiniteFinger") -> Shape:
         """Return `top`, found on `finest`, with what has changed from `before` to `now` on `other`, as a start here."""
-        change = replace(now, u=now.u - before.u, pressure=now.pressure - before.pressure)
-        start = self.bridge(other).carried(change)
-        u, pressure = self.bridge(finest).fields(top)
-        return replace(start, u=u + start.u, pressure=pressure + start.pressure)
+        change = self.bridge(other).fields(now.u - before.u, now.pressure - before.pressure)
+        u, pressure = self.bridge(finest).fields(top.u, top.pressure)
+        return self.bridge(other).touched(now, u + change[0], pressure + change[1])
 
     def bridge(self, other: "FiniteFinger") -> Bridge:
         """Return the way here from the mesh of `other`, made when first asked for."""
@@ -108,18 +108,17 @@ class FiniteFinger:
 
     def runs_out(self, shape: Shape) -> bool:
         """Return whether contact reaches an end of the skin that is looked at."""
-        return bool(shape.touching[[0, -1]].any())
+        return bool(shape.state[0] != OPEN or shape.state[-1] != OPEN)
 
     def pinch(self, shape: Shape) -> Pinch:
         """Return how far the skin is squeezed, and whether it has a crease."""
-        geometry = self.geometry
-        touching = np.zeros(len(geometry.whole), bool)
-        touching[self._may_touch] = shape.touching
-        return Pinch(*kernels.pinched(geometry.mesh.nodes, shape.u, geometry.whole, geometry.loose, touching))
+        geometry, first = self.geometry, self._first
+        return Pinch(*kernels.pinched(geometry.mesh.nodes, shape.u, geometry.whole, geometry.loose, shape.state, first))
 
     @cached_property
-    def _may_touch(self) -> Indices:
-        return np.searchsorted(self.geometry.whole, self.geometry.mesh.skin)
+    def _first(self) -> int:
+        """The first node of the whole skin that may touch."""
+        return int(np.searchsorted(self.geometry.whole, self.geometry.mesh.skin)[0])
 
     def crosses(self, shape: Shape) -> bool:
         """Return whether the skin crosses itself."""
@@ -135,19 +134,19 @@ class FiniteFinger:
 
     def edges(self, shape: Shape) -> tuple[float, float] | None:
         """Return the arc positions [mm] where contact ends; None where it is too short to tell."""
-        return edges(self.geometry, shape.reaction[:, 1], shape.touching)
+        return edges(self.places.skin, shape.reaction[:, 1], shape.touching)
 
     def contact_width(self, shape: Shape) -> float:
         """Return how long the contact is along the surface [mm]."""
-        return width(self.geometry, shape.place(self.newton.body)[:, 0], shape.reaction[:, 1], shape.touching)
+        return width(self.places.skin, shape.place(self.newton.body)[:, 0], shape.reaction[:, 1], shape.touching)
 
     def bounded_at_an_edge(self, shape: Shape) -> bool:
         """Return whether skin slips at the traction bound at the last two nodes of an edge of contact that is known.
 
         A drag too small to matter does not count.
         """
-        if not abs(shape.force[0]) > RUBS * shape.force[1]:
+        on = shape.state[shape.touching]
+        if CAP not in on[:2] and CAP not in on[-2:]:
             return False
-        on = np.flatnonzero(shape.touching)
-        last = np.concatenate([on[:2], on[-2:]])
-        return bool((shape.state[last] == CAP).any()) and self.edges(shape) is not None
+        along, up = shape.force
+        return bool(abs(along) > RUBS * up) and self.edges(shape) is not None

@@ -109,7 +109,7 @@ class FiniteStepper:
             done = corrected(newton, shape, given, origin, before, kept=kept)
             if kept and (done is None or done[1] > FURTHEST):
                 continue
-            if done is None or done[1] > FURTHEST or done[0].state[0] != OPEN or done[0].state[-1] != OPEN:
+            if done is None or done[1] > FURTHEST or self._finger.runs_out(done[0]):
                 return self._lose(normal)
             shape = done[0]
             if number >= iterations and not kept and done[1] < far:

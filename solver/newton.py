@@ -111,7 +111,7 @@ class Newton:
         self.steps = np.zeros((2 * skin, 4))  # of the skin
         self.length = np.zeros(skin)
         self.bulk = float((body.lame / body.shear).max())  # how much stiffer the body is to a change of volume [-]
-        self.skin_x, self.skin_y = body.mesh.nodes[body.skin].T.copy()
+        self.skin_x = body.mesh.nodes[body.skin, 0]
         self._reaction = np.zeros((skin, 2))
         self._state, self._sense = np.zeros(skin, np.int32), np.zeros(skin, np.int32)
         self._free = np.zeros(2 * skin, np.int32)
@@ -119,6 +119,7 @@ class Newton:
         self._felt = self.inside.felt
         self._every = np.empty(body.size)
         place, skin, factored = body.mesh.nodes, body.skin, self.inside.factored
+        lies = place, skin, body.middle
         self._assemble = ending(
             kernels.assemble, body.grad_x, body.grad_y, body.weight, body.modes, body.laplace, body.shear,
             body.stiffening, body.lame, body.nodes, body.unknown, self.tangent, self.force, self.fold, self.core,
@@ -134,9 +135,10 @@ class Newton:
             self.steps, self._reaction,
         )  # fmt: skip
         self._move = ending(
-            kernels.move, place, skin, body.middle, *factored, self.inside.carried, self._every, body.nodes,
+            kernels.move, self.inside.stiffness, *lies, *factored, self.inside.carried, self._every, body.nodes,
             body.unknown, body.lame, self.fold, self.dilate, self.volume, self.length,
         )  # fmt: skip
+        self._meet = ending(kernels.meet, *lies, self.length)
 
     def linearise(self, shape: Shape, pull: Pull, anchor: Array, rounds: int = 0) -> bool:
         """Set up the system at `shape` under `pull`, solve it for the skin's `steps` (2 k, 4); False where it fails.
@@ -175,8 +177,8 @@ class Newton:
         self, shape: Shape, pull: Pull, skin: Array, anchor: Array, scale: float = 1.0
     ) -> tuple[Shape, float, int]:
         """Return the shape after the skin's step (2 k,), its largest move [mm], and how many states it changed."""
-        u, pressure = np.empty_like(shape.u), np.empty_like(shape.pressure)
-        state, sense, reaction = self._state.copy(), self._sense.copy(), self.reaction(skin)
+        u, pressure, reaction = np.empty_like(shape.u), np.empty_like(shape.pressure), np.empty_like(shape.reaction)
+        state, sense = self._state.copy(), self._sense.copy()
         largest, changed = self._move(
             shape.u, shape.pressure, skin, scale, anchor, pull.depth, pull.mu, pull.tau, pull.sense, u, pressure, state,
             sense, reaction,
@@ -190,8 +192,9 @@ class Newton:
         the steps fall: with a new tangent as the square, with a kept one in proportion. Raises NotConverged where
         `limit` iterations do not do it or the body would turn inside out.
         """
-        anchor = start.place(self.body)[:, 0] + (pull.travel - start.pull.travel)
-        shape = before = self._entered(start, pull)
+        x = self.skin_x + start.u[self.body.skin, 0]
+        anchor = x + (pull.travel - start.pull.travel)
+        shape = before = self._entered(start, pull, x)
         kept = self.inside.found is start.u
         scale, last, new, alike = 1.0, 0.0, False, 0
         for _ in range(limit):
@@ -225,11 +228,8 @@ class Newton:
             last = largest
         raise NotConverged(f"no equilibrium within {limit} iterations")
 
-    def _entered(self, start: Shape, pull: Pull) -> Shape:
-        """Return `start` with the states that `pull` brings at once: new contacts, and slip in its direction."""
+    def _entered(self, start: Shape, pull: Pull, x: Array) -> Shape:
+        """Return `start`, whose skin lies at `x` (k,) along the surface, with the states that `pull` brings at once."""
         state, sense = start.state.copy(), start.sense.copy()
-        x = self.skin_x + start.u[self.body.skin, 0]
-        above = self.skin_y + start.u[self.body.skin, 1] - pull.depth
-        kernels.rubbed(x, self.body.middle, state, pull.mu, self.length)
-        kernels.restate(state, sense, start.reaction, above, x - x, self.length, pull.mu, pull.tau, pull.sense)
+        self._meet(start.u, x, pull.depth, pull.mu, pull.tau, pull.sense, state, sense, start.reaction)
         return Shape(start.u, start.pressure, state, sense, start.reaction, start.pull, start.iterations)

@@ -8,7 +8,7 @@ from solver.kernels.carrying import carry
 from solver.kernels.compiling import CAP, HELD_X, HELD_Y, OPEN, SLIP, STICK, ending
 from solver.kernels.elements import assemble, energies, forces
 from solver.kernels.fronts import condense, eliminate, unfold
-from solver.kernels.iterating import move, touch
+from solver.kernels.iterating import meet, move, touch
 from solver.kernels.outline import crosses, pinched
 from solver.kernels.overstress import add_overstress
 from solver.kernels.skin import STEEP, impose, restate, rubbed, solve, tributary
@@ -31,6 +31,7 @@ __all__ = [
     "energies",
     "forces",
     "impose",
+    "meet",
     "move",
     "pinched",
     "restate",

@@ -238,12 +238,10 @@ def forces(
     least = np.inf
     ux, uy = np.empty(9), np.empty(9)
     fx, fy = np.empty(9), np.empty(9)
-    inverse = np.empty((9, 4))  # transposed, at each quadrature point
+    inverse, stress = np.empty((9, 4)), np.empty((9, 4))  # transposed, and without the pressure, at quadrature points
     for e in range(nodes.shape[0]):
         for i in range(9):
             ux[i], uy[i] = u[nodes[e, i], 0], u[nodes[e, i], 1]
-        fx[:] = 0.0
-        fy[:] = 0.0
         v0 = v1 = v2 = 0.0
         for q in range(9):
             gx, gy = grad_x[e, q], grad_y[e, q]
@@ -269,17 +267,16 @@ def forces(
                 g *= stiffened(stiffening[e], excess)[0]
             a00, a01, a10, a11 = f11 / j, -f10 / j, -f01 / j, f00 / j
             inverse[q, 0], inverse[q, 1], inverse[q, 2], inverse[q, 3] = a00, a01, a10, a11
-            p00, p11 = g * (h00 - h11 + grown * f00) / j, g * (h11 - h00 + grown * f11) / j  # as exactly
-            p01, p10 = g * (f01 - a01), g * (f10 - a10)
-            for i in range(9):
-                fx[i] += p00 * gx[i] + p01 * gy[i]
-                fy[i] += p10 * gx[i] + p11 * gy[i]
+            stress[q, 0], stress[q, 3] = g * (h00 - h11 + grown * f00) / j, g * (h11 - h00 + grown * f11) / j  # as exactly
+            stress[q, 1], stress[q, 2] = g * (f01 - a01), g * (f10 - a10)
         volume[e, 0], volume[e, 1], volume[e, 2] = v0, v1, v2
+        fx[:] = 0.0
+        fy[:] = 0.0
         for q in range(9):
             gx, gy = grad_x[e, q], grad_y[e, q]
             push = lame[e] * weight[e, q] * (modes[e, q, 0] * v0 + modes[e, q, 1] * v1 + modes[e, q, 2] * v2)
-            p00, p01 = push * inverse[q, 0], push * inverse[q, 1]
-            p10, p11 = push * inverse[q, 2], push * inverse[q, 3]
+            p00, p01 = stress[q, 0] + push * inverse[q, 0], stress[q, 1] + push * inverse[q, 1]
+            p10, p11 = stress[q, 2] + push * inverse[q, 2], stress[q, 3] + push * inverse[q, 3]
             for i in range(9):
                 fx[i] += p00 * gx[i] + p01 * gy[i]
                 fy[i] += p10 * gx[i] + p11 * gy[i]

@@ -2,17 +2,19 @@
 
 import numpy as np
 
-from solver.kernels.compiling import Array, Flags, Wide, compiled
+from solver.kernels.compiling import OPEN, Array, Flags, Narrow, Wide, compiled
 
 SQUEEZED = 0.85  # stretch of skin, on one side at least, in which a kink is told of
 
 
 @compiled
-def pinched(nodes: Array, u: Array, outline: Wide, loose: Flags, touching: Flags) -> tuple[float, int, float, float]:
+def pinched(
+    nodes: Array, u: Array, outline: Wide, loose: Flags, state: Narrow, first: int
+) -> tuple[float, int, float, float]:
     """Return how far the skin is squeezed where its elements are `loose` (a,), as `solver.crossing.pinched` has it.
 
     `nodes` (n, 2) undeformed, `u` (n, 2) displacements, `outline` (2 a + 1,) the nodes of the skin in order, of which
-    some are `touching` (2 a + 1,).
+    those from number `first` on may touch, as `state` (k,) says.
     """
     least, place, lowest, kink = np.inf, 0, np.inf, 0.0
     before_x, before_y = np.nan, np.nan  # tangent at the end of the element before
@@ -31,7 +33,9 @@ def pinched(nodes: Array, u: Array, outline: Wide, loose: Flags, touching: Flags
             least, place = min(one, other), j
         size = np.hypot(3.0 * px - qx, 3.0 * py - qy)
         x, y = (3.0 * dx - ex) / size, (3.0 * dy - ey) / size
-        if min(np.hypot(x, y), np.hypot(before_x, before_y)) < SQUEEZED and not touching[2 * j]:
+        node = 2 * j - first
+        touches = 0 <= node < state.shape[0] and state[node] != OPEN
+        if min(np.hypot(x, y), np.hypot(before_x, before_y)) < SQUEEZED and not touches:
             kink = max(kink, np.hypot(x - before_x, y - before_y))
         size = np.hypot(3.0 * qx - px, 3.0 * qy - py)
         before_x, before_y = (3.0 * ex - dx) / size, (3.0 * ey - dy) / size

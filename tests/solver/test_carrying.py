@@ -40,7 +40,7 @@ def test_the_compiled_carrying_is_the_plain_one():
         shape.u.reshape(len(old.arcs), len(old.heights), 2), slopes, (bridge.along, bridge.along_parts),
         (bridge.across, bridge.across_parts), host.reshape(-1, 9), new.points, new.body.weight, new.body.modes,
     )  # fmt: skip
-    found, modes = bridge.fields(shape)
+    found, modes = bridge.fields(shape.u, shape.pressure)
     np.testing.assert_allclose(found, u.reshape(-1, 2), rtol=0.0, atol=1e-14)
     np.testing.assert_allclose(modes, pressure, rtol=1e-10, atol=1e-15)
 

@@ -216,7 +216,9 @@ def test_the_compiled_outline_is_squeezed_and_crosses_itself_where_the_plain_one
         outline = np.arange(2, 23)
         loose, touching = draw.random(10) < 0.8, draw.random(21) < 0.3
         before, after = nodes[outline], (nodes + u)[outline]
-        assert kernels.pinched(nodes, u, outline, loose, touching) == pytest.approx(
+        first, state = 5, touching[5:18].astype(np.int32)
+        touching[:5] = touching[18:] = False  # skin that may not touch
+        assert kernels.pinched(nodes, u, outline, loose, state, first) == pytest.approx(
             pinched(before, after, loose, touching), rel=1e-12
         )
         assert kernels.crosses(nodes, u, outline) == crosses_itself(after)
