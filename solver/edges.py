@@ -18,8 +18,7 @@ def edges(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> tuple[float
 
     `force` (k,) [N/mm] are the normal forces on the nodes that may touch, which lie at `arcs` (k,).
     """
-    high = last_edge(arcs, force, touching)
-    low = last_edge(-arcs[::-1], force[::-1], touching[::-1])
+    high, low = last_edge(arcs, force, touching), last_edge(-arcs[::-1], force[::-1], touching[::-1])
     return None if high is None or low is None or high <= -low else (-low, high)
 
 
@@ -58,9 +57,9 @@ def last_edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float |
         return None
     last = int(on[-1])
     line = last - 2 if last % 2 == 0 else last - 1  # the last line with contact on both sides
-    pressed, way = force[line : last + 1].copy(), arcs[line : last + 1] - arcs[line]
-    gaps = arcs[line] - arcs[line - 2], arcs[line + 2] - arcs[line]
+    place, pressed = arcs.tolist(), force[line : last + 1].tolist()  # so few numbers are quicker one by one
+    gaps = place[line] - place[line - 2], place[line + 2] - place[line]
     pressed[0] *= gaps[1] / (gaps[0] + gaps[1])  # the part of the line's own force that stems from beyond
-    reach = 2.5 * float(pressed @ way) / float(pressed.sum())
-    least = arcs[last] - 0.35 * (arcs[last] - arcs[last - 1])
-    return float(min(max(arcs[line] + reach, least), arcs[min(last + 1, len(arcs) - 1)]))
+    moment = sum(one * (at - place[line]) for one, at in zip(pressed, place[line : last + 1], strict=True))
+    least = place[last] - 0.35 * (place[last] - place[last - 1])
+    return min(max(place[line] + 2.5 * moment / sum(pressed), least), place[min(last + 1, len(place) - 1)])

@@ -145,8 +145,8 @@ class FiniteFinger:
 
         A drag too small to matter does not count.
         """
-        on = shape.state[shape.touching]
-        if CAP not in on[:2] and CAP not in on[-2:]:
+        on = [state for state in shape.state.tolist() if state != OPEN]
+        if CAP not in on[:2] + on[-2:]:
             return False
         along, up = shape.force
         return bool(abs(along) > RUBS * up) and self.edges(shape) is not None

@@ -173,20 +173,23 @@ def condense(
     """
     for p in range(start.shape[0]):
         k, b, first = inner[p], border[p], start[p]
-        top = factors[factor_at[p] : factor_at[p] + k * (k + b)].reshape(k, k + b)
-        passed = near[:b]
-        passed[:] = 0.0
-        for i in range(k):
-            row = top[i]
-            part = force[first + i] / row[i]
-            mine, across = force[first + i + 1 : first + k], row[i + 1 : k]
-            for j in range(k - i - 1):
-                mine[j] -= across[j] * part
-            across = row[k:]
-            for j in range(b):
-                passed[j] += across[j] * part
+        wide = k + b
+        top = factors[factor_at[p] : factor_at[p] + k * wide].reshape(k, wide)
+        near[:k], near[k:wide] = force[first : first + k], 0.0
+        for i in range(0, k - 1, 2):  # two rows at a time, which share what they change
+            one, two, rest = top[i, i:], top[i + 1, i:], near[i:wide]
+            x = rest[0] / one[0]
+            rest[1] -= one[1] * x
+            y = rest[1] / two[1]
+            for j in range(2, wide - i):
+                rest[j] -= one[j] * x + two[j] * y
+        if k % 2 == 1:
+            one, x = top[k - 1], near[k - 1] / top[k - 1, k - 1]
+            for j in range(k, wide):
+                near[j] -= one[j] * x
+        force[first : first + k] = near[:k]
         for j in range(b):
-            force[numbers[border_at[p] + j]] -= passed[j]
+            force[numbers[border_at[p] + j]] += near[k + j]
 
 
 @compiled

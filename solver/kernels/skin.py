@@ -8,7 +8,7 @@ from solver.kernels.compiling import CAP, HELD_X, HELD_Y, OPEN, SLIP, STICK, Arr
 # how the length of skin of an edge's first, middle and last node grows with the positions of the three: Simpson's rule
 _LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
 
-
+COLUMNS = 4  # of the right-hand side
 STEEP = 1.0  # coefficient of friction from which skin that comes to touch is first thought to slip at the bound
 
 
@@ -152,37 +152,39 @@ def solve(matrix: Array, right: Array, size: int) -> bool:
     No pivoting: the rows of contact and friction sit in a matrix that is otherwise the tangent of a stable body.
     """
     a = matrix[: size * size].reshape(size, size)
+    over = np.empty(size)  # one over the pivots
     for r in range(size):
         row = a[r]
         p = 0
         while p + 4 <= r:
             s0, s1, s2, s3 = a[p], a[p + 1], a[p + 2], a[p + 3]
-            f0 = row[p] / s0[p]
-            f1 = (row[p + 1] - f0 * s0[p + 1]) / s1[p + 1]
-            f2 = (row[p + 2] - f0 * s0[p + 2] - f1 * s1[p + 2]) / s2[p + 2]
-            f3 = (row[p + 3] - f0 * s0[p + 3] - f1 * s1[p + 3] - f2 * s2[p + 3]) / s3[p + 3]
+            f0 = row[p] * over[p]
+            f1 = (row[p + 1] - f0 * s0[p + 1]) * over[p + 1]
+            f2 = (row[p + 2] - f0 * s0[p + 2] - f1 * s1[p + 2]) * over[p + 2]
+            f3 = (row[p + 3] - f0 * s0[p + 3] - f1 * s1[p + 3] - f2 * s2[p + 3]) * over[p + 3]
             target = row[p + 4 :]
             s0, s1, s2, s3 = s0[p + 4 :], s1[p + 4 :], s2[p + 4 :], s3[p + 4 :]
             for c in range(target.shape[0]):
                 target[c] -= f0 * s0[c] + f1 * s1[c] + f2 * s2[c] + f3 * s3[c]
-            for s in range(right.shape[1]):
+            for s in range(COLUMNS):
                 right[r, s] -= f0 * right[p, s] + f1 * right[p + 1, s] + f2 * right[p + 2, s] + f3 * right[p + 3, s]
             p += 4
         while p < r:
-            factor = row[p] / a[p, p]
+            factor = row[p] * over[p]
             for c in range(p + 1, size):
                 row[c] -= factor * a[p, c]
-            for s in range(right.shape[1]):
+            for s in range(COLUMNS):
                 right[r, s] -= factor * right[p, s]
             p += 1
         if row[r] == 0.0:
             return False
+        over[r] = 1.0 / row[r]
     for r in range(size - 1, -1, -1):
         for c in range(r + 1, size):
-            for s in range(right.shape[1]):
+            for s in range(COLUMNS):
                 right[r, s] -= a[r, c] * right[c, s]
-        for s in range(right.shape[1]):
-            right[r, s] /= a[r, r]
+        for s in range(COLUMNS):
+            right[r, s] *= over[r]
     return True
 
 
