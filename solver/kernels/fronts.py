@@ -91,8 +91,9 @@ def eliminate(
 def _factorised(top: Array, rest: Array) -> bool:
     """Replace the inner rows `top` (k, k + b) by their factor, and `rest` (b, b) by what it leaves; upper halves.
 
-    Rows are finished two at a time, and updated by four finished rows at a time: that keeps most numbers in registers
-    and the nearest cache. What a pair's second row holds before its diagonal is of no meaning.
+    Rows are finished two at a time, and those of `rest` updated four at a time, by four finished rows at a time: that
+    keeps most numbers in registers and the nearest cache. What rows updated together hold before their diagonals is of
+    no meaning.
     """
     k, b = top.shape[0], rest.shape[0]
     over = np.empty(k)  # one over the pivots
@@ -113,10 +114,10 @@ def _factorised(top: Array, rest: Array) -> bool:
         if top[k - 1, k - 1] == 0.0:
             return False
         over[k - 1] = 1.0 / top[k - 1, k - 1]
-    for r in range(0, b - 1, 2):
-        _update_two(top, over, k, k + r, rest[r, r:], rest[r + 1, r:])
-    if b % 2 == 1:
-        _update_one(top, over, k, k + b - 1, rest[b - 1, b - 1 :])
+    for r in range(0, b - 3, 4):
+        _update_four(top, over, k + r, rest[r, r:], rest[r + 1, r:], rest[r + 2, r:], rest[r + 3, r:])
+    for r in range(b - b % 4, b):
+        _update_one(top, over, k, k + r, rest[r, r:])
     return True
 
 
@@ -141,6 +142,36 @@ def _update_two(top: Array, over: Array, count: int, r: int, one: Array, two: Ar
         for c in range(size):
             one[c] -= a0 * s0[c]
             two[c] -= b0 * s0[c]
+        p += 1
+
+
+@compiled
+def _update_four(top: Array, over: Array, r: int, one: Array, two: Array, three: Array, four: Array) -> None:
+    """Take from rows r to r + 3 of a front, all given from column r on, what the rows of `top` hold of them."""
+    p, count = 0, top.shape[0]
+    while p + 4 <= count:
+        d0, d1, d2, d3 = over[p], over[p + 1], over[p + 2], over[p + 3]
+        s0, s1, s2, s3 = top[p, r:], top[p + 1, r:], top[p + 2, r:], top[p + 3, r:]
+        a0, a1, a2, a3 = s0[0] * d0, s1[0] * d1, s2[0] * d2, s3[0] * d3
+        b0, b1, b2, b3 = s0[1] * d0, s1[1] * d1, s2[1] * d2, s3[1] * d3
+        c0, c1, c2, c3 = s0[2] * d0, s1[2] * d1, s2[2] * d2, s3[2] * d3
+        e0, e1, e2, e3 = s0[3] * d0, s1[3] * d1, s2[3] * d2, s3[3] * d3
+        for c in range(one.shape[0]):
+            x0, x1, x2, x3 = s0[c], s1[c], s2[c], s3[c]
+            one[c] -= a0 * x0 + a1 * x1 + a2 * x2 + a3 * x3
+            two[c] -= b0 * x0 + b1 * x1 + b2 * x2 + b3 * x3
+            three[c] -= c0 * x0 + c1 * x1 + c2 * x2 + c3 * x3
+            four[c] -= e0 * x0 + e1 * x1 + e2 * x2 + e3 * x3
+        p += 4
+    while p < count:
+        s0 = top[p, r:]
+        a0, b0, c0, e0 = s0[0] * over[p], s0[1] * over[p], s0[2] * over[p], s0[3] * over[p]
+        for c in range(one.shape[0]):
+            x0 = s0[c]
+            one[c] -= a0 * x0
+            two[c] -= b0 * x0
+            three[c] -= c0 * x0
+            four[c] -= e0 * x0
         p += 1
 
 
@@ -173,23 +204,20 @@ def condense(
     """
     for p in range(start.shape[0]):
         k, b, first = inner[p], border[p], start[p]
-        wide = k + b
-        top = factors[factor_at[p] : factor_at[p] + k * wide].reshape(k, wide)
-        near[:k], near[k:wide] = force[first : first + k], 0.0
-        for i in range(0, k - 1, 2):  # two rows at a time, which share what they change
-            one, two, rest = top[i, i:], top[i + 1, i:], near[i:wide]
-            x = rest[0] / one[0]
-            rest[1] -= one[1] * x
-            y = rest[1] / two[1]
-            for j in range(2, wide - i):
-                rest[j] -= one[j] * x + two[j] * y
-        if k % 2 == 1:
-            one, x = top[k - 1], near[k - 1] / top[k - 1, k - 1]
-            for j in range(k, wide):
-                near[j] -= one[j] * x
-        force[first : first + k] = near[:k]
+        top = factors[factor_at[p] : factor_at[p] + k * (k + b)].reshape(k, k + b)
+        passed = near[:b]
+        passed[:] = 0.0
+        for i in range(k):
+            row = top[i]
+            part = force[first + i] / row[i]
+            mine, across = force[first + i + 1 : first + k], row[i + 1 : k]
+            for j in range(k - i - 1):
+                mine[j] -= across[j] * part
+            across = row[k:]
+            for j in range(b):
+                passed[j] += across[j] * part
         for j in range(b):
-            force[numbers[border_at[p] + j]] += near[k + j]
+            force[numbers[border_at[p] + j]] -= passed[j]
 
 
 @compiled
