@@ -267,8 +267,8 @@ def forces(
                 g *= stiffened(stiffening[e], excess)[0]
             a00, a01, a10, a11 = f11 / j, -f10 / j, -f01 / j, f00 / j
             inverse[q, 0], inverse[q, 1], inverse[q, 2], inverse[q, 3] = a00, a01, a10, a11
-            stress[q, 0], stress[q, 3] = g * (h00 - h11 + grown * f00) / j, g * (h11 - h00 + grown * f11) / j  # as exactly
-            stress[q, 1], stress[q, 2] = g * (f01 - a01), g * (f10 - a10)
+            stress[q, 0], stress[q, 1] = g * (h00 - h11 + grown * f00) / j, g * (f01 - a01)  # as exactly
+            stress[q, 2], stress[q, 3] = g * (f10 - a10), g * (h11 - h00 + grown * f11) / j
         volume[e, 0], volume[e, 1], volume[e, 2] = v0, v1, v2
         fx[:] = 0.0
         fy[:] = 0.0
