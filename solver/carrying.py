@@ -52,8 +52,7 @@ class Bridge:
     across_parts: Array  # (2 b + 1, 3)
     station: Narrow  # (a, 3) old elements along the skin that hold the new quadrature points
     layer: Narrow  # (b, 3) and across it
-    onto: Array  # (k, old k) the new skin's values by the old skin's, between whose nodes they are linear
-    forces: Array  # (k, old k) the same of forces, whose values are those by length
+    forces: Array  # (k, old k) the new skin's forces by the old skin's: by length they are linear between its nodes
     nearest: Indices  # (k,) old node of the skin
     driven: Flags  # (nodes, 2) which components of the new nodes are held
 
@@ -66,7 +65,7 @@ class Bridge:
         onto = np.stack([np.interp(new.skin, old.skin, one, 0.0, 0.0) for one in np.eye(len(old.skin))], axis=1)
         forces = new.lengths[:, None] * onto / old.lengths
         nearest = np.abs(new.skin[:, None] - old.skin).argmin(axis=1)
-        return Bridge(old, new, *along, *across, station, layer, onto, forces, nearest, new.body.mesh.driven)
+        return Bridge(old, new, *along, *across, station, layer, forces, nearest, new.body.mesh.driven)
 
     def carried(self, shape: Shape) -> Shape:
         """Return `shape`, found on the old mesh, as a start on the new one."""
@@ -74,10 +73,9 @@ class Bridge:
 
     def touched(self, shape: Shape, u: Array, pressure: Array) -> Shape:
         """Return a start on the new mesh of `u` (nodes, 2) and `pressure` (e, 3), touching where `shape` does."""
-        touching = shape.touching
-        state = np.where(self.onto @ touching > 0.5, np.maximum(shape.state[self.nearest], kernels.SLIP), kernels.OPEN)
-        reaction = self.forces @ (shape.reaction * touching[:, None])
-        return Shape(u, pressure, state, shape.sense[self.nearest], reaction, shape.pull, shape.iterations)
+        state, sense = shape.state[self.nearest], shape.sense[self.nearest]
+        state[state == kernels.STICK] = kernels.SLIP
+        return Shape(u, pressure, state, sense, self.forces @ shape.reaction, shape.pull, shape.iterations)
 
     def fields(self, u: Array, pressure: Array) -> tuple[Array, Array]:
         """Return displacements `u` [mm] and modes of `pressure` of the old mesh on the new one, (nodes, 2) and (e, 3).

@@ -52,12 +52,12 @@ def last_edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float |
     `force` (k,) is what falls to nothing there like the square root of the distance; nodes alternate between ends and
     middles of edges, an end first.
     """
-    on = np.flatnonzero(touching)
+    on = [number for number, touches in enumerate(touching.tolist()) if touches]  # few numbers: quicker one by one
     if len(on) < FEWEST:
         return None
-    last = int(on[-1])
+    last = on[-1]
     line = last - 2 if last % 2 == 0 else last - 1  # the last line with contact on both sides
-    place, pressed = arcs.tolist(), force[line : last + 1].tolist()  # so few numbers are quicker one by one
+    place, pressed = arcs.tolist(), force[line : last + 1].tolist()
     gaps = place[line] - place[line - 2], place[line + 2] - place[line]
     pressed[0] *= gaps[1] / (gaps[0] + gaps[1])  # the part of the line's own force that stems from beyond
     moment = sum(one * (at - place[line]) for one, at in zip(pressed, place[line : last + 1], strict=True))

@@ -136,7 +136,8 @@ class ClimbingMeshed:
         self.dofs = finger.newton.body.dofs
 
     def _make(self, scene: Scene, sizing: Sizing) -> FiniteFinger:
-        sizing = replace(sizing, shift=self._shift)
+        if self._shift:
+            sizing = replace(sizing, shift=True)
         if sizing not in self._made:
             begun = clock()
             beside = None if sizing.edges is None else self._last
