@@ -13,7 +13,6 @@ import numpy as np
 from solver.finite_finger import FiniteFinger
 from solver.finite_forced import Given, corrected
 from solver.kernels import OPEN, SLIP, STICK
-from solver.limit import CREASE
 from solver.mesh import Array
 from solver.newton import BY_DEPTH, Pull, Shape
 
@@ -23,7 +22,8 @@ MET = 0.02  # part of the normal force by which a state may miss the forces and 
 EASED = 0.7  # of the normal force at which the state was lost and led to in vain: from there it is sought again [-]
 STAIRS, LEADING = 12, 3  # that lead a finger from nothing to forces it bears already, and iterations on each
 ARRIVING, NEAR = 8, 0.01  # iterations on the last, as after a state that was not told of, until one is so small [mm]
-FOLDING = 0.68  # least stretch of the skin that is told of: it folds from 0.544 on, and a coarse mesh squeezes it less
+FOLDING = 0.65  # least stretch of the skin that is told of: it folds from 0.544 on, and a coarse mesh squeezes it less
+CREASING = 0.3  # largest kink that is told of: where skin folds behind the last node that touches, that mesh has this
 FAR, HURRIED = 0.15, 3  # displacement in one iteration from which on there is another [mm], and how many at most
 STIFF = 1e3  # bulk over shear stiffness from which on a tangent from elsewhere leads astray (nu 0.4995)
 FURTHEST = 5.0  # displacement in one iteration beyond which the state is lost [mm]
@@ -124,7 +124,7 @@ class FiniteStepper:
         self._behind = behind > MET * normal
         if self._behind:
             return float("nan")
-        if pinch.lowest < FOLDING or pinch.kink > CREASE:
+        if pinch.lowest < FOLDING or pinch.kink > CREASING:
             return self._lose(normal)
         return self._finger.sed_ending(shape)
 

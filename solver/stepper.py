@@ -38,7 +38,8 @@ class Stepper(Protocol):
         """Take one reading and return the SED averaged over the ending [MPa]; nan where no state can be told of.
 
         `normal` [N/mm] presses the finger, `tangential` [N/mm] is the surface's pull on it along +x. At small strain
-        the next reading starts afresh from the untouched finger, at finite strain the first after the force has eased.
+        the next reading starts afresh from the untouched finger; at finite strain, where that is in vain, the first
+        after the force has eased.
         """
         ...
 
