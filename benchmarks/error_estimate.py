@@ -167,20 +167,18 @@ def solved(scenes: int, first: int, jobs: int, keep: Path | None, *, fingers: bo
                 yield Case.of(row)
 
 
-def shares(cases: list[Case], fineness: float, number: int) -> tuple[int, float, float, list[float]]:
-    """Return how many scenes were counted, the share of estimates above the error and below the bound, and errors."""
-    above: list[bool] = []
-    below: list[bool] = []
-    errors: list[float] = []
-    for case in cases:
-        estimate, error = (float(x[number]) for x in case.on(fineness))
-        bound = 10.0 * max(error, SMALL)
-        errors.append(error)
-        if case.doubt[number] <= estimate / 3.0:
-            above.append(estimate >= error)
-        if case.doubt[number] <= bound / 3.0:
-            below.append(estimate < bound)
-    return len(above), float(np.mean(above)), float(np.mean(below)), errors
+def shares(estimates: np.ndarray, errors: np.ndarray, doubts: np.ndarray) -> tuple[int, float, float]:
+    """Return of how many scenes (n,) an estimate counts, and which shares are above the error and below the bound."""
+    bounds = 10.0 * np.maximum(errors, SMALL)
+    known, sure = doubts <= estimates / 3.0, doubts <= bounds / 3.0
+    return int(known.sum()), float(np.mean((estimates >= errors)[known])), float(np.mean((estimates < bounds)[sure]))
+
+
+def of_answers(found: list[tuple[np.ndarray, np.ndarray]], doubts: np.ndarray) -> str:
+    """Return the shares, in per cent, of all three numbers of answers: `found` is what `Case.on` says of each scene."""
+    told = np.array(found)
+    parts = [shares(told[:, 0, number], told[:, 1, number], doubts[:, number])[1:] for number in range(len(NAMES))]
+    return ", ".join(f"{100 * above:.0f} {100 * near:.0f}" for above, near in parts)
 
 
 def report(cases: list[Case]) -> None:
@@ -190,17 +188,21 @@ def report(cases: list[Case]) -> None:
             f"{name}\nfineness  counted  estimate above error %  below 10 x max(error, 0.02 %) %  error %: median, most"
         )
         for fineness in CHECKED:
-            counted, above, below, errors = shares(cases, fineness, number)
-            ends = f"{100 * np.median(errors):15.3f} {100 * max(errors):9.3f}"
+            told = np.array([case.on(fineness) for case in cases])[:, :, number]
+            errors = told[:, 1]
+            counted, above, below = shares(told[:, 0], errors, np.array([case.doubt[number] for case in cases]))
+            ends = f"{100 * np.median(errors):15.3f} {100 * errors.max():9.3f}"
             print(f"{fineness:8g} {counted:8d} {100 * above:23.1f} {100 * below:31.1f} {ends}")
-    print("tolerance %  counted  true error below %  estimate below %  meshes taken")
+    print("tolerance %  counted  true error below %  estimate below %  meshes taken; above, near of SED, forces %")
     for tolerance in TOLERANCES:
         meshes = [case.asked(tolerance) for case in cases]
         found = [case.on(mesh) for case, mesh in zip(cases, meshes, strict=True)]
+        doubts = np.array([case.doubt for case in cases])
         sound = [case.doubt[0] <= tolerance / 3.0 for case in cases]
         met = np.mean([error[0] <= tolerance for (_, error), good in zip(found, sound, strict=True) if good])
         told = np.mean([estimate[0] <= tolerance for estimate, _ in found])
         taken = ", ".join(f"{n:g}: {count}" for n, count in sorted(Counter(meshes).items()))
+        taken += f"; {of_answers(found, doubts)}"
         print(f"{100 * tolerance:11g} {sum(sound):8d} {100 * met:19.1f} {100 * told:17.1f}  {taken}")
 
 

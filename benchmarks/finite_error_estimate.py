@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.error_estimate import other_finger
+from benchmarks.error_estimate import of_answers, other_finger, shares
 from daq_app.accuracy.methods import overkill
 from solver.climbing import MARGIN, ascended, sized
 from solver.estimate import FINENESS, coarsest_for, estimates
@@ -41,7 +41,6 @@ MESHES = FINENESS["finite"][:4]
 OVERKILL = (23.0, 26.0, 29.0)  # finenesses of the meshes with lines at the edges of contact, the last where bounded
 PLAIN = 17.0  # and of that without
 TOLERANCES = (0.01, 0.003, 0.001)
-SMALL = 2e-4  # relative error below which nobody minds by how much an estimate is too large
 
 
 def random_scene(number: int, *, bounded: bool = False, fingers: bool = False) -> Scene:
@@ -147,21 +146,21 @@ def report(cases: list[Case]) -> None:
             f"{name}\nfineness  counted  estimate above error %  below 10 x max(error, 0.02 %) %  error %: median, most"
         )
         for fineness in MESHES:
-            found = [(*(float(x[number]) for x in case.on(fineness)), case.doubt[number]) for case in cases]
-            above = [estimate >= error for estimate, error, doubt in found if doubt <= estimate / 3.0]
-            bounds = [(estimate, 10.0 * max(error, SMALL), doubt) for estimate, error, doubt in found]
-            below = [estimate < bound for estimate, bound, doubt in bounds if doubt <= bound / 3.0]
-            errors = 100.0 * np.array([error for _, error, _ in found])
-            ends = f"{np.median(errors):15.3f} {errors.max():9.3f}"
-            print(f"{fineness:8g} {len(above):8d} {100 * np.mean(above):23.1f} {100 * np.mean(below):31.1f} {ends}")
-    print("tolerance %  counted  true error below %  estimate below %  meshes taken")
+            told = np.array([case.on(fineness) for case in cases])[:, :, number]
+            errors = told[:, 1]
+            counted, above, below = shares(told[:, 0], errors, np.array([case.doubt[number] for case in cases]))
+            ends = f"{100 * np.median(errors):15.3f} {100 * errors.max():9.3f}"
+            print(f"{fineness:8g} {counted:8d} {100 * above:23.1f} {100 * below:31.1f} {ends}")
+    print("tolerance %  counted  true error below %  estimate below %  meshes taken; above, near of SED, forces %")
     for tolerance in TOLERANCES:
         meshes = [case.asked(tolerance) for case in cases]
         found = [case.on(mesh) for case, mesh in zip(cases, meshes, strict=True)]
+        doubts = np.array([case.doubt for case in cases])
         good = [case.doubt[0] <= tolerance / 3.0 for case in cases]
         met = np.mean([error[0] <= tolerance for (_, error), sure in zip(found, good, strict=True) if sure])
         told = np.mean([estimate[0] <= tolerance for estimate, _ in found])
         taken = ", ".join(f"{n:g}: {count}" for n, count in sorted(Counter(meshes).items()))
+        taken += f"; {of_answers(found, doubts)}"
         print(f"{100 * tolerance:11g} {sum(good):8d} {100 * met:19.1f} {100 * told:17.1f}  {taken}")
 
 
