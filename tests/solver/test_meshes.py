@@ -108,8 +108,8 @@ def test_lines_between_elements_frame_the_ending_and_lie_on_the_layers():
         assert np.abs(made.arcs - arc).min() < 1e-9
 
 
-@pytest.mark.parametrize("depth", [1.3, 0.003, 0.748, 0.752, 1.997])  # at the skin, and beside lines between layers
-@pytest.mark.parametrize("fineness", [2.5, 8.0, 24.0])
+@pytest.mark.parametrize("depth", [1.3, 0.003, 0.752])  # at the surface, and beside a line between layers
+@pytest.mark.parametrize("fineness", [2.5, 12.0])
 def test_an_ending_that_is_hardly_more_than_a_point_lies_in_one_small_element_and_those_around_it_grow(depth, fineness):
     made = finger_mesh(Finger(), Receptor(depth, (0.004, 0.004)), Sizing(fineness, 2.0))
     size = 0.1 * 5.0 / fineness
@@ -186,12 +186,13 @@ def test_the_lowest_point_of_the_skin_touches_the_surface():
     depth=st.floats(1e-3, 2.5),
     fineness=st.sampled_from([3, 6, 12]),
     shift=st.booleans(),
+    ending=st.sampled_from([(0.2, 1.0), (0.001, 0.001)]),
 )
 def test_every_finger_that_a_scene_allows_can_be_meshed_without_a_folded_element(
-    angle, epidermis, dermis, bone, depth, fineness, shift
+    angle, epidermis, dermis, bone, depth, fineness, shift, ending
 ):
     finger = Finger(epidermis=epidermis, dermis=dermis, bone_radius=bone, bone_centre=(-1.0, 0.3), contact_angle=angle)
-    receptor = Receptor(depth=epidermis + dermis - 0.1)
+    receptor = Receptor(epidermis + dermis - 0.1, ending)
     made = finger_mesh(finger, receptor, Sizing(fineness, depth, shift))
     found = quality(made.mesh)
     assert found["jacobian_ratio"] > 0.02
