@@ -31,7 +31,12 @@ from solver.scene import Finger, Receptor, Scene
 
 FINENESS = {"small": (5, 6, 8, 10, 12, 16, 20, 24), "finite": (7, 11, 14, 20, 24)}  # meshes that can be asked for
 DEFAULT = {"small": 8, "finite": 11}
-FROM_MESHES = {"small": 0.25, "finite": 0.75}
+FROM_MESHES = {
+    "small": 0.25,
+    "finite": 0.36 / 0.64,  # what errors that fall with the square of an element leave of a mesh 0.6 times as fine
+}
+FROM_COURSES = 0.75  # the same at the end of a course at finite strain
+AT_EDGES = 1.0  # and where skin slips at the bound up to an edge: between that and 1.5, were errors as long as elements
 FROM_NAIL = {"small": 2.5, "finite": 4.0}  # the same where a nail ends: errors fall with the element, or its root
 FROM_FINENESS = {"small": ((0.08, 2.0),), "finite": ((0.15, 2.0), (0.0215, 1.1))}  # the largest, by the power given
 OF_OTHERS = ((0.115, 2.0), (0.8, 3.0))  # the same at small strain of any finger but the published one
@@ -171,11 +176,14 @@ def _off(
         contact = 2.0 * _half(scene) * scene.finger.tip_radius
         of_bound = FROM_BOUND[kind] * _element(scene, fineness) / contact * np.abs(felt)
     else:
-        of_bound[2] = _of_bound(scene, fineness, float(size[1]), float(size[2]))
         at_edge = np.abs(felt if kind == "finite" else bounded)
         if np.any(at_edge):
             of_edge = FROM_EDGE[kind] * scene.friction.cap * _element(scene, fineness) / size[2] * at_edge
+        else:
+            of_bound[2] = _of_bound(scene, fineness, float(size[1]), float(size[2]))
     from_meshes = (FROM_NAIL if scene.finger.nail_length > 0.0 else FROM_MESHES)[kind]
+    if kind == "finite":
+        from_meshes = max(from_meshes, FROM_COURSES if marched else AT_EDGES if np.any(of_edge) else 0.0)
     return np.linalg.norm([from_meshes * largest, part * size, of_bound * size, of_edge * size], axis=0)
 
 
@@ -197,11 +205,10 @@ def finer_than(scene: Scene, fineness: float) -> list[int]:
 
 def _least(scene: Scene, fineness: float) -> float:
     """Return the part of an estimate that the mesh alone decides."""
-    resolved, kind = _resolved(scene, fineness), scene.solve.kinematics
-    if kind == "finite" or _published(scene):
-        return max(part / resolved**order for part, order in FROM_FINENESS[kind])
-    thinner = _around_bone(scene.finger) / _around_bone(Finger())
-    return thinner**THIN * max(part / resolved**order for part, order in OF_OTHERS)
+    resolved, kind, published = _resolved(scene, fineness), scene.solve.kinematics, _published(scene)
+    parts = OF_OTHERS if kind == "small" and not published else FROM_FINENESS[kind]
+    thinner = 1.0 if published else _around_bone(scene.finger) / _around_bone(Finger())
+    return thinner**THIN * max(part / resolved**order for part, order in parts)
 
 
 def _around_bone(finger: Finger) -> float:

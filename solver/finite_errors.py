@@ -18,9 +18,9 @@ from solver.tissues import stiff, strains_the_cut
 COARSER = 0.6  # fineness of the mesh that the error is estimated from, by that of the answer
 NUDGE = 1e-3  # of the traction bound, to see what it does
 SQUEEZED = 0.82  # least det F, below which tissue is squeezed where the cut meets the bone
-OF_CORNER = np.array([4.5, 2.5, 2.5, 2.5, 2.5, 2.5])  # added to differences then, by the force's or depth's
-OF_STIFF = 8.0  # the same of the SED where skin is stiff, and does not only stiffen
-OF_SQUEEZED = 3.5  # under other skin, of the element there squared and what det F has fallen by cubed
+OF_CORNER = np.array([3.4, 1.9, 1.9, 1.9, 1.9, 1.9])  # part of an estimate then, by the difference in force or depth
+OF_STIFF = 6.0  # the same of the SED where skin is stiff, and does not only stiffen
+OF_SQUEEZED = 2.6  # under other skin, of the element there squared and what det F has fallen by cubed
 
 
 def error_estimates(
@@ -32,7 +32,7 @@ def error_estimates(
     there (1, 6), or none where it has no state; and what of the SED's error meshes of all finenesses have in common.
     """
     found = compared(scene, fineness, way_up, numbers, stop)
-    return errors(scene, fineness, *found), found[1][:1], FROM_MESHES["finite"] * _squeezed(scene, way_up.top)
+    return errors(scene, fineness, *found), found[1][:1], _squeezed(scene, way_up.top)
 
 
 def compared(
@@ -59,11 +59,12 @@ def compared(
     both = (coarse, way_up.first)
     others = np.array([other.finger.all_numbers(other.shape) for other in both if other is not None])
     felt = np.zeros(6) if way_up.first is None else felt_of_bound(coarse)
-    return numbers, np.vstack([others, numbers * (1.0 + _of_corner(scene, at, numbers, others[0]))]), felt, None
+    corner = _of_corner(scene, at, numbers, others[0]) / FROM_MESHES["finite"]
+    return numbers, np.vstack([others, numbers * (1.0 + corner)]), felt, None
 
 
 def _of_corner(scene: Scene, at: Climbed, numbers: Array, other: Array) -> Array:
-    """Return the relative differences (6,) that stand for what two meshes have in common where the cut meets the bone.
+    """Return the parts (6,) of estimates, relative, for what meshes have in common where the cut meets the bone.
 
     They are told by how far tissue is squeezed there, and under stiff skin by what the `other` mesh makes of the force.
     """

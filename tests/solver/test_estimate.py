@@ -87,6 +87,15 @@ def test_a_drag_below_the_friction_limit_is_known_to_a_part_of_an_element():
     assert with_bound == pytest.approx([*without[:2], np.hypot(without[2], more)])
 
 
+def test_of_two_meshes_whose_errors_fall_with_the_square_of_an_element_the_estimate_knows_the_error():
+    finite = replace(scene(STICKINESS[0]), friction=Friction(0.3), solve=Solve("finite"))
+    truth, error = np.array([1.0, 2.0, 0.6]), 0.01
+    own, coarser = truth * (1.0 + error), truth * (1.0 + error / 0.6**2)
+    found = estimates(finite, 20.0, own, coarser[None])
+    assert np.all(found * own >= error * truth)
+    assert np.all(found < 1.01 * error)
+
+
 # Scenes of benchmarks/finite_error_estimate.py and of others with low bounds: depth, mu, bound, slide, contact angle,
 # moduli, and the mean of three solves on far finer meshes. Two meshes with lines at the same edges of contact agree on
 # them and are wrong: 4 % off with three layers in the fat, 1.3 % off where the bound acts on a part of an element.
