@@ -238,7 +238,7 @@ def climbed(
     sizing = sizing or sized(fineness, below)
     if sizing.at_cut is not None and sizing.at_cut < AT_CUT:
         begun = _begun(scene, sizing, below, make, near)
-        shape = nearby(begun.finger, scene, begun.shape)
+        shape = nearby(begun.finger, scene, begun.shape, stop)
         if shape is not None and begun.finger.least_at_cut(shape) >= COLLAPSED:
             return replace(begun, shape=shape)
         sizing = replace(sizing, at_cut=AT_CUT, sharing=None)

@@ -12,7 +12,7 @@ from solver.finite_finger import FiniteFinger
 from solver.kernels import CAP, OPEN, STEEP
 from solver.limit import follow
 from solver.newton import BY_FRICTION, Newton, Pull, Shape
-from solver.reach import Reach, folded, sound
+from solver.reach import PLAIN, Reach, folded, sound
 from solver.scene import Scene
 from solver.sliding import settled
 
@@ -35,7 +35,7 @@ def steady(
     """
     found: list[Shape] = []
     for shape in _tried(finger.newton, pull, tolerance, start, stop):
-        if sound(finger, shape):
+        if sound(finger, shape, PLAIN):
             return shape
         found.append(shape)
     proof = reach.of_friction(finger.scene, pull, pull.mu, stop)
@@ -64,6 +64,16 @@ def steady(
         f"At {pull.depth:.3g} mm of indentation and mu = {pull.mu:.3g} there is settled sliding, but near the limit of "
         "friction, and this mesh does not find it: ask for a little less friction, or another tolerance"
     )
+
+
+def stands(finger: FiniteFinger, shape: Shape, stop: Callable[[], bool]) -> bool:
+    """Return whether a state lies on the branch that begins without friction: plainly, or since that was followed."""
+    if sound(finger, shape, PLAIN):
+        return True
+    if not sound(finger, shape):
+        return False
+    proof = reach.of_friction(finger.scene, shape.pull, shape.pull.mu, stop)
+    return not proof.limited and _proven(finger, shape, proof)
 
 
 def steep(pull: Pull) -> bool:
@@ -107,7 +117,7 @@ def _tried(
 
 def doubts(finger: FiniteFinger, shape: Shape, stop: Callable[[], bool] = lambda: False) -> tuple[str, ...]:
     """Return the sentence that a settled slide needs whose friction is as large as may be, or none."""
-    if shape.pull.sense == 0 or sound(finger, shape):
+    if shape.pull.sense == 0 or sound(finger, shape, PLAIN):
         return ()
     proof = reach.of_friction(finger.scene, shape.pull, shape.pull.mu, stop)
     if not proof.near:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver import finite_forced, reach, sliding
-from solver.existence import all_at_the_bound, steady, steep
+from solver.existence import all_at_the_bound, stands, steady, steep
 from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.finite_finger import FiniteFinger
 from solver.finite_forced import Given, balanced
@@ -46,8 +46,11 @@ def settled(
     return steady(finger, pull_sliding(scene), start=start, stop=stop)
 
 
-def nearby(finger: FiniteFinger, scene: Scene, start: Shape) -> Shape | None:
-    """Return the settled slide that lies a few iterations from `start`, or None where there is no sound one so near."""
+def nearby(finger: FiniteFinger, scene: Scene, start: Shape, stop: Callable[[], bool] = lambda: False) -> Shape | None:
+    """Return the settled slide that lies a few iterations from `start`, or None where none that stands is so near.
+
+    Raises Cancelled where `stop` says so.
+    """
     newton, force = finger.newton, scene.normal_force
     try:
         if force is None:
@@ -56,9 +59,9 @@ def nearby(finger: FiniteFinger, scene: Scene, start: Shape) -> Shape | None:
             near = replace(start, pull=_under(scene)._replace(depth=start.pull.depth, travel=start.pull.travel))
             found = balanced(newton, near, Given(force, None), limit=FEW)
             shape = newton.settle(found, found.pull, limit=FEW)
+        return shape if stands(finger, shape, stop) else None
     except NotConverged:
         return None
-    return shape if reach.sound(finger, shape) else None
 
 
 def roughly(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: Shape | None = None) -> Shape:

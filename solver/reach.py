@@ -23,7 +23,8 @@ from solver.tissues import finite_laws
 FINENESS = 7.0  # of both meshes, but where the skin folds
 MARGIN = 6.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
 SMOOTH = 0.66  # stretch down to which a rough mesh has the states of the fine one
-SOUND = 0.65  # least stretch of the skin that needs no proof on any mesh: neo-Hookean surfaces fold at 0.54
+SOUND = 0.65  # least stretch of the skin from which others may be sought: neo-Hookean surfaces fold at 0.54
+PLAIN = 0.71  # and that needs no proof: just below limits meshes not made for the fold have up to 0.70
 ASTRAY = 0.5  # between where the skin folds and where it was thought to, from which another mesh is made [mm]
 HOPS, HOP = 3, (0.01, 0.03)  # tries to go on where a branch ends, by how much of its value
 STAYS = 0.05  # by how much forces change then, at most
@@ -76,10 +77,10 @@ def of_depth(scene: Scene, pull: Pull, stop: Callable[[], bool] = lambda: False)
     return _reach(_asked(scene, pull, BY_DEPTH, pull.depth, stop))
 
 
-def sound(finger: FiniteFinger, shape: Shape) -> bool:
-    """Return whether the skin is nowhere squeezed so far that it may have folded, and does not cross itself."""
+def sound(finger: FiniteFinger, shape: Shape, least: float = SOUND) -> bool:
+    """Return whether the skin is nowhere squeezed to `least`, has no crease and does not cross itself."""
     pinch = finger.pinch(shape)
-    return pinch.lowest >= SOUND and pinch.kink <= CREASE and not finger.crosses(shape)
+    return pinch.lowest >= least and pinch.kink <= CREASE and not finger.crosses(shape)
 
 
 def folded(finger: FiniteFinger, shape: Shape) -> bool:
@@ -98,7 +99,7 @@ def _reach(asked: _Question) -> Reach:
     sizing = Sizing(FINENESS, asked.pull.depth, margin=MARGIN)
     rough = FiniteFinger.of(asked.scene, sizing)
     branch = _followed(rough, _start(rough, asked), asked, folds)
-    if not branch.limited and sound(rough, branch.last):
+    if not branch.limited and sound(rough, branch.last, PLAIN):
         return _told(rough, branch, folds)
     fine, branch, place = _finely(rough, branch.states, asked, folds)
     if abs(_squeezed(fine, branch.last) - place) > ASTRAY:

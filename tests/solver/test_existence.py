@@ -7,7 +7,7 @@ from solver.climbing import ascended
 from solver.existence import steady
 from solver.failures import NoSteadyState
 from solver.newton import Pull
-from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
+from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
 from solver.sliding import settled
 from solver.solution import solve
 from tests.solver.finite_examples import published
@@ -105,3 +105,37 @@ def test_answers_near_the_largest_friction_say_so_and_refusals_name_it():
     with pytest.raises(NoSteadyState, match="folds") as refusal:
         solve(drawn(0.76))
     assert refusal.value.limit_mu == pytest.approx(0.735, rel=0.03)  # on a mesh of half the size
+
+
+@pytest.mark.parametrize("fineness", [7.0, pytest.param(11.0, marks=SLOW), pytest.param(14.0, marks=SLOW)])
+def test_a_fold_that_lies_where_meshes_are_coarse_is_seen_by_all_of_them(fineness):
+    """Dragged from distal to proximal, a small finger folds where its tip ends; skin is squeezed to 0.54 there.
+
+    Meshes of 7, 11 and 14 have 0.70, 0.67 and 0.65. On meshes made for the fold the state is lost at 0.875 to 0.888.
+    """
+    finger = Finger(
+        tip_radius=2.5427,
+        epidermis=0.2299,
+        dermis=0.68397,
+        shaft_length=5.1859,
+        bone_radius=0.41,
+        bone_centre=(-0.0554, 0.34236),
+        contact_angle=50.374,
+        cut="driven",
+    )
+    tissues = Materials(Material(0.17512, 0.48), Material(0.09348, 0.48), Material(0.03503, 0.48))
+
+    def at(mu):
+        return Scene(
+            finger=finger,
+            materials=tissues,
+            friction=Friction(mu),
+            loading=Loading(1.0997, "-x"),
+            receptor=Receptor(0.435, (0.1017, 0.1526)),
+            solve=Solve("finite"),
+        )
+
+    assert ascended(at(0.84), 1.0997, fineness, lambda: False).top.shape.touching.any()
+    with pytest.raises(NoSteadyState) as refused:
+        ascended(at(0.91), 1.0997, fineness, lambda: False)
+    assert refused.value.limit_mu == pytest.approx(0.88, rel=0.03)
