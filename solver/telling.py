@@ -7,19 +7,30 @@ with listening(lambda doing, part: print(f"{doing}: {part:.0%} of it")):
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 
 Listener = Callable[[str, float], None]  # told what is being done, and which part of that is done, 0 to 1
-_LISTENER: ContextVar[Listener | None] = ContextVar("listener", default=None)
+
+
+@dataclass(slots=True)
+class _Told:
+    """Who listens, and what was said last."""
+
+    listener: Listener
+    doing: str = ""
+
+
+_TOLD: ContextVar[_Told | None] = ContextVar("told", default=None)
 
 
 @contextmanager
 def listening(listener: Listener) -> Generator[None]:
     """Let `listener` hear what the solver is at in this thread, until the block ends."""
-    before = _LISTENER.set(listener)
+    before = _TOLD.set(_Told(listener))
     try:
         yield
     finally:
-        _LISTENER.reset(before)
+        _TOLD.reset(before)
 
 
 def tell(doing: str, part: float = 0.0) -> None:
@@ -32,6 +43,29 @@ def tell(doing: str, part: float = 0.0) -> None:
     >>> heard
     [('following sliding to its largest friction', 0.25)]
     """
-    listener = _LISTENER.get()
-    if listener is not None:
-        listener(doing, part)
+    told = _TOLD.get()
+    if told is not None:
+        told.doing = doing
+        told.listener(doing, part)
+
+
+@contextmanager
+def aside(doing: str) -> Generator[None]:
+    """Say what is done in between, until the block ends; then again what was said before.
+
+    >>> heard = []
+    >>> with listening(lambda doing, part: heard.append(doing)):
+    ...     tell("solving", 0.5)
+    ...     with aside("compiling"):
+    ...         pass
+    >>> heard
+    ['solving', 'compiling', 'solving']
+    """
+    told = _TOLD.get()
+    before = told.doing if told is not None else ""
+    tell(doing)
+    try:
+        yield
+    finally:
+        if before:
+            tell(before)

@@ -1,5 +1,6 @@
 """Machine code of the loops is kept, linked without numba, and never where anything about it is in doubt."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ from solver import kernels
 from solver.kernels import keeping
 from solver.kernels.compiling import compiled
 from solver.kernels.keeping import Place
+from solver.telling import listening, tell
 
 
 @pytest.fixture
@@ -61,7 +63,7 @@ def test_where_code_cannot_be_linked_numba_does_it_its_own_way(monkeypatch, chan
     loop, out = compiled(kernels.tributary.function), np.zeros(3)
     loop(np.linspace(0.0, 3.0, 3), np.array([0, 1, 0], np.int32), out)
     np.testing.assert_allclose(out, [0.5, 2.0, 0.5], rtol=1e-15)
-    assert type(loop._entry((out, np.zeros(3, np.int32), out))).__module__ == "numba.core.registry"
+    assert type(loop.entry((out, np.zeros(3, np.int32), out))).__module__ == "numba.core.registry"
 
 
 def test_what_is_kept_is_found_again_until_its_sources_change(kept):
@@ -99,3 +101,15 @@ def test_new_code_takes_the_place_of_that_of_earlier_sources(kept):
     keeping.keep(after, b"late", "wrapper", "environment", [])
     assert [file.name for file in folder.glob("*.loop")] == [after.file] != [early]
     assert not Path(folder / early).exists()
+
+
+def test_progress_says_which_loop_is_being_compiled_and_then_again_what_it_was(monkeypatch):
+    monkeypatch.setattr(keeping, "linked", lambda _: None)
+    monkeypatch.setattr(keeping, "keep", lambda *_: None)
+    loop, heard = compiled(kernels.tributary.function), []
+    monkeypatch.setattr(loop, "_made", lambda _: (loop.function, ()))
+    with listening(lambda doing, _: heard.append(doing)):
+        tell("solving")
+        loop(np.linspace(0.0, 3.0, 3), np.array([0, 1, 0], np.int32), np.zeros(3))
+    assert re.fullmatch(r"compiling tributary, loop \d+ of \d+ at most, once on this machine", heard[1])
+    assert heard == ["solving", heard[1], "solving"]
