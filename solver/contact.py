@@ -21,6 +21,7 @@ States = NDArray[np.int8]
 Flags = NDArray[np.bool_]
 SMALL = 1e-11  # a contradiction smaller than this, relative to the largest of its kind, is round-off
 ROUNDS = 12  # systems after which the short way to settled sliding is given up
+FIRST = (0.3, 0.1, 0.03, 0.01, 0.6, 1.0)  # parts of the skin's height tried as what touches under a force, in turn
 HERTZ = 0.5  # part of the depth below which skin is first thought to touch: half as deep is half the overlap's square
 
 AMBIGUOUS = "the touching points have no unique forces"
@@ -129,6 +130,9 @@ class Course:
         sense = np.full(count, -float(direction))
         low = self.body.gap + self.body.normal_free < depth
         guesses = [np.where(low, SLIP, OPEN)] if guess is None else [guess]
+        if guess is None and self.body.motions.shape[1]:  # the depth, or a part of it, is found
+            guesses = guesses if low.any() else []
+            guesses += [np.where(self.body.gap <= height, SLIP, OPEN) for height in self._heights()]
         if guess is None and np.isfinite(self.law.tau_max):
             guesses.append(np.where(low, CAP, OPEN))
         if guess is None and not self.body.motions.shape[1]:
@@ -142,6 +146,11 @@ class Course:
                 if number == len(guesses) - 1:
                     raise
         raise AssertionError  # there is always a guess
+
+    def _heights(self) -> Array:
+        """Return heights [mm] below which skin may first be thought to touch where a force finds the depth."""
+        low, high = float(self.body.gap.min()), float(self.body.gap.max())
+        return low + np.array(FIRST) * (high - low)
 
     def _slid(self, depth: float, sense: float) -> Contact | None:
         """Return what `_consistent` does where all that touches slips one way; None where that takes many rounds.
@@ -196,6 +205,8 @@ class Course:
         ContactLost, and ValueError for a depth or travel that is not finite.
         """
         depth, travel = finite("depth", depth), finite("travel", travel)
+        if self.body.motions.shape[1]:
+            before = lowered(self.law, before)
         self._resultants = self.body.resultants if resultants is None else resultants
         try:
             return self._consistent(depth, travel, before.shift, before.state, before.sense, free=True)
@@ -317,6 +328,15 @@ def untouched(body: Touchable, depth: float = 0.0) -> Contact:
     state = np.full(count, OPEN, np.int8)
     gap = body.gap + body.normal_free - depth
     return Contact(state, np.ones(count), zero, zero, body.tangential_free, gap, np.zeros(0), 0)
+
+
+def lowered(law: FrictionLaw, contact: Contact) -> Contact:
+    """Return `contact` with the lowest point on the surface, where nothing touches: under a force something does."""
+    if contact.touching.any():
+        return contact
+    state = contact.state.copy()
+    state[np.argmin(contact.gap)] = SLIP if law.frictionless else STICK
+    return replace(contact, state=state)
 
 
 def forced(body: Touchable, normal_force: float, tangential_force: float | None = None) -> Touchable:

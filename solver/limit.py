@@ -8,12 +8,12 @@ Comput. Struct. 13, 55, with the plane of Riks.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from solver.crossing import Pinch
-from solver.failures import Cancelled
-from solver.finite_finger import FiniteFinger
+from solver.failures import Cancelled, NotConverged
 from solver.mesh import Array
 from solver.newton import BY_FRICTION, EQUILIBRIUM, Newton, Pull, Shape
 from solver.telling import tell
@@ -26,7 +26,26 @@ TURN = 0.7  # least cosine between the directions of the branch and of a step al
 SQUEEZE = 0.85  # least ratio of the skin's least stretches at neighbouring points: a leap to a folded branch has less
 CREASE = 0.6  # kink from which skin has a crease: coarse meshes of smooth skin have 0.3, creases 1 and more
 STEEP = 0.1  # part of the value in the branch's direction, from which a limit point is far
+HOPS, HOP = 3, (0.01, 0.03)  # tries to go on where a branch ends, by how much of its value
+STAYS = 0.05  # by how much forces change then, at most
 APART = 0.04  # of the skin's least stretches at two points between which the stretch that folds is met
+
+
+class Followed(Protocol):
+    """What a branch is followed on: the finger, or a body handed in."""
+
+    @property
+    def newton(self) -> Newton:
+        """The iterations on its body."""
+        ...
+
+    def pinch(self, shape: Shape) -> Pinch:
+        """Return how far the skin is squeezed, and whether it has a crease."""
+        ...
+
+    def crosses(self, shape: Shape) -> bool:
+        """Return whether the skin crosses itself."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,8 +63,48 @@ class Branch:
         return self.states[-1]
 
 
+def followed(
+    finger: Followed,
+    start: Shape,
+    by: int,
+    target: float,
+    folds: float,
+    stop: Callable[[], bool] = lambda: False,
+) -> Branch:
+    """Do as `follow`, and go on where the branch only turns back for a moment."""
+    branch = follow(finger, start, by, target, folds, stop)
+    for _ in range(HOPS):
+        beyond = _beyond(finger, branch, by, target, folds) if branch.limited else None
+        if beyond is None:
+            break
+        more = follow(finger, beyond, by, target, folds, stop)
+        branch = Branch((*branch.states, *more.states), more.value, more.limited, more.lost)
+    return branch
+
+
+def _beyond(finger: Followed, branch: Branch, by: int, target: float, folds: float) -> Shape | None:
+    """Return a state of the branch a little beyond its end, None where it ends there indeed.
+
+    Where a node of the contact comes to the bound, the branch may turn back for a moment, as no skin does.
+    """
+    last = branch.last
+    pinch = finger.pinch(last)
+    if pinch.least < folds + APART:
+        return None
+    for part in HOP:
+        value = min((1.0 + part) * branch.value, target)
+        try:
+            there = finger.newton.settle(last, with_value(last.pull, by, value), TOLERANCE)
+        except NotConverged:
+            continue
+        near = abs(there.force - last.force).max() <= STAYS * abs(last.force).max()
+        if near and finger.pinch(there).least > pinch.least - APART and not leapt(finger, last, there):
+            return there
+    return None
+
+
 def follow(
-    finger: FiniteFinger,
+    finger: Followed,
     start: Shape,
     by: int,
     target: float,
@@ -54,8 +113,8 @@ def follow(
 ) -> Branch:
     """Follow the branch from `start` until the friction coefficient (BY_FRICTION) or depth (BY_DEPTH) reaches `target`.
 
-    It ends where its value passes a maximum, or where the skin is squeezed to `folds` of its length. Raises Cancelled
-    where `stop` says so.
+    It ends where its value passes a maximum, or where the skin is squeezed to `folds` of its length
+    (`folding.folds_at`). Raises Cancelled where `stop` says so.
     """
     way = [_Point(start, finger.pinch(start), value_of(start.pull, by))]
     if way[0].value >= target * (1.0 - 1e-12):
@@ -103,7 +162,7 @@ class _Point:
 
 
 def _further(
-    finger: FiniteFinger,
+    finger: Followed,
     last: _Point,
     by: int,
     direction: Array,
@@ -133,7 +192,7 @@ def with_value(pull: Pull, by: int, value: float) -> Pull:
     return pull._replace(mu=value) if by == BY_FRICTION else pull._replace(depth=value)
 
 
-def leapt(finger: FiniteFinger, before: Shape, after: Shape) -> bool:
+def leapt(finger: Followed, before: Shape, after: Shape) -> bool:
     """Return whether a step went to another branch, where the skin is folded."""
     one, other = finger.pinch(before), finger.pinch(after)
     return other.least < SQUEEZE * one.least or other.kink > CREASE or finger.crosses(after)

@@ -12,7 +12,7 @@ from functools import lru_cache
 from solver.failures import NotConverged
 from solver.finite_finger import FiniteFinger
 from solver.folding import folds_at
-from solver.limit import APART, CREASE, LARGEST_MU, TOLERANCE, Branch, follow, leapt, with_value
+from solver.limit import CREASE, LARGEST_MU, TOLERANCE, Branch, followed
 from solver.mesh import Array
 from solver.mesher import EPIDERMIS, Sizing
 from solver.newton import BY_DEPTH, BY_FRICTION, Pull, Shape
@@ -26,8 +26,6 @@ SMOOTH = 0.66  # stretch down to which a rough mesh has the states of the fine o
 SOUND = 0.65  # least stretch of the skin from which others may be sought: neo-Hookean surfaces fold at 0.54
 PLAIN = 0.71  # and that needs no proof: just below limits meshes not made for the fold have up to 0.70
 ASTRAY = 0.5  # between where the skin folds and where it was thought to, from which another mesh is made [mm]
-HOPS, HOP = 3, (0.01, 0.03)  # tries to go on where a branch ends, by how much of its value
-STAYS = 0.05  # by how much forces change then, at most
 STARTS = (0.3, 0.1, 0.03, 0.01)  # of the depth asked for, at which its branch may begin
 NEARLY = 0.02  # stretch above the one that folds, from which a limit is near: about two hundredths of the friction
 
@@ -119,38 +117,11 @@ def _finely(
 def _followed(finger: FiniteFinger, start: Shape, asked: _Question, folds: float) -> Branch:
     """Return the branch from `start` on. Beyond LARGEST_MU the bound decides, and what is asked for is a step away."""
     target = asked.target if asked.by == BY_DEPTH else min(asked.target, LARGEST_MU)
-    branch = follow(finger, start, asked.by, target, folds, asked.stop)
-    for _ in range(HOPS):
-        beyond = _beyond(finger, branch, asked.by, target, folds) if branch.limited else None
-        if beyond is None:
-            break
-        more = follow(finger, beyond, asked.by, target, folds, asked.stop)
-        branch = Branch((*branch.states, *more.states), more.value, more.limited, more.lost)
+    branch = followed(finger, start, asked.by, target, folds, asked.stop)
     if branch.limited or target == asked.target:
         return branch
     last = settled(finger.newton, branch.last.pull._replace(mu=asked.target), branch.last, TOLERANCE, asked.stop)
     return Branch((*branch.states, last), asked.target, limited=False)
-
-
-def _beyond(finger: FiniteFinger, branch: Branch, by: int, target: float, folds: float) -> Shape | None:
-    """Return a state of the branch a little beyond its end, None where it ends there indeed.
-
-    Where a node of the contact comes to the bound, the branch may turn back for a moment, as no skin does.
-    """
-    last = branch.last
-    pinch = finger.pinch(last)
-    if pinch.least < folds + APART:
-        return None
-    for part in HOP:
-        value = min((1.0 + part) * branch.value, target)
-        try:
-            there = finger.newton.settle(last, with_value(last.pull, by, value), TOLERANCE)
-        except NotConverged:
-            continue
-        near = abs(there.force - last.force).max() <= STAYS * abs(last.force).max()
-        if near and finger.pinch(there).least > pinch.least - APART and not leapt(finger, last, there):
-            return there
-    return None
 
 
 def _told(finger: FiniteFinger, branch: Branch, folds: float) -> Reach:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.contact import CAP, SLIP, STICK, Contact, ContactLost, Course, Touchable, forced, untouched
+from solver.contact import CAP, SLIP, Contact, ContactLost, Course, Touchable, forced, lowered, untouched
 from solver.failures import Cancelled, NotConverged, followed_to
 from solver.friction import FrictionLaw
 from solver.meeting import UNMET, met
@@ -104,10 +104,7 @@ class Way:
         self._body = body
         if self.by_force:
             body = forced(body, 0.0, 0.0 if self.by_drag else None)
-            # under a force something touches from the first
-            state = start.state.copy()
-            state[np.argmin(start.gap)] = SLIP if law.frictionless else STICK
-            start = replace(start, state=state, motion=np.zeros(len(body.resultants)))
+            start = replace(lowered(law, start), motion=np.zeros(len(body.resultants)))
         self.course = Course(body, law)
         self.instants = [Instant(0.0, 0.0, 0.0, start)]
         self.aim = Aim(0.0, 0.0, 0.0)

@@ -31,7 +31,7 @@ def cylinder(half_width: float, finest: float, nu: float = 0.48, zone: float = 0
 def pressed():
     """P = 0.01 N/mm on R = 5, E = 0.08, nu = 0.48: a = 0.782578 mm, p0 = 0.008135 MPa (Johnson 1985, ch. 4)."""
     body = cylinder(4.5, 0.06)
-    found = Course(forced(body.touchable, 0.01), FrictionLaw(0.0, np.inf)).sliding(0.0, 1, start_state(body))
+    found = Course(forced(body.touchable, 0.01), FrictionLaw(0.0, np.inf)).sliding(0.0, 1)
     return body, found
 
 

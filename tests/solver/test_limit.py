@@ -3,13 +3,18 @@
 import numpy as np
 import pytest
 
-from solver import mesher, reach
+from solver import mesher, own_existence, reach
+from solver.failures import NoSteadyState, NotConverged
+from solver.finite_body import FiniteBody
+from solver.finite_finger import FiniteFinger
 from solver.folding import folds_at
+from solver.grid import grid_mesh
 from solver.hyperelastic import NeoHooke, Ogden
 from solver.limit import follow
-from solver.newton import BY_FRICTION, Pull
+from solver.newton import BY_FRICTION, Newton, Pull
 from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
 from solver.sliding import settled
+from solver.tissues import finite_laws
 from tests.solver.finite_examples import published
 
 SLOW = pytest.mark.slow
@@ -94,3 +99,31 @@ def test_a_surface_that_keeps_its_volume_folds_where_biot_found(exponent):
 def test_skin_that_stiffens_folds_later():
     folds = [folds_at(Ogden(0.136, 0.48, exponent)) for exponent in (2.0, 3.0, 6.0, 9.0)]
     assert folds == sorted(folds, reverse=True)
+
+
+@SLOW
+def test_a_finger_handed_in_as_arrays_is_refused_beyond_the_friction_that_another_code_found():
+    scene = Scene(friction=Friction(0.0), loading=Loading(2.0))
+    laws = finite_laws(scene.materials)
+    mesh = FiniteFinger.of(scene, mesher.Sizing(11.0, 2.0, margin=6.0)).geometry.mesh
+    newton = Newton(FiniteBody.of(mesh, laws))
+    pull = Pull(2.0, 0.5, np.inf, TOWARDS_TIP)
+    with pytest.raises(NoSteadyState) as refused:
+        own_existence.steady(newton, pull, laws[mesher.EPIDERMIS])
+    assert refused.value.limit_mu == pytest.approx(0.373, rel=0.03)
+    below = own_existence.steady(newton, pull._replace(mu=0.3), laws[mesher.EPIDERMIS])
+    np.testing.assert_allclose(below.u, settled(newton, pull._replace(mu=0.3)).u, atol=1e-6)
+
+
+@SLOW
+@pytest.mark.parametrize("layers", [8, 12])
+def test_what_is_crushed_beside_a_rigid_core_is_told_as_not_known_whatever_the_mesh(layers):
+    # a half cylinder around a rigid core, pressed by a third of its thickness: in its corners det F falls below 0.3
+    # on any mesh, on finer ones at less friction, so that no mesh tells a limit
+    angle, part = np.linspace(-np.pi / 2, np.pi / 2, 10 * layers + 1), np.linspace(0.35, 1.0, 2 * layers + 1)
+    x, y = np.sin(angle)[:, None] * part, 1.0 - np.cos(angle)[:, None] * part
+    core = np.arange(len(angle)) * len(part)
+    mesh = grid_mesh(5.0 * np.stack([x, y], axis=-1), np.zeros(layers, np.int64), slice(0, len(angle)), core)
+    newton = Newton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]))
+    with pytest.raises(NotConverged, match="is not known"):
+        own_existence.steady(newton, Pull(1.0, 1.5, sense=TOWARDS_TIP), NeoHooke(0.08, 0.48))
