@@ -26,24 +26,23 @@ def of_shape(finger: FiniteFinger, scene: Scene, shape: Shape) -> Derivatives:
     if not newton.linearise(shape, pull, newton.skin_x):
         raise ValueError("the state has no tangent")
     skin = _followed(newton, shape)
-    reaction = np.stack([newton.reaction(one, still=True).sum(axis=0) for one in skin])
+    along, up = newton.follows(skin.T)
     inner = _spread(newton, np.stack([newton.inside.unfold(one, still=True) for one in skin], axis=1))
     sed = slope(finger.ending, newton.body, shape.u, inner)[0]
-    return driven(scene, sed, reaction[:, 1], pull.sense * reaction[:, 0])
+    return driven(scene, sed, up, pull.sense * along)
 
 
 def _followed(newton: Newton, shape: Shape) -> Array:
     """Return how the skin (3, 2 k) follows mu, tau_max and depth, its contact linearised as Newton does."""
     body, pull, size = newton.body, shape.pull, len(shape.state)
-    felt = newton.reaction(np.zeros(2 * size)).ravel()
     length, place = np.empty(size), shape.place(body)
     kernels.rubbed(place[:, 0], body.middle, shape.state, pull.mu, length)
     free, matrix = np.zeros(2 * size, np.int32), np.zeros(4 * size * size)
     right, steps = np.zeros((2 * size, 4)), np.zeros((2 * size, 4))
     still = np.zeros(size)  # on the surface, and nowhere else than where it sticks
     count = kernels.impose(
-        newton.inside.stiffness, felt, body.held, body.middle, shape.state, shape.sense, pull.mu, pull.tau, still,
-        still, length, free, matrix, right, steps,
+        newton.inside.stiffness, newton.inside.felt, body.held, body.middle, shape.state, shape.sense, pull.mu,
+        pull.tau, still, still, length, free, matrix, right, steps,
     )  # fmt: skip
     free, by = free[:count], np.zeros((count, 3))
     by[:, MU], by[:, DEPTH] = right[:count, BY_FRICTION], right[:count, BY_DEPTH]

@@ -6,6 +6,7 @@ and from them follows which change of both makes up for the forces that are miss
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -59,22 +60,21 @@ def corrected(
     if not linearise(shape, pull, origin + pull.travel - before, 0):
         return None
     steps = newton.steps
-    here = newton.reaction(steps[:, EQUILIBRIUM]).sum(axis=0)
-    by_depth = newton.reaction(steps[:, BY_DEPTH], still=True).sum(axis=0)
+    drag, push = newton.follows(steps).tolist()
+    felt_drag, felt_push = newton.inside.felt.reshape(-1, 2).sum(axis=0).tolist()
+    missing = given.normal - felt_push - push[EQUILIBRIUM]
     deeper = along = 0.0
     if given.tangential is not None and (shape.state == STICK).any():
-        by_travel = newton.reaction(steps[:, BY_TRAVEL], still=True).sum(axis=0)
-        matrix = np.array([[by_depth[1], by_travel[1]], [by_depth[0], by_travel[0]]])
-        missing = np.array([given.normal - here[1], given.tangential - here[0]])
-        det = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
+        missing_drag = given.tangential - felt_drag - drag[EQUILIBRIUM]
+        det = push[BY_DEPTH] * drag[BY_TRAVEL] - push[BY_TRAVEL] * drag[BY_DEPTH]
         if det == 0.0:
             return None
-        deeper = (missing[0] * matrix[1, 1] - missing[1] * matrix[0, 1]) / det
-        along = (matrix[0, 0] * missing[1] - matrix[1, 0] * missing[0]) / det
-    elif by_depth[1] != 0.0:
-        deeper = (given.normal - here[1]) / by_depth[1]
+        deeper = (missing * drag[BY_TRAVEL] - missing_drag * push[BY_TRAVEL]) / det
+        along = (push[BY_DEPTH] * missing_drag - drag[BY_DEPTH] * missing) / det
+    elif push[BY_DEPTH] != 0.0:
+        deeper = missing / push[BY_DEPTH]
     most = max(abs(deeper), abs(along))
-    if not np.isfinite(most):
+    if not isfinite(most):
         return None
     if most > STRIDE:
         deeper, along = deeper * STRIDE / most, along * STRIDE / most

@@ -179,7 +179,7 @@ def _at_force(newton: Newton, start: Shape, force: float, stop: Callable[[], boo
             return shape
         if not newton.linearise(shape, shape.pull, newton.skin_x):
             break
-        stiffness = float(newton.reaction(newton.steps[:, BY_DEPTH], still=True)[:, 1].sum())
+        stiffness = float(newton.follows(newton.steps)[1, BY_DEPTH])
         if not stiffness > 0.0:
             break
         depth += float(np.clip((force - shape.force[1]) / stiffness, -FURTHEST * depth, FURTHEST * depth))

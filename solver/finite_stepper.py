@@ -114,7 +114,7 @@ class FiniteStepper:
             shape = done[0]
             if number >= iterations and not kept and done[1] < far:
                 break
-        self._stiffness = float(newton.reaction(newton.steps[:, BY_DEPTH], still=True)[:, 1].sum())
+        self._stiffness = float(newton.follows(newton.steps)[1, BY_DEPTH])
         pinch = self._finger.pinch(shape)
         if pinch.least < FOLDING:
             return self._lose(normal)

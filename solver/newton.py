@@ -116,7 +116,6 @@ class Newton:
         self._state, self._sense = np.zeros(skin, np.int32), np.zeros(skin, np.int32)
         self._free = np.zeros(2 * skin, np.int32)
         self._matrix, self._right = np.zeros(4 * skin * skin), np.zeros((2 * skin, 4))
-        self._felt = self.inside.felt
         self._every = np.empty(body.size)
         place, skin, factored = body.mesh.nodes, body.skin, self.inside.factored
         lies = place, skin, body.middle
@@ -168,10 +167,9 @@ class Newton:
         self._state[:], self._sense[:] = shape.state, shape.sense
         return self._settle_skin(shape.u, anchor, pull.depth, pull.mu, pull.tau, pull.sense, rounds)
 
-    def reaction(self, skin: Array, *, still: bool = False) -> Array:
-        """Return the surface's forces on the skin (k, 2) at the end of its step (2 k,), or their change alone."""
-        out = self.inside.stiffness @ skin
-        return (out if still else out + self._felt).reshape(-1, 2)
+    def follows(self, steps: Array) -> Array:
+        """Return how the force of the surface along x and y (2, c) changes with `steps` of the skin (2 k, c)."""
+        return self.inside.stiffness.reshape(-1, 2, len(steps)).sum(axis=0) @ steps
 
     def moved(
         self, shape: Shape, pull: Pull, skin: Array, anchor: Array, scale: float = 1.0
