@@ -38,7 +38,7 @@ def steady(
         if sound(finger, shape, PLAIN):
             return shape
         found.append(shape)
-    proof = reach.of_friction(finger.scene, pull, pull.mu, stop)
+    proof = _followed(finger.scene, pull, stop)
     if proof.lost:
         raise NotConverged(
             f"At {pull.depth:.3g} mm of indentation settled sliding was followed up to mu = {proof.value:.3g} and lost "
@@ -72,7 +72,7 @@ def stands(finger: FiniteFinger, shape: Shape, stop: Callable[[], bool]) -> bool
         return True
     if not sound(finger, shape):
         return False
-    proof = reach.of_friction(finger.scene, shape.pull, shape.pull.mu, stop)
+    proof = _followed(finger.scene, shape.pull, stop)
     return not proof.limited and _proven(finger, shape, proof)
 
 
@@ -91,7 +91,7 @@ def refuse_far_beyond(scene: Scene, pull: Pull, stop: Callable[[], bool]) -> Non
     if pull.mu > STEEP:
         return
     with suppress(NotConverged):
-        proof = reach.of_friction(scene, pull, pull.mu, stop)
+        proof = _followed(scene, pull, stop)
         if proof.limited and not proof.lost and proof.value < FAR * pull.mu:
             raise _refused(scene, pull, proof, stop)
 
@@ -127,6 +127,19 @@ def doubts(finger: FiniteFinger, shape: Shape, stop: Callable[[], bool] = lambda
         f"{100 * proof.folds:.0f} %: this is within some 2 % of the largest friction with settled sliding, which is "
         "known as well.",
     )
+
+
+def _followed(scene: Scene, pull: Pull, stop: Callable[[], bool]) -> Reach:
+    """Return how far the branch goes as friction grows, or as depth does where that alone leads to what `pull` asks.
+
+    Where nearly all skin slips at a bound the coefficient hardly matters, and how far it may grow is badly told.
+    """
+    proof = reach.of_friction(scene, pull, pull.mu, stop)
+    if proof.limited:
+        with suppress(NotConverged):
+            deepest = reach.of_depth(scene, pull, stop)
+            return proof if deepest.limited else deepest
+    return proof
 
 
 def _refused(scene: Scene, pull: Pull, proof: Reach, stop: Callable[[], bool]) -> NoSteadyState:
