@@ -7,7 +7,7 @@ import traceback
 from types import ModuleType
 from typing import NoReturn
 
-from daq_app.console import Console
+from daq_app.console import Console, harmless, takes_all
 
 DONE, FAILED, WRONG, FLAWED, STOPPED = 0, 1, 2, 3, 130
 
@@ -46,6 +46,7 @@ _WRONG = (
 )
 _FAILED = (
     "daq_app.cluster.SchedulerError",
+    "daq_app.console.NotWritten",
     "daq_app.sensitivity.TooFewAnswers",
     "drivers.transducer.DeviceFault",
     "drivers.transducer.LinkLost",
@@ -60,6 +61,9 @@ _FAILED = (
 )
 
 
+_OUR_OWN = ("daq_app", "drivers", "sessions", "simulators", "solver")
+
+
 class WrongValue(Exception):
     """The command line or a value in a file was wrong: exit code 2."""
 
@@ -67,6 +71,7 @@ class WrongValue(Exception):
 def run(arguments: list[str]) -> int:
     """Run one command line and return its exit code. Never raises, save for a broken interpreter."""
     debug = "--debug" in arguments
+    takes_all(sys.stdout, sys.stderr)
     try:
         return _dispatch(arguments)
     except KeyboardInterrupt:
@@ -153,6 +158,9 @@ def _failure(error: Exception) -> tuple[str, int]:
         if error.filename is None or error.strerror is None:
             return sentence, FAILED
         return f"{error.filename}: {error.strerror.lower()}", FAILED
+    if isinstance(error, ModuleNotFoundError) and error.name and error.name.partition(".")[0] not in _OUR_OWN:
+        package = error.name.partition(".")[0]
+        return f"the Python package {package} is not installed; 'pip install daq-app' brings all that is needed", FAILED
     return f"unexpected {type(error).__name__} ({sentence}); run again with --debug and report what it shows", FAILED
 
 
@@ -163,5 +171,5 @@ def _loaded(names: tuple[str, ...]) -> tuple[type[Exception], ...]:
 
 
 def _said(sentence: str, code: int) -> int:
-    print(f"daq-app: {sentence}", file=sys.stderr)
+    print(f"daq-app: {harmless(sentence)}", file=sys.stderr)
     return code

@@ -1,6 +1,8 @@
 """What a verb says to people and to scripts, kept apart."""
 
+import io
 import json
+import re
 import sys
 import threading
 import time
@@ -34,6 +36,26 @@ class Underway:
         self.part = max(self.part, min(part, 0.99))
 
 
+class NotWritten(Exception):
+    """What was said could not be written: why, where, and what to do."""
+
+
+def takes_all(*streams: TextIO | None) -> None:
+    """Let each stream write what its encoding has no letters for as escapes: no answer is lost to a dash."""
+    for stream in streams:
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def harmless(text: str) -> str:
+    r"""Return text as a terminal may have it: control characters, which it would obey, are shown escaped.
+
+    >>> print(harmless("a\x1b[31mb"))
+    a\x1b[31mb
+    """
+    return re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", lambda found: f"\\x{ord(found[0]):02x}", text)
+
+
 class Console:
     """Text for people on stdout, or one JSON document there and everything else on stderr."""
 
@@ -49,18 +71,18 @@ class Console:
         """Print a line for people; left out where a script reads."""
         if not self.as_json:
             self._end_progress()
-            print(text, file=self._out, flush=True)
+            self._answer(harmless(text))
 
     def note(self, text: str) -> None:
         """Print a line on stderr: progress, warnings, losses."""
         self._end_progress()
-        print(text, file=self._err, flush=True)
+        print(harmless(text), file=self._err, flush=True)
 
     def result(self, document: Mapping[str, Any]) -> None:
         """Print the one JSON document; left out where a person reads. NaN and infinity are refused by the format."""
         if self.as_json:
             self._end_progress()
-            print(json.dumps(document, indent=1, allow_nan=False), file=self._out, flush=True)
+            self._answer(json.dumps(document, indent=1, allow_nan=False))
 
     def progress(self, done: float, text: str) -> None:
         """Show how far a long job is (`done` from 0 to 1): a moving line on a terminal, else now and then a new one."""
@@ -101,6 +123,17 @@ class Console:
         finally:
             over.set()
             shower.join()
+
+    def _answer(self, text: str) -> None:
+        try:
+            print(text, file=self._out, flush=True)
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            why = (error.strerror or "refused").lower()
+            raise NotWritten(
+                f"the answer could not be written to standard output ({why}); free space there, or send it elsewhere"
+            ) from error
 
     def _end_progress(self) -> None:
         if self._line_open:

@@ -2,6 +2,7 @@
 
 import importlib
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from typing import Any, cast
@@ -9,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.toml_file import SettingsError
+from sessions.toml_file import SettingsError, shown
 from solver.failures import SolveFailure
 from solver.scene import TISSUES, Scene
 from solver.solution import solve
@@ -94,10 +95,12 @@ def checked(design: Mapping[str, Any], scene: Scene, where: str) -> dict[str, tu
     for name, span in design.items():
         if _value(scene, name) is None:
             raise SettingsError(f"{where}: {name} is no number of this scene; a dotted key such as friction.mu is one")
+        given: object = span
         pair: list[Any] = cast("list[Any]", span) if isinstance(span, list) else []
-        numbers = [float(end) for end in pair if isinstance(end, int | float) and math.isfinite(end)]
+        numbers = [float(end) for end in pair if isinstance(end, int | float) and abs(end) <= sys.float_info.max]
         if len(pair) != 2 or len(numbers) != 2 or not numbers[0] < numbers[1]:
-            raise SettingsError(f"{where}: {name} = {span!r} is not allowed: [least, greatest], least below greatest")
+            allowed = "[least, greatest], least below greatest"
+            raise SettingsError(f"{where}: {name} = {shown(given)} is not allowed: {allowed}")
         found[name] = (numbers[0], numbers[1])
     if len(found) < 2:
         raise SettingsError(f"{where}: a design needs two numbers at least")

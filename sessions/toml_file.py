@@ -5,7 +5,9 @@ import math
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import MISSING, fields, is_dataclass
+from datetime import date, time
 from pathlib import Path
 from types import NoneType
 from typing import Any, Literal, TypeVar, cast, get_args, get_origin, get_type_hints
@@ -39,12 +41,12 @@ def load_toml(path: Path, cls: type[T]) -> T:
 
 
 def text_of(path: Path) -> str:
-    """Return the text of a TOML file. Raises as `load_toml` does."""
-    if not path.is_file():
+    """Return the text of a TOML file, which may be a pipe. Raises as `load_toml` does."""
+    if path.is_dir() or not path.exists():
         found = "this is a folder" if path.is_dir() else "there is no such file"
         raise FileNotFoundError(f"{path}: {found}; give the path of a TOML file")
     try:
-        return path.read_bytes().decode()
+        return path.read_bytes().decode("utf-8-sig")  # some editors begin a file with a mark that is no part of it
     except UnicodeDecodeError as error:
         raise SettingsError(f"{path}: byte {error.start} is no UTF-8 text; save the file as UTF-8") from error
 
@@ -55,14 +57,24 @@ def from_toml(text: str, cls: type[T], where: str, instead: Mapping[str, Any] | 
     `instead` are tables and values that count in place of the text's own, or of those that it lacks.
     """
     try:
-        return from_table({**tomllib.loads(text), **(instead or {})}, cls, where)
-    except tomllib.TOMLDecodeError as error:
-        raise SettingsError(f"{where}: this is not TOML: {error}") from error
+        return from_table({**tables_in(text, where), **(instead or {})}, cls, where)
     except _Wrong as wrong:
         line = _line_of(text, wrong.key)
         raise SettingsError(
             f"{where}, line {line}: {wrong.sentence}" if line else f"{where}: {wrong.sentence}"
         ) from wrong
+
+
+def tables_in(text: str, where: str) -> dict[str, Any]:
+    """Return what a TOML text holds; `where` is how messages call it. Raises SettingsError."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SettingsError(f"{where}: this is not TOML: {error}") from error
+    except RecursionError as error:
+        raise SettingsError(f"{where}: lists or tables are nested too deep; write it with fewer brackets") from error
+    except ValueError as error:  # Python's limit, 4300 unless told
+        raise SettingsError(f"{where}: a whole number has thousands of digits; shorten it") from error
 
 
 def from_table(table: Mapping[str, Any], cls: type[T], where: str) -> T:
@@ -80,7 +92,7 @@ def from_table(table: Mapping[str, Any], cls: type[T], where: str) -> T:
         if cause is None:
             value, kind = _found_at(table, cls, path)
             allowed = f"it must be {_in_words(kind)}"
-            raise _Wrong(where, path, f"{path} = {_shown(value)} is not allowed: {allowed}") from error
+            raise _Wrong(where, path, f"{path} = {shown(value)} is not allowed: {allowed}") from error
         # A dataclass that checks itself names the key, in full or from itself on.
         key = str(getattr(cause, "key", ""))
         full = key if not path or key == path or key.startswith((f"{path}.", f"{path}[")) else f"{path}.{key}"
@@ -88,7 +100,7 @@ def from_table(table: Mapping[str, Any], cls: type[T], where: str) -> T:
             raise _Wrong(where, path, f"{path or 'this'}: {cause}") from error
         value: object = getattr(cause, "value", None)
         allowed = str(getattr(cause, "allowed", cause)).rstrip(".")
-        raise _Wrong(where, full, f"{full} = {_shown(value)} is not allowed: {allowed}") from error
+        raise _Wrong(where, full, f"{full} = {shown(value)} is not allowed: {allowed}") from error
 
 
 def toml_text(made: Any) -> str:  # noqa: ANN401  any dataclass of texts, numbers, tuples and dataclasses
@@ -120,8 +132,29 @@ def _inline(value: Any) -> str:  # noqa: ANN401  as above
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_inline, cast("tuple[Any, ...]", value))) + "]"
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
+        return "".join(c if c.isprintable() else _escaped(c) for c in json.dumps(value, ensure_ascii=False))
+    if isinstance(value, date | time):
+        return value.isoformat()
+    if isinstance(value, bool):
+        return {True: "true", False: "false"}[value]
+    with suppress(ValueError):
+        return repr(value)
+    return hex(value)  # of any length, whereas Python limits decimal digits
+
+
+def _escaped(character: str) -> str:
+    """Return a character as it stands in a text in quotes: one that a terminal would obey, or nobody would see."""
+    code = ord(character)
+    return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+
+
+def _key(name: str) -> str:
+    """Return a key as TOML writes it.
+
+    >>> _key("tip_radius"), _key(""), _key("a b")
+    ('tip_radius', '""', '"a b"')
+    """
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _inline(name)
 
 
 class _Wrong(SettingsError):
@@ -147,7 +180,7 @@ def _check_keys(value: Any, kind: Any, key: str, where: str) -> None:  # noqa: A
     table = cast("Mapping[str, Any]", value)
     hints = get_type_hints(dataclass)
     for name, inside in table.items():
-        full = f"{key}.{name}" if key else name
+        full = f"{key}.{_key(name)}" if key else _key(name)
         if name not in hints:
             raise _Wrong(where, full, f"{full} is not known; allowed here: {', '.join(hints)}")
         _check_keys(inside, hints[name], full, where)
@@ -206,19 +239,15 @@ def _found_at(table: Any, kind: Any, key: str) -> tuple[object, Any]:  # noqa: A
     return table, kind
 
 
-def _shown(value: object) -> str:
+def shown(value: object) -> str:
     """Return a value as TOML writes it, cut short.
 
-    >>> _shown("a"), _shown(True), _shown([1, 2.5])
-    ('"a"', 'true', '[1, 2.5]')
+    >>> shown("a"), shown(True), shown([1, 2.5]), shown(date(2026, 1, 1))
+    ('"a"', 'true', '[1, 2.5]', '2026-01-01')
     """
     if value is None:
         return "nothing"
-    text = {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
-    if isinstance(value, str):
-        text = f'"{value}"'
-    if isinstance(value, tuple):
-        text = repr(list(cast("tuple[Any, ...]", value)))
+    text = _inline(value)
     return text if len(text) <= 60 else text[:57] + "..."
 
 

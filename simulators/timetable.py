@@ -82,10 +82,10 @@ def usual_timetable() -> Timetable:
 def load_timetable(path: Path) -> Timetable:
     """Return the timetable in a TOML file. Raises SetupError where there is none, TimetableError where it is wrong."""
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise SetupError(f"{path} cannot be read ({(error.strerror or 'refused').lower()}); check its name") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # no TOML, no UTF-8, a number of thousands of digits, brackets on end
         raise TimetableError(f"{path} is not TOML: {error}") from None
     try:
         script = msgspec.convert(table, _Script)

@@ -28,8 +28,8 @@ def extension(name: str) -> Any:  # noqa: ANN401 - C
 
 
 def package_folder(package: str) -> Path:
-    """Return where a package is installed, without importing it. Raises ImportError."""
+    """Return where a package is installed, without importing it. Raises ModuleNotFoundError."""
     spec = find_spec(package)
     if spec is None or not spec.submodule_search_locations:
-        raise ImportError(f"{package} is not installed")
+        raise ModuleNotFoundError(f"{package} is not installed", name=package)
     return Path(spec.submodule_search_locations[0])

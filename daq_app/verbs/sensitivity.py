@@ -5,13 +5,12 @@ nobody measured; they are printed with the result. A design is a TOML file: "fin
 """
 
 import argparse
-import tomllib
 from pathlib import Path
 
 from daq_app.cli import WrongValue
 from daq_app.console import Console, number, table
 from daq_app.sensitivity import checked, doubts, left_as_it_is, sensitivity, usual_design
-from sessions.toml_file import load_toml
+from sessions.toml_file import load_toml, tables_in, text_of
 from solver.scene import Scene
 
 EXAMPLE = "daq-app sensitivity scene.toml --samples 64"
@@ -36,11 +35,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.design is None:
         design, origin = usual_design(scene), "default: nobody set it"
     else:
-        try:
-            read = tomllib.loads(options.design.read_text(encoding="utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise WrongValue(f"{options.design}: this is not TOML: {error}") from error
-        design, origin = checked(read, scene, str(options.design)), "set"
+        where = str(options.design)
+        design, origin = checked(tables_in(text_of(options.design), where), scene, where), "set"
     count = samples * (len(design) + 2)
 
     def shown(part: float) -> None:

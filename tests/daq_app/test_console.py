@@ -1,10 +1,14 @@
+import errno
 import io
 import json
+import os
+import sys
 import threading
 
 import pytest
 
-from daq_app.console import Console, Underway
+from daq_app.cli import run
+from daq_app.console import Console, NotWritten, Underway, takes_all
 from solver.telling import listening, tell
 
 
@@ -28,6 +32,48 @@ def test_without_json_the_document_stays_unsaid():
     speaker.say("for people")
     speaker.result({"a": 1})
     assert out.getvalue() == "for people\n"
+
+
+def test_an_answer_that_the_output_has_no_letters_for_is_written_with_escapes():
+    out = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    takes_all(out, None)
+    Console(as_json=False, out=out).say("Ω – 1.5")
+    assert out.buffer.getvalue() == rb"\u03a9 \u2013 1.5" + os.linesep.encode()
+
+
+def test_a_terminal_is_shown_control_characters_and_does_not_obey_them(capsys):
+    speaker, out, err = console(as_json=False)
+    speaker.say("a\x1b[2Jb\x00\nc\x9bd")
+    speaker.note("\x07")
+    assert out.getvalue() == "a\\x1b[2Jb\\x00\nc\\x9bd\n"
+    assert err.getvalue() == "\\x07\n"
+    assert run(["\x1b[2J"]) == 2
+    assert "\x1b" not in capsys.readouterr().err
+
+
+def test_a_full_disk_is_told_with_what_could_not_be_written_and_where():
+    class Full(io.StringIO):
+        def write(self, _):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    for as_json in (True, False):
+        speaker = Console(as_json=as_json, out=Full())
+        with pytest.raises(NotWritten, match=r"the answer could not be written to standard output \(no space left"):
+            (speaker.result if as_json else speaker.say)({} if as_json else "")
+
+
+def test_a_package_that_is_missing_is_named_with_what_to_install(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "daq_app.verbs.solve", None)  # one of our own: a fault of ours
+    assert run(["solve", "scene.toml"]) == 1
+    assert "unexpected ModuleNotFoundError" in capsys.readouterr().err
+
+    def needs(_):
+        raise ModuleNotFoundError("No module named 'llvmlite.binding'", name="llvmlite.binding")
+
+    monkeypatch.setattr("daq_app.cli._dispatch", needs)
+    assert run(["solve", "scene.toml"]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("daq-app: the Python package llvmlite is not installed; 'pip install ")
 
 
 def test_a_number_that_is_none_never_becomes_json():

@@ -93,7 +93,11 @@ def test_a_scene_without_a_bound_varies_none():
 
 
 def test_what_cannot_be_varied_is_named():
-    for wrong, what in (({"finger.toe": [1, 2]}, "finger.toe"), ({"friction.mu": [0.5, 0.5]}, "friction.mu")):
+    for wrong, what in (
+        ({"finger.toe": [1, 2]}, "finger.toe"),
+        ({"friction.mu": [0.5, 0.5]}, "friction.mu"),
+        ({"friction.mu": [0.5, 10**400]}, r"friction.mu = \[0.5, 1000"),
+    ):
         with pytest.raises(SettingsError, match=what):
             checked(wrong, SCENE, "design.toml")
 

@@ -1,5 +1,7 @@
+import os
 import re
 from dataclasses import dataclass, field
+from datetime import date, time
 from pathlib import Path
 from typing import Literal
 
@@ -65,6 +67,11 @@ def test_whole_numbers_stand_for_numbers_and_defaults_for_what_is_left_out():
         ({"kind": "three"}, 'here: kind = "three" is not allowed: it must be "one" or "two"'),
         ({"note": 3}, "here: note = 3 is not allowed: it must be text in quotes"),
         ({"inner": 3}, "here: inner = 3 is not allowed: it must be a table"),
+        ({"": 3}, 'here: "" is not known; allowed here: count, inner, kind, note, limit, many'),
+        ({"a\x1b[2J": 3}, r'here: "a\u001b[2J" is not known; allowed here: count, inner, kind, note, limit, many'),
+        ({"kind": "\x9b"}, r'here: kind = "\u009b" is not allowed: it must be "one" or "two"'),
+        ({"count": date(2026, 1, 31)}, "here: count = 2026-01-31 is not allowed: it must be a whole number"),
+        ({"note": [time(7, 32)]}, "here: note = [07:32:00] is not allowed: it must be text in quotes"),
         ({"colour": 3}, "here: colour is not known; allowed here: count, inner, kind, note, limit, many"),
     ],
 )
@@ -101,6 +108,37 @@ def test_what_is_not_toml_is_refused_with_the_files_name(tmp_path, content):
     path.write_bytes(content)
     with pytest.raises(SettingsError, match=r"broken\.toml: "):
         load_toml(path, Outer)
+
+
+@pytest.mark.parametrize(
+    ("value", "sentence"),
+    [
+        ("[" * 2000 + "]" * 2000, "lists or tables are nested too deep"),
+        ("1" * 5000, "a whole number has thousands of digits"),
+        (f"0x{'f' * 5000}", "limit = 0xfff"),  # more decimal digits than Python shows
+    ],
+    ids=["brackets", "digits", "hexadecimal digits"],
+)
+def test_a_value_beyond_all_measure_is_refused_in_a_sentence(value, sentence):
+    with pytest.raises(SettingsError, match=f"^here(, line 3)?: {re.escape(sentence)}"):
+        from_toml(f"count = 3\ninner = {{depth = 2}}\nlimit = {value}", Outer, "here")
+
+
+def test_the_mark_that_some_editors_begin_a_file_with_is_no_part_of_it(tmp_path):
+    path = tmp_path / "marked.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + SCENE.encode())
+    assert load_toml(path, Scene).friction.mu == 0.67
+
+
+@pytest.mark.skipif(not Path("/dev/fd").exists(), reason="no pipe has a path here")
+def test_a_file_may_be_a_pipe():
+    out, into = os.pipe()
+    os.write(into, SCENE.encode())
+    os.close(into)
+    try:
+        assert load_toml(Path(f"/dev/fd/{out}"), Scene).friction.mu == 0.67
+    finally:
+        os.close(out)
 
 
 SCENE = "[finger]\ntip_radius = 5.0\n\n[friction]\nmu = 0.67\n\n[loading]\nindentation = 2.0\n"

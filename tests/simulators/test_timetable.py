@@ -62,6 +62,9 @@ def test_a_script_gives_strokes_in_order_and_faults(script):
     ("text", "reason"),
     [
         ("repeat = ", "not TOML"),
+        (f"repeat = {'[' * 2000}", "not TOML"),
+        (f"repeat = {'1' * 5000}", "not TOML"),
+        ("\ufeffstrokes = 1", "strokes"),  # the mark that some editors begin a file with
         ("strokes = 1", "strokes"),
         ("[[stroke]]\nat = -1\nmu = 0.5", "at"),
         ("[[stroke]]\nat = 1\nmu = nan", "mu"),
