@@ -28,6 +28,7 @@ from solver.scene import Loading
 from solver.stepping import PRESSING_STEPS, PRESSING_TIME, Aim, Progress, Way, course
 from solver.stiffness import Elastic, Probes
 
+KEPT = 4  # lengths of steps that a body is kept ready for, factors and all
 RELAXED = 14.0  # times of the slowest tissue after which a body may count as relaxed: e^-14 is 8e-7
 EQUAL_STEPS = 6  # steps of equal length while nothing but relaxation goes on, before they are doubled
 STILL = 1e-6  # change of the SED over such steps from which on it counts as relaxed [-]
@@ -166,6 +167,8 @@ class RelaxingBody:
     def _form(self, step: float) -> _Ready:
         key = f"{step:.9e}"
         if key not in self._steps:
+            while len(self._steps) >= KEPT:
+                del self._steps[next(iter(self._steps))]  # the one asked for longest ago
             body = Body.of(
                 self.mesh,
                 [law.within(step) for law in self._laws],
@@ -177,6 +180,7 @@ class RelaxingBody:
             across = t.normal_by_tangential
             whole = np.block([[t.normal_by_normal, across], [across.T, t.tangential_by_tangential]])
             self._steps[key] = _Ready(body, whole)
+        self._steps[key] = self._steps.pop(key)
         return self._steps[key]
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver import relaxing
 from solver.materials import Prony
 from solver.reference import SLIPPERINESS, scene
 from solver.relaxing import RelaxingBody
@@ -64,6 +65,24 @@ def test_a_block_pressed_between_walls_keeps_its_bulk_stress_and_relaxes_by_its_
     for time, part in zip(TIMES, TABLE[1.0], strict=True):
         expected = -0.01 * (law.bulk * min(time, 1.0) + 4.0 / 3.0 * law.shear * part)
         np.testing.assert_allclose(found[time][:, 1, 1], expected, rtol=1e-6)
+
+
+def test_a_body_is_kept_ready_for_the_last_few_lengths_of_steps_and_makes_the_others_anew(monkeypatch):
+    """A course of steps of ever other lengths would else hold the factors of each."""
+    law = Prony(0.08, 0.48, ((0.3, 1.0),))
+    lengths = [0.1 * n for n in (1, 2, 3, 4, 5, 6, 1, 2, 7, 7, 1)]
+
+    def stepped():
+        body, probes, places = held_all_round(law)
+        for number, step in enumerate(lengths):
+            body.ready(step, 0.01 * number * places @ np.array([[0.0, 1.0], [0.0, 0.0]]).T)
+            body.advance(np.zeros(0), np.zeros(0))
+        return body, body.energy(probes)
+
+    few, energy = stepped()
+    assert len(few._steps) == relaxing.KEPT < len(set(lengths))
+    monkeypatch.setattr(relaxing, "KEPT", 100)
+    np.testing.assert_array_equal(stepped()[1], energy)
 
 
 def test_the_energy_is_that_of_the_springs_alone():
