@@ -73,12 +73,9 @@ class Place:
 def linked(place: Place) -> Callable[..., Any] | None:
     """Return the kept code as a function; None where there is none that can be linked here."""
     for folder in place.folders():
-        with suppress(OSError):
-            data = (folder / place.file).read_bytes()
-            head, _, code = data.partition(b"\n")
-            told = json.loads(head)
-            if told["digest"] == _digest(code):
-                return _linked(place, code, told["wrapper"], told["environment"], told["outside"])
+        kept = _read(folder / place.file)
+        if kept is not None:
+            return _linked(place, *kept)
     return None
 
 
@@ -88,19 +85,36 @@ def keep(place: Place, code: bytes, wrapper: str, environment: str, outside: lis
     `wrapper` is the function in it that takes Python's arguments, `environment` the variable that points to its
     globals, `outside` the functions it asks for.
     """
-    from tempfile import NamedTemporaryFile
+    from tempfile import mkstemp
 
     told = {"digest": _digest(code), "wrapper": wrapper, "environment": environment, "outside": outside}
     for folder in place.folders():
         with suppress(OSError):
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            with NamedTemporaryFile(dir=folder, delete=False) as file:  # others may be writing the same
-                file.write(json.dumps(told).encode() + b"\n" + code)
-            Path(file.name).replace(folder / place.file)
+            handle, name = mkstemp(dir=folder)  # others may be writing the same
+            os.close(handle)
+            new = Path(name)
+            try:
+                new.write_bytes(json.dumps(told).encode() + b"\n" + code)
+                new.replace(folder / place.file)
+            finally:
+                new.unlink(missing_ok=True)
             for other in folder.glob(f"{place.label}*{_ENDING}"):
                 if other.name != place.file:
                     other.unlink(missing_ok=True)
             return
+
+
+def _read(file: Path) -> tuple[bytes, str, str, list[str]] | None:
+    """Return what `keep` was given; None where the file is not there, or is not what `keep` wrote."""
+    try:
+        head, _, code = file.read_bytes().partition(b"\n")
+        told = json.loads(head)
+        if told["digest"] != _digest(code):
+            return None
+        return code, told["wrapper"], told["environment"], told["outside"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
 
 
 def _linked(place: Place, code: bytes, wrapper: str, environment: str, outside: list[str]) -> Callable[..., Any] | None:

@@ -91,6 +91,37 @@ def test_damaged_code_and_code_that_asks_for_what_is_not_there_is_not_linked(kep
     assert keeping.linked(place) is None
 
 
+@pytest.mark.parametrize("content", [b"", b"\0" * 64, b"[]\n", b"{}\n", b"\xff\xfe\n", b"no JSON\n"])
+def test_a_file_that_is_no_kept_code_is_replaced_by_what_is_compiled(kept, monkeypatch, content):
+    place, folder, _ = kept
+    file = folder / place.file
+    file.write_bytes(content)
+    loop, made = compiled(kernels.tributary.function), []
+    monkeypatch.setattr(loop, "_place", lambda _: place)
+    monkeypatch.setattr(
+        loop, "_made", lambda _: made.append(1) or (loop.function, (b"code", "wrapper", "environment", []))
+    )
+    loop(np.linspace(0.0, 3.0, 3), np.array([0, 1, 0], np.int32), np.zeros(3))
+    assert made == [1]
+    assert file.read_bytes().endswith(b"\ncode")
+
+
+def test_where_code_cannot_be_put_no_part_of_it_is_left(kept, monkeypatch):
+    place, folder, _ = kept
+    (folder / place.file).mkdir()
+    monkeypatch.setattr(Place, "folders", lambda _: iter([folder]))
+    keeping.keep(place, b"code", "wrapper", "environment", [])
+    assert {one.name for one in folder.iterdir()} == {"skin.py", place.file}
+
+
+def test_without_numba_the_package_that_is_missing_is_named(monkeypatch):
+    monkeypatch.setattr("solver.extension.find_spec", lambda _: None)
+    loop, out = compiled(kernels.tributary.function), np.zeros(3)
+    with pytest.raises(ModuleNotFoundError, match="numba is not installed") as caught:
+        loop(np.linspace(0.0, 3.0, 3), np.array([0, 1, 0], np.int32), out)
+    assert caught.value.name == "numba"
+
+
 def test_new_code_takes_the_place_of_that_of_earlier_sources(kept):
     place, folder, _ = kept
     keeping.keep(place, b"early", "wrapper", "environment", [])
