@@ -26,7 +26,7 @@ import numpy as np
 from solver.friction import STEEP
 from solver.load_steps import Steps
 from solver.mesh import Array
-from solver.mesher import ANYWHERE, EDGE, FINEST, SHORT
+from solver.mesher import ANYWHERE, EDGE, FINEST, POINT, SHORT
 from solver.scene import Finger, Receptor, Scene
 
 FINENESS = {"small": (5, 6, 8, 10, 12, 16, 20, 24), "finite": (7, 11, 14, 20, 24)}  # meshes that can be asked for
@@ -40,6 +40,7 @@ AT_EDGES = 1.0  # and where skin slips at the bound up to an edge: between that 
 FROM_NAIL = {"small": 2.5, "finite": 4.0}  # the same where a nail ends: errors fall with the element, or its root
 FROM_FINENESS = {"small": ((0.08, 2.0),), "finite": ((0.15, 2.0), (0.0215, 1.1))}  # the largest, by the power given
 OF_OTHERS = ((0.115, 2.0), (0.8, 3.0))  # the same at small strain of any finger but the published one
+ELSEWHERE = {"small": 1.3, "finite": 1.0}  # times that in the SED, where the receptor is not the published one
 THIN = 0.75  # power with which those grow as the bone gets thinner by the tissue below it: fat is sheared most there
 OF_STEEP = 2.0  # times what the mesh alone decides at small strain where friction is steep
 FROM_ROOT = 0.05  # of both forces at small strain where a nail ends, by fineness
@@ -158,6 +159,7 @@ def _off(
     kind = scene.solve.kinematics
     size, largest = np.abs(numbers), np.abs(others - numbers).max(axis=0)
     part = np.full(len(numbers), _least(scene, fineness))
+    part[0] *= ELSEWHERE[kind] if _elsewhere(scene) else 1.0
     if kind == "finite":
         part[DEPTH] *= OF_DEPTH
     if kind == "small":
@@ -190,10 +192,12 @@ def _off(
 def coarsest_for(scene: Scene, tolerance: float) -> float:
     """Return the fineness of the coarsest mesh whose estimate can meet the tolerance, the finest where none can.
 
-    In a light touch that is one beyond which the smallest elements, along the skin, are as small as they get.
+    In a light touch that is one beyond which the smallest elements, along the skin, are as small as they get. For a
+    receptor elsewhere than the published one it is none coarser than the usual one.
     """
     kind = scene.solve.kinematics
-    meets = (n for n in FINENESS[kind] if _least(scene, n) <= 0.9 * tolerance)
+    usual, part = (DEFAULT[kind], ELSEWHERE[kind]) if _elsewhere(scene) else (0, 1.0)
+    meets = (n for n in FINENESS[kind] if n >= usual and part * _least(scene, n) <= 0.9 * tolerance)
     return next(meets, next(n for n in FINENESS[kind] if n >= DEFAULT[kind] and not finer_than(scene, n)))
 
 
@@ -209,6 +213,18 @@ def _least(scene: Scene, fineness: float) -> float:
     parts = OF_OTHERS if kind == "small" and not published else FROM_FINENESS[kind]
     thinner = 1.0 if published else _around_bone(scene.finger) / _around_bone(Finger())
     return thinner**THIN * max(part / resolved**order for part, order in parts)
+
+
+def _elsewhere(scene: Scene) -> bool:
+    """Return whether the receptor is another than the published one, by tip radius, on which meshes were chosen.
+
+    One that is hardly more than a point has elements made for it.
+    """
+    own, published = (
+        np.array([*r.ending, r.depth]) / f.tip_radius
+        for r, f in ((scene.receptor, scene.finger), (Receptor(), Finger()))
+    )
+    return not np.allclose(own, published) and not np.all(own[:2] < POINT)
 
 
 def _around_bone(finger: Finger) -> float:

@@ -16,6 +16,16 @@ from solver.solution import solve
 from tests.solver.drawn_scenes import DRAWN, HELD_OUT
 
 
+@pytest.mark.parametrize("kinematics", ["small", "finite"])
+def test_a_receptor_elsewhere_than_the_published_one_has_no_mesh_coarser_than_the_usual_one(kinematics):
+    asked = Scene(friction=Friction(0.3), loading=Loading(1.0), solve=Solve(kinematics, tolerance=0.05))
+    assert coarsest_for(asked, 0.05) < DEFAULT[kinematics]
+    assert coarsest_for(replace(asked, receptor=Receptor(1.0)), 0.05) == DEFAULT[kinematics]
+    larger = Finger(10.0, 1.5, 2.5, 30.0, 3.0, (-2.0, 1.5))  # twice the published one in all lengths
+    same = replace(asked, finger=larger, receptor=Receptor(3.8, (0.4, 2.0)))
+    assert coarsest_for(same, 0.05) < DEFAULT[kinematics]
+
+
 @pytest.mark.slow
 def test_estimates_lie_above_the_errors_of_scenes_drawn_at_random_and_mostly_below_ten_times_them():
     close: list[bool] = []
