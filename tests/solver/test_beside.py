@@ -9,6 +9,15 @@ import pytest
 from solver.beside import beside
 
 
+@pytest.fixture
+def heard():
+    """Let this process hear Ctrl-C: one begun in the background by a shell was told not to."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("heard")
 def test_ctrl_c_that_comes_while_c_calls_python_stops_the_wait_and_not_the_work():
     go_on, ended = threading.Event(), threading.Event()
 
