@@ -28,7 +28,7 @@ from solver.matching import within_reach
 from solver.mesh import Array
 from solver.mesher import Sizing
 from solver.newton import EQUILIBRIUM, Newton, Shape
-from solver.prediction import History, Prediction, Row, Skin
+from solver.prediction import History, Prediction, Row, Skin, drag
 from solver.receptor import ROW
 from solver.scene import Scene
 from solver.telling import tell
@@ -149,7 +149,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         sed_ending=sed,
         sed_point=float(finger.point.average(body, shape.u)[0]),
         normal_force=normal,
-        tangential_force=_drag(scene, tangential),
+        tangential_force=drag(scene, tangential),
         contact_width=width,
         indentation=depth,
         shift=shift if held else None,
@@ -175,13 +175,6 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         history=_history(scene, finger, way, relaxing, times) if way else None,
         warnings=(*evidence.warnings(driven, model["left_out"]), *doubts(finger, shape, stop), *rounding(checks)),
     )
-
-
-def _drag(scene: Scene, tangential: float) -> float:
-    """Return the drag opposing the slide [N/mm]; without a slide, the size of the tangential force."""
-    if scene.friction.mu == 0.0 or scene.friction.cap == 0.0 or scene.tangential_force == 0.0:
-        return 0.0  # but for round-off
-    return abs(tangential) if scene.loading.direction == 0 else 0.0 - scene.loading.direction * tangential  # never -0
 
 
 def _sticking(shape: Shape) -> float:
@@ -253,7 +246,7 @@ def _history(
         sed_ending=sed[:, 0],
         sed_point=sed[:, 1],
         normal_force=np.array([float(shape.force[1]) for shape in way]),
-        tangential_force=np.array([_drag(scene, float(shape.force[0])) for shape in way]),
+        tangential_force=np.array([drag(scene, float(shape.force[0])) for shape in way]),
         contact_width=np.array([finger.contact_width(shape) for shape in way]),
         slipping=slipping,
     )

@@ -124,3 +124,13 @@ class Prediction:
             plain["time"], plain["bone_x"], plain["bone_y"] = (course.pop(k) for k in ("time", "bone_x", "bone_y"))
             plain["history"] = course
         return plain
+
+
+def drag(scene: Scene, along: float) -> float:
+    """Return the drag opposing the slide [N/mm] for the surface's force `along` +x on it, without a slide its size.
+
+    0 where nothing rubs and where a drag of none is given, that force being round-off then; never -0.
+    """
+    if scene.friction.mu == 0.0 or scene.friction.cap == 0.0 or scene.tangential_force == 0.0:
+        return 0.0
+    return abs(along) if scene.loading.direction == 0 else 0.0 - scene.loading.direction * along

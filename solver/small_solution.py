@@ -31,7 +31,7 @@ from solver.grid import MeshError
 from solver.load_steps import Steps
 from solver.mesh import Array
 from solver.mesher import Sizing
-from solver.prediction import History, Prediction, Row, Skin
+from solver.prediction import History, Prediction, Row, Skin, drag
 from solver.receptor import ROW
 from solver.scene import Scene, SceneError
 from solver.small_errors import error_estimates, others_on, steps_asked, times_on_way
@@ -235,7 +235,7 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
         sed_ending=sed,
         sed_point=finger.sed_point(displacement),
         normal_force=float(contact.normal.sum()),
-        tangential_force=_drag(scene, contact.tangential.sum()),
+        tangential_force=drag(scene, float(contact.tangential.sum())),
         contact_width=float(numbers[5]),
         indentation=depth,
         shift=shift,
@@ -284,15 +284,6 @@ def _balanced(
     return contact, displacement, checks
 
 
-def _drag(scene: Scene, tangential: float) -> float:
-    """Return the drag opposing the slide [N/mm]; without a slide, the size of the tangential force."""
-    if scene.tangential_force == 0.0:
-        return 0.0  # but for round-off
-    if scene.loading.direction == 0:
-        return abs(float(tangential))
-    return 0.0 - scene.loading.direction * float(tangential)  # never -0
-
-
 def skin_of(finger: FingerModel, contact: Contact, skin: Array) -> Skin:
     """Return the skin that may touch, in a state of contact with its displacement (2 k,), normal first [mm]."""
     mesh, k = finger.geometry.mesh, len(contact.state)
@@ -319,7 +310,7 @@ def _history(scene: Scene, finger: FingerModel, way: March, over_time: Array | N
         sed_ending=sed[:, 0],
         sed_point=sed[:, 1],
         normal_force=np.array([c.normal.sum() for c in contacts]),
-        tangential_force=np.array([_drag(scene, c.tangential.sum()) for c in contacts]),
+        tangential_force=np.array([drag(scene, float(c.tangential.sum())) for c in contacts]),
         contact_width=np.array([finger.contact_width(c, np.concatenate([c.gap, c.shift])) for c in contacts]),
         slipping=slipping / np.maximum(touching, 1),
     )
