@@ -26,16 +26,16 @@ from typing import Any, Literal
 
 import numpy as np
 
-from solver.climbing import ascended
-from solver.contact import ContactLost
-from solver.differences import told
+from solver.accuracy.adaptivity import ascended
+from solver.accuracy.contrasts import told
+from solver.contact.active_set import ContactLost
+from solver.continuation.small_states import numbers_on, settled
+from solver.continuation.wedging import WIDE
+from solver.equilibrium.finger import FingerModel
 from solver.failures import SolveFailure
-from solver.finger import FingerModel
-from solver.mesher import Sizing
+from solver.mesh.mesher import Sizing
+from solver.response.solution import solve_together
 from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
-from solver.small_states import numbers_on, settled
-from solver.solution import solve_together
-from solver.wedging import WIDE
 
 NAMES = ("SED", "normal force", "drag")
 TOLERANCES = (None, 0.01, 0.003)

@@ -26,14 +26,14 @@ from typing import Any
 
 import numpy as np
 
-from solver.contact import ContactLost
-from solver.estimate import FINENESS, coarsest_for, estimates
+from solver.accuracy.error_estimate import FINENESS, coarsest_for, estimates
+from solver.contact.active_set import ContactLost
+from solver.continuation.small_states import numbers_on, settled
+from solver.continuation.wedging import WIDE
+from solver.equilibrium.finger import FingerModel
 from solver.failures import SolveFailure
-from solver.finger import FingerModel
-from solver.mesher import Sizing
+from solver.mesh.mesher import Sizing
 from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, SceneError
-from solver.small_states import numbers_on, settled
-from solver.wedging import WIDE
 
 NAMES = ("SED of the ending", "normal force", "drag")
 OVERKILL = ((26.0, False), (26.0, True), (23.0, False))  # fineness, and whether moved by half an element

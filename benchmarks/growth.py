@@ -19,14 +19,14 @@ from time import thread_time
 
 import numpy as np
 
-from solver.body import Body, elimination
-from solver.finger import FingerModel
-from solver.finite_finger import FiniteFinger
-from solver.materials import Hooke
-from solver.mesher import Sizing
-from solver.newton import Pull
-from solver.reference import SLIPPERINESS, scene
-from solver.sliding import settled
+from solver.body.linear import Body, elimination
+from solver.constitutive.linear import Hooke
+from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.newton import Pull
+from solver.mesh.mesher import Sizing
+from solver.scene.published import SLIPPERINESS, scene
 
 FINENESS = (3, 5, 7, 10, 14, 18, 26, 34, 46)
 SCENE = scene(SLIPPERINESS[4])

@@ -30,14 +30,14 @@ import numpy as np
 
 from benchmarks.error_estimate import on_mesh, random_scene
 from daq_app.accuracy.methods import overkill
-from solver.climbing import MARGIN, sized
-from solver.contact import ContactLost
+from solver.accuracy.adaptivity import MARGIN, sized
+from solver.contact.active_set import ContactLost
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh import Array
-from solver.mesher import Sizing
+from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
+from solver.response.solution import answers
 from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
-from solver.solution import answers
 
 NAMES = ("SED of the ending", "normal force", "drag")
 ASKED = (None, 0.01, 0.003)

@@ -42,7 +42,7 @@ _WRONG = (
     "sessions.decisions.DecisionError",
     "sessions.toml_file.SettingsError",
     "simulators.timetable.TimetableError",
-    "solver.scene_tables.SceneError",
+    "solver.scene.tables.SceneError",
 )
 _FAILED = (
     "daq_app.cluster.SchedulerError",

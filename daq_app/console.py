@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, TextIO
 
-from solver.telling import listening
+from solver.progress import listening
 
 _MOST_DIGITS = 9  # of a range whose ends read alike with fewer
 PATIENCE = 1.0  # of people, before they want to see that something is going on [s]

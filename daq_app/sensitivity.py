@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from sessions.toml_file import SettingsError, shown
 from solver.failures import SolveFailure
+from solver.response.solution import solve
 from solver.scene import TISSUES, Scene
-from solver.solution import solve
 
 Design = Mapping[str, tuple[float, float]]  # dotted key of the scene file -> least and greatest value
 

@@ -1,13 +1,13 @@
-"""What `solver.kernels` computes, said once more in plain NumPy: slow, short, and what the tests hold the other to."""
+"""What `solver._kernels` computes, said once more in plain NumPy: slow, short, and what the tests hold the other to."""
 
 from typing import cast
 
 import numpy as np
 
-from solver.finite_body import FiniteBody
-from solver.friction import CAP, OPEN, SLIP, STICK, FrictionLaw
-from solver.hyperelastic import shape, slopes
-from solver.kernels.skin import STEEP
+from solver._kernels.skin import STEEP
+from solver.body.finite import FiniteBody
+from solver.constitutive.hyperelastic import shape, slopes
+from solver.contact.law import CAP, OPEN, SLIP, STICK, FrictionLaw
 from solver.mesh import Array, Flags, Indices
 
 IMAGINARY = 1e-30  # step whose square is nothing [-]
@@ -195,7 +195,7 @@ def restated(
     law: FrictionLaw,
     direction: int,
 ) -> tuple[Indices, Indices]:
-    """Return states and senses (k,) as `solver.friction` asks for them, for the forces and places of a solution.
+    """Return states and senses (k,) as `solver.contact.law` asks for them, for the forces and places of a solution.
 
     Arguments as those of the loop `restate`, which changes its own.
     """

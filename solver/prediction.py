@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.mesh import Mesh
-from solver.mesher import FingerMesh
+from solver.mesh.mesher import FingerMesh
 from solver.scene import Scene
 
 Array = NDArray[np.float64]

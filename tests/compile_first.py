@@ -4,9 +4,9 @@ import subprocess
 import sys
 from dataclasses import replace
 
-from solver.reference import SLIPPERINESS, scene
-from solver.solution import solve
-from solver.stepper import stepper
+from solver.response.solution import solve
+from solver.response.stepper import stepper
+from solver.scene.published import SLIPPERINESS, scene
 
 if __name__ == "__main__":
     for kinematics in ("small", "finite"):

@@ -17,8 +17,8 @@ from typing import cast
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, timed, within
 from daq_app.accuracy.methods import Kinematics
 from daq_app.accuracy.truth import KINEMATICS, cases
+from solver.response.solution import solve
 from solver.scene import Solve
-from solver.solution import solve
 
 # What a file of the solver does, and what a compiled loop does whose file does more than one thing.
 FILES = {

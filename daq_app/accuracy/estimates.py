@@ -13,11 +13,11 @@ from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, within
 from daq_app.accuracy.methods import Kinematics
 from daq_app.accuracy.random_scenes import random_scene
 from daq_app.accuracy.truth import KINEMATICS, NUMBERS, cases, judged, known, overkill
-from solver.contact import ContactLost
+from solver.contact.active_set import ContactLost
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
+from solver.response.solution import answers
 from solver.scene import Scene, Solve
-from solver.solution import answers
 
 TOLERANCES = (0.01, 0.003, 0.001)
 SMALL = 2e-4  # relative error below which nobody minds by how much an estimate is too large

@@ -8,9 +8,9 @@ import numpy as np
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, timed, within
 from daq_app.accuracy.methods import FiniteMeshed, Kinematics, SmallMeshed
 from daq_app.accuracy.truth import JUDGED, cases
-from solver.contact import Course, untouched
-from solver.friction import FrictionLaw
-from solver.march import march, press_and_slide
+from solver.contact.active_set import Course, untouched
+from solver.contact.law import FrictionLaw
+from solver.equilibrium.march import march, press_and_slide
 from solver.scene import Scene
 
 PRESS, SLIDES, DISTANCE = 40, 160, 8.0  # substeps of the press and of the slide, and how far it goes [mm]

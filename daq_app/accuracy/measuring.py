@@ -24,10 +24,10 @@ from daq_app.accuracy.subjects import SUBJECTS, Subject
 from daq_app.accuracy.targets import Target
 from daq_app.accuracy.truth import Truth, cases
 from daq_app.accuracy.warm import Warm
-from solver.contact import ContactLost
+from solver.contact.active_set import ContactLost
 from solver.failures import SolveFailure
-from solver.solution import solve
-from solver.stepper import stepper
+from solver.response.solution import solve
+from solver.response.stepper import stepper
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

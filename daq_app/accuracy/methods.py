@@ -10,20 +10,20 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from daq_app.accuracy.asked import clock
-from solver.body import Body
-from solver.climbing import MARGIN, Ascent, Climbed, climbed, foot, risen, sized, sized_together
-from solver.elements import Q2P1
-from solver.existence import steady
-from solver.finger import FingerModel
-from solver.finite_finger import FiniteFinger
-from solver.finite_solution import alike
-from solver.finite_states import nearby
+from solver.accuracy.adaptivity import MARGIN, Ascent, Climbed, climbed, foot, risen, sized, sized_together
+from solver.body.linear import Body
+from solver.body.tissues import settled_moduli
+from solver.continuation.existence import steady
+from solver.continuation.finite_states import nearby
+from solver.continuation.small_states import numbers_on, settled
+from solver.element import Q2P1
+from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.newton import Newton, Pull, Shape
 from solver.mesh import Array
-from solver.mesher import AT_CUT, Sizing
-from solver.newton import Newton, Pull, Shape
+from solver.mesh.mesher import AT_CUT, Sizing
+from solver.response.finite_solution import alike
 from solver.scene import Friction, Scene
-from solver.small_states import numbers_on, settled
-from solver.tissues import settled_moduli
 
 SHORTEST = 0.02  # of truths, elements where the cut meets the bone, by tip radius, below which none are asked for
 HALF, LITTLE_LESS = 0.5, 0.7  # each by the one before; the second where the first leads nowhere

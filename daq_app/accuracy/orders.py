@@ -8,13 +8,13 @@ import numpy as np
 
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, within
 from daq_app.accuracy.published import contacts, locking
-from solver.finger import FingerModel
-from solver.finite_finger import FiniteFinger
-from solver.finite_states import settled as finite_settled
-from solver.mesher import Sizing
-from solver.reference import SLIPPERINESS, STICKINESS, scene
+from solver.continuation.finite_states import settled as finite_settled
+from solver.continuation.small_states import numbers_on, settled
+from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.finite_finger import FiniteFinger
+from solver.mesh.mesher import Sizing
 from solver.scene import Scene
-from solver.small_states import numbers_on, settled
+from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
 Errors = Sequence[float]
 

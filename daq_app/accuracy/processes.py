@@ -29,9 +29,9 @@ LONGEST = 60.0  # seconds after which a process is given up
 MEMORY = """
 import json
 from dataclasses import replace
-from solver.reference import SLIPPERINESS, scene
+from solver.scene.published import SLIPPERINESS, scene
 from solver.scene import Solve
-from solver.solution import solve
+from solver.response.solution import solve
 asked = scene(SLIPPERINESS[4])
 solve(replace(asked, solve=Solve("{kinematics}", tolerance=0.05)))
 def held(name):
@@ -94,7 +94,7 @@ def _commands(folder: Path) -> list[tuple[str, list[str]]]:
         ("Python alone", [python, "-c", "pass"]),
         ("Python and its arrays", [python, "-c", "import numpy, scipy.linalg"]),
     ]
-    for kinematics, loaded in (("small", "solver.solution"), ("finite", "solver.finite_solution")):
+    for kinematics, loaded in (("small", "solver.response.solution"), ("finite", "solver.response.finite_solution")):
         out.append((f"the solver loaded, {kinematics} strain", [python, "-c", f"import {loaded}"]))
         scene = folder / f"{kinematics}.toml"
         scene.write_text(SCENE.format(kinematics=kinematics), encoding="utf-8")

@@ -9,9 +9,9 @@ import numpy as np
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, timed, within
 from daq_app.accuracy.methods import FINITE, METHODS, NUMPY, PLAIN, SMALL, Meshed, Method
 from daq_app.accuracy.truth import JUDGED, Truth, cases, known
-from solver.contact import ContactLost
+from solver.contact.active_set import ContactLost
 from solver.failures import SolveFailure
-from solver.finite_solution import alike
+from solver.response.finite_solution import alike
 from solver.scene import Scene
 
 MESHES = {  # elements to a tip radius; 840 to 15,000 unknowns, and 1,480 to 11,000 where meshes follow the contact

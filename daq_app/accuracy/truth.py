@@ -15,11 +15,11 @@ import numpy as np
 
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock
 from daq_app.accuracy.methods import Kinematics, SmallMeshed, climbed_twice
-from solver.contact import ContactLost
+from solver.contact.active_set import ContactLost
 from solver.failures import SolveFailure
-from solver.reference import scenes
+from solver.response.solution import answers
 from solver.scene import Scene, Solve
-from solver.solution import answers
+from solver.scene.published import scenes
 
 KINEMATICS: tuple[Kinematics, ...] = ("small", "finite")
 NUMBERS = ("SED of the ending", "normal force", "drag")

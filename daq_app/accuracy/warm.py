@@ -14,13 +14,13 @@ import numpy as np
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, within
 from daq_app.accuracy.methods import FiniteMeshed, Kinematics, SmallMeshed
 from daq_app.accuracy.truth import cases
-from solver.contact import Course, untouched
-from solver.friction import FrictionLaw
-from solver.march import march, press_and_slide
-from solver.newton import Pull
+from solver.contact.active_set import Course, untouched
+from solver.contact.law import FrictionLaw
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.march import march, press_and_slide
+from solver.equilibrium.newton import Pull
+from solver.response.stepper import Stepper, stepper
 from solver.scene import Friction, Scene
-from solver.sliding import settled
-from solver.stepper import Stepper, stepper
 
 PASSES, QUICK_PASSES = 5, 3
 PRESS, SLIDES, DISTANCE = 200, 60, 6.0  # readings of the press and of the slide, and how far it goes [mm]

@@ -7,12 +7,12 @@ import numpy as np
 from daq_app.analyst.frame import Contact, Film, Finger, Frame, Instant, Parts
 from sessions.prediction import Way
 from sessions.report import Field
+from solver.body.receptor import ROW
+from solver.equilibrium.load_path import Instant as Step
 from solver.failures import Cancelled
-from solver.fields import Fields, Sketch, fields_of
-from solver.film import Still, most_squeezed, stills, way_until
 from solver.prediction import Prediction, Skin
-from solver.receptor import ROW
-from solver.stepping import Instant as Step
+from solver.response.fields import Fields, Sketch, fields_of
+from solver.response.film import Still, most_squeezed, stills, way_until
 
 MOST = 150  # states of a way that did not settle, which may be long
 AT_ONCE = 8  # states that are drawn before progress is told

@@ -25,7 +25,7 @@ from sessions.report import Field, Report, findings
 from sessions.report.predictions import field_of, finding_of
 from sessions.uncertainty import with_intervals
 from solver.failures import Cancelled
-from solver.fields import Sketch
+from solver.response.fields import Sketch
 from solver.scene import SceneError
 
 if TYPE_CHECKING:

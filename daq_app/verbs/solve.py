@@ -38,8 +38,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     """Solve the scene and print what came out; stopped by the user, what was found by then."""
     from sessions.toml_file import load_toml
     from solver.failures import SolveFailure
+    from solver.response.solution import solve
     from solver.scene import Scene
-    from solver.solution import solve
 
     scene = load_toml(options.scene, Scene)
     before: list[Prediction] = []

@@ -16,17 +16,17 @@ from daq_app.window.live_model import Forces, Kinematics, Picture, Provisional, 
 from sessions.analysis import AnalysisSettings, FrictionParameters
 from sessions.plan import SessionPlan
 from sessions.prediction import DEFAULT_SPEED, SLIDES, PredictionOptions, with_own_finger
+from solver.body.receptor import ROW
+from solver.equilibrium.finger import FingerModel
 from solver.failures import SolveFailure
-from solver.fields import fields_of
-from solver.finger import FingerModel
-from solver.live_picture import LivePicture
 from solver.mesh import Array, Indices
-from solver.mesher import Sizing
-from solver.receptor import ROW
+from solver.mesh.mesher import Sizing
+from solver.response.fields import fields_of
+from solver.response.live_picture import LivePicture
+from solver.response.small_stepper import Condensed, SmallStepper
+from solver.response.solution import solve
+from solver.response.stepper import FINENESS, MARGIN
 from solver.scene import Friction, Loading, Scene, Solve
-from solver.small_stepper import Condensed, SmallStepper
-from solver.solution import solve
-from solver.stepper import FINENESS, MARGIN
 
 if TYPE_CHECKING:
     from daq_app.window.live_finite import LiveFinite

@@ -18,8 +18,8 @@ from sessions.prediction.solving import (
     traction_reached,
 )
 from sessions.prediction.stored import SessionPrediction, TrialPrediction
-from solver.nearby import Nearby
 from solver.prediction import Prediction
+from solver.response.nearby import Nearby
 from solver.scene import Friction, Scene
 
 __all__ = [

@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from sessions.plan import SessionPlan
-from solver.reference import SCALE
-from solver.reference import Reading as TauReading
 from solver.scene import Friction, Loading, Scene
+from solver.scene.published import SCALE
+from solver.scene.published import Reading as TauReading
 
 
 @dataclass(frozen=True, slots=True)

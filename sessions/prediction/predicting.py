@@ -9,13 +9,13 @@ from sessions.prediction.options import PredictionOptions, template, with_own_fi
 from sessions.prediction.scenes import Prepared, opposite, prepared_cases
 from sessions.prediction.solving import Progress, quick
 from sessions.prediction.stored import SessionPrediction, TrialPrediction
+from solver.equilibrium.expected_depth import matching_depths
+from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.load_path import March
 from solver.failures import SolveFailure
-from solver.finger import FingerModel
-from solver.matching import matching_depths
 from solver.prediction import Prediction
+from solver.response.solution import answers
 from solver.scene import Finger, Scene
-from solver.solution import answers
-from solver.stepping import March
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,8 +8,8 @@ from sessions.analysis import Analysis, FrictionParameters, Stroke
 from sessions.plan import DISTAL_TO_PROXIMAL, PROXIMAL_TO_DISTAL, Block, SessionPlan, Trial
 from sessions.prediction.options import PredictionOptions, bound, template, with_own_finger
 from sessions.prediction.stored import TrialPrediction
-from solver.reference import SCALE
 from solver.scene import Friction, Loading, Scene, SceneError, Slide, Solve
+from solver.scene.published import SCALE
 
 SLIDES: dict[int, Slide] = {PROXIMAL_TO_DISTAL: "+x", DISTAL_TO_PROXIMAL: "-x"}
 DEFAULT_SPEED = 20.0  # where none was measured [mm/s]; rescales the time of a course and nothing else

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 from sessions.prediction.options import PredictionOptions, bound, template
 from sessions.prediction.scenes import SLIDES
-from solver.audits import inside_out
-from solver.derivatives import By
+from solver.accuracy.audits import inside_out
 from solver.failures import Cancelled, SolveFailure
-from solver.nearby import Nearby, nearby
 from solver.prediction import Prediction
+from solver.response.derivatives import By
+from solver.response.nearby import Nearby, nearby
+from solver.response.solution import answers
 from solver.scene import Friction, Loading, Scene, Solve
-from solver.solution import answers
 
 Progress = Callable[[float], bool]
 

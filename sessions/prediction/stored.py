@@ -10,8 +10,8 @@ from sessions.decisions import Decision
 from sessions.plan import Stimulus
 from sessions.prediction.options import PredictionOptions, template
 from sessions.sed_interval import Ends, SedInterval
-from solver.fields import Fields, fields_of
 from solver.prediction import History, Prediction, Skin
+from solver.response.fields import Fields, fields_of
 
 _NOT_TOLD = ("prediction", "opposite")  # of a row as plain data: all that the solver found
 _TOLD_OTHERWISE = ("stimulus", "alternatives", "interval", "opposite_interval")

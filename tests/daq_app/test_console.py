@@ -9,7 +9,7 @@ import pytest
 
 from daq_app.cli import run
 from daq_app.console import Console, NotWritten, Underway, takes_all
-from solver.telling import listening, tell
+from solver.progress import listening, tell
 
 
 def console(*, as_json):

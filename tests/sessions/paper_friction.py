@@ -2,7 +2,7 @@
 
 from sessions.analysis import Analysis, AnalysisSettings, FrictionParameters, Stroke
 from sessions.plan import Block, Frame, SessionPlan, Stimulus, Trial
-from solver.reference import INDENTATION, SLIPPERINESS, STICKINESS
+from solver.scene.published import INDENTATION, SLIPPERINESS, STICKINESS
 
 PLAN = SessionPlan(
     protocol="sensotact-friction",

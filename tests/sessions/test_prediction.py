@@ -9,11 +9,11 @@ from paper_friction import MEASURED, PLAN, analysis, parameters, stroke
 
 from sessions.plan import Finger as OwnFinger
 from sessions.prediction import PredictionOptions, predict, with_own_finger
-from solver.fields import Sketch
-from solver.film import most_squeezed, stills, way_until
-from solver.reference import SLIPPERINESS, STICKINESS
+from solver.response.fields import Sketch
+from solver.response.film import most_squeezed, stills, way_until
+from solver.response.solution import solve
 from solver.scene import Finger, Friction, Loading, Scene, SceneError
-from solver.solution import solve
+from solver.scene.published import SLIPPERINESS, STICKINESS
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,9 @@ from sessions import side_by_side
 from sessions.alternative import Variant
 from sessions.prediction import PredictionOptions, predict
 from sessions.side_by_side import with_alternatives
-from solver.reference import STICKINESS
+from solver.response.solution import solve
 from solver.scene import Friction, Loading, Scene, Solve
-from solver.solution import solve
+from solver.scene.published import STICKINESS
 
 TRIALS = (2, 4)  # stickiness 20 and 80: with and without a settled slide at finite strain
 SMALL = [("computed", "depth"), ("as-printed", "depth"), ("computed", "force"), ("computed", "other way")]

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sessions.toml_file import NotAllowed, SettingsError, from_table, from_toml, load_toml, toml_text
-from solver.reference import STICKINESS
-from solver.reference import scene as published
 from solver.scene import Finger, Friction, Loading, Material, Materials, Relaxation, Scene
+from solver.scene.published import STICKINESS
+from solver.scene.published import scene as published
 
 CONTRACT = Path(__file__).resolve().parents[3] / "shared" / "design" / "contract.md"
 

@@ -15,7 +15,7 @@ from sessions.prediction import PredictionOptions, predict, scene_along, settled
 from sessions.side_by_side import with_alternatives
 from sessions.uncertainty import with_intervals
 from simulators.bench import BenchSettings
-from solver.derivatives import By
+from solver.response.derivatives import By
 
 PLANTED = Path(__file__).parents[1] / "end_to_end" / "test_planted_truth.py"
 _spec = importlib.util.spec_from_file_location("planted_truth", PLANTED)

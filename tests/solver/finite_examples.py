@@ -4,16 +4,16 @@ from functools import cache
 
 import numpy as np
 
-from solver.finite_body import FiniteBody, FiniteProbes
-from solver.finite_finger import FiniteFinger
-from solver.hyperelastic import NeoHooke
-from solver.materials import Hooke
+from solver.body.finite import FiniteBody, FiniteProbes
+from solver.body.receptor import endings
+from solver.body.stiffness import Elastic
+from solver.constitutive.hyperelastic import NeoHooke
+from solver.constitutive.linear import Hooke
+from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.newton import Newton
 from solver.mesh import Mesh
-from solver.mesher import Sizing, finger_mesh
-from solver.newton import Newton
-from solver.receptor import endings
+from solver.mesh.mesher import Sizing, finger_mesh
 from solver.scene import Finger, Friction, Loading, Materials, Receptor, Scene, Solve
-from solver.stiffness import Elastic
 
 
 @cache

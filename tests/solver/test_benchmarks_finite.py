@@ -9,12 +9,12 @@ from daq_app.accuracy.published.bodies import distorted
 from daq_app.accuracy.published.finite_contacts import ELEMENT, light_finite
 from daq_app.accuracy.published.problems import CAPPED, FINITE_PARTS
 from solver import kernels_numpy
-from solver.finite_body import FiniteBody
-from solver.grid import quality
-from solver.hyperelastic import LAWS, energy, stress
-from solver.newton import Pull
-from solver.shapes import block
-from solver.sliding import settled
+from solver.body.finite import FiniteBody
+from solver.constitutive.hyperelastic import LAWS, energy, stress
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.newton import Pull
+from solver.mesh.blocks import block
+from solver.mesh.grid import quality
 from tests.solver.finite_examples import finger
 
 MEMBERS = [law(0.08, nu) for law in LAWS for nu in (0.48, 0.4999999)]

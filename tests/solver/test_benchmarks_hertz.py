@@ -9,8 +9,8 @@ import pytest
 from daq_app.accuracy.published import contacts
 from daq_app.accuracy.published.contacts import ELEMENT
 from daq_app.accuracy.published.problems import BELOW, CAPPED, HERTZ, PARTS
-from solver.contact import CAP, OPEN, SLIP
-from solver.friction import FrictionLaw
+from solver.contact.active_set import CAP, OPEN, SLIP
+from solver.contact.law import FrictionLaw
 
 
 @pytest.fixture(scope="module")

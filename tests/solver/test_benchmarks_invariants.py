@@ -6,13 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from solver.contact import CAP, SLIP, Contact, Course
-from solver.finger import FingerModel
-from solver.friction import FrictionLaw
-from solver.mesher import Sizing
-from solver.reference import SLIPPERINESS, STICKINESS, scene
+from solver.contact.active_set import CAP, SLIP, Contact, Course
+from solver.contact.law import FrictionLaw
+from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.load_path import march
+from solver.mesh.mesher import Sizing
 from solver.scene import Friction, Loading, Material, Materials, Scene
-from solver.stepping import march
+from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
 LAWS = {"no bound": FrictionLaw(0.44, np.inf), "bound": FrictionLaw(0.44, 0.005)}
 WAYS = [("no bound", 1), ("no bound", -1), ("bound", 1), ("bound", -1)]

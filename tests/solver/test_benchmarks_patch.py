@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from daq_app.accuracy.published.bodies import distorted
-from solver.body import Body, edge_load
-from solver.contact import CAP, SLIP, STICK, Course, untouched
-from solver.elements import Q2P1
-from solver.friction import FrictionLaw
-from solver.grid import quality
-from solver.materials import Hooke
+from solver.body.linear import Body, edge_load
+from solver.body.stiffness import Probes
+from solver.constitutive.linear import Hooke
+from solver.contact.active_set import CAP, SLIP, STICK, Course, untouched
+from solver.contact.law import FrictionLaw
+from solver.element import Q2P1
 from solver.mesh import Mesh
-from solver.shapes import block
-from solver.stiffness import Probes
+from solver.mesh.blocks import block
+from solver.mesh.grid import quality
 
 GRADIENT = np.array([[0.01, 0.03], [-0.02, -0.01]])  # keeps volume, as an incompressible body asks
 

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from solver.beside import beside
+from solver.uninterrupted import beside
 
 
 @pytest.fixture

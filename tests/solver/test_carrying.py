@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from solver import kernels_numpy
-from solver.carrying import Bridge, Places
-from solver.mesher import Sizing, finger_mesh
-from solver.newton import Pull
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.mesh_transfer import Bridge, Places
+from solver.equilibrium.newton import Pull
+from solver.mesh.mesher import Sizing, finger_mesh
 from solver.scene import Finger, Receptor
-from solver.sliding import settled
 from tests.solver.finite_examples import finger
 
 PULL = Pull(1.0, 0.28, 0.008033, -1)

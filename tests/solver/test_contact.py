@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.body import Body
-from solver.contact import CAP, OPEN, SLIP, STICK, ContactLost, Course, forced, untouched
-from solver.friction import FrictionLaw
-from solver.materials import Hooke
-from solver.shapes import block
+from solver.body.linear import Body
+from solver.constitutive.linear import Hooke
+from solver.contact.active_set import CAP, OPEN, SLIP, STICK, ContactLost, Course, forced, untouched
+from solver.contact.law import FrictionLaw
+from solver.mesh.blocks import block
 
 RADIUS = 5.0
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from solver import climbing
-from solver.climbing import ascended, climbed, foot, sized, sized_together
-from solver.mesher import AT_CUT, SHORT_AT_CUT
+from solver.accuracy import adaptivity as climbing
+from solver.accuracy.adaptivity import ascended, climbed, foot, sized, sized_together
+from solver.mesh.mesher import AT_CUT, SHORT_AT_CUT
 from solver.scene import Friction, Loading, Scene, Solve
 
 

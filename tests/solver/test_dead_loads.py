@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.body import Body, edge_load
-from solver.dead_loads import loaded
-from solver.finite_body import FiniteBody
-from solver.hyperelastic import NeoHooke, stress
-from solver.kernels import SLIP
-from solver.materials import Hooke
-from solver.newton import Newton, Pull, Shape
+from solver._kernels import SLIP
+from solver.body.dead_loads import loaded
+from solver.body.finite import FiniteBody
+from solver.body.linear import Body, edge_load
+from solver.constitutive.hyperelastic import NeoHooke, stress
+from solver.constitutive.linear import Hooke
+from solver.equilibrium.newton import Newton, Pull, Shape
 from tests.solver.finite_examples import block
 
 DERMIS = NeoHooke(0.08, 0.48)

@@ -6,23 +6,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import finite_forced, sliding
-from solver.contact import CAP, OPEN, SLIP, STICK, Course, Touchable
-from solver.derivatives import of_contact, of_forces
-from solver.finger import FingerModel
-from solver.finite_body import FiniteBody, FiniteProbes
-from solver.finite_derivatives import of_shape, slope
-from solver.finite_finger import FiniteFinger
-from solver.friction import FrictionLaw
-from solver.hyperelastic import NeoHooke, Ogden
-from solver.hyperelastic import shape as grown
-from solver.materials import Hooke
-from solver.mesher import Sizing
-from solver.newton import Pull
-from solver.receptor import Endings
+from solver.body.finite import FiniteBody, FiniteProbes
+from solver.body.receptor import Endings
+from solver.body.stiffness import Elastic, Probes
+from solver.constitutive.hyperelastic import NeoHooke, Ogden
+from solver.constitutive.hyperelastic import shape as grown
+from solver.constitutive.linear import Hooke
+from solver.contact.active_set import CAP, OPEN, SLIP, STICK, Course, Touchable
+from solver.contact.law import FrictionLaw
+from solver.continuation.small_states import law_of, numbers_on, settled
+from solver.equilibrium import force_control as finite_forced
+from solver.equilibrium import full_slip as sliding
+from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.newton import Pull
+from solver.mesh.mesher import Sizing
+from solver.response.derivatives import of_contact, of_forces
+from solver.response.finite_derivatives import of_shape, slope
 from solver.scene import Friction, Loading, Scene, Solve
-from solver.small_states import law_of, numbers_on, settled
-from solver.stiffness import Elastic, Probes
 from tests.solver.finite_examples import block
 
 NAMES = ("mu", "tau_max", "press")

@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from solver.differences import TOLD, finer, off, off_by, together
-from solver.estimate import FINENESS
-from solver.reference import STICKINESS, scene
+from solver.accuracy.contrasts import TOLD, finer, off, off_by, together
+from solver.accuracy.error_estimate import FINENESS
+from solver.response.solution import answers, solve, solve_together
 from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
-from solver.solution import answers, solve, solve_together
+from solver.scene.published import STICKINESS, scene
 
 
 def test_differences_are_off_by_a_part_of_what_the_other_mesh_that_changes_them_most_makes_of_them():

@@ -6,13 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from solver.climbing import ascended, climbed
-from solver.estimate import DEFAULT, FINENESS, coarsest_for, estimates
-from solver.finite_errors import error_estimates
-from solver.mesher import AT_CUT
-from solver.reference import STICKINESS, scene
+from solver.accuracy.adaptivity import ascended, climbed
+from solver.accuracy.error_estimate import DEFAULT, FINENESS, coarsest_for, estimates
+from solver.accuracy.finite_errors import error_estimates
+from solver.mesh.mesher import AT_CUT
+from solver.response.solution import solve
 from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
-from solver.solution import solve
+from solver.scene.published import STICKINESS, scene
 from tests.solver.drawn_scenes import DRAWN, HELD_OUT
 
 

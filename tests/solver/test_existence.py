@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from solver.climbing import ascended
-from solver.existence import steady
+from solver.accuracy.adaptivity import ascended
+from solver.continuation.existence import steady
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.newton import Pull
 from solver.failures import NoSteadyState
-from solver.newton import Pull
+from solver.response.solution import solve
 from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
-from solver.sliding import settled
-from solver.solution import solve
 from tests.solver.finite_examples import published
 
 TOWARDS_TIP = -1

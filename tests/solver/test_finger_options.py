@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.mesher import BONE, Sizing, finger_mesh
-from solver.outline import Outline
-from solver.reference import SLIPPERINESS, scene
+from solver.mesh.mesher import BONE, Sizing, finger_mesh
+from solver.mesh.outline import Outline
+from solver.response.solution import solve
 from solver.scene import Finger, Friction, Material, Materials, Receptor, SceneError, Solve
-from solver.solution import solve
+from solver.scene.published import SLIPPERINESS, scene
 
 KINEMATICS = ("small", "finite")
 BASE = scene(SLIPPERINESS[0])

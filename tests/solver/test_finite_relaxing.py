@@ -8,19 +8,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver import kernels_numpy, overstress
-from solver.finite_audits import course_audits
-from solver.finite_body import FiniteBody
-from solver.finite_relaxing import RelaxingNewton
-from solver.hyperelastic import NeoHooke
-from solver.hyperelastic import stress as relaxed_stress
-from solver.hyperelastic import tangent as relaxed_tangent
-from solver.materials import Hooke, Prony
-from solver.newton import Pull, Shape
-from solver.overstress import Past
-from solver.reference import SLIPPERINESS, scene
+from solver import kernels_numpy
+from solver.accuracy.finite_audits import course_audits
+from solver.body.finite import FiniteBody
+from solver.constitutive import overstress
+from solver.constitutive.hyperelastic import NeoHooke
+from solver.constitutive.hyperelastic import stress as relaxed_stress
+from solver.constitutive.hyperelastic import tangent as relaxed_tangent
+from solver.constitutive.linear import Hooke, Prony
+from solver.constitutive.overstress import Past
+from solver.equilibrium.finite_relaxation import RelaxingNewton
+from solver.equilibrium.newton import Pull, Shape
+from solver.response.solution import solve
 from solver.scene import Materials, Relaxation, Solve
-from solver.solution import solve
+from solver.scene.published import SLIPPERINESS, scene
 from tests.solver.finite_examples import block
 from tests.solver.test_relaxing import TABLE, TIMES
 

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 from daq_app.accuracy.methods import climbed_twice
-from solver import finite_errors
-from solver.audits import refuse_unsound, rounding
-from solver.climbing import ascended
+from solver.accuracy import finite_errors
+from solver.accuracy.adaptivity import ascended
+from solver.accuracy.audits import refuse_unsound, rounding
+from solver.accuracy.finite_audits import audits
+from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.newton import Pull
 from solver.failures import NoSteadyState, NotConverged
-from solver.finite_audits import audits
-from solver.finite_finger import FiniteFinger
-from solver.newton import Pull
-from solver.reference import SLIPPERINESS, STICKINESS, scene
+from solver.response.solution import UNKNOWN, answers, solve, solve_together
 from solver.scene import Friction, Loading, Scene, Solve
-from solver.sliding import settled
-from solver.solution import UNKNOWN, answers, solve, solve_together
+from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 from tests.solver.finite_examples import published
 
 # Ending-averaged SED [MPa], normal and tangential force [N/mm] of the published finger: means of two independent codes

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solver.failures import NoSteadyState, SolveFailure
-from solver.reference import SLIPPERINESS, STICKINESS, scene
+from solver.response.solution import solve
 from solver.scene import Finger, Friction, Loading, Scene, SceneError, Solve
-from solver.solution import solve
+from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
 KINEMATICS = ("small", "finite")
 COURSES = ("small", pytest.param("finite", marks=pytest.mark.slow))  # a course at finite strain takes seconds

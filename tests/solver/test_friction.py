@@ -6,14 +6,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from solver import friction, kernels, kernels_numpy
-from solver.contact import Contact, Course, Touchable, untouched
-from solver.finite_body import FiniteBody
-from solver.friction import CAP, LAWS, NAMES, OPEN, SLIP, STICK, FrictionLaw
-from solver.hyperelastic import NeoHooke
-from solver.newton import BY_DEPTH, BY_FRICTION, BY_TRAVEL, Newton, Pull, Shape
-from solver.shapes import block
-from solver.small_stepper import Condensed, SmallStepper
+from solver import _kernels as kernels
+from solver import kernels_numpy
+from solver.body.finite import FiniteBody
+from solver.constitutive.hyperelastic import NeoHooke
+from solver.contact import law as friction
+from solver.contact.active_set import Contact, Course, Touchable, untouched
+from solver.contact.law import CAP, LAWS, NAMES, OPEN, SLIP, STICK, FrictionLaw
+from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, BY_TRAVEL, Newton, Pull, Shape
+from solver.mesh.blocks import block
+from solver.response.small_stepper import Condensed, SmallStepper
 
 FREE, BOUND = FrictionLaw(0.5, np.inf), FrictionLaw(0.5, 0.02)
 STEEP, NEVER_FELT = FrictionLaw(1000.0, 0.02), FrictionLaw(0.5, 1e9)

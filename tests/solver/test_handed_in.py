@@ -3,23 +3,23 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from solver.body import Body
-from solver.contact import Course
-from solver.dead_loads import loaded
-from solver.finite_body import FiniteBody
-from solver.finite_forced import Given, untouched
-from solver.finite_relaxing import RelaxingNewton
-from solver.friction import FrictionLaw
-from solver.grid import MeshError
-from solver.handed_in import BodyError
-from solver.hyperelastic import NeoHooke, Ogden
-from solver.march import march
-from solver.materials import Hooke, Prony
+from solver.body.dead_loads import loaded
+from solver.body.finite import FiniteBody
+from solver.body.linear import Body
+from solver.body.validation import BodyError
+from solver.constitutive.hyperelastic import NeoHooke, Ogden
+from solver.constitutive.linear import Hooke, Prony
+from solver.contact.active_set import Course
+from solver.contact.law import FrictionLaw
+from solver.equilibrium.finite_relaxation import RelaxingNewton
+from solver.equilibrium.force_control import Given, untouched
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.march import march
+from solver.equilibrium.newton import Newton, Pull
+from solver.equilibrium.relaxation import RelaxingBody
 from solver.mesh import Mesh
-from solver.newton import Newton, Pull
-from solver.relaxing import RelaxingBody
-from solver.shapes import block
-from solver.sliding import settled
+from solver.mesh.blocks import block
+from solver.mesh.grid import MeshError
 
 MESH = block(np.linspace(-1.0, 1.0, 3), np.linspace(0.0, 1.0, 3))
 ONE = block(np.array([-1.0, 1.0]), np.array([0.0, 1.0]))

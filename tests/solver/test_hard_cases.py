@@ -12,8 +12,8 @@ from daq_app.accuracy.hard_cases.light import of_light_touch
 from daq_app.accuracy.hard_cases.outcome import of_scene
 from daq_app.accuracy.hard_cases.suite import TELLING, Case
 from solver.failures import SolveFailure
+from solver.response.solution import answers, solve
 from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
-from solver.solution import answers, solve
 
 SUITE = {(case.kinematics, case.name): case for kind in ("small", "finite") for case in cases(kind)}
 

@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from numpy.linalg import LinAlgError
 
-from solver.body import Body, elimination
-from solver.contact import CAP, SLIP, STICK, ContactLost, Course, forced, untouched
-from solver.dissection import Reduced
-from solver.friction import FrictionLaw
-from solver.in_loops import ReducedInLoops
-from solver.materials import Hooke, Moduli
+from solver.body.linear import Body, elimination
+from solver.body.linear_compiled import ReducedInLoops
+from solver.body.stiffness import Elastic
+from solver.constitutive.linear import Hooke, Moduli
+from solver.contact.active_set import CAP, SLIP, STICK, ContactLost, Course, forced, untouched
+from solver.contact.law import FrictionLaw
+from solver.equilibrium.load_path import march
+from solver.linalg.dissection import Reduced
 from solver.mesh import Mesh
-from solver.mesher import Sizing, finger_mesh
-from solver.reference import SLIPPERINESS, STICKINESS, scene
+from solver.mesh.blocks import block
+from solver.mesh.mesher import Sizing, finger_mesh
+from solver.response.solution import answers, solve
 from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
-from solver.shapes import block
-from solver.solution import answers, solve
-from solver.stepping import march
-from solver.stiffness import Elastic
+from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
 TISSUES = [Hooke(0.136, 0.48), Hooke(0.08, 0.48), Hooke(0.034, 0.3)]
 CLOSE = 1e-11
@@ -186,16 +186,16 @@ def test_the_same_question_is_answered_bit_by_bit_the_same_again():
 def test_who_solves_once_waits_for_no_compiled_loops_and_who_asks_for_them_gets_them():
     code = """
 import sys
-from solver.reference import STICKINESS, scene
+from solver.scene.published import STICKINESS, scene
 from solver.scene import Solve
-from solver.solution import solve
+from solver.response.solution import solve
 import subprocess
 import sys
 from dataclasses import replace
 asked = replace(scene(STICKINESS[0]), solve=Solve(tolerance=0.05))
 for in_loops in (False, True):
     solve(asked, in_loops=in_loops)
-    print("solver.kernels" in sys.modules)
+    print("solver._kernels" in sys.modules)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "True"]

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver import kernels
-from solver.kernels import keeping
-from solver.kernels.compiling import compiled
-from solver.kernels.keeping import Place
-from solver.telling import listening, tell
+from solver import _kernels as kernels
+from solver._kernels import keeping
+from solver._kernels.compiling import compiled
+from solver._kernels.keeping import Place
+from solver.progress import listening, tell
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def test_a_process_that_finds_kept_code_does_without_numba():
     code = """
 import sys
 import numpy as np
-from solver import kernels
+from solver import _kernels as kernels
 out = np.zeros(3)
 kernels.tributary(np.linspace(0.0, 3.0, 3), np.array([0, 1, 0], np.int32), out)
 print("numba" in sys.modules, *out)

@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver import kernels, kernels_numpy
-from solver.crossing import crosses_itself, pinched
-from solver.finite_body import FiniteBody
-from solver.hyperelastic import LAWS, NeoHooke
-from solver.kernels import CAP, OPEN, SLIP, STICK
-from solver.newton import Newton, Pull, Shape
+from solver import _kernels as kernels
+from solver import kernels_numpy
+from solver._kernels import CAP, OPEN, SLIP, STICK
+from solver.body.finite import FiniteBody
+from solver.constitutive.hyperelastic import LAWS, NeoHooke
+from solver.contact.skin_compression import crosses_itself, pinched
+from solver.equilibrium.newton import Newton, Pull, Shape
 from tests.solver.finite_examples import block, finger
 
 
@@ -242,8 +243,8 @@ def test_a_straight_line_does_not_cross_itself_whatever_its_rounding(angle, piec
 def test_no_bit_depends_on_which_loops_a_process_called_before():
     solved = (
         "from dataclasses import replace\n"
-        "from solver.reference import SLIPPERINESS, scene\n"
-        "from solver.solution import solve\n"
+        "from solver.scene.published import SLIPPERINESS, scene\n"
+        "from solver.response.solution import solve\n"
         "asked = scene(SLIPPERINESS[0])\n"
         "asked = replace(asked, solve=replace(asked.solve, kinematics='finite'))\n"
         "found = solve(asked)\n"

@@ -3,18 +3,20 @@
 import numpy as np
 import pytest
 
-from solver import mesher, own_existence, reach
+from solver.body.finite import FiniteBody
+from solver.body.tissues import finite_laws
+from solver.constitutive.hyperelastic import NeoHooke, Ogden
+from solver.continuation import limit_point as reach
+from solver.continuation import own_existence
+from solver.continuation.arc_length import follow
+from solver.continuation.surface_instability import folds_at
+from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.newton import BY_FRICTION, Newton, Pull
 from solver.failures import NoSteadyState, NotConverged
-from solver.finite_body import FiniteBody
-from solver.finite_finger import FiniteFinger
-from solver.folding import folds_at
-from solver.grid import grid_mesh
-from solver.hyperelastic import NeoHooke, Ogden
-from solver.limit import follow
-from solver.newton import BY_FRICTION, Newton, Pull
+from solver.mesh import mesher
+from solver.mesh.grid import grid_mesh
 from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
-from solver.sliding import settled
-from solver.tissues import finite_laws
 from tests.solver.finite_examples import published
 
 SLOW = pytest.mark.slow

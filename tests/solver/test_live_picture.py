@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from solver.finger import FingerModel
-from solver.live_picture import LivePicture
-from solver.mesher import Sizing
+from solver.equilibrium.finger import FingerModel
+from solver.mesh.mesher import Sizing
+from solver.response.live_picture import LivePicture
 from solver.scene import Friction, Loading, Scene
 
 
@@ -27,7 +27,7 @@ def test_nodes_and_energies_are_those_that_the_body_gives_for_the_same_forces(fi
     mesh, elastic = finger.geometry.mesh, finger.body.elastic
     assert picture.nodes(forces, 1.5) == pytest.approx(mesh.nodes + moved - [0.0, 1.5], abs=1e-9)
 
-    from solver.stiffness import Probes
+    from solver.body.stiffness import Probes
 
     third = 7  # an element; its quarters' middles are probed by the solver's own energy
     probes = Probes.at(mesh, elastic, np.full(4, third), np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]))

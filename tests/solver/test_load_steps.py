@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.finger import FingerModel
-from solver.load_steps import Steps
-from solver.mesher import Sizing
-from solver.reference import SLIPPERINESS, scene
+from solver.accuracy.step_error import Steps
+from solver.continuation.small_states import all_numbers, end
+from solver.equilibrium.finger import FingerModel
+from solver.mesh.mesher import Sizing
+from solver.response.solution import solve
 from solver.scene import Friction, Loading, Scene, Solve
-from solver.small_states import all_numbers, end
-from solver.solution import solve
+from solver.scene.published import SLIPPERINESS, scene
 
 WHOLE = np.array([1.0, 2.0, -0.5, 1.5, -0.2, 6.0])
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from solver import kernels_numpy
-from solver.finite_audits import course_audits
-from solver.kernels import SLIP, STICK
-from solver.march import march, press_and_slide
-from solver.newton import Pull
-from solver.sliding import settled
+from solver._kernels import SLIP, STICK
+from solver.accuracy.finite_audits import course_audits
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.march import march, press_and_slide
+from solver.equilibrium.newton import Pull
 from tests.solver.finite_examples import finger
 
 

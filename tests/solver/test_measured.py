@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.holding import relaxing
-from solver.reference import SLIPPERINESS, STICKINESS, scene
+from solver.accuracy.residual_overstress import relaxing
+from solver.response.solution import solve
 from solver.scene import Friction, Loading, Material, Relaxation, Scene, SceneError, Solve
-from solver.solution import solve
+from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.nearby import nearby
+from solver.response.nearby import nearby
+from solver.response.solution import answers
 from solver.scene import Friction, Loading, Scene, Solve
-from solver.solution import answers
 
 DRIVEN = {
     "small, by depth": Scene(friction=Friction(0.44, 0.03), loading=Loading(2.0)),

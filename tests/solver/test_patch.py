@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.body import Body, edge_load
-from solver.contact import CAP, OPEN, SLIP, STICK, ContactLost, Course, untouched
-from solver.friction import FrictionLaw
-from solver.materials import Hooke
+from solver.body.linear import Body, edge_load
+from solver.body.stiffness import Probes
+from solver.constitutive.linear import Hooke
+from solver.contact.active_set import CAP, OPEN, SLIP, STICK, ContactLost, Course, untouched
+from solver.contact.law import FrictionLaw
 from solver.mesh import Mesh
-from solver.shapes import block
-from solver.stiffness import Probes
+from solver.mesh.blocks import block
 
 DERMIS = Hooke(0.08, 0.48)
 PRESSURE = 0.001

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import relaxing
-from solver.materials import Prony
-from solver.reference import SLIPPERINESS, scene
-from solver.relaxing import RelaxingBody
+from solver.body.stiffness import Probes
+from solver.constitutive.linear import Prony
+from solver.equilibrium import relaxation as relaxing
+from solver.equilibrium.relaxation import RelaxingBody
+from solver.mesh.blocks import block
+from solver.response.solution import solve
 from solver.scene import Material, Materials, Relaxation, Solve
-from solver.shapes import block
-from solver.solution import solve
-from solver.stiffness import Probes
+from solver.scene.published import SLIPPERINESS, scene
 
 TIMES = [0.5, 1.0, 1.5, 2.0, 3.0, 6.0]
 # E(t)/E0 = 1 - g + g exp(-t/tau), g = 0.3, strain ramped to 1 within 1 s and held: stress/E0 (elementary integral)

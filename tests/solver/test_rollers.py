@@ -7,18 +7,18 @@ import pytest
 
 from daq_app.accuracy.published.bodies import ring
 from daq_app.accuracy.published.locking import INNER, OUTER, YOUNG, widening
-from solver.body import Body, edge_load
-from solver.contact import Course, untouched
-from solver.dead_loads import loaded
-from solver.finite_body import FiniteBody
-from solver.friction import FrictionLaw
-from solver.handed_in import BodyError
-from solver.hyperelastic import NeoHooke
-from solver.march import march
-from solver.materials import Hooke
+from solver.body.dead_loads import loaded
+from solver.body.finite import FiniteBody
+from solver.body.linear import Body, edge_load
+from solver.body.validation import BodyError
+from solver.constitutive.hyperelastic import NeoHooke
+from solver.constitutive.linear import Hooke
+from solver.contact.active_set import Course, untouched
+from solver.contact.law import FrictionLaw
+from solver.equilibrium.march import march
+from solver.equilibrium.newton import Newton, Pull
 from solver.mesh import Mesh
-from solver.newton import Newton, Pull
-from solver.shapes import block as round_block
+from solver.mesh.blocks import block as round_block
 from tests.solver.finite_examples import block
 
 NO_SKIN = np.zeros((0, 1))

@@ -3,7 +3,6 @@ from dataclasses import fields, replace
 
 import pytest
 
-from solver.reference import SLIPPERINESS, STICKINESS, scene, scenes
 from solver.scene import (
     Finger,
     Friction,
@@ -16,6 +15,7 @@ from solver.scene import (
     SceneError,
     Solve,
 )
+from solver.scene.published import SLIPPERINESS, STICKINESS, scene, scenes
 
 
 @pytest.mark.parametrize(

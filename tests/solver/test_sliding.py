@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from solver import kernels_numpy
-from solver.finite_body import FiniteBody
-from solver.hyperelastic import NeoHooke
-from solver.kernels import CAP, OPEN, SLIP
-from solver.newton import Newton, Pull
-from solver.sliding import settled
+from solver._kernels import CAP, OPEN, SLIP
+from solver.body.finite import FiniteBody
+from solver.constitutive.hyperelastic import NeoHooke
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.newton import Newton, Pull
 from tests.solver.finite_examples import block, finger
 
 # ending-averaged SED [MPa], normal and tangential force [N/mm]: means of two independent codes (quadrilaterals with

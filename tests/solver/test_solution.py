@@ -8,17 +8,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solver.audits import audits
-from solver.body import skin_lengths
-from solver.contact import Course
+from solver.accuracy.audits import audits
+from solver.body.linear import skin_lengths
+from solver.contact.active_set import Course
+from solver.contact.law import FrictionLaw
+from solver.equilibrium.finger import FingerModel
 from solver.failures import Cancelled, NoSteadyState, SolveFailure
-from solver.fields import fields_of
-from solver.finger import FingerModel
-from solver.friction import FrictionLaw
-from solver.mesher import Sizing
-from solver.reference import SLIPPERINESS, STICKINESS, scene, scenes
+from solver.mesh.mesher import Sizing
+from solver.response.fields import fields_of
+from solver.response.solution import answers, solve, solve_together
 from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
-from solver.solution import answers, solve, solve_together
+from solver.scene.published import SLIPPERINESS, STICKINESS, scene, scenes
 
 # Mean of two independent codes (structured quadrilaterals with exact active sets; a public high-order triangle code
 # with penalty contact), err 0.1 % of sed_ending: the reference page of this finger, small strain.

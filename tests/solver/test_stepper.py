@@ -7,22 +7,22 @@ from functools import cache
 import numpy as np
 import pytest
 
-from solver.contact import CAP, STICK, Course, forced, untouched
-from solver.finger import FingerModel
-from solver.finite_finger import FiniteFinger
-from solver.finite_forced import Given
-from solver.finite_forced import march as forced_march
-from solver.finite_forced import untouched as at_rest
-from solver.finite_stepper import FiniteStepper
-from solver.friction import FrictionLaw
-from solver.kernels.following import follow
-from solver.march import march, press_and_slide
-from solver.mesher import Sizing
-from solver.receptor import ROW
+from solver._kernels.following import follow
+from solver.body.receptor import ROW
+from solver.contact.active_set import CAP, STICK, Course, forced, untouched
+from solver.contact.law import FrictionLaw
+from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.force_control import Given
+from solver.equilibrium.force_control import march as forced_march
+from solver.equilibrium.force_control import untouched as at_rest
+from solver.equilibrium.march import march, press_and_slide
+from solver.mesh.mesher import Sizing
+from solver.response.finite_stepper import FiniteStepper
+from solver.response.small_stepper import Condensed, SmallStepper
+from solver.response.solution import solve
+from solver.response.stepper import stepper
 from solver.scene import Friction, Loading, Scene, Solve
-from solver.small_stepper import Condensed, SmallStepper
-from solver.solution import solve
-from solver.stepper import stepper
 
 KINEMATICS = ("small", "finite")
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from solver import solution
 from solver.failures import NoSteadyState, NotConverged
 from solver.prediction import Prediction
+from solver.response import solution
+from solver.response.solution import solve
 from solver.scene import Friction, Loading, Materials, Scene, Solve
-from solver.solution import solve
 
 
 def stiffening(mu, tolerance=None):

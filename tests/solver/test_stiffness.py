@@ -1,14 +1,14 @@
 import numpy as np
 import pytest
 
-from solver.body import Body, elimination
-from solver.dissection import Reduced, Tree
-from solver.elements import Q2P1
-from solver.materials import MATERIALS, Hooke
-from solver.mesher import Sizing, finger_mesh
+from solver.body.linear import Body, elimination
+from solver.body.stiffness import Elastic, Probes, local_coordinates
+from solver.constitutive.linear import MATERIALS, Hooke
+from solver.element import Q2P1
+from solver.linalg.dissection import Reduced, Tree
+from solver.mesh.blocks import block
+from solver.mesh.mesher import Sizing, finger_mesh
 from solver.scene import Finger, Receptor
-from solver.shapes import block
-from solver.stiffness import Elastic, Probes, local_coordinates
 
 TISSUES = [Hooke(0.136, 0.48), Hooke(0.08, 0.48), Hooke(0.034, 0.48)]
 

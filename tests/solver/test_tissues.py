@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 from sessions.toml_file import load_toml
-from solver.fields import fields_of
-from solver.reference import SLIPPERINESS, scene
+from solver.response.fields import fields_of
+from solver.response.solution import solve
 from solver.scene import Friction, Loading, Material, Materials, Relaxation, Scene, SceneError, Solve
-from solver.solution import solve
+from solver.scene.published import SLIPPERINESS, scene
 
 NAMES = ("epidermis", "dermis", "fat")
 

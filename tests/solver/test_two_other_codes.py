@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from solver.prediction import Prediction
-from solver.reference import SLIPPERINESS, STICKINESS, scene
+from solver.response.solution import solve
 from solver.scene import Friction, Loading, Scene, Solve
-from solver.solution import solve
+from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
 FILE = Path(__file__).resolve().parents[3] / "shared" / "reference" / "fe-reference.json"
 CASES = (

@@ -7,16 +7,16 @@ import numpy as np
 from daq_app.accuracy.hard_cases.meshes import jittered, slabs, two_parts
 from daq_app.accuracy.hard_cases.outcome import Outcome, agree, percent, power
 from daq_app.accuracy.hard_cases.small import one_node as one_node_small
-from solver.finite_body import FiniteBody
-from solver.finite_finger import FiniteFinger
-from solver.hyperelastic import NeoHooke
-from solver.march import march
+from solver.body.finite import FiniteBody
+from solver.constitutive.hyperelastic import NeoHooke
+from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.march import march
+from solver.equilibrium.newton import Newton, Pull, Shape
 from solver.mesh import Mesh
-from solver.mesher import Sizing
-from solver.newton import Newton, Pull, Shape
-from solver.reference import STICKINESS, scene
-from solver.shapes import block
-from solver.sliding import settled
+from solver.mesh.blocks import block
+from solver.mesh.mesher import Sizing
+from solver.scene.published import STICKINESS, scene
 
 DEPTH = 1.5  # [mm]
 TISSUES = (NeoHooke(0.136, 0.48), NeoHooke(0.08, 0.48), NeoHooke(0.034, 0.48))

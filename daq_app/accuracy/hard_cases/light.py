@@ -7,8 +7,8 @@ from math import log, pi, sqrt
 from daq_app.accuracy.hard_cases.outcome import Outcome, of_answer
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
+from solver.response.solution import answers
 from solver.scene import Scene
-from solver.solution import answers
 
 KNOWN = 1e-3  # indentation at which contact spans many elements, and is still far thinner than the epidermis [mm]
 MODEL = 0.005  # what the rest of the finger changes in the two laws, from there to lighter touches

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.elements import Q2P1
+from solver.element import Q2P1
 from solver.mesh import Array, Indices, Mesh
-from solver.shapes import block
+from solver.mesh.blocks import block
 
 
 def jittered(mesh: Mesh, outline: Indices, by: float, seed: int) -> Mesh:

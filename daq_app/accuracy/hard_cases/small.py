@@ -6,14 +6,14 @@ import numpy as np
 
 from daq_app.accuracy.hard_cases.meshes import jittered, slabs, two_parts
 from daq_app.accuracy.hard_cases.outcome import Outcome, agree, percent, power
-from solver.body import Body
-from solver.contact import Contact, Course, untouched
-from solver.finger import FingerModel
-from solver.friction import FrictionLaw
-from solver.materials import Hooke
-from solver.mesher import Sizing
-from solver.reference import STICKINESS, scene
-from solver.shapes import block
+from solver.body.linear import Body
+from solver.constitutive.linear import Hooke
+from solver.contact.active_set import Contact, Course, untouched
+from solver.contact.law import FrictionLaw
+from solver.equilibrium.finger import FingerModel
+from solver.mesh.blocks import block
+from solver.mesh.mesher import Sizing
+from solver.scene.published import STICKINESS, scene
 
 DEPTH = 1.5  # [mm]
 TISSUES = (Hooke(0.136, 0.48), Hooke(0.08, 0.48), Hooke(0.034, 0.48))

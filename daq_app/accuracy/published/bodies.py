@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.body import Body
-from solver.contact import OPEN, SLIP, Contact, States
-from solver.grid import grid_mesh, quality
+from solver.body.linear import Body
+from solver.body.stiffness import Probes, local_coordinates
+from solver.contact.active_set import OPEN, SLIP, Contact, States
 from solver.mesh import Array, Indices, Mesh
-from solver.stiffness import Probes, local_coordinates
+from solver.mesh.grid import grid_mesh, quality
 
 NONE: Indices = np.zeros(0, np.int64)
 

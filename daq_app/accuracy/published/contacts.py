@@ -20,10 +20,10 @@ from daq_app.accuracy.published.bodies import (
     touching_within,
 )
 from daq_app.accuracy.published.zones import half_above, half_width
-from solver.body import Body, edge_load
-from solver.contact import OPEN, STICK, Contact, Course, Touchable, forced
-from solver.friction import FrictionLaw
-from solver.materials import Hooke
+from solver.body.linear import Body, edge_load
+from solver.constitutive.linear import Hooke
+from solver.contact.active_set import OPEN, STICK, Contact, Course, Touchable, forced
+from solver.contact.law import FrictionLaw
 from solver.mesh import Array
 
 ELEMENT = 1 / 30  # of the half-width

@@ -3,11 +3,11 @@
 import numpy as np
 
 from daq_app.accuracy.published.bodies import distorted, membrane, ring
-from solver.body import Body, edge_load
-from solver.elements import Q2P1
-from solver.materials import Hooke
+from solver.body.linear import Body, edge_load
+from solver.body.stiffness import Probes
+from solver.constitutive.linear import Hooke
+from solver.element import Q2P1
 from solver.mesh import Array, Indices, Mesh
-from solver.stiffness import Probes
 
 INNER, OUTER, YOUNG = 3.0, 9.0, 1000.0  # radii [mm] and modulus [MPa] of the cylinder, under an inner pressure of 1 MPa
 _SHARE = INNER**2 / (OUTER**2 - INNER**2)

@@ -8,7 +8,7 @@ import numpy as np
 
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, within
 from daq_app.accuracy.published import contacts, finite_contacts, locking
-from solver.friction import FrictionLaw
+from solver.contact.law import FrictionLaw
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.edges import last_edge
+from solver.contact.edges import last_edge
 from solver.mesh import Array
 
 

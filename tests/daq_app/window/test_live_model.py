@@ -16,7 +16,7 @@ from sessions.analysis import FrictionParameters
 from sessions.plan import Frame
 from sessions.protocols import plan, protocol
 from solver.failures import NoSteadyState
-from solver.solution import solve
+from solver.response.solution import solve
 
 PLAN = plan(protocol("sensotact-friction"), "S01", 3, frame=Frame("-z", "set", 20.0, "set"))
 MU, NORMAL, AREA = 0.6, 2.0, PLAN.contact_area

@@ -1,0 +1,57 @@
+"""A state of one mesh taken to another: displacements by the elements' own functions, pressures by their elements."""
+
+from solver._kernels.compiling import Array, Narrow, compiled
+
+
+@compiled
+def carry(
+    u: Array,
+    pressure: Array,
+    combination: Array,
+    centre: Array,
+    along: Narrow,
+    along_parts: Array,
+    across: Narrow,
+    across_parts: Array,
+    station: Narrow,
+    layer: Narrow,
+    points: Array,
+    weight: Array,
+    modes: Array,
+    u_new: Array,
+    pressure_new: Array,
+) -> None:
+    """Fill `u_new` (n, 2) and `pressure_new` (e, 3) from `u` and `pressure` on a mesh of r rows of nodes across.
+
+    A node in line i and row j of the new mesh takes its part of three lines of the old one from `along[i]` on, and of
+    three rows from `across[j]` on, by `along_parts` (lines, 3) and `across_parts` (rows, 3). Quadrature points of the
+    new elements lie in the old elements of `station` (a, 3) and `layer` (b, 3), whose pressure is a combination of
+    1, x, y (`FiniteBody.combination`, `centre`); `points` (e, 9, 2), `weight` (e, 9) and `modes` (e, 9, 3) are new.
+    """
+    lines, rows = along.shape[0], across.shape[0]
+    old_rows = across[rows - 1] + 3
+    for i in range(lines):
+        for j in range(rows):
+            x = y = 0.0
+            for a in range(3):
+                first = (along[i] + a) * old_rows + across[j]
+                for b in range(3):
+                    part = along_parts[i, a] * across_parts[j, b]
+                    x += part * u[first + b, 0]
+                    y += part * u[first + b, 1]
+            u_new[i * rows + j, 0], u_new[i * rows + j, 1] = x, y
+    layers, old_layers = layer.shape[0], old_rows // 2
+    for e in range(weight.shape[0]):
+        p0 = p1 = p2 = 0.0
+        for q in range(9):
+            host = station[e // layers, q // 3] * old_layers + layer[e % layers, q % 3]
+            x, y = points[e, q, 0] - centre[host, 0], points[e, q, 1] - centre[host, 1]
+            field = 0.0
+            for m in range(3):
+                c = combination[host, m]
+                field += pressure[host, m] * (c[0] + c[1] * x + c[2] * y)
+            field *= weight[e, q]
+            p0 += field * modes[e, q, 0]
+            p1 += field * modes[e, q, 1]
+            p2 += field * modes[e, q, 2]
+        pressure_new[e, 0], pressure_new[e, 1], pressure_new[e, 2] = p0, p1, p2

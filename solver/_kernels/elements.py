@@ -1,0 +1,391 @@
+# ruff: noqa: C901 - a compiled loop is flat: calls inside it would cost more than they explain
+"""Elements: forces, tangents and energies of all of them. e elements of nine nodes, q = 9 quadrature points."""
+
+import numpy as np
+
+from solver._kernels.compiling import Array, Narrow, compiled
+
+PLAIN = 2.0  # exponent of tissue that does not stiffen
+
+
+@compiled
+def stiffened(exponent: float, excess: float) -> tuple[float, float]:
+    """Return by how much the shear modulus has grown, and how fast it grows: `hyperelastic.slopes`."""
+    if excess > 0.04:
+        s = np.arcsinh(0.5 * np.sqrt(excess))
+        two = np.sinh(2.0 * s)
+        grown = 2.0 / exponent * np.sinh(exponent * s) / two
+        return grown, (np.cosh(exponent * s) - grown * np.cosh(2.0 * s)) / (2.0 * two * two)
+    x, grown, growth, term = -excess / 4.0, 1.0, 0.0, 1.0
+    for n in range(14):
+        factor = (1.0 + exponent / 2.0 + n) * (1.0 - exponent / 2.0 + n) / ((1.5 + n) * (n + 1.0))
+        growth -= (n + 1.0) / 4.0 * factor * term
+        term *= factor * x
+        grown += term
+    return grown, growth
+
+
+@compiled
+def assemble(
+    u: Array,
+    pressure: Array,
+    grad_x: Array,
+    grad_y: Array,
+    weight: Array,
+    modes: Array,
+    laplace: Array,
+    shear: Array,
+    stiffening: Array,
+    lame: Array,
+    nodes: Narrow,
+    unknown: Narrow,
+    tangent: Array,
+    force: Array,
+    fold: Array,
+    core: Array,
+    dilate: Array,
+    volume: Array,
+) -> float:
+    """Fill the tangents and the internal forces at displacements `u` (nodes, 2); return the least det F.
+
+    `pressure` (e, 3) are the pressure modes that the tangent sees (the linearised prediction), while the forces follow
+    from `u` alone. `grad_x`, `grad_y` (e, q, 9), `weight` (e, q), `modes` (e, q, 3, orthonormal over the element),
+    `laplace` (e, 9, 9) integrals of the products of gradients times `shear`;
+    `shear`, `stiffening` (Ogden's exponent), `lame` (e,); `nodes` (e, 9), `unknown` (e, 8, 2), -1 where fixed.
+    Filled: `tangent` (e, 16, 16) of the outer nodes, lower half, `force` (n,), `fold` (e, 2, 17)
+    (centre = -(fold @ (outer unknowns, 1))), `core` (e, 3) of the centre's stiffness inverted (xx, xy, yy),
+    `dilate` (e, 3, 18) derivative of the modes of ln J, `volume` (e, 3) those modes.
+    Where det F is not positive, the arrays are left half filled.
+    """
+    force[:] = 0.0
+    least = np.inf
+    # Sums over quadrature points are products of small matrices of a fixed size, sixteen columns at a time: x of the
+    # outer nodes, then y; the centre's come last. `h`: gradients in the deformed body, `s`: what the stress is made of.
+    h, s = np.empty((9, 18)), np.empty((9, 18))
+    wide, push, more, bend = np.empty((9, 3)), np.empty(9), np.empty(9), np.empty(9)
+    d, f = np.empty((3, 18)), np.empty(18)
+    by_x, by_y, grown_laplace = np.empty((9, 16)), np.empty((9, 16)), np.empty((9, 9))
+    left, right, own = np.empty((18, 5)), np.empty((5, 16)), np.empty((16, 16))
+    ux, uy = np.empty(9), np.empty(9)
+    for e in range(nodes.shape[0]):
+        for i in range(9):
+            ux[i], uy[i] = u[nodes[e, i], 0], u[nodes[e, i], 1]
+        v0 = v1 = v2 = 0.0
+        p0, p1, p2 = pressure[e, 0], pressure[e, 1], pressure[e, 2]
+        stiffens = stiffening[e] != PLAIN
+        for q in range(9):
+            gx, gy = grad_x[e, q], grad_y[e, q]
+            h00, f01, f10, h11 = 0.0, 0.0, 0.0, 0.0
+            for i in range(9):
+                h00 += ux[i] * gx[i]
+                f01 += ux[i] * gy[i]
+                f10 += uy[i] * gx[i]
+                h11 += uy[i] * gy[i]
+            swollen = h00 + h11 + h00 * h11 - f01 * f10  # det F - 1, to its own digits: stiff tissue multiplies them
+            f00, f11, j = 1.0 + h00, 1.0 + h11, 1.0 + swollen
+            least = min(least, j)
+            if not j > 0.0:
+                return least
+            w = weight[e, q]
+            w0, w1, w2 = w * modes[e, q, 0], w * modes[e, q, 1], w * modes[e, q, 2]
+            wide[q, 0], wide[q, 1], wide[q, 2] = w0, w1, w2
+            log = np.log1p(swollen)
+            v0 += w0 * log
+            v1 += w1 * log
+            v2 += w2 * log
+            wg = w * shear[e]
+            if stiffens:
+                excess = 2.0 * (h00 + h11 - log) + h00 * h00 + f01 * f01 + f10 * f10 + h11 * h11
+                grown, growth = stiffened(stiffening[e], excess)
+                more[q] = 2.0 * growth * wg
+                wg *= grown
+            push[q] = wg
+            bend[q] = wg - (w0 * p0 + w1 * p1 + w2 * p2)
+            over = 1.0 / j
+            a00, a01, a10, a11 = f11 * over, -f10 * over, -f01 * over, f00 * over  # inverse transposed
+            b00, b11 = (h00 - h11 + swollen * f00) * over, (h11 - h00 + swollen * f11) * over  # F less it, as exactly
+            b01, b10 = f01 - a01, f10 - a10
+            for i in range(8):
+                x, y = a00 * gx[i] + a01 * gy[i], a10 * gx[i] + a11 * gy[i]
+                h[q, i], h[q, 8 + i] = x, y
+                s[q, i], s[q, 8 + i] = b00 * gx[i] + b01 * gy[i], b10 * gx[i] + b11 * gy[i]
+            x, y = a00 * gx[8] + a01 * gy[8], a10 * gx[8] + a11 * gy[8]
+            h[q, 16], h[q, 17] = x, y
+            s[q, 16], s[q, 17] = b00 * gx[8] + b01 * gy[8], b10 * gx[8] + b11 * gy[8]
+        lam = lame[e]
+        volume[e, 0], volume[e, 1], volume[e, 2] = v0, v1, v2
+        for c in range(18):
+            d0 = d1 = d2 = total = 0.0
+            for q in range(9):
+                d0 += wide[q, 0] * h[q, c]
+                d1 += wide[q, 1] * h[q, c]
+                d2 += wide[q, 2] * h[q, c]
+                total += push[q] * s[q, c]
+            d[0, c], d[1, c], d[2, c] = d0, d1, d2
+            f[c] = total + lam * (d0 * v0 + d1 * v1 + d2 * v2)
+        for m in range(3):
+            for c in range(8):
+                dilate[e, m, 2 * c], dilate[e, m, 2 * c + 1] = d[m, c], d[m, 8 + c]
+            dilate[e, m, 16], dilate[e, m, 17] = d[m, 16], d[m, 17]
+            for c in range(16):
+                right[m, c] = d[m, c]
+            for c in range(18):
+                left[c, m] = lam * d[m, c]
+        even = laplace[e]
+        if stiffens:
+            for i in range(9):
+                grown_laplace[i] = 0.0
+                for q in range(9):
+                    x, y = push[q] * grad_x[e, q, i], push[q] * grad_y[e, q, i]
+                    for c in range(9):
+                        grown_laplace[i, c] += x * grad_x[e, q, c] + y * grad_y[e, q, c]
+            even = grown_laplace
+        for i in range(9):  # each node's x, then its y, by all: rows of the one go with columns of the other
+            a, b = i + 8 * (i == 8), i + 8 + (i == 8)
+            for c in range(16):
+                x = y = 0.0
+                for q in range(9):
+                    x += bend[q] * h[q, a] * h[q, c]
+                    y += bend[q] * h[q, b] * h[q, c]
+                by_x[i, c], by_y[i, c] = x, y
+        # the centre node meets no other element: it is eliminated
+        xx, yy, xy = even[8, 8], even[8, 8], 0.0
+        for q in range(9):
+            x, y = bend[q] * h[q, 16], bend[q] * h[q, 17]
+            xx += x * h[q, 16]
+            xy += x * h[q, 17]
+            yy += y * h[q, 17]
+        for m in range(3):
+            xx += left[16, m] * d[m, 16]
+            xy += left[16, m] * d[m, 17]
+            yy += left[17, m] * d[m, 17]
+        if stiffens:
+            for q in range(9):
+                xx += more[q] * s[q, 16] * s[q, 16]
+                xy += more[q] * s[q, 16] * s[q, 17]
+                yy += more[q] * s[q, 17] * s[q, 17]
+        det = xx * yy - xy * xy
+        k00, k01, k11 = yy / det, -xy / det, xx / det
+        core[e, 0], core[e, 1], core[e, 2] = k00, k01, k11
+        for c in range(16):
+            i = c % 8
+            if c < 8:
+                x, y = by_x[8, i] + even[8, i], by_x[8, 8 + i]
+            else:
+                x, y = by_y[8, i], by_y[8, 8 + i] + even[8, i]
+            for m in range(3):
+                x += left[16, m] * d[m, c]
+                y += left[17, m] * d[m, c]
+            if stiffens:
+                for q in range(9):
+                    x += more[q] * s[q, 16] * s[q, c]
+                    y += more[q] * s[q, 17] * s[q, c]
+            left[c, 3], left[c, 4] = -x, -y
+            right[3, c], right[4, c] = k00 * x + k01 * y, k01 * x + k11 * y
+        for i in range(16):
+            for c in range(16):
+                total = 0.0
+                for m in range(5):
+                    total += left[i, m] * right[m, c]
+                own[i, c] = total
+        if stiffens:
+            for i in range(16):
+                for q in range(9):
+                    x = more[q] * s[q, i]
+                    for c in range(16):
+                        own[i, c] += x * s[q, c]
+        for i in range(8):
+            for c in range(i + 1):
+                tangent[e, 2 * i, 2 * c] = own[i, c] + by_x[i, c] + even[i, c]
+                tangent[e, 2 * i, 2 * c + 1] = own[i, 8 + c] + by_y[i, c]
+                tangent[e, 2 * i + 1, 2 * c] = own[8 + i, c] + by_x[i, 8 + c]
+                tangent[e, 2 * i + 1, 2 * c + 1] = own[8 + i, 8 + c] + by_y[i, 8 + c] + even[i, c]
+        for m in range(2):
+            for c in range(8):
+                fold[e, m, 2 * c], fold[e, m, 2 * c + 1] = right[3 + m, c], right[3 + m, 8 + c]
+        fold[e, 0, 16] = k00 * f[16] + k01 * f[17]
+        fold[e, 1, 16] = k01 * f[16] + k11 * f[17]
+        for c in range(16):
+            row = unknown[e, c % 8, c // 8]
+            if row >= 0:
+                force[row] += f[c] - right[3, c] * f[16] - right[4, c] * f[17]
+    return least
+
+
+@compiled
+def forces(
+    u: Array,
+    grad_x: Array,
+    grad_y: Array,
+    weight: Array,
+    modes: Array,
+    shear: Array,
+    stiffening: Array,
+    lame: Array,
+    nodes: Narrow,
+    unknown: Narrow,
+    force: Array,
+    fold: Array,
+    core: Array,
+    volume: Array,
+) -> float:
+    """Fill the internal forces at displacements `u` for a tangent assembled elsewhere; return the least det F.
+
+    Of that tangent are `fold` and `core`, by which the centres are eliminated. Filled: `force` (n,), the last column of
+    `fold`, and `volume`.
+    """
+    force[:] = 0.0
+    least = np.inf
+    ux, uy = np.empty(9), np.empty(9)
+    fx, fy = np.empty(9), np.empty(9)
+    inverse, stress = np.empty((9, 4)), np.empty((9, 4))  # transposed, and without the pressure, at quadrature points
+    for e in range(nodes.shape[0]):
+        for i in range(9):
+            ux[i], uy[i] = u[nodes[e, i], 0], u[nodes[e, i], 1]
+        v0 = v1 = v2 = 0.0
+        for q in range(9):
+            gx, gy = grad_x[e, q], grad_y[e, q]
+            h00, f01, f10, h11 = 0.0, 0.0, 0.0, 0.0
+            for i in range(9):
+                h00 += ux[i] * gx[i]
+                f01 += ux[i] * gy[i]
+                f10 += uy[i] * gx[i]
+                h11 += uy[i] * gy[i]
+            grown = h00 + h11 + h00 * h11 - f01 * f10  # det F - 1, to its own digits: stiff tissue multiplies them
+            f00, f11, j = 1.0 + h00, 1.0 + h11, 1.0 + grown
+            least = min(least, j)
+            if not j > 0.0:
+                return least
+            w = weight[e, q]
+            log = np.log1p(grown)
+            v0 += w * modes[e, q, 0] * log
+            v1 += w * modes[e, q, 1] * log
+            v2 += w * modes[e, q, 2] * log
+            g = w * shear[e]
+            if stiffening[e] != PLAIN:
+                excess = 2.0 * (h00 + h11 - log) + h00 * h00 + f01 * f01 + f10 * f10 + h11 * h11
+                g *= stiffened(stiffening[e], excess)[0]
+            a00, a01, a10, a11 = f11 / j, -f10 / j, -f01 / j, f00 / j
+            inverse[q, 0], inverse[q, 1], inverse[q, 2], inverse[q, 3] = a00, a01, a10, a11
+            stress[q, 0], stress[q, 1] = g * (h00 - h11 + grown * f00) / j, g * (f01 - a01)  # as exactly
+            stress[q, 2], stress[q, 3] = g * (f10 - a10), g * (h11 - h00 + grown * f11) / j
+        volume[e, 0], volume[e, 1], volume[e, 2] = v0, v1, v2
+        fx[:] = 0.0
+        fy[:] = 0.0
+        for q in range(9):
+            gx, gy = grad_x[e, q], grad_y[e, q]
+            push = lame[e] * weight[e, q] * (modes[e, q, 0] * v0 + modes[e, q, 1] * v1 + modes[e, q, 2] * v2)
+            p00, p01 = stress[q, 0] + push * inverse[q, 0], stress[q, 1] + push * inverse[q, 1]
+            p10, p11 = stress[q, 2] + push * inverse[q, 2], stress[q, 3] + push * inverse[q, 3]
+            for i in range(9):
+                fx[i] += p00 * gx[i] + p01 * gy[i]
+                fy[i] += p10 * gx[i] + p11 * gy[i]
+        fold[e, 0, 16] = core[e, 0] * fx[8] + core[e, 1] * fy[8]
+        fold[e, 1, 16] = core[e, 1] * fx[8] + core[e, 2] * fy[8]
+        for i in range(16):
+            row = unknown[e, i // 2, i % 2]
+            if row >= 0:
+                mine = fx[i // 2] if i % 2 == 0 else fy[i // 2]
+                force[row] += mine - fold[e, 0, i] * fx[8] - fold[e, 1, i] * fy[8]
+    return least
+
+
+@compiled
+def advance(
+    u: Array,
+    pressure: Array,
+    step: Array,
+    scale: float,
+    nodes: Narrow,
+    unknown: Narrow,
+    lame: Array,
+    fold: Array,
+    dilate: Array,
+    volume: Array,
+    u_new: Array,
+    pressure_new: Array,
+) -> float:
+    """Fill `u_new`, `pressure_new` after `scale` times the `step` (n,) of the unknowns; return the largest move.
+
+    The pressure is the linearised prediction at the end of the full step, approached by `scale`: the mixed
+    integration points of Magisano, Leonetti and Garcea (2017), Int. J. Numer. Meth. Eng. 109, 1237.
+    """
+    largest = 0.0
+    for n in range(u.shape[0]):
+        u_new[n, 0], u_new[n, 1] = u[n, 0], u[n, 1]
+    move = np.empty(18)
+    for e in range(nodes.shape[0]):
+        for i in range(16):
+            row = unknown[e, i // 2, i % 2]
+            move[i] = step[row] if row >= 0 else 0.0
+        for a in range(2):
+            centre = fold[e, a, 16]
+            for i in range(16):
+                centre += fold[e, a, i] * move[i]
+            move[16 + a] = -centre
+        for i in range(18):
+            largest = max(largest, abs(move[i]))
+            u_new[nodes[e, i // 2], i % 2] = u[nodes[e, i // 2], i % 2] + scale * move[i]
+        for m in range(3):
+            change = volume[e, m]
+            for i in range(18):
+                change += dilate[e, m, i] * move[i]
+            pressure_new[e, m] = pressure[e, m] + scale * (lame[e] * change - pressure[e, m])
+    return largest
+
+
+@compiled
+def energies(
+    u: Array,
+    grad_x: Array,
+    grad_y: Array,
+    weight: Array,
+    modes: Array,
+    shear: Array,
+    stiffening: Array,
+    lame: Array,
+    nodes: Narrow,
+    at_element: Narrow,
+    at_x: Array,
+    at_y: Array,
+    at_modes: Array,
+    out: Array,
+) -> None:
+    """Fill `out` (p,) with the strain-energy density at probes; ln J is the element's best fit by its three modes.
+
+    `at_element` (p,), `at_x`, `at_y` (p, 9) gradients of the shape functions there, `at_modes` (p, 3) the modes there.
+    """
+    seen = -1
+    v0 = v1 = v2 = 0.0
+    for p in range(at_element.shape[0]):
+        e = at_element[p]
+        if e != seen:
+            v0 = v1 = v2 = 0.0
+            for q in range(9):
+                h00, f01, f10, h11 = 0.0, 0.0, 0.0, 0.0
+                for i in range(9):
+                    x, y = u[nodes[e, i], 0], u[nodes[e, i], 1]
+                    h00 += x * grad_x[e, q, i]
+                    f01 += x * grad_y[e, q, i]
+                    f10 += y * grad_x[e, q, i]
+                    h11 += y * grad_y[e, q, i]
+                log = weight[e, q] * np.log1p(h00 + h11 + h00 * h11 - f01 * f10)
+                v0 += log * modes[e, q, 0]
+                v1 += log * modes[e, q, 1]
+                v2 += log * modes[e, q, 2]
+            seen = e
+        h00, f01, f10, h11 = 0.0, 0.0, 0.0, 0.0
+        for i in range(9):
+            x, y = u[nodes[e, i], 0], u[nodes[e, i], 1]
+            h00 += x * at_x[p, i]
+            f01 += x * at_y[p, i]
+            f10 += y * at_x[p, i]
+            h11 += y * at_y[p, i]
+        fit = at_modes[p, 0] * v0 + at_modes[p, 1] * v1 + at_modes[p, 2] * v2
+        linear = h00 + h11
+        excess = 2.0 * (linear - np.log1p(linear + h00 * h11 - f01 * f10))
+        excess += h00 * h00 + f01 * f01 + f10 * f10 + h11 * h11
+        if stiffening[e] != PLAIN:
+            half = np.sinh(stiffening[e] / 2.0 * np.arcsinh(0.5 * np.sqrt(max(excess, 0.0))))
+            excess = 16.0 / stiffening[e] ** 2 * half * half
+        out[p] = 0.5 * shear[e] * excess + 0.5 * lame[e] * fit * fit

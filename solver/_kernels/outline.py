@@ -1,0 +1,74 @@
+"""The deformed skin as a line: how far it is squeezed, and whether it crosses itself. `skin_compression` in NumPy."""
+
+import numpy as np
+
+from solver._kernels.compiling import OPEN, Array, Flags, Narrow, Wide, compiled
+
+SQUEEZED = 0.85  # stretch of skin, on one side at least, in which a kink is told of
+
+
+@compiled
+def pinched(
+    nodes: Array, u: Array, outline: Wide, loose: Flags, state: Narrow, first: int
+) -> tuple[float, int, float, float]:
+    """Return how far the skin is squeezed where its elements are `loose` (a,), as `skin_compression.pinched` has it.
+
+    `nodes` (n, 2) undeformed, `u` (n, 2) displacements, `outline` (2 a + 1,) the nodes of the skin in order, of which
+    those from number `first` on may touch, as `state` (k,) says.
+    """
+    least, place, lowest, kink = np.inf, 0, np.inf, 0.0
+    before_x, before_y = np.nan, np.nan  # tangent at the end of the element before
+    for j in range(loose.shape[0]):
+        if not loose[j]:
+            before_x, before_y = np.nan, np.nan
+            continue
+        a, b, c = outline[2 * j], outline[2 * j + 1], outline[2 * j + 2]
+        px, py = nodes[b, 0] - nodes[a, 0], nodes[b, 1] - nodes[a, 1]
+        qx, qy = nodes[c, 0] - nodes[b, 0], nodes[c, 1] - nodes[b, 1]
+        dx, dy = px + u[b, 0] - u[a, 0], py + u[b, 1] - u[a, 1]
+        ex, ey = qx + u[c, 0] - u[b, 0], qy + u[c, 1] - u[b, 1]
+        one = np.sqrt((dx * dx + dy * dy) / (px * px + py * py))
+        other = np.sqrt((ex * ex + ey * ey) / (qx * qx + qy * qy))
+        if min(one, other) < least:
+            least, place = min(one, other), j
+        size = np.hypot(3.0 * px - qx, 3.0 * py - qy)
+        x, y = (3.0 * dx - ex) / size, (3.0 * dy - ey) / size
+        node = 2 * j - first
+        touches = 0 <= node < state.shape[0] and state[node] != OPEN
+        if min(np.hypot(x, y), np.hypot(before_x, before_y)) < SQUEEZED and not touches:
+            kink = max(kink, np.hypot(x - before_x, y - before_y))
+        size = np.hypot(3.0 * qx - px, 3.0 * qy - py)
+        before_x, before_y = (3.0 * ex - dx) / size, (3.0 * ey - dy) / size
+        lowest = min(lowest, np.hypot(x, y), np.hypot(before_x, before_y))
+    return least, place, min(lowest, least), kink
+
+
+@compiled
+def crosses(nodes: Array, u: Array, outline: Wide) -> bool:
+    """Return whether the deformed line meets itself other than at the nodes that join its pieces."""
+    count = outline.shape[0]
+    x, y = np.empty(count), np.empty(count)
+    for i in range(count):
+        x[i], y[i] = nodes[outline[i], 0] + u[outline[i], 0], nodes[outline[i], 1] + u[outline[i], 1]
+    for i in range(count - 3):
+        dx, dy = x[i + 1] - x[i], y[i + 1] - y[i]
+        before = dx * (y[i + 2] - y[i]) - dy * (x[i + 2] - x[i])
+        for j in range(i + 2, count - 1):
+            side = dx * (y[j + 1] - y[i]) - dy * (x[j + 1] - x[i])
+            if before * side < 0.0:  # the ends of piece j lie on both sides of the line of piece i
+                ex, ey = x[j + 1] - x[j], y[j + 1] - y[j]
+                one = ex * (y[i] - y[j]) - ey * (x[i] - x[j])
+                other = ex * (y[i + 1] - y[j]) - ey * (x[i + 1] - x[j])
+                if one * other < 0.0 and _overlap(x, i, j) and _overlap(y, i, j):
+                    return True
+            before = side
+    return False
+
+
+@compiled
+def _overlap(at: Array, i: int, j: int) -> bool:
+    """Return whether the pieces that begin at points `i` and `j` share positions along one axis.
+
+    Pieces of a straight line do not; on which sides of each other they lie is told by rounding alone.
+    """
+    return max(at[i], at[i + 1]) >= min(at[j], at[j + 1]) and max(at[j], at[j + 1]) >= min(at[i], at[i + 1])

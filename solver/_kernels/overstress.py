@@ -1,0 +1,112 @@
+# ruff: noqa: C901 - a compiled loop is flat: calls inside it would cost more than they explain
+"""What relaxing tissue adds to the forces and tangents of elements that `solver._kernels.elements` has assembled."""
+
+import numpy as np
+
+from solver._kernels.compiling import Array, Narrow, compiled
+
+
+@compiled
+def add_overstress(
+    u: Array,
+    tensor: Array,
+    grad_x: Array,
+    grad_y: Array,
+    weight: Array,
+    nodes: Narrow,
+    unknown: Narrow,
+    tangent: Array,
+    force: Array,
+    fold: Array,
+    core: Array,
+    anew: bool,
+) -> None:
+    """Add the forces of W = 1/2 J^-2/3 T:C at displacements `u`, and where `anew` its tangent.
+
+    `tensor` (e, q, 4) is T: xx, yy, xy, zz [MPa]; the others as in `assemble` and `forces`, by which `tangent`,
+    `force`, `fold` and `core` were filled, the centre of each element eliminated. `anew`: it is eliminated again, with
+    what is added; otherwise the tangent is one kept from elsewhere.
+    """
+    ux, uy = np.empty(9), np.empty(9)
+    full, own = np.empty((18, 18)), np.empty(18)
+    hx, hy, mx, my = np.empty(9), np.empty(9), np.empty(9), np.empty(9)
+    across = np.empty((2, 17))
+    for e in range(nodes.shape[0]):
+        for i in range(9):
+            ux[i], uy[i] = u[nodes[e, i], 0], u[nodes[e, i], 1]
+        full[:, :] = 0.0
+        own[:] = 0.0
+        for q in range(9):
+            gx, gy = grad_x[e, q], grad_y[e, q]
+            f00, f01, f10, f11 = 1.0, 0.0, 0.0, 1.0
+            for i in range(9):
+                f00 += ux[i] * gx[i]
+                f01 += ux[i] * gy[i]
+                f10 += uy[i] * gx[i]
+                f11 += uy[i] * gy[i]
+            j = f00 * f11 - f01 * f10
+            c = weight[e, q] * j ** (-2.0 / 3.0)
+            t0, t1, t2 = tensor[e, q, 0], tensor[e, q, 1], tensor[e, q, 2]
+            m00, m01 = f00 * t0 + f01 * t2, f00 * t2 + f01 * t1
+            m10, m11 = f10 * t0 + f11 * t2, f10 * t2 + f11 * t1
+            whole = f00 * m00 + f01 * m01 + f10 * m10 + f11 * m11 + tensor[e, q, 3]
+            a00, a01, a10, a11 = f11 / j, -f10 / j, -f01 / j, f00 / j  # inverse transposed
+            for i in range(9):
+                hx[i] = a00 * gx[i] + a01 * gy[i]
+                hy[i] = a10 * gx[i] + a11 * gy[i]
+                mx[i] = m00 * gx[i] + m01 * gy[i]
+                my[i] = m10 * gx[i] + m11 * gy[i]
+                own[2 * i] += c * (mx[i] - whole / 3.0 * hx[i])
+                own[2 * i + 1] += c * (my[i] - whole / 3.0 * hy[i])
+            if anew:
+                both, part, third = c * 2.0 / 9.0 * whole, c * 2.0 / 3.0, c * whole / 3.0
+                for i in range(9):
+                    px, py = c * (t0 * gx[i] + t2 * gy[i]), c * (t2 * gx[i] + t1 * gy[i])
+                    for k in range(i + 1):
+                        laplace = px * gx[k] + py * gy[k]
+                        full[2 * i, 2 * k] += (
+                            laplace - part * (mx[i] * hx[k] + hx[i] * mx[k]) + (both + third) * hx[i] * hx[k]
+                        )
+                        full[2 * i + 1, 2 * k + 1] += (
+                            laplace - part * (my[i] * hy[k] + hy[i] * my[k]) + (both + third) * hy[i] * hy[k]
+                        )
+                        full[2 * i, 2 * k + 1] += (
+                            both * hx[i] * hy[k] + third * hy[i] * hx[k] - part * (mx[i] * hy[k] + hx[i] * my[k])
+                        )
+                        full[2 * i + 1, 2 * k] += (
+                            both * hy[i] * hx[k] + third * hx[i] * hy[k] - part * (my[i] * hx[k] + hy[i] * mx[k])
+                        )
+        if not anew:
+            fold[e, 0, 16] += core[e, 0] * own[16] + core[e, 1] * own[17]
+            fold[e, 1, 16] += core[e, 1] * own[16] + core[e, 2] * own[17]
+            for i in range(16):
+                row = unknown[e, i // 2, i % 2]
+                if row >= 0:
+                    force[row] += own[i] - fold[e, 0, i] * own[16] - fold[e, 1, i] * own[17]
+            continue
+        # the centre comes back, gets its share, and is eliminated again
+        det = core[e, 0] * core[e, 2] - core[e, 1] * core[e, 1]
+        k00, k01, k11 = core[e, 2] / det, -core[e, 1] / det, core[e, 0] / det
+        for i in range(17):
+            across[0, i] = k00 * fold[e, 0, i] + k01 * fold[e, 1, i]
+            across[1, i] = k01 * fold[e, 0, i] + k11 * fold[e, 1, i]
+        for i in range(16):
+            row = unknown[e, i // 2, i % 2]
+            if row >= 0:
+                force[row] += own[i] + across[0, i] * fold[e, 0, 16] + across[1, i] * fold[e, 1, 16]
+            for k in range(i + 1):
+                tangent[e, i, k] += full[i, k] + across[0, i] * fold[e, 0, k] + across[1, i] * fold[e, 1, k]
+        k00, k01, k11 = k00 + full[16, 16], k01 + full[17, 16], k11 + full[17, 17]
+        det = k00 * k11 - k01 * k01
+        core[e, 0], core[e, 1], core[e, 2] = k11 / det, -k01 / det, k00 / det
+        for i in range(17):
+            across[0, i] += own[16] if i == 16 else full[16, i]
+            across[1, i] += own[17] if i == 16 else full[17, i]
+            fold[e, 0, i] = core[e, 0] * across[0, i] + core[e, 1] * across[1, i]
+            fold[e, 1, i] = core[e, 1] * across[0, i] + core[e, 2] * across[1, i]
+        for i in range(16):
+            row = unknown[e, i // 2, i % 2]
+            if row >= 0:
+                force[row] -= across[0, i] * fold[e, 0, 16] + across[1, i] * fold[e, 1, 16]
+            for k in range(i + 1):
+                tangent[e, i, k] -= across[0, i] * fold[e, 0, k] + across[1, i] * fold[e, 1, k]

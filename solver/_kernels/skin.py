@@ -1,0 +1,312 @@
+# ruff: noqa: C901 - a compiled loop is flat: calls inside it would cost more than they explain
+"""The skin that may touch: lengths, contact rows and states of its k nodes."""
+
+import numpy as np
+
+from solver._kernels.compiling import CAP, HELD_X, HELD_Y, OPEN, SLIP, STICK, Array, Narrow, compiled
+
+# how the length of skin of an edge's first, middle and last node grows with the positions of the three: Simpson's rule
+_LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
+
+COLUMNS = 4  # of the right-hand side
+STEEP = 1.0  # coefficient of friction from which skin that comes to touch is first thought to slip at the bound
+
+
+@compiled
+def tributary(x: Array, at: Narrow, out: Array) -> None:
+    """Fill `out` (k,) with the length of skin each node stands for, `x` (k,) being positions along the surface.
+
+    Simpson's rule on edges of three nodes; `at` (k,) is 0 at edge ends, 1 in the middle. The lengths are linear in x.
+    """
+    out[:] = 0.0
+    for i in range(at.shape[0]):
+        if at[i] == 1:
+            for n in range(3):
+                row = _LENGTHS[n]
+                out[i - 1 + n] += row[0] * x[i - 1] + row[1] * x[i] + row[2] * x[i + 1]
+
+
+@compiled
+def rubbed(x: Array, at: Narrow, state: Narrow, mu: float, out: Array) -> None:
+    """Fill `out` (k,) with the length of skin on which a bound acts that each node stands for.
+
+    That is its `tributary` length, less what `rubs` not.
+    """
+    out[:] = 0.0
+    for i in range(at.shape[0]):
+        if at[i] == 1:
+            for n in range(3):
+                if rubs(state, i, i - 1 + n, mu):
+                    row = _LENGTHS[n]
+                    out[i - 1 + n] += row[0] * x[i - 1] + row[1] * x[i] + row[2] * x[i + 1]
+
+
+@compiled
+def rubs(state: Narrow, edge: int, node: int, mu: float) -> bool:
+    """Return whether a bound acts on the part of an edge, told by its middle, that one of its nodes stands for.
+
+    Where friction is steep, skin slips at the bound up to where contact ends, which is where a line of the mesh lies:
+    an edge beyond, whose middle is open, is not rubbed. A node that touches alone stands for what touches, however
+    little that is. Where friction is not, pressure limits it there, and contact may end anywhere.
+    """
+    other = 2 * node - edge
+    return mu <= STEEP or state[edge] != OPEN or other < 0 or other >= state.shape[0] or state[other] == OPEN
+
+
+@compiled
+def impose(
+    stiffness: Array,
+    force: Array,
+    held: Narrow,
+    at: Narrow,
+    state: Narrow,
+    sense: Narrow,
+    mu: float,
+    tau: float,
+    above: Array,
+    behind: Array,
+    length: Array,
+    free: Narrow,
+    matrix: Array,
+    right: Array,
+    steps: Array,
+) -> int:
+    """Write down the skin's system of contact: return its size f, and fill its `matrix` (f f,) and `right` (f, 4).
+
+    `stiffness` (2 k, 2 k) and `force` (2 k,) are the body's as its skin feels them: x, y of one node, x, y of the next.
+    `held` (k,) says along what a node is fixed (HELD_X, HELD_Y, their sum), `above` (k,) heights over the surface,
+    `behind` (k,) distances of stuck nodes from where they stick, `length` from `rubbed`. The columns of `right` are the
+    step to equilibrium, and its derivatives with respect to depth, mu and travel of the surface along +x. `steps`
+    (2 k, 4) is filled where the contact's conditions prescribe displacements; what is unknown is listed in `free`
+    (f,).
+    """
+    size = state.shape[0]
+    steps[:, :] = 0.0
+    f = 0
+    for i in range(size):
+        x, y = 2 * i, 2 * i + 1
+        if held[i] & HELD_X == 0:
+            if state[i] == STICK:
+                steps[x, 0], steps[x, 3] = -behind[i], 1.0
+            else:
+                free[f] = x
+                f += 1
+        if held[i] & HELD_Y == 0:
+            if state[i] == OPEN:
+                free[f] = y
+                f += 1
+            else:
+                steps[y, 0], steps[y, 1] = -above[i], 1.0
+    spot = np.full(2 * size, -1)
+    for r in range(f):
+        spot[free[r]] = r
+    square = matrix[: f * f].reshape(f, f)
+    right[:, :] = 0.0
+    for r in range(f):
+        row = free[r]
+        i = row // 2
+        slips = state[i] == SLIP
+        drag = sense[i] * mu if slips else 0.0
+        mine, other = stiffness[row], stiffness[min(row + 1, 2 * size - 1)]
+        if slips:
+            for c in range(f):
+                square[r, c] = mine[free[c]] - drag * other[free[c]]
+            right[r, 0] = drag * force[row + 1] - force[row]
+            right[r, 2] = sense[i] * force[row + 1]
+        else:
+            for c in range(f):
+                square[r, c] = mine[free[c]]
+            right[r, 0] = -force[row]
+        for j in range(size):
+            if state[j] == OPEN or held[j] & HELD_Y != 0:
+                continue
+            y = 2 * j + 1
+            value = mine[y] - drag * other[y]
+            right[r, 0] -= value * steps[y, 0]
+            right[r, 1] -= value
+            if state[j] == STICK and held[j] & HELD_X == 0:
+                value = mine[y - 1] - drag * other[y - 1]
+                right[r, 0] -= value * steps[y - 1, 0]
+                right[r, 3] -= value
+        if state[i] == CAP:
+            drag = sense[i] * tau
+            right[r, 0] += drag * length[i]
+            for edge in range(max(i - 1, 0), min(i + 2, size)):
+                if at[edge] != 1 or not rubs(state, edge, i, mu):
+                    continue
+                for n in range(3):
+                    x = 2 * (edge - 1 + n)
+                    slope = drag * _LENGTHS[i - edge + 1, n]
+                    if spot[x] >= 0:
+                        square[r, spot[x]] -= slope
+                    else:
+                        right[r, 0] += slope * steps[x, 0]
+                        right[r, 3] += slope * steps[x, 3]
+    return f
+
+
+@compiled
+def solve(matrix: Array, right: Array, size: int) -> bool:
+    """Solve the system of contact, `matrix` (size size,), in place for `right` (size, 4); False where a pivot is zero.
+
+    No pivoting: the rows of contact and friction sit in a matrix that is otherwise the tangent of a stable body.
+    """
+    a = matrix[: size * size].reshape(size, size)
+    over = np.empty(size)  # one over the pivots
+    for r in range(size):
+        row = a[r]
+        p = 0
+        while p + 4 <= r:
+            s0, s1, s2, s3 = a[p], a[p + 1], a[p + 2], a[p + 3]
+            f0 = row[p] * over[p]
+            f1 = (row[p + 1] - f0 * s0[p + 1]) * over[p + 1]
+            f2 = (row[p + 2] - f0 * s0[p + 2] - f1 * s1[p + 2]) * over[p + 2]
+            f3 = (row[p + 3] - f0 * s0[p + 3] - f1 * s1[p + 3] - f2 * s2[p + 3]) * over[p + 3]
+            target = row[p + 4 :]
+            s0, s1, s2, s3 = s0[p + 4 :], s1[p + 4 :], s2[p + 4 :], s3[p + 4 :]
+            for c in range(target.shape[0]):
+                target[c] -= f0 * s0[c] + f1 * s1[c] + f2 * s2[c] + f3 * s3[c]
+            for s in range(COLUMNS):
+                right[r, s] -= f0 * right[p, s] + f1 * right[p + 1, s] + f2 * right[p + 2, s] + f3 * right[p + 3, s]
+            p += 4
+        while p < r:
+            factor = row[p] * over[p]
+            for c in range(p + 1, size):
+                row[c] -= factor * a[p, c]
+            for s in range(COLUMNS):
+                right[r, s] -= factor * right[p, s]
+            p += 1
+        if row[r] == 0.0:
+            return False
+        over[r] = 1.0 / row[r]
+    for r in range(size - 1, -1, -1):
+        for c in range(r + 1, size):
+            for s in range(COLUMNS):
+                right[r, s] -= a[r, c] * right[c, s]
+        for s in range(COLUMNS):
+            right[r, s] *= over[r]
+    return True
+
+
+@compiled
+def restate(
+    state: Narrow,
+    sense: Narrow,
+    reaction: Array,
+    above: Array,
+    slid: Array,
+    length: Array,
+    mu: float,
+    tau: float,
+    direction: int,
+) -> int:
+    """Change `state` and `sense` (k,) in place where the solution contradicts them; return how many were changed.
+
+    `reaction` (k, 2) forces on the skin, `above` (k,) heights over the surface, `slid` (k,) how far each node went
+    along +x relative to the surface since the last step. With `direction` -1 or +1 every touching node slips, the
+    friction force pointing there; with 0 nodes stick, slip and turn round. Where friction is steep, slip is a bad guess
+    of a node that comes to touch: its own drag may lift it off by more than it is pressed, and open it goes through.
+    """
+    changed = 0
+    size = state.shape[0]
+    force = reach = 0.0
+    for i in range(size):
+        force = max(force, abs(reaction[i, 1]))
+        reach = max(reach, abs(above[i]))
+    slack, small = 1e-12 * force, 1e-13 * reach
+    for i in range(size):
+        was, turned = state[i], sense[i]
+        now = was
+        if was == OPEN:
+            if above[i] < -small:
+                now = STICK if direction == 0 and mu > 0.0 and tau > 0.0 else SLIP
+                if direction != 0 and mu > STEEP and tau < np.inf:
+                    now = CAP
+                turned = direction if direction != 0 else turned
+        elif reaction[i, 1] < -slack:
+            now = OPEN
+        else:
+            coulomb, bound = mu * max(reaction[i, 1], 0.0), tau * max(length[i], 0.0)
+            most = min(coulomb, bound)
+            if direction != 0:
+                turned = direction
+                now = CAP if bound < coulomb - slack or (was == CAP and bound <= coulomb + slack) else SLIP
+            elif was == STICK:
+                if abs(reaction[i, 0]) > most + slack:
+                    turned = 1 if reaction[i, 0] > 0.0 else -1
+                    now = CAP if bound < coulomb else SLIP
+            elif slid[i] * sense[i] > small and most > 0.0:
+                now = STICK
+            else:
+                now = CAP if bound < coulomb - slack or (was == CAP and bound <= coulomb + slack) else SLIP
+        if now != was or (now >= SLIP and turned != sense[i]):
+            changed += 1
+        state[i], sense[i] = now, turned
+    return changed
+
+
+@compiled
+def settle(
+    stiffness: Array,
+    force: Array,
+    held: Narrow,
+    at: Narrow,
+    state: Narrow,
+    sense: Narrow,
+    mu: float,
+    tau: float,
+    direction: int,
+    x: Array,
+    above: Array,
+    anchor: Array,
+    rounds: int,
+    length: Array,
+    free: Narrow,
+    matrix: Array,
+    right: Array,
+    steps: Array,
+    reaction: Array,
+) -> bool:
+    """Solve the skin's system of contact for `steps`, changing states up to `rounds` times until none contradicts it.
+
+    That is the contact of the linearised body, exact where the rounds suffice. `x` (k,) are positions along the
+    surface, `anchor` (k,) those where nodes stick; filled beside `steps`: `reaction` (k, 2). For the rest see
+    `impose` and `restate`. A node that comes to touch at the bound again and again slips every other time. False where
+    a system cannot be solved.
+    """
+    size = state.shape[0]
+    entered = np.zeros(size, np.int32)  # how often each node came to touch
+    before = np.empty_like(state)
+    for turn in range(rounds + 1):
+        before[:] = state
+        rubbed(x, at, state, mu, length)
+        count = impose(
+            stiffness, force, held, at, state, sense, mu, tau, above, x - anchor, length, free, matrix, right, steps
+        )
+        if not solve(matrix, right[:count], count):
+            return False
+        for r in range(count):
+            steps[free[r]] = right[r]
+        for i in range(2 * size):
+            total = force[i]
+            for c in range(2 * size):
+                total += stiffness[i, c] * steps[c, 0]
+            reaction[i // 2, i % 2] = total
+        if turn == rounds:
+            break
+        ahead = x + steps[::2, 0]
+        reached, lengths = above + steps[1::2, 0], _lengths(ahead, at, state, mu)
+        if restate(state, sense, reaction, reached, ahead - anchor, lengths, mu, tau, direction) == 0:
+            break
+        for i in range(size):
+            if before[i] == OPEN and state[i] == CAP:
+                entered[i] += 1
+                state[i] = CAP if entered[i] % 2 == 1 else SLIP
+    return True
+
+
+@compiled
+def _lengths(x: Array, at: Narrow, state: Narrow, mu: float) -> Array:
+    out = np.empty_like(x)
+    rubbed(x, at, state, mu, out)
+    return out

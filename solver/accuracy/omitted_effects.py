@@ -1,0 +1,251 @@
+"""What a result leaves out, each with a number computed for its scene: how much that could have changed."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from solver.constitutive.hyperelastic import HUMAN_SKIN
+from solver.contact.active_set import STICK, Contact
+from solver.equilibrium.finger import FingerModel
+from solver.mesh import Array
+from solver.scene import Material, Scene
+
+DENSITY = 1.1e-9  # of soft tissue [t/mm3 = N s2/mm4]
+# Relaxation of the fingerpad under load: times from Pawluk and Howe 1999 (J. Biomech. Eng. 121, 178); their weights are
+# not in the abstract, so a fifth of the instantaneous stiffness is assumed for each, and two fifths stay.
+RELAXATION = ((0.004, 0.2), (0.07, 0.2), (1.4, 0.2))
+WORTH_TELLING = 0.02  # part of the SED from which something left out is worth a warning [-]
+LARGE_STRAIN = 0.1  # a strain from which finite strain ought to be considered [-]
+
+
+def _laws(scene: Scene) -> str:
+    """Say which law every tissue follows."""
+    usual = "Hooke" if scene.solve.kinematics == "small" else "compressible neo-Hookean"
+    said: list[str] = []
+    for name in ("epidermis", "dermis", "fat"):
+        tissue = scene.materials.of(name)
+        law = _ogden(tissue) if tissue.law == "ogden" else usual
+        said.append(f"{name} {law}" + (f", relaxing in {len(tissue.prony)} terms" if tissue.prony else ""))
+    return "; ".join(said)
+
+
+def _ogden(tissue: Material) -> str:
+    if tissue.stiffening is not None:
+        return f"Ogden, exponent {tissue.stiffening:g}"
+    return f"Ogden, exponent {HUMAN_SKIN:g} (default: human skin, ascribed to Shergold and Fleck 2004)"
+
+
+def _held(scene: Scene) -> str:
+    """Say what moves with the bone, and how the bone itself is modelled."""
+    finger = scene.finger
+    said = "driven as a whole" if finger.bone == "rigid" else "meshed, driven at its core of a third of its radius"
+    said += "; the cut is free" if finger.cut == "free" else "; the cut is driven with it"
+    return said + (f"; a nail plate of {finger.nail_length:g} mm is fixed to it" if finger.nail_length else "; no nail")
+
+
+def model(scene: Scene, finger: FingerModel, contact: Contact, displacement: Array) -> dict[str, Any]:
+    """Return what was modelled and what was left out, as plain data.
+
+    Every entry of `left_out` has `estimate`, the relative change of the SED (or a lower bound of it) that leaving it
+    out may have caused, `from`, the numbers of this scene that it rests on, and `how` they make the estimate.
+    """
+    force = finger.body.reactions(displacement[:, :, None])[finger.geometry.mesh.held, :, 0].sum(axis=0)
+    length = float(finger.body.touchable.length[contact.touching].sum())
+    touching = int(contact.touching.sum())
+    sticking = int((contact.state == STICK).sum()) / touching if touching else 0.0
+    slide = _elastic_slide(finger, displacement)
+    width = finger.contact_width(contact, finger.skin_displacement(contact)[:, 0])
+    return {
+        "kinematics": "small strain, plane strain",
+        "material": _laws(scene),
+        "element": "Q2/P-1: nine nodes, three pressure modes condensed in the element",
+        "contact": "unilateral, Coulomb with |t| <= min(mu p, tau_max), open, stick, slip or cap at every skin node",
+        "course": _course(scene),
+        "bone": _held(scene),
+        "width": "forces are per mm of width",
+        "left_out": {
+            "finite strain": _finite_strain(finger, displacement),
+            "bone compliance": _bone(scene, force),
+            "inertia": _inertia(scene, float(contact.normal.sum()), length),
+            "viscosity": _viscosity(scene, slide),
+            "history": _history(scene, sticking, slide),
+            "the third dimension": _width(scene, width),
+        },
+    }
+
+
+def finite_model(scene: Scene, *, force: Array, width: float, sticking: float, slide: float) -> dict[str, Any]:
+    """Return what `model` does for a result at finite strain.
+
+    `force` (2,) of the surface on the skin [N/mm], contact `width` [mm], part of the touching points that stick, and
+    `slide`, the largest sideways displacement of the skin [mm].
+    """
+    return {
+        "kinematics": "finite strain, plane strain",
+        "material": _laws(scene),
+        "element": "Q2/P-1: nine nodes, three modes of ln J condensed in the element",
+        "contact": "unilateral on the deformed skin, Coulomb with |t| <= min(mu p, tau_max) on true tractions",
+        "course": _course(scene),
+        "bone": _held(scene),
+        "width": "forces are per mm of width",
+        "left_out": {
+            "bone compliance": _bone(scene, force),
+            "inertia": _inertia(scene, float(force[1]), width),
+            "viscosity": _viscosity(scene, slide),
+            "history": _history(scene, sticking, slide),
+            "the third dimension": _width(scene, width),
+        },
+    }
+
+
+def warnings(scene: Scene, left_out: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return a sentence for everything left out that this scene would have needed."""
+    told: list[str] = []
+    if "finite strain" in left_out:
+        told += _of_strain(left_out["finite strain"])
+    needs = {
+        "bone compliance": 'ask for finger.bone = "meshed"',
+        "history": 'ask for solve.course = "history"',
+        "inertia": "nothing here models it",
+    }
+    if scene.solve.course == "history":
+        needs["viscosity"] = "give the tissues a Prony series"
+    elif scene.materials.relax:
+        needs["viscosity"] = 'ask for solve.course = "history"'
+    for name, cure in needs.items():
+        change = left_out[name]["estimate"] if name in left_out else None
+        if change is not None and change > WORTH_TELLING:
+            told.append(f"Leaving out {name} may have changed the ending's SED by {100 * change:.2g} %: {cure}.")
+    return tuple(told)
+
+
+def _of_strain(entry: Mapping[str, Any]) -> list[str]:
+    numbers, change = entry["from"], entry["estimate"]
+    if "limit_mu" in numbers:
+        return ["At finite strain this scene has no settled state: the skin folds first. Small strain hides that."]
+    if "with_MPa" in numbers:
+        if change is None or change <= WORTH_TELLING:
+            return []
+        return [f"At finite strain the ending's SED differs by {100 * change:.2g} %: small strain is not meant for it."]
+    if numbers["largest_strain"] <= LARGE_STRAIN:
+        return []
+    return [
+        f"Strains reach {100 * numbers['largest_strain']:.0f} % in the skin and "
+        f"{100 * numbers['strain_at_ending']:.0f} % at the ending, beyond what small strain is meant for: "
+        "finite strain would give another answer."
+    ]
+
+
+def _course(scene: Scene) -> str:
+    if scene.loading.direction == 0:
+        return "pre-indentation, marched with stick and slip"
+    if scene.solve.course == "history":
+        return "pre-indentation, stick, partial slip and slide, marched until settled"
+    return "settled sliding, solved directly"
+
+
+def _finite_strain(finger: FingerModel, displacement: Array) -> dict[str, Any]:
+    small, large = finger.stretches(displacement)
+    mesh, elastic = finger.geometry.mesh, finger.body.elastic
+    probes, weights = finger.ending.probes, finger.ending.weights
+    gradient = probes.displacement_gradient(mesh, displacement)
+    f = gradient + np.eye(2)
+    det = f[:, 0, 0] * f[:, 1, 1] - f[:, 0, 1] * f[:, 1, 0]
+    shear, lame = elastic.shear[probes.element], elastic.lame[probes.element]
+    estimate = None
+    if det.min() > 0.0:
+        log = np.log(det)
+        finite = shear / 2.0 * (np.sum(f * f, axis=(1, 2)) - 2.0 - 2.0 * log) + lame / 2.0 * log**2
+        hooke = probes.energy(mesh, elastic, displacement[:, :, None])[:, 0]
+        estimate = abs(float(weights @ finite) / float(weights @ hooke) - 1.0)
+    strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2.0
+    at_ending = float(np.abs(np.linalg.eigvalsh(strain)).max())
+    return {
+        "estimate": estimate,
+        "from": {"largest_strain": float(max(1.0 - small.min(), large.max() - 1.0)), "strain_at_ending": at_ending},
+        "how": "change of the ending's SED when these displacements enter the neo-Hookean law; contact and forces "
+        "would change too, so it is no bound: solved at finite strain, six published surfaces changed 0.1 to 2.1 times "
+        "as much",
+    }
+
+
+def _bone(scene: Scene, force: Array) -> dict[str, Any]:
+    if scene.finger.bone == "meshed":
+        how = "the bone was meshed"
+        return {"estimate": 0.0, "from": {"E_MPa": scene.materials.bone.E}, "how": how}
+    bone = scene.materials.bone
+    pressure = float(np.hypot(*force)) / (2.0 * scene.finger.bone_radius)
+    yields = pressure * (1.0 - bone.nu**2) / bone.E * 2.0 * scene.finger.bone_radius
+    return {
+        "estimate": 2.0 * yields / scene.loading.depth,
+        "from": {"bone_pressure_MPa": pressure, "bone_shortening_mm": yields},
+        "how": "the bone's own shortening under the force on it, as part of the indentation, twice for an energy",
+    }
+
+
+def _inertia(scene: Scene, normal: float, length: float) -> dict[str, Any]:
+    pressure = normal / length if length else 0.0
+    speed = max(scene.loading.speed if scene.loading.direction else 0.0, scene.loading.depth)
+    return {
+        "estimate": 2.0 * DENSITY * speed**2 / pressure if pressure else None,
+        "from": {"mean_pressure_MPa": pressure, "speed_mm_s": speed},
+        "how": "pressure of moving tissue (density times speed squared, 1.1 g/cm3) by the mean contact pressure, "
+        "twice for an energy",
+    }
+
+
+def _viscosity(scene: Scene, slide: float) -> dict[str, Any]:
+    lasting = 2.0 * slide / scene.loading.speed if scene.loading.direction else 0.0
+    if scene.materials.relax and scene.solve.course == "history":
+        longest = scene.materials.longest_relaxation
+        how = "tissues relaxed as the scene says, until nothing changed"
+        return {"estimate": 0.0, "from": {"longest_relaxation_s": longest}, "how": how}
+    if scene.materials.relax:
+        series = [[(t.tau, t.g) for t in tissue.prony] for tissue in scene.materials.by_region]
+        whose = "the tissues relaxing by the scene's own series, the largest of them"
+    else:
+        series = [list(RELAXATION)]
+        whose = (
+            "all layers relaxing alike with the times of Pawluk and Howe (1999) and assumed weights of a fifth each; "
+            "it would scale all surfaces alike"
+        )
+    return {
+        "estimate": max(_held_after(lasting, terms) for terms in series),
+        "from": {"slide_s": lasting, "relaxation_s": sorted({tau for terms in series for tau, _ in terms})},
+        "how": f"stress above its relaxed value when sliding has settled, {whose}",
+    }
+
+
+def _held_after(lasting: float, terms: Sequence[tuple[float, float]]) -> float:
+    """Return the stress above its relaxed value, relative, after a press of 1 s and a slide `lasting` so long [s]."""
+    after = sum(g * tau * (np.exp(-lasting / tau) - np.exp(-(lasting + 1.0) / tau)) for tau, g in terms)
+    return float(after) / (1.0 - sum(g for _, g in terms))
+
+
+def _elastic_slide(finger: FingerModel, displacement: Array) -> float:
+    """Return the largest sideways displacement of the skin that may touch [mm]."""
+    return float(np.abs(displacement[finger.geometry.mesh.skin, 0]).max())
+
+
+def _history(scene: Scene, sticking: float, slide: float) -> dict[str, Any]:
+    marched = scene.solve.course == "history" or scene.loading.direction == 0
+    return {
+        "estimate": 0.0 if marched else sticking,
+        "from": {"sticking_part": sticking, "elastic_slide_mm": slide},
+        "how": "the history was marched"
+        if marched
+        else "part of the touching points that stick: those alone depend on the way, which is forgotten once the bone "
+        "has slid a few times the skin's own sideways displacement",
+    }
+
+
+def _width(scene: Scene, width: float) -> dict[str, Any]:
+    nu = max(tissue.nu for tissue in scene.materials.by_region)
+    return {
+        "estimate": nu**2 * min(1.0, width / scene.finger.width),
+        "from": {"contact_width_mm": width, "finger_width_mm": scene.finger.width, "poisson_ratio": nu},
+        "how": "within half a contact width of either side of the finger tissue is free to widen, as in plane stress, "
+        "and nu squared softer: that by the part of the finger's width so near a side; that the pulp is round "
+        "across its width too is not in it, and changes more",
+    }

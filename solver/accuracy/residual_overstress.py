@@ -1,0 +1,150 @@
+"""What tissues that relax would still hold of their past when the slide of an elastic finger has settled.
+
+The course is marched, on a rough mesh and in few steps: the press, then a slide as long as the skin follows the surface
+sideways, by when all of an elastic finger slips. A step is exact for a strain that grows evenly, so that few will do.
+"""
+
+from collections.abc import Callable
+from copy import copy
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from solver.accuracy.omitted_effects import RELAXATION, warnings
+from solver.body.tissues import relaxing_laws
+from solver.contact.active_set import ContactLost
+from solver.continuation.small_states import law_of, settled
+from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.load_path import PRESSING_TIME, Aim
+from solver.equilibrium.relaxation import RelaxingBody, RelaxingWay
+from solver.failures import SolveFailure
+from solver.mesh.mesher import Sizing
+from solver.prediction import Prediction
+from solver.scene import Finger, Friction, Loading, Materials, Receptor, Relaxation, Scene
+
+ROUGH = {"small": 2.0, "finite": 3.0}  # fineness of the meshes
+STEPS = {"small": (1, 2), "finite": (3, 3)}  # of the press, and of the slide
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """What is still held, and when."""
+
+    part: float  # of the settled SED of the ending, by which it is larger [-]
+    slide_s: float  # after the slide began [s]
+
+
+def relaxing(scene: Scene) -> Scene | None:
+    """Return a scene whose tissues relax: as they are if they do, else to the moduli that they have.
+
+    Their bulk modulus stays, which is not possible for tissue that is very compressible: None.
+    """
+    if scene.materials.relax:
+        return scene
+    stays = 1.0 - sum(g for _, g in RELAXATION)
+    terms = tuple(Relaxation(g, tau) for tau, g in RELAXATION)
+    soft: dict[str, Any] = {}
+    for name in ("epidermis", "dermis", "fat"):
+        tissue = scene.materials.of(name)
+        shear, bulk = tissue.E / (2.0 * (1.0 + tissue.nu)) / stays, tissue.E / (3.0 * (1.0 - 2.0 * tissue.nu))
+        nu = (3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear))
+        if nu < 0.0:
+            return None
+        soft[name] = replace(tissue, E=2.0 * shear * (1.0 + nu), nu=nu, prony=terms)
+    return replace(scene, materials=replace(scene.materials, **soft))
+
+
+def with_held(found: Prediction, stop: Callable[[], bool] = lambda: False, *, in_loops: bool = False) -> Prediction:
+    """Return `found` with the evidence on viscosity marched, where that can be; `in_loops` as in `solution.answers`.
+
+    Raises Cancelled as `stop` says.
+    """
+    scene, begun = found.scene, perf_counter()
+    if scene.materials.relax and scene.solve.course == "history":
+        return found
+    still = held(found, stop, in_loops=in_loops)
+    took = perf_counter() - begun
+    if still is None:
+        return replace(found, evidence_s=took)
+    whose = "with the scene's own series"
+    if not scene.materials.relax:
+        whose = (
+            "to the moduli of the scene with the times of Pawluk and Howe (1999) and assumed weights of a fifth each"
+        )
+    before = found.model["left_out"]
+    entry = {
+        "estimate": still.part,
+        "from": {**before["viscosity"]["from"], "slide_s": still.slide_s},
+        "how": "change of the ending's SED when an elastic finger's slide has settled, all soft tissues relaxing "
+        f"{whose}: press and slide marched on a coarse mesh in few steps",
+    }
+    left_out = {**before, "viscosity": entry}
+    kept = tuple(told for told in found.warnings if told not in warnings(scene, before))
+    return replace(
+        found,
+        model={**found.model, "left_out": left_out},
+        warnings=(*kept, *warnings(scene, left_out)),
+        evidence_s=took,
+    )
+
+
+def held(found: Prediction, stop: Callable[[], bool] = lambda: False, *, in_loops: bool = False) -> Held | None:
+    """Return what tissues would still hold in the scene of `found`, whose skin says how long the slide lasts.
+
+    None where the rough mesh has no such course. Raises Cancelled where `stop` says so.
+    """
+    scene = relaxing(found.scene.driven(found.indentation))
+    if scene is None or not found.sed_ending > 0.0:
+        return None
+    direction = scene.loading.direction
+    slide = float(np.abs(found.displacement[found.mesh.skin, 0]).max()) if direction else 0.0
+    kind, depth = scene.solve.kinematics, scene.loading.depth
+    lasting = slide / scene.loading.speed if direction else 0.0
+    press, along = (np.arange(1, steps + 1) / steps for steps in STEPS[kind])
+    aims = [Aim(PRESSING_TIME * part, depth * part, 0.0) for part in press.tolist()]
+    if slide > 0.0:
+        aims += [Aim(PRESSING_TIME + lasting * part, depth, direction * slide * part) for part in along.tolist()]
+    try:
+        then, at_last = _small(scene, aims, in_loops) if kind == "small" else _finite(scene, aims, stop)
+    except (ContactLost, SolveFailure):
+        return None
+    return Held(abs(then / at_last - 1.0), lasting) if at_last > 0.0 else None
+
+
+def _small(scene: Scene, aims: list[Aim], in_loops: bool) -> tuple[float, float]:
+    """Return the SED [MPa] after the last of `aims`, and that of the settled state."""
+    finger, body = _rough(scene.finger, scene.materials, scene.receptor, scene.loading.depth, in_loops)
+    body = copy(body)  # each course has a past of its own
+    body.rest()
+    way = RelaxingWay(body, law_of(scene), scene.loading_per_mm, finger.ending, finger.point, aims[0].time)
+    for aim in aims:
+        way.go(aim)
+    return way.sed[-1][0], finger.sed_ending(finger.displacement(settled(scene, finger)))
+
+
+@lru_cache(maxsize=1)
+def _rough(
+    finger: Finger, materials: Materials, receptor: Receptor, depth: float, in_loops: bool
+) -> tuple[FingerModel, RelaxingBody]:
+    """Return a rough mesh of a finger, settled and relaxing; surfaces of one finger follow each other and share it."""
+    scene = Scene(finger=finger, materials=materials, friction=Friction(0.0), loading=Loading(depth), receptor=receptor)
+    made = FingerModel.of(scene, Sizing(ROUGH["small"], depth, margin=4.0), in_loops=in_loops)
+    body = RelaxingBody(made.geometry.mesh, relaxing_laws(materials), in_loops=in_loops, checked=True)
+    body.ready(PRESSING_TIME / STEPS["small"][0])
+    return made, body
+
+
+def _finite(scene: Scene, aims: list[Aim], stop: Callable[[], bool]) -> tuple[float, float]:
+    """Do the same at finite strain."""
+    # Imported here: small strain need not wait for the compiled loops to be loaded.
+    from solver.accuracy.adaptivity import MARGIN
+    from solver.continuation.finite_states import roughly
+    from solver.equilibrium.finite_finger import FiniteFinger
+    from solver.equilibrium.finite_relaxation import RelaxingCourse
+
+    finger = FiniteFinger.of(scene, Sizing(ROUGH["finite"], scene.loading.depth, margin=MARGIN))
+    at_last = finger.sed_ending(roughly(finger, scene, stop))
+    return RelaxingCourse(scene, finger, stop, aims).sed[-1][0], at_last

@@ -1,0 +1,155 @@
+"""A body at finite strain as the arrays that the compiled loops ask for, and the places where its energy is probed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver import _kernels as kernels
+from solver._kernels import HELD_X, HELD_Y
+from solver.body.receptor import Endings
+from solver.body.validation import check_body, check_driven, check_laws
+from solver.constitutive.hyperelastic import Law
+from solver.element import Q2P1
+from solver.linalg.elimination import Plan
+from solver.mesh import Array, Indices, Mesh
+
+Narrow = NDArray[np.int32]
+VALUES, _SLOPES = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FiniteBody:
+    """Elements, their unknowns and the skin that may touch; e elements, n unknowns, k nodes of skin.
+
+    The centre node of an element meets no other and is eliminated inside it; held nodes are fixed. What is left is
+    numbered in the order of its elimination, the skin last.
+    """
+
+    mesh: Mesh
+    grad_x: Array  # (e, 9, 9) of the shape functions at the quadrature points [1/mm]
+    grad_y: Array  # (e, 9, 9)
+    weight: Array  # (e, 9) areas of the quadrature points [mm2]
+    modes: Array  # (e, 9, 3) pressure modes there, orthonormal over the element [1/mm]
+    laplace: Array  # (e, 9, 9) integrals of the shear modulus times grad N_i . grad N_j [N/mm per mm]
+    centre: Array  # (e, 2) the modes are combinations of 1, x - centre, y - centre
+    combination: Array  # (e, 3, 3) mode m = sum over l of combination[m, l] (1, x - centre, y - centre)[l]
+    shear: Array  # (e,) [MPa]
+    stiffening: Array  # (e,) Ogden's exponent [-]
+    lame: Array  # (e,) [MPa]
+    nodes: Narrow  # (e, 9)
+    unknown: Narrow  # (e, 8, 2) of the outer nodes, -1 where fixed
+    plan: Plan  # of the elimination
+    held: Narrow  # (k,) whether a node of the skin is held: along x HELD_X, along y HELD_Y, both their sum
+    middle: Narrow  # (k,) 1 at the middle of an edge of the skin, 0 at its ends
+
+    @staticmethod
+    def of(mesh: Mesh, laws: Sequence[Law], *, checked: bool = False) -> "FiniteBody":
+        """Prepare `mesh`, whose regions are made of `laws`. The centre of an element is never held.
+
+        Raises BodyError and MeshError, unless it was `checked` before.
+        """
+        if not checked:
+            check_body(mesh, laws)
+            check_laws(laws)
+            check_driven(mesh)
+        corners = mesh.nodes[mesh.elements]  # (e, 9, 2)
+        jacobian = np.swapaxes(corners, 1, 2)[:, None] @ _SLOPES  # (e, q, 2, 2)
+        det = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
+        inverse = np.empty_like(jacobian)
+        inverse[..., 0, 0], inverse[..., 1, 1] = jacobian[..., 1, 1] / det, jacobian[..., 0, 0] / det
+        inverse[..., 0, 1], inverse[..., 1, 0] = -jacobian[..., 0, 1] / det, -jacobian[..., 1, 0] / det
+        gradient = _SLOPES @ inverse  # (e, q, 9, 2)
+        weight = det * Q2P1.weights
+        place = VALUES @ corners
+        centre = place.mean(axis=1)
+        raw = np.concatenate([np.ones((*place.shape[:2], 1)), place - centre[:, None]], axis=2)
+        mass = np.swapaxes(raw * weight[:, :, None], 1, 2) @ raw
+        combination = np.asarray(np.linalg.inv(np.linalg.cholesky(mass)), np.float64)
+        modes = raw @ np.swapaxes(combination, 1, 2)
+
+        shear = np.array([law.shear for law in laws])[mesh.region]
+        grad_x, grad_y = np.ascontiguousarray(gradient[..., 0]), np.ascontiguousarray(gradient[..., 1])
+        stiff = (weight * shear[:, None])[:, :, None]
+        laplace = np.swapaxes(stiff * grad_x, 1, 2) @ grad_x + np.swapaxes(stiff * grad_y, 1, 2) @ grad_y
+        plan = Plan.of(mesh)
+        at_middle = (np.arange(len(mesh.skin)) % 2).astype(np.int32)
+        return FiniteBody(
+            mesh,
+            grad_x,
+            grad_y,
+            weight,
+            np.ascontiguousarray(modes),
+            laplace,
+            centre,
+            combination,
+            shear,
+            np.array([law.stiffening for law in laws])[mesh.region],
+            np.array([law.lame for law in laws])[mesh.region],
+            mesh.elements.astype(np.int32),
+            plan.unknown.reshape(-1, 8, 2),
+            plan,
+            (mesh.driven[mesh.skin] @ np.array([HELD_X, HELD_Y])).astype(np.int32),
+            at_middle,
+        )
+
+    @property
+    def skin(self) -> Indices:
+        """Nodes of the skin that may touch (k,)."""
+        return self.mesh.skin
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns after the centres are eliminated."""
+        return self.plan.size
+
+    @property
+    def dofs(self) -> int:
+        """Number of unknown displacements, centres included."""
+        return self.plan.size + 2 * len(self.nodes)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FiniteProbes:
+    """Places inside elements where the strain energy is wanted, p of them, averaged with weights over r patches."""
+
+    element: Narrow  # (p,)
+    grad_x: Array  # (p, 9)
+    grad_y: Array  # (p, 9)
+    modes: Array  # (p, 3)
+    weights: Array  # (p,) areas [mm2]
+    patch: Indices  # (p,)
+    areas: Array  # (r,) [mm2]; nan where there is no patch
+
+    @staticmethod
+    def of(body: FiniteBody, endings: Endings) -> "FiniteProbes":
+        """Carry the probes of `endings` over to `body`, element by element."""
+        probes = endings.probes
+        order = np.argsort(probes.element, kind="stable")
+        element = probes.element[order]
+        modes = (body.combination[element] @ probes.modes[order][:, :, None])[:, :, 0]
+        gradient = probes.gradient[order]
+        areas = np.bincount(endings.patch, endings.weights, endings.count)
+        return FiniteProbes(
+            element.astype(np.int32),
+            np.ascontiguousarray(gradient[..., 0]),
+            np.ascontiguousarray(gradient[..., 1]),
+            modes,
+            endings.weights[order],
+            endings.patch[order],
+            np.where(areas > 0.0, areas, np.nan),
+        )
+
+    def energy(self, body: FiniteBody, displacement: Array) -> Array:
+        """Return the SED (p,) [MPa] for displacements (nodes, 2), ln J being each element's best fit of it."""
+        out = np.empty(len(self.element))
+        kernels.energies(
+            displacement, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening, body.lame,
+            body.nodes, self.element, self.grad_x, self.grad_y, self.modes, out,
+        )  # fmt: skip
+        return out
+
+    def average(self, body: FiniteBody, displacement: Array) -> Array:
+        """Return the SED averaged over each patch (r,) [MPa]; nan where there is no patch."""
+        return np.bincount(self.patch, self.energy(body, displacement) * self.weights, len(self.areas)) / self.areas

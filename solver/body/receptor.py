@@ -1,0 +1,88 @@
+"""The endings as patches of tissue: where the strain energy is probed, and with which weights it is averaged."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.body.stiffness import Centred, Elastic, Probes, local_coordinates
+from solver.element import GAUSS_3
+from solver.mesh import Array, Indices, Mesh, distinct
+from solver.mesh.mesher import FingerMesh
+from solver.scene import Receptor
+
+ROW: Array = 0.25 * np.arange(-32.0, 25.0)  # arc positions of the row of receptors [mm]
+_POINTS, _WEIGHTS = GAUSS_3
+_ASIDE = 1e-7  # [mm]: a point on a line between elements is probed on both sides
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Endings:
+    """Probes of several patches: r of them, p probes in all."""
+
+    probes: Probes
+    weights: Array  # (p,) areas [mm2]
+    patch: Indices  # (p,) number of the patch each probe belongs to
+    count: int
+
+    def average(self, mesh: Mesh, elastic: Elastic, displacement: Array) -> Array:
+        """Return the SED averaged over each patch (r, c) [MPa] for displacements (nodes, 2, c); nan where no patch."""
+        sed = self.probes.energy(mesh, elastic, displacement)
+        total = np.zeros((self.count, sed.shape[1]))
+        np.add.at(total, self.patch, sed * self.weights[:, None])
+        area = np.bincount(self.patch, self.weights, self.count)
+        return total / np.where(area > 0.0, area, np.nan)[:, None]
+
+    def nodes(self, mesh: Mesh) -> Indices:
+        """Return the numbers of the nodes that the probes need."""
+        return distinct(mesh.elements[distinct(self.probes.element)])
+
+
+def endings(finger: FingerMesh, elements: Centred, receptor: Receptor, arcs: Array) -> Endings:
+    """Return the patches of `receptor` at positions `arcs` (r,) [mm], integrated exactly over the pieces of elements.
+
+    A patch reaches half the ending's length to both sides, measured along its own middle line.
+    """
+    across, along = receptor.ending
+    outline = finger.outline
+    depth_lines = distinct(np.concatenate([finger.depths, [receptor.depth - across / 2, receptor.depth + across / 2]]))
+    inside = np.abs(depth_lines - receptor.depth) <= across / 2 * (1 + 1e-12)
+    depth_lines = depth_lines[inside]
+    low, high = (outline.along(arcs, receptor.depth, side * along / 2) for side in (-1.0, 1.0))
+    reaches = (outline.palmar_cut + 1e-9 < low) & (high < outline.dorsal_cut - 1e-9)
+    start, stop = np.maximum(low[:, None], finger.arcs[:-1]), np.minimum(high[:, None], finger.arcs[1:])
+    patch, piece = np.nonzero((start < stop) & reaches[:, None])
+    arc, arc_weight = _gauss(start[patch, piece], stop[patch, piece])
+    depth, depth_weight = _gauss(depth_lines[:-1], depth_lines[1:])
+    area = (arc_weight[:, None] * depth_weight).ravel()
+    patch = np.repeat(patch, len(_POINTS) * len(depth))
+    arc, depth = np.repeat(arc, len(depth)), np.tile(depth, len(arc))
+    # a length on the tip's arc shrinks with the depth
+    curved = (arc > outline.palmar) & (arc < outline.dorsal)
+    area = area * np.where(curved, 1.0 - depth / outline.finger.tip_radius, 1.0)
+    return Endings(_probes(finger, elements, arc, depth), area, patch, len(arcs))
+
+
+def middle(finger: FingerMesh, elements: Centred, receptor: Receptor) -> Endings:
+    """Return the point in the middle of the reference ending: the mean of its limits from the elements around it."""
+    arc = _ASIDE * np.array([-1.0, 1.0, -1.0, 1.0])
+    depth = receptor.depth + _ASIDE * np.array([-1.0, -1.0, 1.0, 1.0])
+    return Endings(_probes(finger, elements, arc, depth), np.full(4, 0.25), np.zeros(4, np.int64), 1)
+
+
+def _gauss(start: Array, stop: Array) -> tuple[Array, Array]:
+    """Return the Gauss points and weights (3 n,) of the intervals between `start` and `stop` (n,)."""
+    half = (stop - start)[:, None] / 2.0
+    return (start[:, None] + half * (1.0 + _POINTS)).ravel(), (half * _WEIGHTS).ravel()
+
+
+def _probes(finger: FingerMesh, elements: Centred, arc: Array, depth: Array) -> Probes:
+    """Find the elements that hold the places at `arc` and `depth` (p,) and the local coordinates in them."""
+    mesh = finger.mesh
+    station = np.clip(np.searchsorted(finger.arcs, arc) - 1, 0, len(finger.arcs) - 2)
+    layer = np.clip(np.searchsorted(-finger.depths, -depth) - 1, 0, len(finger.depths) - 2)
+    element = station * (finger.fat + len(finger.depths) - 1) + finger.fat + layer
+    out = (finger.depths[layer] - depth) / (finger.depths[layer] - finger.depths[layer + 1]) * 2.0 - 1.0
+    side = (arc - finger.arcs[station]) / np.diff(finger.arcs)[station] * 2.0 - 1.0
+    corners = mesh.nodes[mesh.elements[element]]
+    local = local_coordinates(corners, finger.outline.tissue(arc, depth), np.stack([out, side], axis=1))
+    return Probes.at(mesh, elements, element, local)

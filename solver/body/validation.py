@@ -1,0 +1,210 @@
+"""The door for bodies handed in as arrays: what cannot be solved is refused there with one sentence."""
+
+from collections.abc import Sequence
+from math import isfinite
+from typing import Protocol
+
+import numpy as np
+
+from solver.constitutive.hyperelastic import STIFFENING, Law
+from solver.constitutive.linear import Prony
+from solver.element import Q2P1
+from solver.mesh import Array, Mesh
+from solver.mesh.grid import jacobians
+
+HELD = 1e-9  # part of a motion of the body as a whole below which what is held does not move with it [-]
+MOTIONS = ("x", "y", "turn")  # of a body as a whole
+
+
+class BodyError(ValueError):
+    """A body that cannot be solved as it was handed in: what is wrong, where, and what to do."""
+
+
+class Stiff(Protocol):
+    """What is asked of a material at the door."""
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus [MPa]."""
+        ...
+
+    @property
+    def lame(self) -> float:
+        """Lamé's first constant [MPa]."""
+        ...
+
+
+def check_body(mesh: Mesh, materials: Sequence[Stiff]) -> None:
+    """Raise BodyError where arrays of `mesh` or its `materials` by region make no body.
+
+    Raises MeshError where an element is folded at a point of its quadrature, which is all that is asked of it.
+    """
+    _check_arrays(mesh)
+    check_moduli(mesh, materials)
+    jacobians(mesh, Q2P1.points)
+    _check_skin(mesh)
+
+
+def _check_arrays(mesh: Mesh) -> None:
+    """Raise BodyError where an array has another shape or other numbers than it must have."""
+    count = len(mesh.nodes)
+    if mesh.nodes.shape != (count, 2) or mesh.nodes.dtype != np.float64:
+        raise BodyError(
+            f"mesh.nodes has the shape {mesh.nodes.shape} of {mesh.nodes.dtype}; give every node x and y in mm, (n, 2)"
+        )
+    if mesh.elements.shape != (len(mesh.elements), 9) or not len(mesh.elements):
+        raise BodyError(
+            f"mesh.elements has the shape {mesh.elements.shape}; name nine nodes of each, of one at least, (e, 9)"
+        )
+    if not np.isfinite(mesh.nodes).all():
+        worst = int(np.argmin(np.isfinite(mesh.nodes).all(axis=1)))
+        raise BodyError(f"node {worst} of the mesh has no finite position; give every node two lengths in mm")
+    for name in ("elements", "region", "skin", "held", "held_x", "held_y"):
+        numbers = getattr(mesh, name)
+        if numbers.dtype != np.int64:
+            raise BodyError(f"mesh.{name} is made of {numbers.dtype}; give whole numbers, counted from 0")
+        if numbers.ndim != 1 and name != "elements":
+            raise BodyError(f"mesh.{name} has the shape {numbers.shape}; give one row of numbers")
+        if name != "region" and numbers.size and not (numbers.min() >= 0 and numbers.max() < count):
+            raise BodyError(f"mesh.{name} names a node that is not there; number the {count} nodes from 0")
+    if len(mesh.region) != len(mesh.elements):
+        raise BodyError(f"mesh.region has {len(mesh.region)} entries for {len(mesh.elements)} elements; give one each")
+
+
+def check_moduli(mesh: Mesh, materials: Sequence[Stiff]) -> None:
+    """Raise BodyError where a region of `mesh` has no material, or one of them is no tissue."""
+    if not (mesh.region.min() >= 0 and mesh.region.max() < len(materials)):
+        worst = int(mesh.region.max() if mesh.region.min() >= 0 else mesh.region.min())
+        raise BodyError(
+            f"region {worst} of the mesh has no material: {len(materials)} are given; give one for every region from 0"
+        )
+    for number, material in enumerate(materials):
+        try:
+            shear, lame = material.shear, material.lame
+        except ZeroDivisionError:
+            shear, lame = np.nan, np.nan
+        if not (0.0 < shear < np.inf and np.isfinite(lame) and lame > -2.0 / 3.0 * shear):
+            raise BodyError(
+                f"material {number}, {material}, is none that can be computed; E must be above 0 and nu from 0 to "
+                "0.4999999, since nu = 0.5 leaves no energy of volume change"
+            )
+
+
+def check_laws(laws: Sequence[Law]) -> None:
+    """Raise BodyError unless `laws` are those of finite strain, their exponents within what the scene file allows."""
+    for number, law in enumerate(laws):
+        if not hasattr(law, "stiffening"):
+            raise BodyError(
+                f"material {number}, {law}, is no law of finite strain; give one of solver.constitutive.hyperelastic"
+            )
+        low, high = STIFFENING
+        if not low <= law.stiffening <= high:
+            raise BodyError(
+                f"material {number}, {law}, stiffens with the exponent {law.stiffening:g}; it must lie between "
+                f"{low:g} and {high:g}"
+            )
+
+
+def check_terms(laws: Sequence[Prony]) -> None:
+    """Raise BodyError where the terms of a series are none that relax."""
+    for number, law in enumerate(laws):
+        if not (all(g >= 0.0 and 0.0 < tau < np.inf for g, tau in law.terms) and law.stays > 0.0):
+            raise BodyError(
+                f"material {number}, {law}, has terms that cannot relax; every g must be 0 or more, all together below "
+                "1, and every tau a time above 0"
+            )
+
+
+def _check_skin(mesh: Mesh) -> None:
+    """Raise BodyError unless the skin is one chain of free sides of elements, with the body to the left of it.
+
+    The body then lies above skin that runs from left to right, where the surface can meet it.
+    """
+    if not mesh.skin.size:
+        return
+    named = "name one chain of them from left to right, from corner by middle to corner, and so on"
+    if len(mesh.skin) < 3 or len(mesh.skin) % 2 == 0:
+        raise BodyError(f"mesh.skin has {len(mesh.skin)} nodes, which make no whole sides of elements; {named}")
+    sides = np.stack([mesh.skin[:-2:2], mesh.skin[1::2], mesh.skin[2::2]], axis=1)
+    corner = np.arange(4)
+    around = mesh.elements[:, np.stack([corner, corner + 4, (corner + 1) % 4], axis=1)].reshape(-1, 3)
+    middles, first, shared = np.unique(around[:, 1], return_index=True, return_counts=True)
+    at = np.minimum(np.searchsorted(middles, sides[:, 1]), len(middles) - 1)
+    wrong = (around[first[at]] != sides).any(axis=1) | (shared[at] > 1)
+    if wrong.any():
+        nodes = ", ".join(str(node) for node in sides[int(np.argmax(wrong))])
+        raise BodyError(f"nodes {nodes} of mesh.skin are no free side of an element with the body above it; {named}")
+    if len(np.unique(mesh.skin)) < len(mesh.skin):
+        raise BodyError(f"mesh.skin names a node twice; {named}")
+
+
+def check_loads(mesh: Mesh, loads: Array | None, prescribed: Array | None) -> None:
+    """Raise BodyError unless dead `loads` and `prescribed` are (nodes, 2) and finite, and move only what is held."""
+    for name, given in (("loads", loads), ("prescribed", prescribed)):
+        if given is None:
+            continue
+        given = np.asarray(given)
+        if given.dtype.kind not in "fiu" or given.shape != mesh.nodes.shape:
+            raise BodyError(
+                f"{name} has the shape {given.shape} of {given.dtype}; it must be numbers in {mesh.nodes.shape}, a row "
+                "for every node"
+            )
+        if not np.isfinite(given).all():
+            row = int(np.argmin(np.isfinite(given).all(axis=1)))
+            raise BodyError(f"row {row} of {name} is not finite; give 0 where there is none")
+    if prescribed is not None and np.asarray(prescribed)[~mesh.driven].any():
+        row, along = (int(at[0]) for at in np.nonzero(prescribed * ~mesh.driven))
+        raise BodyError(
+            f"prescribed moves node {row} along {'xy'[along]}, where nothing holds it; name it in mesh.held, or in "
+            f"mesh.held_{'xy'[along]}"
+        )
+
+
+def finite(name: str, value: float) -> float:
+    """Return `value` as a float. Raises ValueError where it is not finite."""
+    if not isfinite(value):
+        raise ValueError(f"{name} = {value} is not allowed: give a finite number")
+    return float(value)
+
+
+def loose(mesh: Mesh) -> Array:
+    """Return the motions (3, r) of the body as a whole that nothing holds, as parts of those in MOTIONS."""
+    if len(mesh.held) > 1:
+        return np.zeros((3, 0))
+    x, y = (mesh.nodes / np.ptp(mesh.nodes)).T
+    one, zero = np.ones_like(x), np.zeros_like(x)
+    moves = np.stack([np.c_[one, zero].ravel(), np.c_[zero, one].ravel(), np.c_[-y, x].ravel()], axis=1)[mesh.fixed]
+    _, sizes, ways = np.linalg.svd(np.concatenate([moves, np.zeros((3, 3))]), full_matrices=False)
+    ways[:, 2] /= np.ptp(mesh.nodes)
+    return ways[sizes[:3] < HELD * np.sqrt(len(mesh.fixed) + 1.0)].T
+
+
+def check_driven(mesh: Mesh) -> None:
+    """Raise BodyError where nothing holds a body at all, which its motions at finite strain ask for."""
+    if not mesh.driven.any():
+        raise BodyError(
+            "nothing holds the body; name the nodes that are driven in mesh.held, or along one direction alone in "
+            "mesh.held_x and mesh.held_y"
+        )
+
+
+def check_held(mesh: Mesh, free: Sequence[str] = ()) -> None:
+    """Raise BodyError where what is held leaves a body a motion that is not `free` for the surface to balance.
+
+    Or where skin that may touch is held along y, and so cannot give way to the surface.
+    """
+    if not free and not mesh.driven.any():
+        raise BodyError(
+            "nothing holds the body; name the nodes that are driven in mesh.held, or the motions along which the "
+            'surface alone balances the loads, as free = ("y", "turn")'
+        )
+    left = loose(mesh)
+    left[[MOTIONS.index(name) for name in free]] = 0.0
+    if len(mesh.fixed) and np.abs(left).max(initial=0.0) > HELD:
+        raise BodyError(
+            "what is held leaves the body a motion as a whole; hold more of it, or name the motion in free, for the "
+            "surface to balance"
+        )
+    stiff = mesh.skin[mesh.driven[mesh.skin, 1]]
+    if len(stiff):
+        raise BodyError(f"node {stiff[0]} of the skin is held along y; leave its edge out of mesh.skin")

@@ -1,0 +1,1 @@
+"""Branches of settled slides, followed to the limit where they end."""

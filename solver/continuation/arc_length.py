@@ -1,0 +1,240 @@
+"""A branch of settled sliding states, followed by its arc length to where it ends.
+
+Pressed hard and dragged against its tip, the skin behind the contact folds: the friction coefficient (or the depth)
+passes a maximum along the branch, or the skin is squeezed at one place until its surface loses stability
+(`surface_instability`); beyond, there is no settled state. Riks 1979, Int. J. Solids Struct. 15, 529; Crisfield 1981,
+Comput. Struct. 13, 55, with the plane of Riks.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from solver.contact.skin_compression import Pinch
+from solver.equilibrium.newton import BY_FRICTION, EQUILIBRIUM, Newton, Pull, Shape
+from solver.failures import Cancelled, NotConverged
+from solver.mesh import Array
+from solver.progress import tell
+
+LARGEST_MU = 2.0  # beyond this a coefficient of friction is not looked for
+TOLERANCE = 1e-6  # of a point on the branch [mm]
+FIRST, SHORTEST = 0.1, 1e-3  # steps along the branch, by what is looked through
+MOST = 400  # of them
+TURN = 0.7  # least cosine between the directions of the branch and of a step along it
+SQUEEZE = 0.85  # least ratio of the skin's least stretches at neighbouring points: a leap to a folded branch has less
+CREASE = 0.6  # kink from which skin has a crease: coarse meshes of smooth skin have 0.3, creases 1 and more
+STEEP = 0.1  # part of the value in the branch's direction, from which a limit point is far
+HOPS, HOP = 3, (0.01, 0.03)  # tries to go on where a branch ends, by how much of its value
+STAYS = 0.05  # by how much forces change then, at most
+APART = 0.04  # of the skin's least stretches at two points between which the stretch that folds is met
+
+
+class Followed(Protocol):
+    """What a branch is followed on: the finger, or a body handed in."""
+
+    @property
+    def newton(self) -> Newton:
+        """The iterations on its body."""
+        ...
+
+    def pinch(self, shape: Shape) -> Pinch:
+        """Return how far the skin is squeezed, and whether it has a crease."""
+        ...
+
+    def crosses(self, shape: Shape) -> bool:
+        """Return whether the skin crosses itself."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Branch:
+    """A branch of settled sliding states."""
+
+    states: tuple[Shape, ...]  # on the way, that at the value asked for or the last one before the limit being last
+    value: float  # of the coefficient or the depth [mm] at its end: the largest one met
+    limited: bool  # whether the branch ends there, short of what was asked for
+    lost: bool = False  # whether it ends there for want of a next point only, far from a limit point and from a fold
+
+    @property
+    def last(self) -> Shape:
+        """The last state."""
+        return self.states[-1]
+
+
+def followed(
+    finger: Followed,
+    start: Shape,
+    by: int,
+    target: float,
+    folds: float,
+    stop: Callable[[], bool] = lambda: False,
+) -> Branch:
+    """Do as `follow`, and go on where the branch only turns back for a moment."""
+    branch = follow(finger, start, by, target, folds, stop)
+    for _ in range(HOPS):
+        beyond = _beyond(finger, branch, by, target, folds) if branch.limited else None
+        if beyond is None:
+            break
+        more = follow(finger, beyond, by, target, folds, stop)
+        branch = Branch((*branch.states, *more.states), more.value, more.limited, more.lost)
+    return branch
+
+
+def _beyond(finger: Followed, branch: Branch, by: int, target: float, folds: float) -> Shape | None:
+    """Return a state of the branch a little beyond its end, None where it ends there indeed.
+
+    Where a node of the contact comes to the bound, the branch may turn back for a moment, as no skin does.
+    """
+    last = branch.last
+    pinch = finger.pinch(last)
+    if pinch.least < folds + APART:
+        return None
+    for part in HOP:
+        value = min((1.0 + part) * branch.value, target)
+        try:
+            there = finger.newton.settle(last, with_value(last.pull, by, value), TOLERANCE)
+        except NotConverged:
+            continue
+        near = abs(there.force - last.force).max() <= STAYS * abs(last.force).max()
+        if near and finger.pinch(there).least > pinch.least - APART and not leapt(finger, last, there):
+            return there
+    return None
+
+
+def follow(
+    finger: Followed,
+    start: Shape,
+    by: int,
+    target: float,
+    folds: float,
+    stop: Callable[[], bool] = lambda: False,
+) -> Branch:
+    """Follow the branch from `start` until the friction coefficient (BY_FRICTION) or depth (BY_DEPTH) reaches `target`.
+
+    It ends where its value passes a maximum, or where the skin is squeezed to `folds` of its length
+    (`folding.folds_at`). Raises Cancelled where `stop` says so.
+    """
+    way = [_Point(start, finger.pinch(start), value_of(start.pull, by))]
+    if way[0].value >= target * (1.0 - 1e-12):
+        return Branch((start,), way[0].value, limited=False)
+    best = 0  # of them, by value
+    reach = min(abs(target - way[0].value), LARGEST_MU)
+    length = FIRST * reach
+    direction, rate = _tangent(finger.newton, start, by)
+    doing = f"following sliding to its {'largest friction' if by == BY_FRICTION else 'largest depth'}"
+    for _ in range(MOST):
+        if stop():
+            raise Cancelled
+        tell(doing, abs(way[best].value - way[0].value) / reach)
+        step = _further(finger, way[-1], by, direction, rate, length, target, SHORTEST * reach)
+        if step is None:
+            lost = rate > STEEP and way[-1].pinch.least > folds + APART
+            return Branch(tuple(point.shape for point in way[: best + 1]), way[best].value, limited=True, lost=lost)
+        point, length = step
+        if point.pinch.least < folds:
+            last = way[-1]
+            part = min(max((last.pinch.least - folds) / (last.pinch.least - point.pinch.least), 0.0), 1.0)
+            value = max(way[best].value, last.value + part * (point.value - last.value))
+            return Branch(tuple(point.shape for point in way[: best + 1]), value, limited=True)
+        easy = point.shape.iterations - way[-1].shape.iterations <= 5
+        way.append(point)
+        if point.value > way[best].value:
+            best = len(way) - 1
+        if point.value >= target * (1.0 - 1e-12):
+            return Branch(tuple(point.shape for point in way), point.value, limited=False)
+        length *= 1.5 if easy else 1.0
+        before = direction, rate
+        direction, rate = _tangent(finger.newton, point.shape, by)
+        if direction @ before[0] + rate * before[1] < 0.0:
+            direction, rate = -direction, -rate
+        if rate <= 0.0:
+            break
+    return Branch(tuple(point.shape for point in way[: best + 1]), way[best].value, limited=True)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Point:
+    shape: Shape
+    pinch: Pinch
+    value: float
+
+
+def _further(
+    finger: Followed,
+    last: _Point,
+    by: int,
+    direction: Array,
+    rate: float,
+    length: float,
+    target: float,
+    shortest: float,
+) -> tuple[_Point, float] | None:
+    """Return the next point of the branch and how long the step was that led to it; None where no step does."""
+    while length >= shortest:
+        found = _next(finger.newton, last.shape, by, direction, rate, length, target)
+        if found is not None:
+            pinch = finger.pinch(found)
+            if pinch.least >= last.pinch.least - APART and not leapt(finger, last.shape, found):
+                return _Point(found, pinch, value_of(found.pull, by)), length
+        length /= 2.0
+    return None
+
+
+def value_of(pull: Pull, by: int) -> float:
+    """Return the coefficient of friction or the depth [mm]."""
+    return pull.mu if by == BY_FRICTION else pull.depth
+
+
+def with_value(pull: Pull, by: int, value: float) -> Pull:
+    """Return `pull` with another coefficient of friction or depth [mm]."""
+    return pull._replace(mu=value) if by == BY_FRICTION else pull._replace(depth=value)
+
+
+def leapt(finger: Followed, before: Shape, after: Shape) -> bool:
+    """Return whether a step went to another branch, where the skin is folded."""
+    one, other = finger.pinch(before), finger.pinch(after)
+    return other.least < SQUEEZE * one.least or other.kink > CREASE or finger.crosses(after)
+
+
+def _tangent(newton: Newton, shape: Shape, by: int) -> tuple[Array, float]:
+    """Return the direction of the branch, of unit length: per unknown over root n [mm], and of the value."""
+    newton.linearise(shape, shape.pull, newton.skin_x)
+    direction = newton.steps[:, by] / np.sqrt(len(newton.steps))
+    size = np.sqrt(direction @ direction + 1.0)
+    return direction / size, 1.0 / size
+
+
+def _next(
+    newton: Newton, start: Shape, by: int, direction: Array, rate: float, length: float, target: float
+) -> Shape | None:
+    """Return the state `length` further along the branch, or at `target` where that is nearer; None where not found."""
+    root = np.sqrt(len(newton.steps))
+    value = value_of(start.pull, by)
+    to_target = rate * length >= target - value
+    shape, pull = start, start.pull
+    gone = np.zeros(len(newton.steps))
+    for _ in range(12):
+        if not newton.linearise(shape, pull, newton.skin_x):
+            return None
+        to, along = newton.steps[:, EQUILIBRIUM] / root, newton.steps[:, by] / root
+        now = value_of(pull, by)
+        if to_target:
+            change = target - now
+        else:
+            ahead = direction @ along + rate
+            if ahead == 0.0:
+                return None
+            change = (length - direction @ (gone + to) - rate * (now - value)) / ahead
+        step = to + change * along
+        pull = with_value(pull, by, now + change)
+        shape, largest, changed = newton.moved(shape, pull, step * root, newton.skin_x)
+        gone = gone + step
+        if not largest < 10.0:
+            return None
+        if largest < TOLERANCE and not changed:
+            way = np.sqrt(gone @ gone + (value_of(pull, by) - value) ** 2)
+            straight = direction @ gone + rate * (value_of(pull, by) - value)
+            return shape if straight > TURN * way else None
+    return None

@@ -1,0 +1,181 @@
+"""The settled sliding state where there is one, and where there is none, how far there would be."""
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from solver._kernels import CAP, OPEN, STEEP
+from solver.continuation import limit_point as reach
+from solver.continuation.arc_length import follow
+from solver.continuation.limit_point import PLAIN, Reach, folded, sound
+from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.newton import BY_FRICTION, Newton, Pull, Shape
+from solver.failures import NoSteadyState, NotConverged
+from solver.scene import Scene
+
+FAR = 0.9  # of the friction asked for, below which a limit is beyond doubt
+ALIKE = 0.1  # relative difference of SED and forces within which a state is that of another mesh
+
+
+def steady(
+    finger: FiniteFinger,
+    pull: Pull,
+    tolerance: float = 1e-10,
+    start: Shape | None = None,
+    stop: Callable[[], bool] = lambda: False,
+) -> Shape:
+    """Return the settled sliding state under `pull`, proven to lie on the branch that begins without friction.
+
+    A state, sought from `start` first, whose skin is squeezed so far that it might have folded, or that is not found
+    directly, is proven by following the branch on meshes made for it (`limit_point`). Raises NoSteadyState with both
+    limits where the branch ends before, NotConverged where it cannot be begun, Cancelled where `stop` says so.
+    """
+    found: list[Shape] = []
+    for shape in _tried(finger.newton, pull, tolerance, start, stop):
+        if sound(finger, shape, PLAIN):
+            return shape
+        found.append(shape)
+    proof = _followed(finger.scene, pull, stop)
+    if proof.lost:
+        raise NotConverged(
+            f"At {pull.depth:.3g} mm of indentation settled sliding was followed up to mu = {proof.value:.3g} and lost "
+            f"there; whether there is any at mu = {pull.mu:.3g} is not known: ask for less friction or depth"
+        )
+    if proof.limited:
+        raise _refused(finger.scene, pull, proof, stop)
+    for shape in found:
+        if _proven(finger, shape, proof):
+            return shape
+    if steep(pull):
+        raise NotConverged(
+            f"At {pull.depth:.3g} mm of indentation there is settled sliding at mu = {pull.mu:.3g}, nearly all of the "
+            "skin slipping at the bound, and this mesh does not find it: another tolerance has another mesh"
+        )
+    begin = settled(finger.newton, pull._replace(mu=0.0), None, tolerance, stop)
+    branch = follow(finger, begin, BY_FRICTION, pull.mu, 0.0, stop)
+    if not branch.limited:
+        shape = settled(finger.newton, pull, branch.last, tolerance, stop)
+        if _proven(finger, shape, proof):
+            return shape
+    raise NotConverged(
+        f"At {pull.depth:.3g} mm of indentation and mu = {pull.mu:.3g} there is settled sliding, but near the limit of "
+        "friction, and this mesh does not find it: ask for a little less friction, or another tolerance"
+    )
+
+
+def stands(finger: FiniteFinger, shape: Shape, stop: Callable[[], bool]) -> bool:
+    """Return whether a state lies on the branch that begins without friction: plainly, or since that was followed."""
+    if sound(finger, shape, PLAIN):
+        return True
+    if not sound(finger, shape):
+        return False
+    proof = _followed(finger.scene, shape.pull, stop)
+    return not proof.limited and _proven(finger, shape, proof)
+
+
+def steep(pull: Pull) -> bool:
+    """Return whether friction is so steep that nearly all of the skin slips at a bound."""
+    return pull.mu > STEEP and pull.tau < np.inf
+
+
+def refuse_far_beyond(scene: Scene, pull: Pull, stop: Callable[[], bool]) -> None:
+    """Raise NoSteadyState where the branch ends far below the friction of `pull`.
+
+    Asked where a rough mesh finds nothing, or skin that has folded: to see a fine mesh fail takes longer than to follow
+    the branch. Nothing is raised where it goes on, or ends so near that another mesh may have the state, or where
+    friction is so steep that the bound decides.
+    """
+    if pull.mu > STEEP:
+        return
+    with suppress(NotConverged):
+        proof = _followed(scene, pull, stop)
+        if proof.limited and not proof.lost and proof.value < FAR * pull.mu:
+            raise _refused(scene, pull, proof, stop)
+
+
+def _tried(
+    newton: Newton, pull: Pull, tolerance: float, start: Shape | None, stop: Callable[[], bool]
+) -> Iterator[Shape]:
+    """Yield the states found directly: from `start`, from undeformed, and from all skin slipping at the bound.
+
+    Where friction is steep, so that nearly all skin slips at the bound, undeformed leads nowhere that this does not.
+    """
+    ways: list[Callable[[], Shape]] = []
+    if not steep(pull):
+        ways.append(lambda: settled(newton, pull, None, tolerance, stop))
+    if pull.tau < np.inf:
+        ways.append(lambda: all_at_the_bound(newton, pull, tolerance, stop))
+    if start is not None:
+        ways.insert(0, lambda: settled(newton, pull, start, tolerance, stop))
+    for way in ways:
+        with suppress(NotConverged):
+            yield way()
+
+
+def doubts(finger: FiniteFinger, shape: Shape, stop: Callable[[], bool] = lambda: False) -> tuple[str, ...]:
+    """Return the sentence that a settled slide needs whose friction is as large as may be, or none."""
+    if shape.pull.sense == 0 or sound(finger, shape, PLAIN):
+        return ()
+    proof = reach.of_friction(finger.scene, shape.pull, shape.pull.mu, stop)
+    if not proof.near:
+        return ()
+    return (
+        f"The skin is squeezed to {100 * proof.least:.0f} % of its length at one place and folds at "
+        f"{100 * proof.folds:.0f} %: this is within some 2 % of the largest friction with settled sliding, which is "
+        "known as well.",
+    )
+
+
+def _followed(scene: Scene, pull: Pull, stop: Callable[[], bool]) -> Reach:
+    """Return how far the branch goes as friction grows, or as depth does where that alone leads to what `pull` asks.
+
+    Where nearly all skin slips at a bound the coefficient hardly matters, and how far it may grow is badly told.
+    """
+    proof = reach.of_friction(scene, pull, pull.mu, stop)
+    if proof.limited:
+        with suppress(NotConverged):
+            deepest = reach.of_depth(scene, pull, stop)
+            return proof if deepest.limited else deepest
+    return proof
+
+
+def _refused(scene: Scene, pull: Pull, proof: Reach, stop: Callable[[], bool]) -> NoSteadyState:
+    largest, depth = proof.value, None
+    ends = (
+        "the skin behind the contact folds"
+        if proof.near or all(tissue.law != "ogden" for tissue in scene.materials.by_region)
+        else f"friction is largest there, with the skin behind the contact squeezed to {100 * proof.least:.0f} %"
+    )
+    beyond = ""
+    with suppress(NotConverged):
+        deepest = reach.of_depth(scene, pull, stop)
+        if deepest.limited and not deepest.lost:
+            depth = deepest.value
+            beyond = f", and with this friction up to {depth:.4g} mm"
+    return NoSteadyState(
+        f"At {pull.depth:.4g} mm of indentation there is settled sliding up to mu = {largest:.3g}{beyond}, but "
+        f"not at mu = {pull.mu:.3g}: {ends}; ask for less depth, less friction or small strain.",
+        limit_mu=largest,
+        limit_indentation=depth,
+    )
+
+
+def _proven(finger: FiniteFinger, shape: Shape, proof: Reach) -> bool:
+    """Return whether a state is the one that was reached along the branch on another mesh, and not a folded one."""
+    if folded(finger, shape):
+        return False
+    return bool(np.all(np.abs(finger.numbers(shape) - proof.numbers) <= ALIKE * np.abs(proof.numbers)))
+
+
+def all_at_the_bound(newton: Newton, pull: Pull, tolerance: float, stop: Callable[[], bool]) -> Shape:
+    """Return the settled state begun where nothing rubs, all that touches there slipping at a bound that grows.
+
+    A low bound with a large coefficient of friction is felt where hardly anything presses: there slip is a bad guess.
+    Raises NotConverged.
+    """
+    bare = settled(newton, pull._replace(mu=0.0), None, tolerance, stop)
+    state = np.where(bare.touching, CAP, OPEN).astype(bare.state.dtype)
+    return settled(newton, pull, replace(bare, state=state, pull=pull._replace(tau=0.0)), tolerance, stop)

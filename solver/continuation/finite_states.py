@@ -1,0 +1,302 @@
+"""Settled states and courses of a scene at finite strain, on one mesh: driven by depth, or under given forces."""
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from solver._kernels import STICK
+from solver.continuation import limit_point as reach
+from solver.continuation.existence import all_at_the_bound, stands, steady, steep
+from solver.equilibrium import force_control as finite_forced
+from solver.equilibrium import full_slip as sliding
+from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.force_control import Given, balanced
+from solver.equilibrium.march import march
+from solver.equilibrium.newton import BY_DEPTH, Newton, Pull, Shape
+from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
+from solver.progress import tell
+from solver.scene import Scene
+
+FEW = 10  # iterations from a state nearby to one that is simple to find: 4 to 7 are usual
+LEADING = 1e-3  # tolerance of states that only lead to others [mm]
+GOOD, CLOSE = 1e-7, 1e-7  # tolerance of the states of a course [mm], and by the indentation where that is less
+PRESSES = 40  # steps of the pre-indentation, and of a drag that grows
+BEYOND = 1.5  # times the depth at which a force did not grow any more, up to which the largest is looked for
+SEARCHES = 20  # steps of a search for the depth at which a force is met
+FURTHEST = 0.25  # of the depth, by which it may change in one
+MET = 1e-9  # relative difference within which it is
+ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
+STRIDE = 0.1  # of the bone while it slides, by the indentation [-]
+LONGEST = 8.0  # slide after which a course that has not settled is given up, by the indentation [-]
+SETTLED = 1e-10  # relative change of the ending's SED in a step, with every touching point slipping
+
+
+def settled(
+    finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], start: Shape | None = None, times: float = 1.0
+) -> Shape:
+    """Return the settled state of a scene, sought first from `start`, a proven state nearby.
+
+    Where it depends on its way, that has so many `times` the usual load steps; such a state has a pull without sense.
+    Raises NoSteadyState, NotConverged, Cancelled.
+    """
+    if scene.normal_force is not None:
+        return _settled_under(finger, scene, scene.normal_force, stop, start, times)
+    if scene.loading.direction == 0 and scene.friction.mu > 0.0:
+        return course(scene, finger, stop, times)[-1]
+    return steady(finger, pull_sliding(scene), start=start, stop=stop)
+
+
+def nearby(finger: FiniteFinger, scene: Scene, start: Shape, stop: Callable[[], bool] = lambda: False) -> Shape | None:
+    """Return the settled slide that lies a few iterations from `start`, or None where none that stands is so near.
+
+    Raises Cancelled where `stop` says so.
+    """
+    newton, force = finger.newton, scene.normal_force
+    try:
+        if force is None:
+            shape = newton.settle(start, pull_sliding(scene), limit=FEW)
+        else:
+            near = replace(start, pull=_under(scene)._replace(depth=start.pull.depth, travel=start.pull.travel))
+            found = balanced(newton, near, Given(force, None), limit=FEW)
+            shape = newton.settle(found, found.pull, limit=FEW)
+        return shape if stands(finger, shape, stop) else None
+    except NotConverged:
+        return None
+
+
+def roughly(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: Shape | None = None) -> Shape:
+    """Return a state near the settled one, from which others may start if it is `sound`. Raises as `settled`.
+
+    It is sought first from `near`, the settled state of a surface that slides the same way.
+    """
+    if near is not None:
+        alike = near.pull.sense == -(scene.loading.direction or 1)
+        near = replace(near, iterations=0) if alike else None
+    if scene.normal_force is not None or (scene.loading.direction == 0 and scene.friction.mu > 0.0):
+        return settled(finger, scene, stop, near)
+    pull = pull_sliding(scene)
+    for begin in dict.fromkeys((near, None)):
+        try:
+            return sliding.settled(finger.newton, pull, begin, LEADING, stop)
+        except NotConverged:
+            if begin is None:
+                raise
+    raise AssertionError  # the last begin is none
+
+
+def _settled_under(
+    finger: FiniteFinger, scene: Scene, force: float, stop: Callable[[], bool], start: Shape | None, times: float
+) -> Shape:
+    """Return the settled state under the forces of a scene, depth and shift found. Raises as `settled`."""
+    direction, drag = scene.loading.direction, scene.tangential_force
+    if direction == 0 and scene.friction.mu > 0.0:
+        return course(scene, finger, stop, times)[-1]
+    if start is not None and start.pull.sense == 0:  # the end of a course, and no slide to start from
+        start = None
+        try:
+            return course(scene, finger, stop, times)[-1]
+        except NotConverged:
+            pass
+    try:
+        slides = _sliding_under(finger, scene, force, stop, start)
+    except SolveFailure as failure:
+        if drag is None:
+            raise _under_force(scene, force, failure) from failure
+        return course(scene, finger, stop, times)[-1]  # the drag may be met before sliding would fold the skin
+    most = abs(float(slides.force[0]))
+    if drag is None or most * (1.0 - ALL_SLIPS) <= drag <= most * (1.0 + ALL_SLIPS):
+        return slides
+    if drag > most:
+        raise beyond_friction(drag, most, force)
+    return course(scene, finger, stop, times)[-1]
+
+
+def _under_force(scene: Scene, force: float, failure: SolveFailure) -> SolveFailure:
+    """Return why there is no slide under a normal force, found by searching depths: no limit of friction is known."""
+    if not isinstance(failure, NoSteadyState):
+        return failure
+    depth, most = failure.limit_indentation, failure.limit_normal_force
+    far = [] if most is None else [f"{most:.3g} N/mm"]
+    far += [] if depth is None else [f"{depth:.3g} mm of indentation"]
+    ends = f": with this friction there is settled sliding up to {', '.join(far)}" if far else ""
+    return NoSteadyState(
+        f"No settled sliding at mu = {float(scene.friction.mu):.3g} was found under a normal force of {force:.4g} "
+        f"N/mm{ends}; ask for less force, less friction or small strain.",
+        limit_indentation=depth,
+        limit_normal_force=most,
+    )
+
+
+def _sliding_under(
+    finger: FiniteFinger, scene: Scene, force: float, stop: Callable[[], bool], start: Shape | None
+) -> Shape:
+    """Return settled sliding under the normal force of a scene, from `start` or reached as the force grows."""
+    newton = finger.newton
+    pull = _under(scene)
+    capped = steep(pull)
+    if start is not None:
+        near = replace(start, pull=pull._replace(depth=start.pull.depth, travel=start.pull.travel))
+        with suppress(NotConverged):
+            found = _at_force(newton, near, force, stop) if capped else balanced(newton, near, Given(force, None))
+            return steady(finger, found.pull, start=found, stop=stop)
+    if capped:
+        with suppress(NotConverged):
+            *_, bare = _grown(newton, pull._replace(mu=0.0), force, stop)
+            begin = all_at_the_bound(newton, pull._replace(depth=bare.pull.depth), LEADING, stop)
+            found = _at_force(newton, begin, force, stop)
+            return steady(finger, found.pull, start=found, stop=stop)
+    shape: Shape | None = None
+    try:
+        for reached in _grown(newton, pull, force, stop):
+            shape = reached
+    except NotConverged:
+        if shape is None:
+            raise
+        return _deeper(finger, shape, force, stop)
+    assert shape is not None
+    return steady(finger, shape.pull, start=shape, stop=stop)
+
+
+def _under(scene: Scene) -> Pull:
+    """Return what the surface does while it slides under a normal force, before that has pressed."""
+    return Pull(0.0, float(scene.friction.mu), scene.friction.cap, -(scene.loading.direction or 1))
+
+
+def _grown(newton: Newton, pull: Pull, force: float, stop: Callable[[], bool]) -> Iterator[Shape]:
+    """Yield slides with the friction of `pull` as the normal force grows to `force`. Raises NotConverged."""
+    begin = finite_forced.untouched(newton, pull.mu, pull.tau)
+    begin = replace(begin, pull=begin.pull._replace(sense=pull.sense))
+    grows = [Given(force * part, None) for part in (0.02, 0.1, 0.25, 0.5, 0.75, 1.0)]
+    return finite_forced.march(newton, begin, Given(0.0, None), grows, stop)
+
+
+def _at_force(newton: Newton, start: Shape, force: float, stop: Callable[[], bool]) -> Shape:
+    """Return the slide that presses with `force` [N/mm], its depth sought from `start` on. Raises NotConverged."""
+    shape, depth = start, start.pull.depth
+    for _ in range(SEARCHES):
+        shape = sliding.settled(newton, shape.pull._replace(depth=depth), shape, stop=stop)
+        if abs(shape.force[1] / force - 1.0) < MET:
+            return shape
+        if not newton.linearise(shape, shape.pull, newton.skin_x):
+            break
+        stiffness = float(newton.follows(newton.steps)[1, BY_DEPTH])
+        if not stiffness > 0.0:
+            break
+        depth += float(np.clip((force - shape.force[1]) / stiffness, -FURTHEST * depth, FURTHEST * depth))
+    raise NotConverged(f"No depth was found at which the finger presses with {force:.4g} N/mm: give a depth instead.")
+
+
+def _deeper(finger: FiniteFinger, shape: Shape, force: float, stop: Callable[[], bool]) -> Shape:
+    """Return settled sliding under `force` [N/mm] deeper than `shape`, from where it did not grow on.
+
+    How deep sliding goes, and how hard it presses there, is told by `limit_point`. Raises as `settled`.
+    """
+    proof = reach.of_depth(finger.scene, shape.pull._replace(depth=BEYOND * shape.pull.depth), stop)
+    if proof.limited and not proof.lost and proof.numbers[1] < force:
+        most = proof.numbers[1]
+        raise NoSteadyState("There is none so deep.", limit_indentation=proof.value, limit_normal_force=most)
+    found = _at_force(finger.newton, shape, force, stop)
+    return steady(finger, found.pull, start=found, stop=stop)
+
+
+def pull_sliding(scene: Scene) -> Pull:
+    """Return what the surface does while it slides as a scene has it."""
+    return pull_of(scene)._replace(sense=-(scene.loading.direction or 1))
+
+
+def pull_of(scene: Scene) -> Pull:
+    """Return depth, friction and bound of a scene as what the surface does."""
+    return Pull(scene.loading.depth, float(scene.friction.mu), scene.friction.cap)
+
+
+def presses(times: float) -> int:
+    """Return the load steps of the pre-indentation, or of a drag, so many `times` the usual."""
+    return round(PRESSES * times)
+
+
+def depends_on_way(scene: Scene, shape: Shape) -> bool:
+    """Return whether a state is the end of a course and not a settled slide, found directly."""
+    return shape.pull.sense == 0 and scene.friction.mu > 0.0
+
+
+def course(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], times: float = 1.0) -> list[Shape]:
+    """Return the states from first touch to the last settled slide, or to the end of the press or drag.
+
+    `times` the usual load steps are taken.
+    """
+    drag = scene.tangential_force
+    for leg in scene.earlier_slides():  # one that never settles is refused with its limits
+        settled(finger, leg, stop)
+    if scene.normal_force is None:
+        way = _Driven(scene, finger, stop, times)
+    else:
+        way = _Forced(scene, scene.normal_force, finger, stop, times)
+        if drag is not None:
+            way.drag(-scene.loading.direction * drag)
+            return way.shapes
+    for direction in scene.loading.directions:
+        _settle(way, scene, direction)
+    return way.shapes
+
+
+def _settle(way: "_Driven | _Forced", scene: Scene, direction: int) -> None:
+    """Slide until the response does not change any more. Raises NotConverged where it still does."""
+    depth = way.shapes[-1].pull.depth
+    sed = way.finger.sed_ending(way.shapes[-1])
+    longest = int(LONGEST / STRIDE * way.times)
+    for number in range(longest):
+        tell("sliding until nothing changes", number / longest)
+        way.slide(direction * STRIDE / way.times * depth)
+        before, sed = sed, way.finger.sed_ending(way.shapes[-1])
+        if not (way.shapes[-1].state == STICK).any() and abs(sed - before) * way.times <= SETTLED * sed:
+            return
+    raise NotConverged(
+        f"After {LONGEST * depth:.3g} mm of sliding at {depth:.3g} mm of indentation and mu = {scene.friction.mu:.3g} "
+        "the response still changes: no settled state was reached; ask for less friction or depth."
+    )
+
+
+class _Driven:
+    """A course driven by depth and travel, pressed when made."""
+
+    def __init__(self, scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], times: float) -> None:
+        self.finger, self._stop, self.times = finger, stop, times
+        self._pull = pull_of(scene)
+        count = presses(times)
+        pulls = [self._pull._replace(depth=self._pull.depth * (i + 1) / count) for i in range(count)]
+        self._good = min(GOOD, CLOSE * self._pull.depth)
+        self.shapes = list(march(self.finger.newton, pulls, None, self._good, self._stop))
+
+    def slide(self, distance: float) -> None:
+        """Move the bone by `distance` along +x [mm]."""
+        self._pull = self._pull._replace(travel=self._pull.travel - distance)
+        self.shapes += march(self.finger.newton, [self._pull], self.shapes[-1], self._good, self._stop)
+
+
+class _Forced:
+    """A course under a given normal force, and a given travel or drag; pressed when made."""
+
+    def __init__(
+        self, scene: Scene, normal: float, finger: FiniteFinger, stop: Callable[[], bool], times: float
+    ) -> None:
+        self.finger, self._stop, self.times = finger, stop, times
+        self._given = Given(0.0, 0.0 if scene.loading.dragged else None)
+        self.shapes = [finite_forced.untouched(finger.newton, float(scene.friction.mu), scene.friction.cap)]
+        count = presses(times)
+        self._go([self._given._replace(normal=normal * (i + 1) / count) for i in range(count)])
+        del self.shapes[0]
+
+    def _go(self, aims: list[Given]) -> None:
+        self.shapes += finite_forced.march(self.finger.newton, self.shapes[-1], self._given, aims, self._stop)
+        self._given = aims[-1]
+
+    def slide(self, distance: float) -> None:
+        """Move the bone by `distance` along +x [mm]."""
+        self._go([self._given._replace(travel=self._given.travel - distance)])
+
+    def drag(self, pull: float) -> None:
+        """Let the surface's pull along +x grow to `pull` [N/mm]."""
+        count = presses(self.times)
+        self._go([self._given._replace(tangential=pull * (i + 1) / count) for i in range(count)])

@@ -1,0 +1,1 @@
+"""Equilibria: Newton, load stepping, full slip, force control and relaxation."""

@@ -1,0 +1,110 @@
+"""The depth at which the model presses as hard as a measured finger did."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+
+from numpy.linalg import LinAlgError
+
+from solver.contact.active_set import Contact, ContactLost
+from solver.contact.law import FrictionLaw
+from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.pressing import depth_of, sliding_under
+from solver.failures import NoSteadyState, NotConverged
+from solver.mesh.grid import MeshError
+from solver.mesh.mesher import Sizing
+from solver.scene import SHALLOW, Friction, Loading, Scene, Solve
+
+FINENESS = 6.0  # good to some tenths of a per cent of the depth
+COVERED = 0.9  # of the highest skin that touches: a mesh for that depth looks for contact up to 1.25 times of it
+NEARLY = 0.5  # of what makes it slide, from which a finger that is dragged is about as deep as one that slides
+DEEPEST = 0.85  # of the tissue between first touch and bone: beyond, a small-strain depth means nothing
+
+
+def matching_depths(
+    scenes: Sequence[Scene], normal_forces: Sequence[float], *, in_loops: bool = False
+) -> tuple[float | None, ...]:
+    """Return for each scene the indentation [mm] at which its settled normal force is the given one [N/mm].
+
+    Found directly, with the depth as an unknown and the force given. All scenes share the finger, materials and
+    receptor of the first. None where the finger would be pressed to its bone, or has no such settled state. `in_loops`
+    as in `solver.response.solution.answers`.
+    """
+    if not scenes:
+        return ()
+    deepest = DEEPEST * scenes[0].finger.pulp_thickness()
+    finger = _finger(_bare(scenes[0], deepest), in_loops)
+    pressed = [_pressed(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True)]
+    return tuple(None if found is None else depth_of(found) for found in pressed)
+
+
+def expected_depth(scene: Scene, *, in_loops: bool = False) -> float:
+    """Return the indentation [mm], or about what a given force will lead to, for which meshes are made."""
+    force = scene.normal_force
+    if force is None:
+        return scene.loading.depth
+    deepest = DEEPEST * scene.finger.pulp_thickness()
+    try:
+        finger = _finger(_bare(scene, deepest), in_loops)
+    except (MeshError, LinAlgError):  # who makes the meshes that count will tell
+        return deepest
+    found = _pressed(finger, scene, force, deepest)
+    drag = scene.tangential_force or 0.0
+    held = scene.loading.direction == 0 or scene.loading.dragged
+    if held and (found is None or drag < NEARLY * abs(found.tangential.sum())):
+        # Then it goes about as deep as one that slides with so much drag and no more.
+        friction = Friction(min(drag / force, float(scene.friction.mu)), scene.friction.tau_max)
+        found = _pressed(finger, replace(scene, friction=friction), force, deepest)
+    if found is None:
+        return deepest
+    # A strong drag lifts the bone while it lays ever more skin on the surface, which the mesh must be made for.
+    highest = float(finger.body.touchable.gap[found.touching].max())
+    return max(depth_of(found), COVERED * highest, SHALLOW)
+
+
+def within_reach(scene: Scene, depth: float, most: float | None = None) -> None:
+    """Raise SolveFailure where a given force has led to a `depth` [mm] that no model of the tissue reaches.
+
+    `most` is the normal force [N/mm] that the tissue carries down to the bone, where that is known.
+    """
+    force, room = scene.normal_force, scene.finger.pulp_thickness()
+    if force is None or SHALLOW <= depth < room:
+        return
+    if depth < 0.0:
+        raise NotConverged(
+            f"Under a normal force of {force:.3g} N/mm the drag holds the bone {-depth:.3g} mm above first touch: ask "
+            "for more force, or less friction or drag."
+        )
+    if depth < SHALLOW:
+        raise NotConverged(
+            f"A normal force of {force:.3g} N/mm presses the finger {depth:.1g} mm deep only: below {SHALLOW:g} mm "
+            "round-off is as large as what there is to find; ask for more."
+        )
+    carried = "" if most is None else f": with this friction the {room:.3g} mm of tissue carry up to {most:.3g} N/mm"
+    raise NoSteadyState(
+        f"A normal force of {force:.3g} N/mm would press the finger {depth:.3g} mm deep, to its bone{carried}; "
+        "ask for less."
+    )
+
+
+def _bare(scene: Scene, deepest: float) -> Scene:
+    """Return the scene without all that its mesh does not depend on."""
+    bare = replace(scene, title="", friction=Friction(0.0), loading=Loading(deepest))
+    return replace(bare, solve=Solve(scene.solve.kinematics))
+
+
+@lru_cache(maxsize=1)
+def _finger(bare: Scene, in_loops: bool) -> FingerModel:
+    """Return the finger on a rough mesh: surfaces of one finger follow each other and share it. Raises MeshError."""
+    return FingerModel.of(bare, Sizing(FINENESS, bare.loading.depth), in_loops=in_loops)
+
+
+def _pressed(finger: FingerModel, scene: Scene, normal_force: float, deepest: float) -> Contact | None:
+    """Return the settled slide under a normal force [N/mm], None where none is less deep than `deepest` [mm]."""
+    law = FrictionLaw(float(scene.friction.mu), scene.friction.cap)
+    try:
+        found = sliding_under(finger.body.touchable, law, normal_force, scene.loading.direction or 1, deepest)
+    except ContactLost:
+        return None
+    inside = not (found.touching[0] or found.touching[-1])
+    return found if inside and depth_of(found) <= deepest else None

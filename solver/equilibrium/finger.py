@@ -1,0 +1,138 @@
+"""The finger as the solver sees it: meshed, reduced to its skin, with its endings placed. One serves many surfaces."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from time import perf_counter
+
+import numpy as np
+
+from solver.body.linear import Body, planned
+from solver.body.receptor import ROW, Endings, endings, middle
+from solver.body.stiffness import Probes
+from solver.body.tissues import settled_moduli
+from solver.contact.active_set import Contact
+from solver.contact.edges import arcs_of, width
+from solver.element import Q2P1
+from solver.mesh import Array, distinct
+from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
+from solver.scene import Receptor, Scene
+
+
+@dataclass(frozen=True, eq=False)  # without slots: what few ask for is made when they ask
+class FingerModel:
+    """A finger on one mesh. Bone frame: the bone stays, the surface comes up by the indentation."""
+
+    receptor: Receptor
+    geometry: FingerMesh
+    body: Body
+    ending: Endings  # the reference ending alone
+    solve_s: float  # what assembling and reducing took, beside mesh and tables [s]
+
+    @staticmethod
+    def of(scene: Scene, sizing: Sizing, *, in_loops: bool = False) -> "FingerModel":
+        """Mesh and reduce the finger of `scene`, whose friction and loading do not matter here.
+
+        `in_loops` as in `Body.of`. Raises MeshError where the outline cannot be meshed.
+        """
+        return FingerModel.on(scene, finger_mesh(scene.finger, scene.receptor, sizing), in_loops=in_loops)
+
+    @staticmethod
+    def on(scene: Scene, geometry: FingerMesh, *, in_loops: bool = False) -> "FingerModel":
+        """Do the same on a mesh of the finger that was made before."""
+        tree = planned(geometry.mesh, in_loops=in_loops)
+        begun = perf_counter()
+        body = Body.of(geometry.mesh, settled_moduli(scene.materials), tree=tree, in_loops=in_loops, checked=True)
+        took = perf_counter() - begun
+        at_touch = endings(geometry, body.elastic, scene.receptor, np.zeros(1))
+        return FingerModel(scene.receptor, geometry, body, at_touch, took)
+
+    @cached_property
+    def point(self) -> Endings:
+        """The middle of the reference ending."""
+        return middle(self.geometry, self.body.elastic, self.receptor)
+
+    @cached_property
+    def row(self) -> Endings:
+        """The row of receptors."""
+        return endings(self.geometry, self.body.elastic, self.receptor, ROW)
+
+    @cached_property
+    def corners(self) -> Probes:
+        """Every corner of every element: strains are largest at corners."""
+        count = len(self.geometry.mesh.elements)
+        element = np.repeat(np.arange(count), 4)
+        return Probes.at(self.geometry.mesh, self.body.elastic, element, np.tile(Q2P1.corners, (count, 1)))
+
+    def skin_displacement(self, contact: Contact) -> Array:
+        """Return the displacement (2 k, 1) of the skin that may touch, normal first [mm]."""
+        return self.body.skin_displacement(np.concatenate([contact.normal, contact.tangential])[:, None])
+
+    def skin_compliance(self) -> Array:
+        """Return the skin's displacement (2 k, 2 k) by forces on it, normal ones first [mm per N/mm]."""
+        touch = self.body.touchable
+        across = touch.normal_by_tangential
+        return np.block([[touch.normal_by_normal, across], [across.T, touch.tangential_by_tangential]])
+
+    def displacement(self, contact: Contact) -> Array:
+        """Return the displacement (nodes, 2) of all nodes relative to the bone [mm]."""
+        return self.body.displacement(self.skin_displacement(contact))[:, :, 0]
+
+    def balanced(self, contact: Contact, displacement: Array) -> Array:
+        """Return `displacement` (nodes, 2) of a state of contact with less round-off in it, as `Body.balanced`."""
+        forces = np.concatenate([contact.normal, contact.tangential])[:, None]
+        return self.body.balanced(displacement[:, :, None], forces)[:, :, 0]
+
+    def sed_ending(self, displacement: Array) -> float:
+        """Return the SED averaged over the reference ending [MPa] for displacements (nodes, 2)."""
+        return float(self.ending.average(self.geometry.mesh, self.body.elastic, displacement[:, :, None])[0, 0])
+
+    def sed_endings(self, contacts: Sequence[Contact]) -> Array:
+        """Return the SED averaged over the reference ending (c,) [MPa] of several states, unfolded together there."""
+        return self._averaged(contacts, self.ending)[:, 0]
+
+    def seds(self, contacts: Sequence[Contact]) -> Array:
+        """Return the SED of the reference ending and in its middle (c, 2) [MPa] of several states."""
+        return self._averaged(contacts, self.ending, self.point)
+
+    def _averaged(self, contacts: Sequence[Contact], *patches: Endings) -> Array:
+        """Return the SED averaged over the first ending of each of the patches (c, p) [MPa], unfolded there alone."""
+        mesh, elastic = self.geometry.mesh, self.body.elastic
+        forces = np.array([(*c.normal, *c.tangential) for c in contacts]).T
+        nodes = distinct(np.concatenate([patch.nodes(mesh) for patch in patches]))
+        displacement = self.body.displacement(self.body.skin_displacement(forces), only=nodes)
+        return np.stack([patch.average(mesh, elastic, displacement)[0] for patch in patches], axis=1)
+
+    def sed_point(self, displacement: Array) -> float:
+        """Return the SED in the middle of the reference ending [MPa]."""
+        return float(self.point.average(self.geometry.mesh, self.body.elastic, displacement[:, :, None])[0, 0])
+
+    def sed_row(self, displacement: Array) -> Array:
+        """Return the SED averaged over each ending of the row (r,) [MPa]; nan where the finger ends before it."""
+        return self.row.average(self.geometry.mesh, self.body.elastic, displacement[:, :, None])[:, 0]
+
+    def stretches(self, displacement: Array) -> Array:
+        """Return the smallest and largest in-plane stretch (2, p) at every corner of every element.
+
+        They are the singular values of F = 1 + du/dX; a folded place has a negative smallest one.
+        """
+        f = self.corners.displacement_gradient(self.geometry.mesh, displacement) + np.eye(2)
+        det = f[:, 0, 0] * f[:, 1, 1] - f[:, 0, 1] * f[:, 1, 0]
+        total = np.sum(f * f, axis=(1, 2))
+        plus, minus = np.sqrt(total + 2.0 * det), np.sqrt(np.maximum(total - 2.0 * det, 0.0))
+        return np.stack([(plus - minus) / 2.0, (plus + minus) / 2.0])
+
+    def contact_width(self, contact: Contact, skin: Array) -> float:
+        """Return how long the contact is along the surface [mm]; `skin` (2 k,) its displacement, normal first [mm]."""
+        mesh, k = self.geometry.mesh, len(contact.state)
+        return width(arcs_of(self.geometry), mesh.nodes[mesh.skin, 0] + skin[k:], contact.normal, contact.touching)
+
+    def reaches_out(self, contact: Contact, displacement: Array, indentation: float) -> bool:
+        """Return whether skin outside the part that may touch would, so that the part must be made larger."""
+        whole = self.geometry.whole
+        below = self.geometry.mesh.nodes[whole, 1] + displacement[whole, 1] < indentation * (1.0 - 1e-9)
+        may = np.zeros(len(displacement), bool)
+        may[self.geometry.mesh.skin] = True
+        may = may[whole]
+        ends = bool(contact.touching[0] and may[0] == 0) or bool(contact.touching[-1] and may[-1] == 0)
+        return ends or bool((below & ~may).any())

@@ -1,0 +1,178 @@
+"""A body at finite strain under given forces: the depth, and under a given drag the travel too, are unknowns.
+
+Newton on the bordered system: the columns that say how the body follows depth and travel come with every linear solve,
+and from them follows which change of both makes up for the forces that are missing.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from math import isfinite
+from typing import NamedTuple
+
+import numpy as np
+
+from solver._kernels import SLIP, STICK
+from solver.body.validation import finite
+from solver.equilibrium.newton import BY_DEPTH, BY_TRAVEL, EQUILIBRIUM, Newton, Pull, Shape
+from solver.equilibrium.root import UNMET, met
+from solver.failures import Cancelled, NotConverged, followed_to
+from solver.mesh import Array
+from solver.progress import tell
+
+STRIDE = 0.3  # largest change of depth or travel in one iteration [mm]
+HALVINGS = 8  # how often a step that failed is cut in two before it is given up
+
+
+class Given(NamedTuple):
+    """What drives the bone: the normal force, and the surface's pull along +x or the surface's travel."""
+
+    normal: float  # [N/mm]
+    tangential: float | None  # [N/mm]; None: `travel` is given instead
+    travel: float = 0.0  # of the surface along +x relative to the bone [mm]
+
+    def checked(self) -> "Given":
+        """Return the same of floats alone, as loops take them. Raises ValueError for what is not finite."""
+        drag = None if self.tangential is None else finite("tangential", self.tangential)
+        return Given(finite("normal", self.normal), drag, finite("travel", self.travel))
+
+    def towards(self, other: "Given", part: float) -> "Given":
+        """Return what lies `part` of the way to `other`, which gives the same kind of thing."""
+        tangential = other.tangential
+        if tangential is not None:
+            begun = 0.0 if self.tangential is None else self.tangential
+            tangential = begun + part * (tangential - begun)
+        normal = self.normal + part * (other.normal - self.normal)
+        return Given(normal, tangential, self.travel + part * (other.travel - self.travel))
+
+
+def corrected(
+    newton: Newton, shape: Shape, given: Given, origin: Array, before: float, *, kept: bool = False
+) -> tuple[Shape, float, int] | None:
+    """Return the shape after one iteration towards the forces, its largest displacement, and changed contact states.
+
+    `origin` (k,) are the positions along x where the skin's nodes were when the surface had travelled `before`. With
+    `kept` the tangent is the last one. None where there is no way.
+    """
+    pull = shape.pull
+    if given.tangential is None:
+        pull = pull._replace(travel=given.travel)
+    linearise = newton.relinearise if kept else newton.linearise
+    if not linearise(shape, pull, origin + pull.travel - before, 0):
+        return None
+    steps = newton.steps
+    drag, push = newton.follows(steps).tolist()
+    felt_drag, felt_push = newton.inside.felt.reshape(-1, 2).sum(axis=0).tolist()
+    missing = given.normal - felt_push - push[EQUILIBRIUM]
+    deeper = along = 0.0
+    if given.tangential is not None and (shape.state == STICK).any():
+        missing_drag = given.tangential - felt_drag - drag[EQUILIBRIUM]
+        det = push[BY_DEPTH] * drag[BY_TRAVEL] - push[BY_TRAVEL] * drag[BY_DEPTH]
+        if det == 0.0:
+            return None
+        deeper = (missing * drag[BY_TRAVEL] - missing_drag * push[BY_TRAVEL]) / det
+        along = (push[BY_DEPTH] * missing_drag - drag[BY_DEPTH] * missing) / det
+    elif push[BY_DEPTH] != 0.0:
+        deeper = missing / push[BY_DEPTH]
+    most = max(abs(deeper), abs(along))
+    if not isfinite(most):
+        return None
+    if most > STRIDE:
+        deeper, along = deeper * STRIDE / most, along * STRIDE / most
+    step = steps[:, EQUILIBRIUM] + deeper * steps[:, BY_DEPTH] + along * steps[:, BY_TRAVEL]
+    pull = pull._replace(depth=pull.depth + deeper, travel=pull.travel + along)
+    after, largest, changed = newton.moved(shape, pull, step, origin + pull.travel - before)
+    return after, max(largest, abs(deeper), abs(along)), changed
+
+
+def balanced(newton: Newton, start: Shape, given: Given, tolerance: float = 1e-8, limit: int = 30) -> Shape:
+    """Return the equilibrium under `given`, one backward Euler step from `start`, whose pull has friction and sense.
+
+    Raises NotConverged where `limit` iterations do not do it.
+    """
+    shape = _iterated(newton, start, start, given, tolerance, limit)
+    return _met_by_travel(newton, start, shape, given, tolerance, limit) if _slips_freely(shape, given) else shape
+
+
+def _iterated(newton: Newton, start: Shape, begin: Shape, given: Given, tolerance: float, limit: int) -> Shape:
+    """Return the equilibrium one step from `start`, sought from `begin` on. Raises NotConverged."""
+    origin, before = start.place(newton.body)[:, 0], start.pull.travel
+    shape = begin
+    for _ in range(limit):
+        done = corrected(newton, shape, given, origin, before)
+        if done is None:
+            raise NotConverged("the body would turn inside out, or nothing holds it along the surface")
+        shape, largest, changed = done
+        if not largest < 1e3:
+            raise NotConverged("the displacements grow without bound")
+        if largest < tolerance and not changed:
+            return shape
+    raise NotConverged(f"no equilibrium within {limit} iterations")
+
+
+def _slips_freely(shape: Shape, given: Given) -> bool:
+    """Return whether all that touches slips, so that nothing was there to meet the given drag, and it is not met."""
+    if given.tangential is None or not shape.pull.mu > 0.0 or (shape.state == STICK).any():
+        return False
+    return abs(shape.force[0] - given.tangential) > UNMET * shape.pull.mu * given.normal
+
+
+def _met_by_travel(newton: Newton, start: Shape, shape: Shape, given: Given, tolerance: float, limit: int) -> Shape:
+    """Return the equilibrium that meets the given drag, one step from `start`, its travel sought from `shape` on.
+
+    The travel holds a body of which nothing sticks, and the drag grows with it. Raises NotConverged.
+    """
+    wanted, near = given.tangential or 0.0, shape
+
+    def at(travel: float) -> tuple[float, Shape]:
+        nonlocal near
+        near = _iterated(newton, start, near, Given(given.normal, None, travel), tolerance, limit)
+        return float(near.force[0]) - wanted, near
+
+    found = met(at, shape.pull.travel, UNMET * shape.pull.mu * given.normal)
+    if found is None:
+        raise NotConverged("no travel meets the drag")
+    return found
+
+
+def march(
+    newton: Newton, start: Shape, begin: Given, course: Iterable[Given], stop: Callable[[], bool] = lambda: False
+) -> Iterator[Shape]:
+    """Yield the equilibrium at each aim of `course`, from `start`, which is that at `begin`.
+
+    A step that fails is cut in two. Raises NotConverged, saying where, Cancelled where `stop` says so, and ValueError
+    for forces that are none.
+    """
+    shape, begin = start, begin.checked()
+    for number, aim in enumerate(aims := [aim.checked() for aim in course]):
+        if len(aims) > 1:
+            tell("letting the forces grow step by step", number / len(aims))
+        done, part = 0.0, 1.0
+        while done < 1.0:
+            if stop():
+                raise Cancelled
+            try:
+                there = min(done + part, 1.0)
+                shape = balanced(newton, lowered(newton, shape), begin.towards(aim, there))
+            except NotConverged as reason:
+                part /= 2.0
+                if part < 0.5**HALVINGS:
+                    raise followed_to(shape.pull.depth, shape.pull.travel, reason) from reason
+            else:
+                done = there
+        begin = aim
+        yield shape
+
+
+def untouched(newton: Newton, mu: float, tau: float) -> Shape:
+    """Return the undeformed body over a surface with this friction."""
+    return replace(Shape.undeformed(newton.body), pull=Pull(0.0, mu, tau).checked())
+
+
+def lowered(newton: Newton, shape: Shape) -> Shape:
+    """Return the shape with its lowest node on the surface, where nothing touches yet."""
+    if shape.touching.any():
+        return shape
+    state = shape.state.copy()
+    lowest = int(np.argmin(shape.place(newton.body)[:, 1]))
+    state[lowest] = STICK if shape.pull.mu > 0.0 and shape.pull.tau > 0.0 else SLIP
+    return replace(shape, state=state)

@@ -1,0 +1,64 @@
+"""The course in time: pressing, sticking, partial slip, sliding, turning round, one equilibrium after another."""
+
+from collections.abc import Callable, Iterable, Iterator
+
+from solver.equilibrium.newton import Newton, Pull, Shape
+from solver.failures import Cancelled, NotConverged, followed_to
+from solver.progress import tell
+
+SMALLEST = 1.0 / 256.0  # part of a step below which a failing one is given up
+
+
+def press_and_slide(
+    depth: float, mu: float, tau: float, direction: int, press: int, slides: int, distance: float
+) -> list[Pull]:
+    """Return the course of a bone driven `depth` [mm] down in `press` steps, then `distance` [mm] along in `slides`.
+
+    `direction` is that of the bone, +1 along +x: the surface goes the other way.
+
+    >>> [(p.depth, p.travel) for p in press_and_slide(1.0, 0.3, 0.02, +1, press=2, slides=2, distance=4.0)]
+    [(0.5, 0.0), (1.0, 0.0), (1.0, -2.0), (1.0, -4.0)]
+    """
+    down = [Pull(depth * (i + 1) / press, mu, tau) for i in range(press)]
+    along = [Pull(depth, mu, tau, travel=-direction * distance * (i + 1) / slides) for i in range(slides)]
+    return down + along
+
+
+def march(
+    newton: Newton,
+    course: Iterable[Pull],
+    start: Shape | None = None,
+    tolerance: float = 1e-7,
+    stop: Callable[[], bool] = lambda: False,
+) -> Iterator[Shape]:
+    """Yield the equilibrium at each pull of `course`, from undeformed or `start`; a step that fails is cut in two.
+
+    Backward Euler: within a step a point sticks where it was or slips from there. Raises NotConverged, saying where,
+    Cancelled where `stop` says so, and ValueError for a pull that is none.
+    """
+    shape = Shape.undeformed(newton.body) if start is None else start
+    for number, pull in enumerate(pulls := [pull.checked() for pull in course]):
+        if len(pulls) > 1:
+            tell("pressing and sliding step by step", number / len(pulls))
+        begin, done, part = shape.pull, 0.0, 1.0
+        while done < 1.0:
+            if stop():
+                raise Cancelled
+            aim = min(done + part, 1.0)
+            try:
+                shape = newton.settle(shape, _between(begin, pull, aim), tolerance)
+            except NotConverged as reason:
+                part /= 2.0
+                if part < SMALLEST:
+                    raise followed_to(shape.pull.depth, shape.pull.travel, reason) from reason
+            else:
+                done = aim
+        yield shape
+
+
+def _between(begin: Pull, end: Pull, part: float) -> Pull:
+    """Return the pull `part` of the way along a step, whose friction is that of its end."""
+    if part == 1.0:
+        return end
+    depth = begin.depth + part * (end.depth - begin.depth)
+    return end._replace(depth=depth, travel=begin.travel + part * (end.travel - begin.travel))

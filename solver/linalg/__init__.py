@@ -1,0 +1,1 @@
+"""Elimination of a body down to its skin."""

@@ -1,0 +1,172 @@
+"""The order in which a symmetric body is eliminated down to its skin, as the arrays that the compiled loops ask for."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver import _kernels as kernels
+from solver.linalg.dissection import Tree, places
+from solver.mesh import Array, Indices, Mesh
+
+Narrow = NDArray[np.int32]
+LEAF: Final = 8  # elements in a part that is not halved any more
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """Parts of a body, p of them, children before parents, and the unknowns n that each eliminates.
+
+    Unknowns are numbered in the order of their elimination; those of the skin, m, come last: x, y of each of its nodes.
+    """
+
+    unknown: Narrow  # (e, 16) of the elements' outer nodes, -1 where fixed
+    size: int  # n
+    start: Narrow  # (p,) first unknown eliminated in each part
+    inner: Narrow  # (p,) how many are
+    border: Narrow  # (p,) how many are passed on
+    children: Narrow  # (p, 2) parts joined in each, -1 in a leaf
+    border_at: Narrow  # (p,) where each part's border begins in `numbers` and `place`
+    numbers: Narrow  # unknowns of all borders
+    place: Narrow  # where each of them stands in the front of the parent
+    run: Narrow  # where in its border the run of neighbours ends that are neighbours there too
+    factor_at: Indices  # (p,) where each part's factor begins
+    wait_at: Indices  # (p,) where each part's border waits for the parent
+    leaf: Narrow  # (p, 2) range of `order` that belongs to each leaf
+    order: Narrow  # (e,) elements, leaf after leaf
+    at: Narrow  # (e, 16) in that order: where an element's unknowns stand in the front of its leaf, -1 where fixed
+    factors: int  # numbers that all factors hold
+    waiting: int  # numbers that wait at once
+
+    @staticmethod
+    def of(mesh: Mesh) -> "Plan":
+        """Plan the elimination of `mesh`, the centres of its elements already eliminated inside them.
+
+        It does not depend on where nodes lie, so the last plans are kept for meshes that differ in nothing else.
+        """
+        return _planned(len(mesh.nodes), mesh.elements.tobytes(), mesh.skin.tobytes(), mesh.fixed.tobytes())
+
+
+@lru_cache(maxsize=4)
+def _planned(count: int, *numbers: bytes) -> Plan:
+    """Return the plan for `count` nodes and the numbers of elements' nodes (e, 9), the skin's, and unknowns held."""
+    elements, skin_nodes, fixed = (np.frombuffer(part, np.int64) for part in numbers)
+    elements = elements.reshape(-1, 9)
+    raw = (2 * elements[:, :8, None] + np.arange(2)).reshape(-1, 16)
+    skin = (2 * skin_nodes[:, None] + np.arange(2)).ravel()
+    tree = Tree.of(raw, places(elements), fixed, skin, LEAF, flat=False)
+    number = np.full(2 * count, -1)
+    sequence = np.concatenate([*(part.inner for part in tree.parts), skin])
+    number[sequence] = np.arange(len(sequence))
+    total = len(sequence)
+    borders = [np.sort(number[part.border]) for part in tree.parts]
+    inner = np.array([len(part.inner) for part in tree.parts])
+    border = np.array([len(b) for b in borders])
+    start = np.concatenate([[0], np.cumsum(inner)[:-1]])
+    border_at = np.concatenate([[0], np.cumsum(border)[:-1]])
+    place = np.zeros(int(border.sum()), np.int32)
+    children = np.full((len(border), 2), -1)
+    leaf = np.zeros((len(border), 2), np.int64)
+    at = np.full((len(tree.order), 16), -1)
+    where = np.full(total + 1, -1)  # the last place is that of fixed unknowns, whose number is -1
+    number[fixed] = -1
+    for p, part in enumerate(tree.parts):
+        where[start[p] : start[p] + inner[p]] = np.arange(inner[p])
+        where[borders[p]] = inner[p] + np.arange(border[p])
+        if part.children:
+            children[p] = part.children
+            for child in part.children:
+                place[border_at[child] : border_at[child] + border[child]] = where[borders[child]]
+        else:
+            leaf[p] = part.elements.start, part.elements.stop
+            at[part.elements] = where[number[raw[tree.order[part.elements]]]]
+    sizes = inner * (inner + border)
+    wait_at, waiting = _waiting(children, border)
+    return Plan(
+        unknown=_narrow(number[raw]),
+        size=total,
+        start=_narrow(start),
+        inner=_narrow(inner),
+        border=_narrow(border),
+        children=_narrow(children),
+        border_at=_narrow(border_at),
+        numbers=_narrow(np.concatenate(borders)),
+        place=place,
+        run=_narrow(_runs(place, border)),
+        factor_at=np.cumsum(sizes) - sizes,
+        wait_at=wait_at,
+        leaf=_narrow(leaf),
+        order=_narrow(tree.order),
+        at=_narrow(at),
+        factors=int(sizes.sum()),
+        waiting=waiting,
+    )
+
+
+def _narrow(numbers: Indices) -> Narrow:
+    return numbers.astype(np.int32)
+
+
+def _runs(place: Narrow, border: Indices) -> Indices:
+    """Return for each unknown of each border where in that border the run of consecutive places it lies in ends."""
+    number = np.arange(len(place))
+    owner = np.repeat(np.arange(len(border)), border)
+    last = np.ones(len(place), bool)
+    last[:-1] = (np.diff(place) != 1) | (np.diff(owner) != 0)
+    ends = np.flatnonzero(last)
+    return ends[np.searchsorted(ends, number)] + 1 - np.repeat(np.cumsum(border) - border, border)
+
+
+def _waiting(children: Indices, border: Indices) -> tuple[Indices, int]:
+    """Return where each part's border waits for its parent: a place for each generation's first and second child."""
+    level = np.zeros(len(border), np.int64)
+    second = np.zeros(len(border), np.int64)
+    for p in range(len(border) - 1, -1, -1):
+        for turn, child in enumerate(children[p]):
+            if child >= 0:
+                level[child], second[child] = level[p] + 1, turn
+    slot = 2 * level + second
+    room = np.zeros(int(slot.max()) + 1, np.int64)
+    np.maximum.at(room, slot, border * border)
+    return (np.cumsum(room) - room)[slot], int(room.sum())
+
+
+class Elimination:
+    """One body's tangent, eliminated again and again; the memory is set aside once."""
+
+    def __init__(self, plan: Plan) -> None:
+        """Set memory aside for `plan`."""
+        skin = int(plan.border[-1])
+        self.plan = plan
+        self.stiffness = np.zeros((skin, skin))  # what is left of the tangent for the skin
+        self.found: Array | None = None  # the displacements found with the tangent that is eliminated
+        self.carried = np.zeros(plan.size)  # L^-1 force, the skin's condensed forces at the end
+        self._still = np.zeros(plan.size)
+        self._factors, self._waiting = np.empty(plan.factors), np.empty(plan.waiting)
+        self._near = np.empty(int((plan.inner + plan.border).max()))
+        self.felt = self.carried[plan.size - skin :]
+        self.factored = (  # what loops ask for that solve with the factors
+            plan.start, plan.inner, plan.border, plan.border_at, plan.numbers, plan.factor_at, self._factors, self._near
+        )  # fmt: skip
+        self._eliminate = kernels.ending(
+            kernels.eliminate, plan.start, plan.inner, plan.border, plan.children, plan.border_at, plan.place, plan.run,
+            plan.factor_at, plan.wait_at, plan.leaf, plan.order, plan.at, self._factors, self._waiting, self.stiffness,
+        )  # fmt: skip
+
+    def factorise(self, tangent: Array) -> bool:
+        """Eliminate the elements' tangents (e, 16, 16), lower halves; False where that is not possible."""
+        return self._eliminate(tangent)
+
+    def condense(self, force: Array) -> Array:
+        """Return the forces (m,) that the skin feels of `force` (n,), all of it being kept for `unfold`."""
+        self.carried[:] = force
+        kernels.condense(self.carried, *self.factored)
+        return self.felt
+
+    def unfold(self, skin: Array, *, still: bool = False) -> Array:
+        """Return all displacements (n,) for the skin's (m,), balancing the forces condensed last, or none of them."""
+        out = np.empty(self.plan.size)
+        kernels.unfold(self._still if still else self.carried, skin, *self.factored, out)
+        return out

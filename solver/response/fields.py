@@ -1,0 +1,135 @@
+"""A prediction as a picture: the deformed finger in triangles with the SED at their corners, and its outlines."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.body.receptor import Endings
+from solver.body.stiffness import Elastic, Probes, local_coordinates
+from solver.body.tissues import finite_laws, settled_moduli
+from solver.element import Q2P1
+from solver.mesh import Array, Indices, Mesh
+from solver.mesh.outline import Outline
+from solver.prediction import Prediction
+from solver.scene import Scene
+
+# Eight triangles of each element, in its nine nodes
+_AROUND = [0, 4, 1, 5, 2, 6, 3, 7]  # the nodes along the sides of an element
+_SPLIT = np.array([[8, 0, 4], [8, 4, 1], [8, 1, 5], [8, 5, 2], [8, 2, 6], [8, 6, 3], [8, 3, 7], [8, 7, 0]])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fields:
+    """What is drawn, in the world: the surface is y = 0, the finger above it, pressed and dragged."""
+
+    nodes: Array  # (n, 2) deformed positions [mm]; a node between layers is there once for each
+    triangles: Indices  # (t, 3)
+    sed: Array  # (n,) SED, averaged over the elements of one layer that meet at the node [MPa]
+    outlines: Mapping[str, Array]  # "skin", "epidermis", "dermis", "bone": (m, 2) deformed lines [mm]
+    patch: Array  # (m, 2) outline of the reference ending, deformed [mm]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sketch:
+    """What all pictures of one finger on one mesh share."""
+
+    mesh: Mesh
+    triangles: Indices  # (t, 3) of the nodes that are drawn
+    elements: Indices  # (e, 8) of those nodes, along the sides of each element
+    probes: Probes  # at the nodes of every element, one element after the other
+    elastic: Elastic
+    _kept: Indices  # (n,) node of the mesh behind each node that is drawn
+    _place: Indices  # (e, 9) node that is drawn for each of an element
+    _lines: Mapping[str, tuple[Indices, Array]]  # element (m,) and shape functions (m, 9) of the lines that move
+    _bone: Array  # (m, 2) undeformed [mm]
+
+    @staticmethod
+    def of(mesh: Mesh, scene: Scene) -> "Sketch":
+        """Prepare to draw the finger of `scene`."""
+        count = len(mesh.elements)
+        # one node for each pair of node and layer
+        pairs = mesh.elements + len(mesh.nodes) * mesh.region[:, None]
+        kept, place = np.unique(pairs, return_inverse=True)
+        place = place.reshape(count, 9)
+        elastic = Elastic.of(mesh, settled_moduli(scene.materials))
+        outline = Outline.of(scene.finger)
+        arcs = np.linspace(outline.palmar_cut, outline.dorsal_cut, 241)
+        skin = scene.finger.epidermis
+        depths = {"skin": 0.0, "epidermis": skin, "dermis": skin + scene.finger.dermis}
+        lines = {name: outline.tissue(arcs, np.asarray(depth)) for name, depth in depths.items()}
+        lines["patch"] = _patch(outline, scene)
+        return Sketch(
+            mesh=mesh,
+            triangles=place[:, _SPLIT].reshape(-1, 3),
+            elements=place[:, _AROUND],
+            probes=Probes.at(mesh, elastic, np.repeat(np.arange(count), 9), np.tile(Q2P1.positions, (count, 1))),
+            elastic=elastic,
+            _kept=kept % len(mesh.nodes),
+            _place=place,
+            _lines={name: _followed(mesh, line) for name, line in lines.items()},
+            _bone=outline.bone(arcs),
+        )
+
+    def energies(self, displacement: Array) -> Array:
+        """Return the SED at the nodes of every element (9 e, m) [MPa] of displacements (nodes, 2, m), small strain."""
+        return self.probes.energy(self.mesh, self.elastic, displacement)
+
+    def fields(self, displacement: Array, indentation: float, energies: Array) -> Fields:
+        """Return the picture of displacements (nodes, 2) [mm] relative to the bone, with their `energies` (9 e,)."""
+        lowered = self.mesh.nodes + displacement - [0.0, indentation]
+        mean = np.bincount(self._place.ravel(), energies) / np.bincount(self._place.ravel())
+        drawn = {
+            name: (shape[:, None] @ lowered[self.mesh.elements[element]])[:, 0]
+            for name, (element, shape) in self._lines.items()
+        }
+        patch = drawn.pop("patch")
+        bone = self._bone - [0.0, indentation]
+        return Fields(lowered[self._kept], self.triangles, mean, drawn | {"bone": bone}, patch)
+
+
+def fields_of(prediction: Prediction, sketch: Sketch | None = None) -> Fields:
+    """Return the picture of `prediction`; `sketch` is that of its mesh, where it was made before."""
+    drawn = sketch or Sketch.of(prediction.mesh, prediction.scene)
+    return drawn.fields(prediction.displacement, prediction.indentation, _energies(prediction, drawn))
+
+
+def _energies(prediction: Prediction, sketch: Sketch) -> Array:
+    """Return the SED at the nodes of every element, one element after the other (9 e,) [MPa]."""
+    scene = prediction.scene
+    if scene.solve.kinematics == "small":
+        return sketch.energies(prediction.displacement[:, :, None])[:, 0]
+    # Imported here: a picture at small strain need not wait for the compiled loops to be loaded.
+    from solver.body.finite import FiniteBody, FiniteProbes
+
+    body = FiniteBody.of(prediction.mesh, finite_laws(scene.materials), checked=True)
+    count = len(sketch.probes.element)
+    places = Endings(sketch.probes, np.ones(count), np.arange(count), count)
+    return FiniteProbes.of(body, places).energy(body, prediction.displacement)
+
+
+def _patch(outline: Outline, scene: Scene) -> Array:
+    """Return the undeformed outline of the reference ending (m, 2) [mm]."""
+    receptor = scene.receptor
+    across, along = receptor.ending
+    arc = outline.along(0.0, receptor.depth, np.linspace(-along / 2, along / 2, 11))
+    near, far = (outline.tissue(arc, np.asarray(receptor.depth + side * across / 2)) for side in (-1, 1))
+    return np.concatenate([near, far[::-1], near[:1]])
+
+
+def _followed(mesh: Mesh, points: Array) -> tuple[Indices, Array]:
+    """Return the element (m,) that holds each undeformed point (m, 2), and its shape functions there (m, 9)."""
+    element = _holding(mesh, points)
+    local = local_coordinates(mesh.nodes[mesh.elements[element]], points, np.zeros(points.shape))
+    return element, Q2P1.shape(local)[0]
+
+
+def _holding(mesh: Mesh, points: Array) -> Indices:
+    """Return the element (m,) that holds each point, or the one nearest to holding it."""
+    centres = mesh.nodes[mesh.elements[:, 8]]
+    near = np.argsort(np.sum((points[:, None] - centres) ** 2, axis=2), axis=1)[:, :12]
+    tried = near.ravel()
+    corners = mesh.nodes[mesh.elements[tried]]
+    local = local_coordinates(corners, np.repeat(points, near.shape[1], axis=0), np.zeros((len(tried), 2)))
+    outside = np.abs(local).max(axis=1).reshape(near.shape)
+    return near[np.arange(len(points)), np.argmin(np.where(np.isfinite(outside), outside, np.inf), axis=1)]

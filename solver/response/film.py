@@ -1,0 +1,86 @@
+"""The way of a finger as pictures: from first touch, or as far as a solve that failed had come."""
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.contact.active_set import Contact
+from solver.contact.law import FrictionLaw
+from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.load_path import Instant, Progress, Way, course
+from solver.failures import SolveFailure
+from solver.mesh import Array
+from solver.prediction import Skin
+from solver.response.fields import Fields, Sketch
+from solver.response.small_solution import skin_of
+from solver.scene import Scene
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Still:
+    """One state of the way, at small strain."""
+
+    instant: Instant
+    fields: Fields
+    skin: Skin
+    row: Array  # (r,) SED of the row of receptors [MPa]
+    sed: float  # averaged over the ending [MPa]
+
+
+def stills(finger: FingerModel, instants: Sequence[Instant], sketch: Sketch) -> tuple[Still, ...]:
+    """Return the pictures of states that `finger` was in; tissues at rest, so for ways on which nothing relaxes."""
+    forces = np.stack([np.concatenate([i.contact.normal, i.contact.tangential]) for i in instants], axis=1)
+    skins = finger.body.skin_displacement(forces)
+    displacement = finger.body.displacement(skins)
+    energies = sketch.energies(displacement)
+    mesh, elastic = finger.geometry.mesh, finger.body.elastic
+    rows = finger.row.average(mesh, elastic, displacement)
+    ending = finger.ending.average(mesh, elastic, displacement)[0]
+    return tuple(
+        Still(
+            instant,
+            sketch.fields(displacement[:, :, number], instant.depth, energies[:, number]),
+            skin_of(finger, instant.contact, skins[:, number]),
+            rows[:, number],
+            float(ending[number]),
+        )
+        for number, instant in enumerate(instants)
+    )
+
+
+def way_until(
+    scene: Scene, finger: FingerModel, progress: Progress | None = None
+) -> tuple[tuple[Instant, ...], SolveFailure | None]:
+    """Return the states from first touch on, and why there are no more where they end before the finger settles.
+
+    They end before tissue folds: states beyond solve the equations of small strain and are none of a finger's. Raises
+    Cancelled where `progress` says so.
+    """
+    law = FrictionLaw(float(scene.friction.mu), scene.friction.cap)
+    way = Way(finger.body.touchable, law, scene.loading_per_mm)
+    try:
+        course(way, scene.loading_per_mm, progress)
+    except SolveFailure as failure:
+        return _unfolded(finger, way.instants), failure
+    return tuple(way.instants), None
+
+
+def _unfolded(finger: FingerModel, instants: Sequence[Instant]) -> tuple[Instant, ...]:
+    """Return the states before the first in which tissue is turned inside out; what folds stays folded."""
+
+    def folds(instant: Instant) -> bool:
+        return bool(np.prod(finger.stretches(finger.displacement(instant.contact)), axis=0).min() <= 0.0)
+
+    return tuple(instants[: max(bisect_left(instants, True, key=folds), 1)])
+
+
+def most_squeezed(finger: FingerModel, contact: Contact, depth: float) -> tuple[float, float]:
+    """Return the place [mm] in the world where tissue is squeezed most: the corner that stretches least."""
+    displacement = finger.displacement(contact)
+    mesh = finger.geometry.mesh
+    corner = int(np.argmin(finger.stretches(displacement)[0]))
+    node = mesh.elements[corner // 4, corner % 4]
+    x, y = mesh.nodes[node] + displacement[node]
+    return float(x), float(y - depth)

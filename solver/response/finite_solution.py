@@ -1,0 +1,267 @@
+"""From scenes at finite strain to predictions, each on a mesh made for its contact, and an error estimate with each.
+
+Settled sliding is found directly and refused where it does not exist (`existence`); the course is marched, and
+where tissues relax, in time (`solver.equilibrium.finite_relaxation`).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import groupby
+from time import perf_counter
+
+import numpy as np
+
+from solver import kernels_numpy
+from solver._kernels import STICK
+from solver.accuracy import contrasts as differences
+from solver.accuracy import omitted_effects as evidence
+from solver.accuracy.adaptivity import Ascent, Climbed, foot, risen, sized_together
+from solver.accuracy.audits import forces_missed, refuse_unsound, rounding, unbalanced
+from solver.accuracy.finite_audits import audits, course_audits
+from solver.accuracy.finite_ends import times_on_way
+from solver.accuracy.finite_errors import error_estimates
+from solver.body.receptor import ROW
+from solver.contact.law import NAMES
+from solver.continuation.existence import doubts
+from solver.continuation.finite_states import course, presses
+from solver.equilibrium.expected_depth import within_reach
+from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.finite_relaxation import RelaxingCourse
+from solver.equilibrium.newton import EQUILIBRIUM, Newton, Shape
+from solver.failures import Cancelled, NotConverged, SolveFailure
+from solver.mesh import Array
+from solver.mesh.mesher import Sizing
+from solver.prediction import History, Prediction, Row, Skin, drag
+from solver.progress import tell
+from solver.scene import Scene
+
+ROUGH = 1e-8  # unbalanced part of the forces from which displacements are corrected further [-]
+CORRECTIONS = 4  # at most
+
+Answer = Prediction | SolveFailure
+Progress = Callable[[float], bool]
+
+
+def answers(
+    scenes: Sequence[Scene], expected: float, fineness: float, progress: Progress | None = None
+) -> list[Answer]:
+    """Return the predictions of scenes, or why there is none, on meshes of that fineness.
+
+    Those pressed alike and moved the same way share one mesh, of which only the lines at the edges of contact lie
+    elsewhere for each, and are solved one after the other, friction rising, each begun at the one before. `expected` is
+    the depth [mm] that they reach, or about it where forces are given. Raises SceneError where the finger cannot be
+    meshed, Cancelled where `progress` (told the part done) says so.
+    """
+    found: dict[int, Answer] = {}
+
+    def stop() -> bool:
+        return progress is not None and not progress(len(found) / len(scenes))
+
+    meshes = _Meshes()
+    keys = [alike(scene) for scene in scenes]
+    for _, group in groupby(sorted(range(len(scenes)), key=lambda n: keys[n]), lambda n: keys[n][0]):
+        feet: dict[int, tuple[Climbed, float]] = {}  # and what each took [s]
+        low: Climbed | None = None
+        for number in group:
+            if stop():
+                raise Cancelled
+            begun = perf_counter()
+            tell("finding where contact ends, on a rough mesh")
+            try:
+                low = foot(scenes[number], expected, fineness, stop, meshes.make, low)
+                feet[number] = low, perf_counter() - begun
+            except SolveFailure as failure:
+                found[number] = failure
+        sizings = sized_together(scenes[0], fineness, [below for below, _ in feet.values()])
+        before: Ascent | None = None
+        for (number, (below, took)), sizing in zip(feet.items(), sizings, strict=True):
+            if stop():
+                raise Cancelled
+            begun = perf_counter() - took
+            tell(f"solving on a mesh of {fineness:g} elements to the tip radius")
+            try:
+                before = risen(scenes[number], fineness, below, stop, meshes.make, before, sizing)
+                found[number] = _predicted(scenes[number], before, fineness, stop, begun)
+            except SolveFailure as failure:
+                found[number] = failure
+    return [found[number] for number in range(len(scenes))]
+
+
+class _Meshes:
+    """Makes the meshes of one finger: rough ones once, that surfaces begin one at the other; others with one memory."""
+
+    def __init__(self) -> None:
+        self._rough: dict[Sizing, FiniteFinger] = {}
+        self._last: FiniteFinger | None = None
+
+    def make(self, scene: Scene, sizing: Sizing) -> FiniteFinger:
+        """Mesh the finger, or take its rough mesh again."""
+        if sizing.edges is not None:
+            self._last = FiniteFinger.of(scene, sizing, self._last)
+            return self._last
+        if sizing not in self._rough:
+            self._rough.clear()
+            self._rough[sizing] = FiniteFinger.of(scene, sizing)
+        return self._rough[sizing]
+
+
+def alike(scene: Scene) -> tuple[tuple[float, float, str], float]:
+    """Return what scenes are sorted by, so that neighbours are alike: how they are pressed, then their friction."""
+    return scene.pressed, float(scene.friction.mu)
+
+
+def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[], bool], begun: float) -> Prediction:
+    at = way_up.top
+    finger, shape = at.finger, at.shape
+    setup = sum(state.setup_s for state in (way_up.foot, way_up.first, at) if state is not None)
+    steps = way_up.steps
+    times = times_on_way(scene, way_up.foot.finger, stop) if steps is None else steps.times
+    way: list[Shape] = []
+    relaxing: RelaxingCourse | None = None
+    if scene.solve.course == "history":
+        relaxing = RelaxingCourse(scene, finger, stop, times=times) if scene.materials.relax else None
+        way = course(scene, finger, stop, times) if relaxing is None else relaxing.shapes
+        shape = way[-1]
+    if not shape.touching.any():
+        raise NotConverged(f"No contact was found at {shape.pull.depth:g} mm of indentation: ask for more depth.")
+    within_reach(scene, shape.pull.depth)
+    driven = scene.driven(shape.pull.depth)
+    body = finger.newton.body
+    newton = finger.newton if relaxing is None else relaxing.newton
+    shape, checks = _balanced(newton, shape, lambda found: audits(driven, finger, found, newton))
+    refuse_unsound(checks, shape.pull.depth)
+    numbers = finger.all_numbers(shape)
+    sed, normal, tangential, depth, shift, width = (float(number) for number in numbers)
+    skin = _skin(finger, shape)
+    checks |= forces_missed(scene, float(shape.force[1]), float(shape.force[0]))
+    if way:
+        checks |= course_audits(newton, way)
+    if way and (relaxing is None or _sticking(shape) == 0.0):  # stuck and relaxing, the end depends on the way
+        checks["course_against_direct"] = abs(finger.sed_ending(at.shape) / sed - 1.0)
+    held = scene.loading.dragged and _sticking(shape) > 0.0  # sliding, a finger may have shifted by anything
+    solved = perf_counter()
+    tell("estimating errors, on a coarser mesh")
+    errors, others, stays = error_estimates(scene, fineness, way_up, numbers, stop)
+    estimated = perf_counter()
+    model = evidence.finite_model(
+        driven, force=shape.force, width=width, sticking=_sticking(shape), slide=_slide(finger, shape)
+    )
+    return Prediction(
+        scene=scene,
+        sed_ending=sed,
+        sed_point=float(finger.point.average(body, shape.u)[0]),
+        normal_force=normal,
+        tangential_force=drag(scene, tangential),
+        contact_width=width,
+        indentation=depth,
+        shift=shift if held else None,
+        error_estimate=errors.sed,
+        normal_force_error=errors.normal,
+        tangential_force_error=errors.tangential,
+        indentation_error=errors.indentation,
+        shift_error=errors.shift if held else None,
+        contact_width_error=errors.width,
+        error_stays=stays,
+        beside=differences.those_of(others),
+        dofs=body.dofs,
+        newton_iterations=shape.iterations,
+        wall_s=solved - begun - setup,
+        setup_s=setup,
+        estimate_s=estimated - solved,
+        row=Row(ROW, finger.row.average(body, shape.u)),
+        model=model,
+        audits=checks,
+        skin=skin,
+        geometry=finger.geometry,
+        displacement=shape.u,
+        history=_history(scene, finger, way, relaxing, times) if way else None,
+        warnings=(*evidence.warnings(driven, model["left_out"]), *doubts(finger, shape, stop), *rounding(checks)),
+    )
+
+
+def _sticking(shape: Shape) -> float:
+    touching = int(shape.touching.sum())
+    return int((shape.state == STICK).sum()) / touching if touching else 0.0
+
+
+def _slide(finger: FiniteFinger, shape: Shape) -> float:
+    """Return the largest sideways displacement of the skin that may touch [mm]."""
+    return float(np.abs(shape.u[finger.geometry.mesh.skin, 0]).max())
+
+
+def _skin(finger: FiniteFinger, shape: Shape) -> Skin:
+    place = shape.place(finger.newton.body)
+    touching = shape.touching
+    length = np.where(touching, kernels_numpy.tributary(place[:, 0]), 1.0)
+    return Skin(
+        x=place[:, 0],
+        gap=np.where(touching, 0.0, place[:, 1] - shape.pull.depth),
+        pressure=shape.reaction[:, 1] / length,
+        traction=shape.reaction[:, 0] / length,
+        state=tuple(NAMES[int(state)] for state in shape.state),
+    )
+
+
+def _balanced(
+    newton: Newton, shape: Shape, audits: Callable[[Shape], dict[str, float]]
+) -> tuple[Shape, dict[str, float]]:
+    """Return a state and its checks, its displacements so good that no force is left over but by round-off.
+
+    Displacements good to a part of a nanometre leave much of a light touch on a nearly incompressible body unbalanced.
+    """
+    checks = audits(shape)
+    for _ in range(CORRECTIONS):
+        if unbalanced(checks) <= ROUGH:
+            break
+        x = shape.place(newton.body)[:, 0]
+        if not newton.linearise(shape, shape.pull, x):
+            break
+        after, _, _ = newton.moved(shape, shape.pull, newton.steps[:, EQUILIBRIUM].copy(), x)
+        after = replace(after, state=shape.state, sense=shape.sense)  # a step of nanometres turns no slip into stick
+        better = audits(after)
+        if _contradicting(better) > max(_contradicting(checks), ROUGH) or unbalanced(better) >= unbalanced(checks):
+            break
+        shape, checks = after, better
+    return shape, checks
+
+
+def _contradicting(checks: dict[str, float]) -> float:
+    return max(checks[name] for name in ("penetration", "tension", "cone_violation"))
+
+
+def _history(
+    scene: Scene, finger: FiniteFinger, way: Sequence[Shape], relaxing: RelaxingCourse | None, times: float
+) -> History:
+    travel = np.array([-shape.pull.travel for shape in way])
+    depth = np.array([shape.pull.depth for shape in way])
+    slipping = np.array([1.0 - _sticking(shape) if shape.touching.any() else 0.0 for shape in way])
+    if relaxing is None:
+        time = _times(scene, travel, presses(times))
+        point = [float(finger.point.average(finger.newton.body, shape.u)[0]) for shape in way]
+        sed = np.stack([[finger.sed_ending(shape) for shape in way], point], axis=1)
+    else:
+        time, sed = np.array(relaxing.times), np.array(relaxing.sed)
+    return History(
+        time=time,
+        bone_x=travel,
+        bone_y=-depth,
+        sed_ending=sed[:, 0],
+        sed_point=sed[:, 1],
+        normal_force=np.array([float(shape.force[1]) for shape in way]),
+        tangential_force=np.array([drag(scene, float(shape.force[0])) for shape in way]),
+        contact_width=np.array([finger.contact_width(shape) for shape in way]),
+        slipping=slipping,
+    )
+
+
+def _times(scene: Scene, travel: Array, count: int) -> Array:
+    """Return when a finger that does not relax was where its bone has gone to by `travel` (m,) [mm].
+
+    It was pressed in `count` steps, and dragged in as many.
+    """
+    if scene.loading.dragged:
+        after = np.arange(1, len(travel) - count + 1) / count
+    else:
+        gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(travel)))])
+        after = gone[count:] / scene.loading.speed
+    return np.concatenate([np.arange(1, count + 1) / count, 1.0 + after])

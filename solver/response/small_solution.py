@@ -1,0 +1,316 @@
+"""From scenes at small strain to predictions: one mesh for all that share a finger, an error estimate with each.
+
+Settled sliding is found directly and refused where it does not exist (`wedging`); the course is marched, and
+where tissues relax, in time (`solver.equilibrium.relaxation`).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+from numpy.linalg import LinAlgError
+
+from solver.accuracy.audits import (
+    MIXED,
+    audits,
+    course_audits,
+    forces_missed,
+    inside_out,
+    refuse_unsound,
+    rounding,
+    unbalanced,
+)
+from solver.accuracy.contrasts import those_of, together
+from solver.accuracy.omitted_effects import model, warnings
+from solver.accuracy.small_errors import error_estimates, others_on, steps_asked, times_on_way
+from solver.accuracy.step_error import Steps
+from solver.body.receptor import ROW
+from solver.contact.active_set import SLIP, STICK, Contact
+from solver.contact.law import NAMES, FrictionLaw
+from solver.continuation.small_existence import direct
+from solver.continuation.small_states import (
+    all_numbers,
+    depends_on_way,
+    gives_way,
+    in_tissue,
+    indentation,
+    laid,
+    law_of,
+    marched,
+    shift_of,
+)
+from solver.continuation.wedging import WIDE
+from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.load_path import March
+from solver.failures import Cancelled, NotConverged, SolveFailure
+from solver.mesh import Array
+from solver.mesh.grid import MeshError
+from solver.mesh.mesher import Sizing
+from solver.prediction import History, Prediction, Row, Skin, drag
+from solver.scene import Scene, SceneError
+
+ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements once more
+
+YIELDS = (
+    "The drag lifts the bone: pressed a little harder, the finger would slide at a smaller depth. Under a weight, that "
+    "follows it down, this slide would not last; held at this depth, the finger slides under less force."
+)
+
+Answer = Prediction | SolveFailure
+Watch = Callable[[int, Answer, FingerModel, March | None], None]  # told each answer as it is found, and how
+Progress = Callable[[float], bool]  # told the part done, 0 to 1; returns False to stop the work (Cancelled is raised)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shared:
+    """What scenes solved together share, and each one's part of what it took [s]."""
+
+    fineness: float
+    fine: FingerModel
+    coarse: FingerModel
+    plain: FingerModel | None  # as coarse and not moved, where surfaces are to be told apart
+    setup_s: float
+    solve_s: float
+    estimate_s: float
+    widest: bool  # whether contact was looked for wherever it can be
+
+
+class Fingers:
+    """Makes the fingers of one group of scenes, each mesh once; those of the last fineness asked for are kept."""
+
+    def __init__(self, scene: Scene, *, in_loops: bool) -> None:
+        """Make none yet; `in_loops` as in `Body.of`."""
+        self._scene, self._in_loops = scene, in_loops
+        self._fineness = 0.0
+        self._made: dict[Sizing, tuple[FingerModel, float]] = {}
+
+    def begin(self, fineness: float) -> None:
+        """Forget those of another fineness."""
+        if fineness != self._fineness:
+            self._made.clear()
+        self._fineness = fineness
+
+    def of(self, sizing: Sizing) -> tuple[FingerModel, float]:
+        """Return the finger, and what it took to make [s]. Raises SceneError, NotConverged."""
+        if sizing not in self._made:
+            begun = perf_counter()
+            finger = _meshed(self._scene, sizing, self._in_loops)
+            self._made[sizing] = finger, perf_counter() - begun
+        return self._made[sizing]
+
+
+def answers(
+    scenes: list[Scene],
+    depth: float,
+    fineness: float,
+    progress: Progress | None,
+    watch: Watch | None,
+    fingers: Fingers,
+) -> list[Answer]:
+    """Solve all scenes on one mesh, and on a coarser one for the estimate; look wider where contact reaches out.
+
+    Surfaces that are told apart are solved on a second coarse mesh.
+    """
+    fingers.begin(fineness)
+    surfaces = {number for numbers in together(scenes) for number in numbers}
+    done: list[Answer | None] = []
+    most = max(depth, min(WIDE * depth, scenes[0].finger.pulp_thickness()))  # for drags that lay much skin on
+    for margin, deep in ((1.0, depth), (4.0, depth), (WIDE, depth), (WIDE, most)):
+        sizing = Sizing(fineness, deep, margin=margin)
+        half = replace(sizing, fineness=fineness / 2.0)
+        try:
+            fine, took = fingers.of(sizing)
+            coarse, more = fingers.of(replace(half, shift=True))
+            plain, again = fingers.of(half) if surfaces else (None, 0.0)
+        except NotConverged as failure:
+            return [failure] * len(scenes)
+        solve, estimate = fine.solve_s / len(scenes), (more + again) / len(scenes)
+        alone = _Shared(fineness, fine, coarse, None, took - fine.solve_s, solve, estimate, widest=margin == WIDE)
+        beside = replace(alone, plain=plain)
+        done = []
+        for number, scene in enumerate(scenes):
+            _report(progress, number / len(scenes))
+            shared = beside if number in surfaces else alone
+            answer, way = _answer(scene, shared, _of_all(progress, number, len(scenes)))
+            if watch is not None and answer is not None:
+                watch(number, answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer, fine, way)
+            done.append(answer)
+        if all(answer is not None for answer in done):
+            break
+    lost = NotConverged(
+        "The drag lays more skin on the surface than the finger's palmar side has, where contact is looked for: ask "
+        "for less friction, drag or depth."
+    )
+    return [lost if answer is None else answer for answer in done]
+
+
+def _of_all(progress: Progress | None, number: int, count: int) -> Progress | None:
+    """Return what is told the part done of one of `count` scenes."""
+    return None if progress is None else lambda part: progress((number + part) / count)
+
+
+def _answer(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[Answer | None, March | None]:
+    """Return the answer, None where contact must be looked for on more of the skin; and the way where it has one."""
+    try:
+        return _predicted(scene, shared, progress) or (None, None)
+    except SolveFailure as failure:
+        return failure, None
+
+
+def _report(progress: Progress | None, part: float) -> None:
+    if progress is not None and not progress(part):
+        raise Cancelled
+
+
+def _meshed(scene: Scene, sizing: Sizing, in_loops: bool) -> FingerModel:
+    try:
+        return FingerModel.of(scene, sizing, in_loops=in_loops)
+    except MeshError as bad:
+        raise SceneError("finger.tip_radius", scene.finger.tip_radius, f"no mesh fits this finger ({bad})") from bad
+    except LinAlgError as bad:
+        raise NotConverged(f"Round-off has swallowed the finger's stiffness ({bad}): {MIXED} do that.") from bad
+
+
+def _in_steps(scene: Scene, shared: _Shared) -> tuple[Contact | None, Steps | None]:
+    """Return the settled state as `direct` does, and the load steps it took where it depends on its way.
+
+    Where the course is asked for, an earlier slide that never settles is refused as the last one is, with its limits.
+    """
+    before = scene.earlier_slides() if scene.solve.course == "history" else ()
+    if any(direct(leg, shared.fine, widest=shared.widest) is None for leg in before):
+        return None, None
+    contact = direct(scene, shared.fine, widest=shared.widest)
+    if contact is None or not depends_on_way(scene, contact):
+        return contact, None
+    steps = steps_asked(scene, shared.coarse)
+    return (contact if steps.times == 1 else direct(scene, shared.fine, steps.times, widest=shared.widest)), steps
+
+
+def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[Prediction, March | None] | None:
+    """Return the prediction of one scene, and its way where it has one that can be drawn from forces alone.
+
+    None where contact must be looked for on more of the skin.
+    """
+    finger, law = shared.fine, law_of(scene)
+    begun = perf_counter()
+    contact, steps = _in_steps(scene, shared)
+    if contact is None:
+        return None
+    times = times_on_way(scene, shared.coarse) if steps is None else steps.times
+    way: March | None = None
+    over_time: Array | None = None
+    direct = contact
+    if scene.solve.course == "history":
+        way, over_time = marched(scene, finger, progress, times)
+        contact = way.instants[-1].contact
+    skin = finger.skin_displacement(contact)
+    displacement = finger.body.displacement(skin)[:, :, 0]
+    depth = indentation(scene, contact)
+    in_tissue(scene, finger, depth)
+    if finger.reaches_out(contact, displacement, depth):
+        return None
+    free = way is None and scene.normal_force is None and not (contact.state == STICK).any()
+    contact, displacement, checks = _balanced(finger, law, contact, depth, displacement, slides=free)
+    sed = finger.sed_ending(displacement)
+    refuse_unsound(checks, depth)
+    checks |= forces_missed(scene, float(contact.normal.sum()), float(contact.tangential.sum()))
+    if way is not None:
+        checks |= course_audits(finger, way)
+        if over_time is not None:  # what the balance of work leaves over is what the tissues took by relaxing
+            checks["course_viscous_work"] = checks.pop("course_work_balance")
+        if over_time is None or not (contact.state == STICK).any():  # stuck and relaxing, the end depends on the way
+            checks["course_against_direct"] = abs(finger.sed_ending(finger.displacement(direct)) / sed - 1.0)
+    left = model(scene.driven(depth), finger, contact, displacement)
+    history = None if way is None else _history(scene, finger, way, over_time)
+    row = Row(ROW, finger.sed_row(displacement))
+    solved = perf_counter()
+    numbers, shift = all_numbers(scene, finger, contact), shift_of(scene, contact)
+    numbers[0] = sed
+    off, others = error_estimates(scene, shared.fineness, shared.coarse, numbers, steps)
+    if shared.plain is not None:
+        others = np.vstack([others, others_on(scene, shared.plain, steps)])
+    found = Prediction(
+        scene=scene,
+        sed_ending=sed,
+        sed_point=finger.sed_point(displacement),
+        normal_force=float(contact.normal.sum()),
+        tangential_force=drag(scene, float(contact.tangential.sum())),
+        contact_width=float(numbers[5]),
+        indentation=depth,
+        shift=shift,
+        error_estimate=off.sed,
+        normal_force_error=off.normal,
+        tangential_force_error=off.tangential,
+        indentation_error=off.indentation,
+        shift_error=None if shift is None else off.shift,
+        contact_width_error=off.width,
+        beside=those_of(others),
+        dofs=finger.body.dofs,
+        newton_iterations=contact.iterations if way is None else way.iterations,
+        wall_s=solved - begun + shared.solve_s,
+        setup_s=shared.setup_s,
+        estimate_s=perf_counter() - solved + shared.estimate_s,
+        row=row,
+        model=left,
+        audits=checks,
+        skin=skin_of(finger, contact, skin[:, 0]),
+        geometry=finger.geometry,
+        displacement=displacement,
+        history=history,
+        warnings=(
+            *warnings(scene, left["left_out"]),
+            *filter(None, [inside_out(checks)]),
+            *([YIELDS] if gives_way(scene, finger, contact) else []),
+            *rounding(checks),
+        ),
+    )
+    return found, way if over_time is None else None
+
+
+def _balanced(
+    finger: FingerModel, law: FrictionLaw, contact: Contact, depth: float, displacement: Array, *, slides: bool
+) -> tuple[Contact, Array, dict[str, float]]:
+    """Return a state, its displacement and their audits with less round-off; `slides` at a given depth, all of it."""
+    if slides:
+        contact, displacement = laid(finger, law, contact, depth, displacement)
+    checks = audits(finger, law, contact, depth, displacement)
+    if unbalanced(checks) > ROUGH:
+        if slides:
+            contact, displacement = laid(finger, law, contact, depth, displacement)
+        else:
+            displacement = finger.balanced(contact, displacement)
+        checks = audits(finger, law, contact, depth, displacement)
+    return contact, displacement, checks
+
+
+def skin_of(finger: FingerModel, contact: Contact, skin: Array) -> Skin:
+    """Return the skin that may touch, in a state of contact with its displacement (2 k,), normal first [mm]."""
+    mesh, k = finger.geometry.mesh, len(contact.state)
+    length = finger.body.touchable.length
+    return Skin(
+        x=mesh.nodes[mesh.skin, 0] + skin[k:],
+        gap=np.where(contact.touching, 0.0, contact.gap),
+        pressure=contact.normal / length,
+        traction=contact.tangential / length,
+        state=tuple(NAMES[int(s)] for s in contact.state),
+    )
+
+
+def _history(scene: Scene, finger: FingerModel, way: March, over_time: Array | None) -> History:
+    """Return the course as arrays."""
+    contacts = [instant.contact for instant in way.instants]
+    sed = finger.seds(contacts) if over_time is None else over_time
+    touching = np.array([c.touching.sum() for c in contacts])
+    slipping = np.array([(c.state >= SLIP).sum() for c in contacts])
+    return History(
+        time=np.array([i.time for i in way.instants]),
+        bone_x=np.array([i.travel for i in way.instants]),
+        bone_y=np.array([-i.depth for i in way.instants]),
+        sed_ending=sed[:, 0],
+        sed_point=sed[:, 1],
+        normal_force=np.array([c.normal.sum() for c in contacts]),
+        tangential_force=np.array([drag(scene, float(c.tangential.sum())) for c in contacts]),
+        contact_width=np.array([finger.contact_width(c, np.concatenate([c.gap, c.shift])) for c in contacts]),
+        slipping=slipping / np.maximum(touching, 1),
+    )

@@ -1,0 +1,340 @@
+"""From scenes to predictions: one mesh for all that share a finger, and an error estimate with every answer."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from solver.accuracy import contrasts as differences
+from solver.accuracy.contrasts import TOLD, Off
+from solver.accuracy.error_estimate import DEFAULT, FINENESS, coarsest_for, finer_than
+from solver.accuracy.measured_effects import COARSE, Answers, measured
+from solver.accuracy.residual_overstress import with_held
+from solver.contact.law import STEEP
+from solver.equilibrium.expected_depth import expected_depth
+from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.load_path import March
+from solver.failures import NotConverged, SolveFailure
+from solver.prediction import Prediction
+from solver.progress import tell
+from solver.response import small_solution
+from solver.response.small_solution import Answer, Fingers, Progress, Watch
+from solver.scene import Scene
+
+KNOWN = 0.03  # of a limit of friction, to which it is known
+WORTH = 0.1  # error estimate up to which a coarser mesh's number near a limit is worth more than the limit alone
+NEAR_LIMIT = "That mesh ends settled sliding at mu = {:.3g}, which is known to {:.0f} %: this state may lie beyond."
+MISSES = "The finest mesh leaves an error estimate above the tolerance asked for."
+STAYS = "Where the cut meets the bone tissue is squeezed so far that no mesh meets the tolerance asked for."
+UNKNOWN = "How far this is off is not known, since a coarser mesh has no such state: ask for less friction or depth."
+FINEST_HAS = 0.5  # of an error that meshes have in common, the part that is there on the finest of them too
+Rough = Callable[[Prediction], None]  # told an answer before more is made of it: what there is, should work be stopped
+
+
+def solve(
+    scene: Scene, progress: Progress | None = None, *, rough: Rough | None = None, in_loops: bool = False
+) -> Prediction:
+    """Return the prediction of one scene; `rough` and `in_loops` as in `answers`.
+
+    Raises NoSteadyState where the scene has no settled sliding, NotConverged where none was found, SceneError where
+    its finger cannot be meshed, Cancelled where `progress` says so.
+    """
+    return solve_together((scene,), progress, rough=rough, in_loops=in_loops)[0]
+
+
+def solve_together(
+    scenes: Sequence[Scene],
+    progress: Progress | None = None,
+    *,
+    rough: Rough | None = None,
+    in_loops: bool = False,
+) -> tuple[Prediction, ...]:
+    """Return the predictions of several scenes, in their order; `rough` and `in_loops` as in `answers`.
+
+    Scenes with the same finger, materials and receptor share one mesh, fine enough for the strictest tolerance among
+    them, so that differences between them are more accurate than each of them; at finite strain those do that are
+    pressed alike, its lines moved to the edges of contact of each. It is also so fine that differences between those
+    pressed alike are good to 5 % of their range, as estimated, in SED and, where a tolerance is asked for, in forces
+    and depth, but for variants, asked for with quick evidence; where the finest is not, a warning says by how much.
+    Raises as `solve` does.
+    """
+    done: list[Prediction] = []
+    for answer in answers(scenes, progress, rough=rough, in_loops=in_loops):
+        if isinstance(answer, SolveFailure):
+            raise answer
+        done.append(answer)
+    return tuple(done)
+
+
+def answers(
+    scenes: Sequence[Scene],
+    progress: Progress | None = None,
+    watch: Watch | None = None,
+    *,
+    rough: Rough | None = None,
+    in_loops: bool = False,
+) -> tuple[Prediction | SolveFailure, ...]:
+    """Return the prediction of each scene or why it has none, as `solve_together` does.
+
+    With `in_loops` small strain is solved by compiled loops, as finite strain always is: to round-off the same, and
+    what a process should ask for that solves again and again. To load them takes longer than one solve without them.
+
+    At small strain `watch` is told each answer, by the position of its scene, as soon as it is found, with the finger
+    and the way that led to it; where another mesh is needed it is told once more. `rough` is told the answers that a
+    tolerance sends to a finer mesh, or that await their evidence. Raises SceneError where a finger cannot be meshed,
+    Cancelled where `progress` says so.
+    """
+    known: dict[int, tuple[Answer, Answer]] = {}  # what was told is not looked into again
+
+    def evident(answer: Answer) -> Answer:
+        if id(answer) not in known:
+            if rough is not None and isinstance(answer, Prediction):
+                rough(answer)
+            known[id(answer)] = answer, _with_evidence(answer, progress, in_loops)
+        return known[id(answer)][1]
+
+    def seen(number: int, answer: Answer, finger: FingerModel, way: March | None) -> None:
+        assert watch is not None
+        watch(number, evident(answer), finger, way)
+
+    found = _answers(scenes, progress, seen if watch else None, rough, in_loops=in_loops)
+    return tuple(evident(answer) for answer in found)
+
+
+def _answers(
+    scenes: Sequence[Scene],
+    progress: Progress | None = None,
+    watch: Watch | None = None,
+    rough: Rough | None = None,
+    *,
+    in_loops: bool,
+) -> tuple[Answer, ...]:
+    """Do the same, evidence as far as it comes with the answers."""
+    out: dict[int, Answer] = {}
+    for group in _groups(scenes):
+        found = _solve_group([scenes[i] for i in group], progress, _within(watch, group), rough, in_loops)
+        out |= dict(zip(group, found, strict=True))
+    told = {i: answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer for i, answer in out.items()}
+    return tuple(told[i] for i in range(len(scenes)))
+
+
+def _with_evidence(found: Answer, progress: Progress | None, in_loops: bool) -> Answer:
+    """Return the answer with its evidence marched, and measured where its scene asks for that."""
+    if not isinstance(found, Prediction) or found.scene.solve.evidence == "quick":
+        return found
+    tell("estimating what the model leaves out")
+    found = with_held(found, lambda: progress is not None and not progress(1.0), in_loops=in_loops)
+    found = _with_earlier_slides(found, lambda scenes: _answers(scenes, progress, in_loops=in_loops))
+    if found.scene.solve.evidence == "estimated":
+        return found
+    tell("measuring what the model leaves out")
+    return measured(found, lambda scenes: _answers(scenes, progress, in_loops=in_loops))
+
+
+def _with_earlier_slides(found: Prediction, solved: Answers) -> Prediction:
+    """Return a settled answer with a warning of every slide before that would not have settled, on a coarse mesh."""
+    before = found.scene.earlier_slides() if found.scene.solve.course == "steady" else ()
+    quick = [replace(leg, solve=replace(leg.solve, tolerance=COARSE, evidence="estimated")) for leg in before]
+    lost = [leg for leg in solved(quick) if isinstance(leg, SolveFailure)] if quick else []
+    told = (
+        f"A slide before this one, the other way, has no settled state that it could come from: {leg}" for leg in lost
+    )
+    return replace(found, warnings=(*found.warnings, *told))
+
+
+def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
+    groups: dict[object, list[int]] = {}
+    for number, scene in enumerate(scenes):
+        groups.setdefault((scene.solve.kinematics, scene.finger, scene.materials, scene.receptor), []).append(number)
+    return list(groups.values())
+
+
+def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
+    """Return what is told of a group's scenes by their positions in it."""
+    if watch is None:
+        return None
+    return lambda number, answer, finger, way: watch(group[number], answer, finger, way)
+
+
+def _solve_group(
+    scenes: list[Scene], progress: Progress | None, watch: Watch | None, rough: Rough | None, in_loops: bool
+) -> list[Answer]:
+    """Solve scenes that share a mesh on the coarsest that does."""
+    asked = [s.solve.tolerance for s in scenes if s.solve.tolerance is not None]
+    kind = scenes[0].solve.kinematics
+    depth = max(expected_depth(scene, in_loops=in_loops) for scene in scenes)
+    fineness: float = coarsest_for(scenes[0].driven(depth), min(asked)) if asked else DEFAULT[kind]
+    on_mesh = _Meshing(depth, progress, Fingers(scenes[0], in_loops=in_loops))
+    marched = kind == "small" and any(scene.solve.course == "history" for scene in scenes)
+    if marched and (asked or differences.together(scenes)):
+        return _marched(scenes, fineness, on_mesh, watch)
+    found = _refined(scenes, fineness, on_mesh, watch, rough)
+    return [_saying(answer, told) for answer, told in zip(found.answers, found.told, strict=True)]
+
+
+def _marched(scenes: list[Scene], fineness: float, on_mesh: "_Meshing", watch: Watch | None) -> list[Answer]:
+    """March courses on the mesh that their settled ends ask for, so that each is marched, and told, once.
+
+    What is to be said of an end is said of its course.
+    """
+    ends = [replace(scene, solve=replace(scene.solve, course="steady")) for scene in scenes]
+    ended = _refined(ends, fineness, on_mesh, None, None)
+    out: dict[int, Answer] = {}
+
+    def noted(number: int, answer: Answer, finger: FingerModel, way: March | None) -> None:
+        out[number] = _saying(answer, ended.told[number])
+        if watch is not None:
+            watch(number, out[number], finger, way)
+
+    found = on_mesh(scenes, ended.fineness, noted)
+    return [out.get(number, answer) for number, answer in enumerate(found)]
+
+
+@dataclass(frozen=True, slots=True)
+class _Refined:
+    """What was found of scenes that share a mesh."""
+
+    answers: list[Answer]
+    told: list[tuple[str, ...]]  # of each, sentences about what the finest mesh has left undone
+    fineness: float  # of the last mesh
+
+
+def _refined(
+    scenes: list[Scene], fineness: float, on_mesh: "_Meshing", watch: Watch | None, rough: Rough | None
+) -> _Refined:
+    """Refine until every estimate is known and meets its tolerance and surfaces are told apart, or no mesh is finer.
+
+    Scenes that share a mesh are solved again together on the finer one. Where that has no answer, the coarser mesh's
+    is told if it `_stands`.
+    """
+    surfaces = differences.together(scenes)
+    first, kind = fineness, scenes[0].solve.kinematics
+    found: dict[int, Answer] = {}
+    lost: dict[int, SolveFailure] = {}  # what finer meshes made of those told as a coarser one has them
+    todo = list(range(len(scenes)))
+    while True:
+        solved = on_mesh([scenes[i] for i in todo], fineness, watch)
+        for i, answer in zip(todo, solved, strict=True):
+            coarser = found.get(i)
+            if isinstance(answer, SolveFailure) and coarser is not None and _stands(coarser, answer):
+                lost[i] = answer
+            else:
+                found[i] = answer
+        missed = [i not in lost and _misses(found[i]) for i in range(len(scenes))]
+        mended = [one and not _stays(found[i]) for i, one in enumerate(missed)]
+        apart = [
+            differences.off([one for i in together if isinstance(one := found[i], Prediction)]) for together in surfaces
+        ]
+        alike = {i for together, off in zip(surfaces, apart, strict=True) if off.share > TOLD for i in together}
+        finer = finer_than(scenes[0].driven(on_mesh.depth), fineness) if any(mended) or alike else []
+        if not finer:
+            break
+        for answer in found.values():
+            if rough is not None and isinstance(answer, Prediction):
+                rough(answer)
+        fineness = differences.finer(finer, fineness, max((off.share for off in apart), default=0.0))
+        if kind == "finite":
+            again = {scenes[i].pressed for i in todo if mended[i] or i in alike}
+            todo = [i for i in todo if scenes[i].pressed in again]
+    if kind == "finite":  # where a fine mesh may lose its way
+        lost |= _fallen_back(scenes, found, first, on_mesh)
+    of = {i: off for together, off in zip(surfaces, apart, strict=True) for i in together}
+    left = [_left(found[i]) if missed[i] else "" for i in range(len(scenes))]
+    told = [_undone(of.get(i), left[i], lost.get(i)) for i in range(len(scenes))]
+    return _Refined([found[i] for i in range(len(scenes))], told, fineness)
+
+
+def _fallen_back(
+    scenes: list[Scene], found: dict[int, Answer], first: float, on_mesh: "_Meshing"
+) -> dict[int, SolveFailure]:
+    """Put answers of coarser meshes in place of what the `first` mesh has none of; return what that made of them.
+
+    Where friction is steep any one mesh may have no state, and the next finer one is asked at last.
+    """
+    lost: dict[int, SolveFailure] = {}
+    for i, scene in enumerate(scenes):
+        coarser = [n for n in FINENESS["finite"] if n < first]
+        while coarser and isinstance(failure := found[i], SolveFailure) and _doubtful(scene, failure):
+            answer = on_mesh([scene], coarser.pop(), None)[0]
+            if _stands(answer, failure):
+                found[i], lost[i] = answer, failure
+        finer = [n for n in FINENESS["finite"] if n > first]
+        if finer and isinstance(found[i], NotConverged) and scene.friction.mu > STEEP:
+            found[i] = on_mesh([scene], finer[0], None)[0]
+    return lost
+
+
+def _doubtful(scene: Scene, failure: SolveFailure) -> bool:
+    """Return whether there may be a state nevertheless: none was found, or the limit is as near as limits are known."""
+    if isinstance(failure, NotConverged):
+        return True
+    limit = failure.limit_mu
+    return limit is not None and float(scene.friction.mu) <= (1.0 + KNOWN) * limit
+
+
+def _stands(coarser: Answer, failure: SolveFailure) -> bool:
+    """Return whether the answer of a coarser mesh is told where a finer one has none.
+
+    Where the finer one is sure that there is none it is not; nor near a limit at which numbers grow so that the coarser
+    mesh knows little of them: then the limit is told.
+    """
+    if not isinstance(coarser, Prediction) or not _doubtful(coarser.scene, failure):
+        return False
+    return isinstance(failure, NotConverged) or coarser.error_estimate <= WORTH
+
+
+def _undone(off: Off | None, misses: str, lost: SolveFailure | None) -> tuple[str, ...]:
+    """Return what is to be said of an answer for what the finest mesh has left undone."""
+    told: list[str] = []
+    if lost is not None:
+        told.append("A finer mesh did not find this state; told is the coarser one's, with its own error estimate.")
+        if lost.limit_mu is not None:
+            told.append(NEAR_LIMIT.format(lost.limit_mu, 100.0 * KNOWN))
+    if misses:
+        told.append(misses)
+    if off is not None and off.warning:
+        told.append(off.warning)
+    return tuple(told)
+
+
+def _saying(answer: Answer, told: tuple[str, ...]) -> Answer:
+    """Return the answer with more warnings."""
+    return replace(answer, warnings=(*answer.warnings, *told)) if told and isinstance(answer, Prediction) else answer
+
+
+@dataclass(frozen=True, slots=True)
+class _Meshing:
+    """Solves scenes of one finger on meshes made for it."""
+
+    depth: float  # that they reach, or about [mm]
+    progress: Progress | None
+    fingers: Fingers
+
+    def __call__(self, scenes: list[Scene], fineness: float, watch: Watch | None) -> list[Answer]:
+        """Return the answers on meshes of that fineness."""
+        if scenes[0].solve.kinematics == "finite":
+            # Imported here: small strain, the default, need not wait for the compiled loops to be loaded.
+            from solver.response.finite_solution import answers as finite_answers
+
+            return finite_answers(scenes, self.depth, fineness, self.progress)
+        return small_solution.answers(scenes, self.depth, fineness, self.progress, watch, self.fingers)
+
+
+def _misses(answer: Answer) -> bool:
+    """Return whether an answer has not met the tolerance of its scene, or where none is asked has no estimate."""
+    if not isinstance(answer, Prediction):
+        return False
+    asked = answer.scene.solve.tolerance
+    return answer.error_estimate > asked if asked is not None else answer.error_estimate >= 1.0
+
+
+def _left(answer: Answer) -> str:
+    """Return what is to be said of an answer that misses."""
+    if isinstance(answer, Prediction) and answer.error_estimate >= 1.0:
+        return UNKNOWN
+    return STAYS if _stays(answer) else MISSES
+
+
+def _stays(answer: Answer) -> bool:
+    """Return whether what meshes of all finenesses have in common is above the tolerance of an answer's scene."""
+    if not isinstance(answer, Prediction) or answer.scene.solve.tolerance is None:
+        return False
+    return FINEST_HAS * answer.error_stays > answer.scene.solve.tolerance

@@ -1,0 +1,33 @@
+"""The scene: its tables and their checks, the published finger and its ten surfaces."""
+
+from solver.scene.scene import (
+    SHALLOW,
+    TISSUES,
+    Finger,
+    Friction,
+    Loading,
+    Material,
+    Materials,
+    Receptor,
+    Relaxation,
+    Scene,
+    SceneError,
+    Slide,
+    Solve,
+)
+
+__all__ = [
+    "SHALLOW",
+    "TISSUES",
+    "Finger",
+    "Friction",
+    "Loading",
+    "Material",
+    "Materials",
+    "Receptor",
+    "Relaxation",
+    "Scene",
+    "SceneError",
+    "Slide",
+    "Solve",
+]

@@ -1,0 +1,316 @@
+"""The tables of a scene: finger, materials, friction, loading, receptor, solve; each checks itself when made.
+
+Field names are the keys of a scene file. Lengths in mm, stresses in MPa, angles in degrees. In the finger's own frame
+X points distally along the finger axis, -Y is palmar, and the origin is the centre of the tip's arc.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from solver.constitutive.hyperelastic import STIFFENING
+
+Slide = Literal["+x", "-x", "none"]
+Law = Literal["hooke", "neo-hookean", "ogden"]
+TISSUES = ("epidermis", "dermis", "fat", "bone")  # in the order of the mesh's regions
+SHALLOW = 1e-6  # least indentation [mm]: below, round-off is as large as what there is to find
+FEEBLE = 1e-12  # least friction that is not none [-, MPa]: below, round-off is as large as the drag
+LAWS_OF = {"small": ("hooke",), "finite": ("neo-hookean", "ogden")}  # that each kinematics has
+
+
+class SceneError(ValueError):
+    """A scene that cannot be run as it stands: the key, its value, and what is allowed."""
+
+    def __init__(self, key: str, value: object, allowed: str) -> None:
+        """Name the dotted `key`, the `value` found there, and what is `allowed`."""
+        super().__init__(f"{key} = {value!r} is not allowed: {allowed}.")
+        self.key = key
+        self.value = value
+        self.allowed = allowed
+
+
+def _within(key: str, value: float, low: float, high: float, unit: str = "", *, zero: bool = False) -> None:
+    """Raise SceneError unless low <= value <= high (nan is never within); `zero` says that 0 is allowed beside."""
+    if not low <= value <= high:
+        allowed = f"it must {'be 0 or ' if zero else ''}lie between {low:g} and {high:g}{unit and ' ' + unit}"
+        raise SceneError(key, value, allowed)
+
+
+@dataclass(frozen=True, slots=True)
+class Finger:
+    """Outline of the finger: a half-disc tip, straight edges back to the cut, two layers of skin, a bone."""
+
+    tip_radius: float = 5.0  # of the skin's outline [mm]
+    epidermis: float = 0.75  # thickness [mm]
+    dermis: float = 1.25  # thickness [mm]
+    shaft_length: float = 15.0  # from the centre of the tip's arc back to the cut [mm]
+    bone_radius: float = 1.5  # [mm]
+    bone_centre: tuple[float, float] = (-1.0, 0.75)  # centre of the bone's arc, finger frame [mm]
+    contact_angle: float = 45.0  # between finger axis and surface, tip down [degrees]
+    width: float = 15.0  # used only where forces in N meet forces per mm [mm]; assumed
+    bone: Literal["rigid", "meshed"] = "rigid"  # "meshed": of its own material, driven at its core
+    cut: Literal["free", "driven"] = "free"  # "driven": the cut through the soft tissues moves with the bone
+    nail_length: float = 0.0  # of a nail plate fixed to the bone, on the dorsal skin back from the tip's arc [mm]
+
+    def __post_init__(self) -> None:
+        """Check ranges, and that some fat is left between dermis and bone everywhere."""
+        _within("finger.tip_radius", self.tip_radius, 0.5, 50.0, "mm")
+        for name in ("epidermis", "dermis"):
+            _within(f"finger.{name}", getattr(self, name), 0.01 * self.tip_radius, 0.8 * self.tip_radius, "mm")
+        _within("finger.shaft_length", self.shaft_length, self.tip_radius, 20.0 * self.tip_radius, "mm")
+        _within("finger.bone_radius", self.bone_radius, 0.05 * self.tip_radius, 0.9 * self.tip_radius, "mm")
+        if len(self.bone_centre) != 2 or not all(math.isfinite(c) for c in self.bone_centre):
+            raise SceneError("finger.bone_centre", self.bone_centre, "it must be two finite lengths in mm")
+        _within("finger.bone_centre[0]", self.bone_centre[0], -0.8 * self.shaft_length, self.tip_radius, "mm")
+        _within("finger.contact_angle", self.contact_angle, 10.0, 90.0, "degrees")
+        _within("finger.width", self.width, 0.1, 1000.0, "mm")
+        if self.bone not in ("rigid", "meshed"):
+            raise SceneError("finger.bone", self.bone, 'it must be "rigid" or "meshed"')
+        if self.cut not in ("free", "driven"):
+            raise SceneError("finger.cut", self.cut, 'it must be "free" or "driven"')
+        if self.nail_length != 0.0:
+            _within("finger.nail_length", self.nail_length, 0.1 * self.tip_radius, 0.95 * self.shaft_length, "mm")
+        least = 0.02 * self.tip_radius
+        if not self.fat_thickness() >= least:
+            raise SceneError(
+                "finger.bone_centre",
+                self.bone_centre,
+                f"bone and dermis must leave at least {least:g} mm of fat between them, and they leave "
+                f"{self.fat_thickness():.3g} mm",
+            )
+
+    @property
+    def core_radius(self) -> float:
+        """Radius of the inner side of the dermis [mm]."""
+        return self.tip_radius - self.epidermis - self.dermis
+
+    def fat_thickness(self) -> float:
+        """Return the least distance from bone to dermis [mm]; negative where the bone sticks out of the fat.
+
+        The reference finger's bone is nearest to the dermis along its dorsal edge:
+
+        >>> Finger().fat_thickness()
+        0.75
+        """
+        x, y = self.bone_centre
+        beside = self.core_radius - abs(y) - self.bone_radius
+        if x <= 0.0:  # the end of the bone may still reach past the centre of the tip
+            angles = [math.radians(a) for a in range(-90, 91, 2)]
+            ahead = [(x + self.bone_radius * math.cos(a), y + self.bone_radius * math.sin(a)) for a in angles]
+            reach = max((math.hypot(*p) for p in ahead if p[0] > 0.0), default=0.0)
+            return min(beside, self.core_radius - reach)
+        return min(beside, self.core_radius - math.hypot(x, y) - self.bone_radius)
+
+    def pulp_thickness(self) -> float:
+        """Return the distance from the point of first touch to the end of the bone [mm].
+
+        >>> round(Finger().pulp_thickness(), 3)
+        4.74
+        """
+        angle = math.radians(self.contact_angle)
+        x, y = self.tip_radius * math.sin(angle), -self.tip_radius * math.cos(angle)
+        return math.hypot(x - self.bone_centre[0], y - self.bone_centre[1]) - self.bone_radius
+
+
+@dataclass(frozen=True, slots=True)
+class Relaxation:
+    """One term of a Prony series: this part of the shear modulus relaxes with this time."""
+
+    g: float  # by the modulus at once [-]
+    tau: float  # [s]
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """An isotropic tissue."""
+
+    E: float  # Young's modulus, of the undeformed tissue, at once [MPa]
+    nu: float  # Poisson's ratio, likewise [-]
+    law: Law | None = None  # None: Hooke at small strain, neo-Hookean at finite strain
+    stiffening: float | None = None  # exponent of Ogden's law [-]; None: that of human skin
+    prony: tuple[Relaxation, ...] = ()  # of the shear modulus; the bulk modulus does not relax
+
+    def check(self, key: str) -> None:
+        """Raise SceneError where a value is not allowed; `key` is how the scene calls the tissue."""
+        _within(f"{key}.E", self.E, 1e-6, 1e12, "MPa")
+        if not 0.0 <= self.nu <= 0.4999999:
+            why = ", since at 0.5 a material has no strain energy of volume change to compute" if self.nu > 0.0 else ""
+            raise SceneError(f"{key}.nu", self.nu, f"it must lie between 0 and 0.4999999{why}")
+        if self.law not in (None, "hooke", "neo-hookean", "ogden"):
+            raise SceneError(f"{key}.law", self.law, 'it must be "hooke", "neo-hookean" or "ogden"')
+        if self.stiffening is not None and self.law != "ogden":
+            raise SceneError(f"{key}.stiffening", self.stiffening, 'it belongs to law = "ogden"')
+        if self.stiffening is not None:
+            _within(f"{key}.stiffening", self.stiffening, *STIFFENING)
+        for number, term in enumerate(self.prony):
+            _within(f"{key}.prony[{number}].g", term.g, 0.0, 0.99)
+            _within(f"{key}.prony[{number}].tau", term.tau, 1e-6, 1e6, "s")
+        if not sum(term.g for term in self.prony) <= 0.99:
+            raise SceneError(f"{key}.prony", [term.g for term in self.prony], "all g together must stay below 0.99")
+
+
+@dataclass(frozen=True, slots=True)
+class Materials:
+    """The four tissues; defaults are the paper's Table 3 (after Maeno et al. 1998)."""
+
+    epidermis: Material = Material(0.136, 0.48)
+    dermis: Material = Material(0.08, 0.48)
+    fat: Material = Material(0.034, 0.48)
+    bone: Material = Material(200.0, 0.3)
+
+    def __post_init__(self) -> None:
+        """Check each tissue: here, where it has a name."""
+        for name in TISSUES:
+            self.of(name).check(f"materials.{name}")
+
+    def of(self, name: str) -> Material:
+        """Return the tissue called `name`, one of TISSUES."""
+        return {"epidermis": self.epidermis, "dermis": self.dermis, "fat": self.fat, "bone": self.bone}[name]
+
+    @property
+    def by_region(self) -> tuple[Material, ...]:
+        """The tissues in the order in which the mesh numbers its regions."""
+        return tuple(self.of(name) for name in TISSUES)
+
+    @property
+    def longest_relaxation(self) -> float:
+        """The longest relaxation time of any tissue [s], 0 where none relaxes."""
+        return max((term.tau for tissue in self.by_region for term in tissue.prony), default=0.0)
+
+    @property
+    def longest_creep(self) -> float:
+        """In how long a held load deforms the slowest tissue, at most [s]: the less stays, the slower it yields.
+
+        For one term of a series tau / (1 - g) exactly (the retardation time of Zener's solid: Findley, Lai and Onaran
+        1976, chapter 5); for several none is longer than the longest tau by what stays.
+        """
+        series = [tissue.prony for tissue in self.by_region if tissue.prony]
+        return max((max(t.tau for t in terms) / (1.0 - sum(t.g for t in terms)) for terms in series), default=0.0)
+
+    @property
+    def relax(self) -> bool:
+        """Whether any of the tissues relaxes."""
+        return self.longest_relaxation > 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Friction:
+    """Coulomb friction whose traction never exceeds a bound: |t| <= min(mu p, tau_max)."""
+
+    mu: float  # coefficient of friction [-]
+    tau_max: float | None = None  # traction bound [MPa]; None: there is none
+
+    def __post_init__(self) -> None:
+        """Check ranges."""
+        if self.mu != 0.0:
+            _within("friction.mu", self.mu, FEEBLE, 1000.0, zero=True)
+        if self.tau_max is not None and self.tau_max != 0.0:
+            _within("friction.tau_max", self.tau_max, FEEBLE, 1e12, "MPa", zero=True)
+
+    @property
+    def cap(self) -> float:
+        """The traction bound [MPa], infinite where there is none."""
+        return math.inf if self.tau_max is None else self.tau_max
+
+
+@dataclass(frozen=True, slots=True)
+class Loading:
+    """How the bone is driven: down within 1 s, by an indentation or a force, then along the surface.
+
+    Instead of a slide until nothing changes, a drag can be given: after the press it grows within 1 s, and how far the
+    bone shifts is found.
+    """
+
+    indentation: float | None = None  # [mm]; left out where a normal force is given
+    slide: Slide | tuple[Literal["+x", "-x"], ...] = "+x"  # "+x": proximal to distal; several: one after the other
+    speed: float = 15.0  # [mm/s]; rescales time and nothing else in an elastic finger
+    normal_force: float | None = None  # in place of the indentation
+    tangential_force: float | None = None  # in place of sliding on: a drag opposing the slide, positive
+    force_unit: Literal["N/mm", "N"] = "N/mm"  # of both forces; "N": of the whole finger, by its width
+
+    def __post_init__(self) -> None:
+        """Check ranges, and that depth or force says how far the bone goes down, and one thing only."""
+        if (self.indentation is None) == (self.normal_force is None):
+            allowed = "give either an indentation or a normal force"
+            raise SceneError("loading.indentation", self.indentation, allowed)
+        if self.indentation is not None:
+            _within("loading.indentation", self.indentation, SHALLOW, 200.0, "mm")
+        if self.normal_force is not None:
+            _within("loading.normal_force", self.normal_force, 1e-9, 1e6)
+        if self.force_unit not in ("N/mm", "N"):
+            raise SceneError("loading.force_unit", self.force_unit, 'it must be "N/mm" or "N"')
+        way = self.slide if isinstance(self.slide, tuple) else (self.slide,)
+        single = ("+x", "-x", "none") if len(way) == 1 else ("+x", "-x")
+        if not way or any(leg not in single for leg in way):
+            allowed = 'it must be "+x", "-x" or "none", or a list of "+x" and "-x"'
+            raise SceneError("loading.slide", self.slide, allowed)
+        _within("loading.speed", self.speed, 1e-6, 1e4, "mm/s")
+        if self.tangential_force is not None:
+            _within("loading.tangential_force", self.tangential_force, 0.0, 1e6)
+            if self.indentation is not None:
+                allowed = "it needs a normal force, not an indentation"
+                raise SceneError("loading.tangential_force", self.tangential_force, allowed)
+            if self.slide not in ("+x", "-x"):
+                raise SceneError("loading.slide", self.slide, 'with a tangential force it must be "+x" or "-x"')
+
+    @property
+    def dragged(self) -> bool:
+        """Whether a tangential force is given."""
+        return self.tangential_force is not None
+
+    @property
+    def directions(self) -> tuple[int, ...]:
+        """+1 for every slide along +x, -1 along -x, in their order; none when the bone is pressed only."""
+        way = self.slide if isinstance(self.slide, tuple) else (self.slide,)
+        return tuple({"+x": 1, "-x": -1}[leg] for leg in way if leg != "none")
+
+    @property
+    def direction(self) -> int:
+        """+1 when the bone slides along +x at last, -1 along -x, 0 when it is pressed only."""
+        return self.directions[-1] if self.directions else 0
+
+    @property
+    def depth(self) -> float:
+        """The indentation [mm] of a loading that gives one. Raises ValueError where a force is given instead."""
+        if self.indentation is None:
+            raise ValueError("a force is given: the depth must be found first")
+        return self.indentation
+
+
+@dataclass(frozen=True, slots=True)
+class Receptor:
+    """The nerve ending: a patch of tissue on the inward normal through the point of first touch."""
+
+    depth: float = 1.9  # of its middle below the skin [mm]
+    ending: tuple[float, float] = (0.2, 1.0)  # its size across and along the skin [mm]
+
+    def __post_init__(self) -> None:
+        """Check ranges."""
+        _within("receptor.depth", self.depth, 1e-3, 50.0, "mm")
+        if len(self.ending) != 2 or not all(1e-3 <= size <= 20.0 for size in self.ending):
+            raise SceneError("receptor.ending", self.ending, "it must be two lengths between 0.001 and 20 mm")
+
+
+@dataclass(frozen=True, slots=True)
+class Solve:
+    """How the scene is to be solved.
+
+    Evidence: "quick" is what comes with the answer, "estimated" marches what tissues would still hold as well,
+    "measured" solves the scene again in several ways.
+    """
+
+    kinematics: Literal["small", "finite"] = "small"  # small strain (the paper's), or finite strain
+    course: Literal["steady", "history"] = "steady"  # "steady": the settled state alone; "history": all the way to it
+    tolerance: float | None = None  # relative error asked for in the ending-averaged SED [-]; None: the solver's own
+    evidence: Literal["quick", "estimated", "measured"] = "estimated"  # that what was left out could be
+
+    def __post_init__(self) -> None:
+        """Check that we can do what is asked for."""
+        if self.kinematics not in ("small", "finite"):
+            raise SceneError("solve.kinematics", self.kinematics, 'it must be "small" or "finite"')
+        if self.course not in ("steady", "history"):
+            raise SceneError("solve.course", self.course, 'it must be "steady" or "history"')
+        if self.evidence not in ("quick", "estimated", "measured"):
+            raise SceneError("solve.evidence", self.evidence, 'it must be "quick", "estimated" or "measured"')
+        if self.tolerance is not None:
+            _within("solve.tolerance", self.tolerance, 1e-4, 0.5)
