@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
 
-.PHONY: app demo test test-long setup
+.PHONY: app demo docs test test-long setup
 demo: $(READY)
 	$(BIN)/daq-app demo
 
@@ -16,6 +16,10 @@ test: $(READY)
 
 test-long: $(READY)
 	@$(BIN)/python tests/run.py --long
+
+docs: $(READY)
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet docs docs/_build
+	@echo "The documentation is in docs/_build/index.html."
 
 setup: $(READY)
 

@@ -10,12 +10,12 @@ from pathlib import Path
 from statistics import median
 
 from benchmarks.given_session import given_session
-from sessions.analysis import analyse
-from sessions.analysis.bootstrap import intervals_of
 from sessions.prediction import PredictionOptions, predict
+from sessions.prediction.side_by_side import with_alternatives
+from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording
-from sessions.side_by_side import with_alternatives
-from sessions.uncertainty import with_intervals
+from sessions.strokes import analyse
+from sessions.strokes.bootstrap import intervals_of
 
 RUNS = 9
 

@@ -7,7 +7,7 @@ import csv
 from itertools import groupby
 from pathlib import Path
 
-from sessions.exports.figures.style import GREEN, GREY, INK, PURPLE, SKY, VERMILLION, look, sheet, svg
+from sessions.report.figures.style import GREEN, GREY, INK, PURPLE, SKY, VERMILLION, look, sheet, svg
 
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
 LOOKS = {

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from daq_app.cli import run
+from daq_app.cli.main import run
 
 WORDS = ("run", "sensotact-friction", "--device", "sim:?seed=7&rate=200", "--subject", "P01", "--headless")
 

@@ -61,7 +61,7 @@ def _alone(kinematics: str, repeats: int) -> None:
 def _beside(seconds: float) -> None:
     from daq_app.recorder.messages import Live
     from daq_app.window.live_model_process import LiveModel
-    from sessions.plan import Frame
+    from sessions.plan.plan import Frame
 
     model = LiveModel()
     model.prepare()

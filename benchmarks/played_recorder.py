@@ -7,11 +7,11 @@ import numpy as np
 from daq_app.recorder import messages as m
 from drivers.calibration import Calibration
 from drivers.transducer import Health, TransducerInfo
-from sessions import steps
-from sessions.plan import Frame
-from sessions.protocols import plan, protocol
+from sessions.plan.plan import Frame
+from sessions.plan.protocols import plan, protocol
 from sessions.recording import Acknowledged, LoggedEvent
-from sessions.runner import SessionEnd, Status
+from sessions.run import steps
+from sessions.run.runner import SessionEnd, Status
 from simulators.bench import RATED, Bench
 from simulators.stroke import Stroke
 from simulators.surface import paper_surfaces

@@ -21,8 +21,8 @@ from daq_app.recorder.messages import (
     Stop,
 )
 from drivers.clock import RealClock
-from sessions.protocols import plan, protocol
-from sessions.runner import Status
+from sessions.plan.protocols import plan, protocol
+from sessions.run.runner import Status
 from simulators.bench import Bench
 from simulators.net_ft_box import NetFtBox
 

@@ -17,7 +17,7 @@ import numpy as np
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.plan import Frame, SessionPlan
+from sessions.plan.plan import Frame, SessionPlan
 from sessions.recording import Recording, SessionWriter, provenance
 from sessions.recording.archive import problems, seal
 from sessions.recording.schema import COLUMNS

@@ -9,9 +9,9 @@ from pathlib import Path
 from statistics import median
 
 from benchmarks.given_session import given_session
-from sessions.analysis import analyse
 from sessions.recording import Recording
-from sessions.replay import different_events, different_readings, replay
+from sessions.run.replay import different_events, different_readings, replay
+from sessions.strokes import analyse
 
 RUNS = 7
 

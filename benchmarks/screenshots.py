@@ -141,7 +141,7 @@ class _Places:
     def all(self) -> None:
         """Take a picture of each place."""
         from benchmarks import played_recorder as p
-        from sessions import steps
+        from sessions.run import steps
 
         trial, second, other = p.PLAN.trials[0], p.PLAN.trials[1], p.PLAN.trials[5]
         self.play(*p.OPEN, until=3.0)

@@ -5,7 +5,7 @@ import os
 import sys
 from typing import NoReturn
 
-from daq_app.cli import STOPPED, run
+from daq_app.cli.main import STOPPED, run
 
 
 def main() -> None:

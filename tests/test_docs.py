@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from daq_app.cli import VERBS
+from daq_app.cli.main import VERBS
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]

@@ -17,7 +17,7 @@ from daq_app.accuracy.methods import PLAIN
 from daq_app.accuracy.orders import Order
 from daq_app.accuracy.speed import Speed
 from daq_app.accuracy.truth import JUDGED, NUMBERS, Truth
-from sessions.exports.figures.style import (
+from sessions.report.figures.style import (
     GREEN,
     GREY,
     INK,

@@ -10,8 +10,8 @@ from daq_app.accuracy.asked import PROCESSOR_TIME
 from daq_app.accuracy.figures import plates
 from daq_app.accuracy.measuring import Measured
 from daq_app.accuracy.tables import tables
-from sessions.exports.figures.style import Plate
-from sessions.exports.html import drawn, swap_in
+from sessions.report.figures.style import Plate
+from sessions.report.html import drawn, swap_in
 
 PAGE, DATA, FIGURES = "accuracy.html", "accuracy.json", "figures"
 # anchor, words, and the figures and tables under them, by name
@@ -33,7 +33,7 @@ def page(found: Measured, figures: Mapping[str, Plate] | None = None) -> str:
     """Return the page: no script, nothing asked of any network; `figures` where they are drawn already."""
     figures, listed = plates(found) if figures is None else figures, tables(found)
     environment = Environment(
-        loader=ChoiceLoader([PackageLoader("daq_app.accuracy", "."), PackageLoader("sessions.exports", ".")]),
+        loader=ChoiceLoader([PackageLoader("daq_app.accuracy", "."), PackageLoader("sessions.exchange", ".")]),
         autoescape=select_autoescape(default=True, default_for_string=True),
         trim_blocks=True,
         lstrip_blocks=True,

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from daq_app.analyst.messages import EDGES, Edge
-from sessions.decisions import Decision, Decisions
 from sessions.report.contents import StrokeFinding
+from sessions.strokes.decisions import Decision, Decisions
 
 APART = 0.02  # edges keep so far from each other [s]
 STEP, LEAP = 0.005, 0.05  # a key moves an edge by so much [s]

@@ -165,7 +165,7 @@ class Compare:
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """Asks for a file: "report", one of `sessions.exports.FORMATS`, or "picture NAME" of what `pictures` names."""
+    """Asks for a file: "report", one of `sessions.exchange.FORMATS`, or "picture NAME" of what `pictures` names."""
 
     what: str
     path: str

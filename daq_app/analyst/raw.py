@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.readings import ReadingBlock
-from sessions.analysis.forces import in_face_frame
 from sessions.recording import Recording
 from sessions.recording.schema import LIVE_FILE, SEALED_FILE
 from sessions.report.contents import StrokeFinding
+from sessions.strokes.forces import in_face_frame
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]

@@ -12,24 +12,24 @@ from daq_app.analyst.compared import NAMES, compared
 from daq_app.analyst.edges import brought_back, decision_meant, decision_of, taken_back
 from daq_app.analyst.pictures import field_at, film_of, finger_of, lost_film
 from daq_app.analyst.raw import RawFile
-from daq_app.derived import analysis_document, settings_kept
-from sessions.analysis import analyse
-from sessions.blinding import revealed
-from sessions.decisions import DecisionError, append, read
-from sessions.exports import ExportError, ExportSource, export
-from sessions.plan import Blinded
+from daq_app.batch.derived import analysis_document, settings_kept
+from sessions.exchange import ExportError, ExportSource, export
+from sessions.plan.blinding import revealed
+from sessions.plan.plan import Blinded
 from sessions.prediction import TrialPrediction, Way, predict
+from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording, RecordingError
 from sessions.recording.provenance import software_versions
 from sessions.report import Field, Report, findings
 from sessions.report.predictions import field_of, finding_of
-from sessions.uncertainty import with_intervals
+from sessions.strokes import analyse
+from sessions.strokes.decisions import DecisionError, append, read
 from solver.failures import Cancelled
 from solver.response.fields import Sketch
 from solver.scene import SceneError
 
 if TYPE_CHECKING:
-    from sessions.exports.figures import Panel
+    from sessions.report.figures import Panel
 
 Say = Callable[[m.Said], None]
 Urgent = Callable[[], bool]  # whether what is being done must be left for something else
@@ -158,9 +158,9 @@ class Work:
 
     def _panel(self, name: str) -> "tuple[Panel | None, bytes]":
         """Return a picture and its PNG; `shown.session_pictures` tells those of the session."""
-        from sessions.exports.figures import picture  # slow to load, and many never look at one
-        from sessions.exports.figures.finger import common_levels, finger_panels
-        from sessions.exports.figures.style import in_pixels, look
+        from sessions.report.figures import picture  # slow to load, and many never look at one
+        from sessions.report.figures.finger import common_levels, finger_panels
+        from sessions.report.figures.style import in_pixels, look
 
         what, _, of = name.partition(" ")
         report = self._report
@@ -195,8 +195,8 @@ class Work:
         return field_at(finding.experiment, finding.index, film.film, int(step))
 
     def _compared_panel(self) -> "Panel | None":
-        from sessions.exports.figures.compared import compared_panel
-        from sessions.exports.figures.style import look
+        from sessions.report.figures.compared import compared_panel
+        from sessions.report.figures.style import look
 
         other = self._other
         if other is None:
@@ -257,7 +257,7 @@ class Work:
             self.go_on()
         assert self._prediction is not None  # it was just made
         if asked.what == "report":
-            from sessions.exports import html
+            from sessions.report import html
 
             told = self.timed("carrying the uncertainty of friction through")
             with_them = replace(self._prediction, options=replace(self._prediction.options, intervals=True))
@@ -277,8 +277,8 @@ class Work:
         return str(export(source, asked.what, path, shown))
 
     def _write_picture(self, name: str, path: Path) -> str:
-        from sessions.exports.html import panel_csv, swap_in
-        from sessions.recording.whole_file import write_whole
+        from sessions.recording.atomic_file import write_whole
+        from sessions.report.html import panel_csv, swap_in
 
         self._say(m.Step(0.0, f"writing {path.name}"))
         panel, png = self._panel(name)
@@ -316,7 +316,7 @@ def sentence_of(error: Exception) -> str:
         NothingToShow,
     )
     with suppress(ImportError):
-        from sessions.exports.html import ReportError
+        from sessions.report.html import ReportError
 
         known = (*known, ReportError)
     return str(error) if isinstance(error, known) else f"{type(error).__name__}: {error}"

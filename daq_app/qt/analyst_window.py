@@ -30,7 +30,7 @@ from daq_app.qt.parts import Shortened, button, choice, label, panel
 from daq_app.qt.stroke_column import StrokeColumn
 from daq_app.qt.tokens import GRID, Tokens, font_scale
 from daq_app.qt.trials_column import TrialsColumn
-from sessions.exports import FORMATS
+from sessions.exchange import FORMATS
 
 LOOK = 30  # between two looks at the work [ms]
 LEAST = (480, 320)  # the window can be made as small as that [px]

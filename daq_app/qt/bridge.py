@@ -9,8 +9,8 @@ from typing import Protocol
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from daq_app.life import life_of
 from daq_app.recorder import messages as m
+from daq_app.recorder.device_history import life_of
 from daq_app.recorder.messages import REQUESTS, Report, Request
 from daq_app.window.bench_load import Load
 from daq_app.window.live_feed import LiveFeed, together
@@ -20,7 +20,7 @@ from daq_app.window.messages import DrawingFailed, Judged, LifeKnown, Loaded, Me
 from daq_app.window.state import AppState, fold
 from daq_app.window.take_watch import Judge
 from daq_app.window.view import View, derive_view
-from sessions.plan import Frame
+from sessions.plan.plan import Frame
 
 FRAME = 16  # between two looks at the recorder [ms]: 60 a second
 AFTER_OPENING = 1500  # what is not needed at once waits until the window stands [ms]

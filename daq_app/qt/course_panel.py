@@ -21,7 +21,7 @@ from daq_app.qt.parts import button, label, say
 from daq_app.qt.tokens import GRID, TARGET, Tokens
 from daq_app.window.messages import Message
 from daq_app.window.view_course import Button, CourseView, PlanRow
-from sessions import steps
+from sessions.run import steps
 
 QUESTIONS = {
     "redo": "Why is it done again?",

@@ -11,8 +11,8 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QWidget
 from daq_app.qt.parts import button
 from daq_app.qt.tokens import GRID
 from daq_app.window.answer import Choice
-from sessions.plan import Hand
-from sessions.steps import Event
+from sessions.plan.plan import Hand
+from sessions.run.steps import Event
 
 Which = Literal["first", "second"]
 LARGE = 36  # type of the number [device-independent pixels]

@@ -25,8 +25,8 @@ from daq_app.qt.tokens import GRID, TARGET
 from daq_app.recorder.messages import ResumeSession
 from daq_app.window.messages import Message
 from daq_app.window.new_session import AXES, Bench, SessionForm, Unfinished, enrolled, enrolment, offered
-from sessions.plan import Hand
-from sessions.protocols import protocol_names
+from sessions.plan.plan import Hand
+from sessions.plan.protocols import protocol_names
 
 HANDS: tuple[tuple[str, Hand | None], ...] = (("not stated", None), ("right", "right"), ("left", "left"))
 

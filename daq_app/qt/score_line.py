@@ -17,8 +17,8 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from daq_app.qt.tokens import Tokens
 from daq_app.window.answer import LEAP, STEP, Answer, Device
-from sessions.plan import Hand
-from sessions.steps import Scored
+from sessions.plan.plan import Hand
+from sessions.run.steps import Scored
 
 LENGTH = 100.0  # of the line [mm]
 REACH = 12.0  # above and below the line that counts as touching it [mm]

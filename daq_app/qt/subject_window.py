@@ -14,7 +14,7 @@ from daq_app.qt.score_line import ScoreLine
 from daq_app.qt.screens import Millimetres, millimetres
 from daq_app.qt.tokens import GRID, Tokens, font
 from daq_app.window.view_subject import SubjectView
-from sessions.plan import Hand
+from sessions.plan.plan import Hand
 
 LARGE, LARGER = 24, 36  # type that is read from where a hand rests on a transducer
 WIDEST = 1100  # row of the button

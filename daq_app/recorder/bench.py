@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from daq_app.life import remember_zero
+from daq_app.recorder.device_history import remember_zero
 from daq_app.recorder.display import Display, six
 from daq_app.recorder.messages import Device, Failed, LinkBack, LinkDown, NoDevice, Report, Tared
-from daq_app.wiring import Connected, connected
+from daq_app.simulation.wiring import Connected, connected
 from drivers.clock import Clock
 from drivers.readings import ReadingBlock
 from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, Transducer, TransducerInfo
-from sessions.analysis.onset import DetectorSettings, is_quiet
-from sessions.interruptions import interruptions
 from sessions.recording import RecordingError
-from sessions.resuming import check_same_transducer
+from sessions.run.interruptions import interruptions
+from sessions.run.resuming import check_same_transducer
+from sessions.strokes.onset import DetectorSettings, is_quiet
 
 TRY_AGAIN = 1.0  # between two attempts to reach a transducer that was lost [real s]
 GLANCE = 0.01  # between two looks while no session runs [real s]

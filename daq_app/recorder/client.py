@@ -6,14 +6,14 @@
         recorder.send(StartSession(plan, "recordings/P07", People("simulated hand", 7)))
         for report in recorder.poll(0.05):                 # waits so long for the first; () when none came
             match report:
-                case AskMount(trial): ...                  # a command of sessions.steps: ask the experimenter
+                case AskMount(trial): ...                  # a command of sessions.run.steps: ask the experimenter
                 case LoggedEvent(): ...                    # written down and safe: the course so far
                 case Status(safe=safe): ...                # the recording lamp: what the disk has acknowledged
                 case SessionEnded(folder, end): ...        # its end is written; Sealing and Sealed follow
                 case Gone(asked, sentence): ...            # always the last report
-        recorder.send(StimulusMounted("K31"))              # an event of sessions.steps: what somebody did
+        recorder.send(StimulusMounted("K31"))              # an event of sessions.run.steps: what somebody did
 
-Requests and reports are the dataclasses of `messages.py`, the events and commands of `sessions.steps`, `LoggedEvent`
+Requests and reports are the dataclasses of `messages.py`, the events and commands of `run.steps`, `LoggedEvent`
 and `Status`. The recorder answers what it cannot do with `Failed(request, sentence)`; events that mean nothing now come
 back as the command `Refuse`. `Stop` is answered within 0.2 s: what waits for a device is broken off, a session gets its
 written end. No call waits, save `poll` for as long as it is told, `close`, and `Recorder.start` for the process to be

@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.life import remember_overload
+from daq_app.recorder.device_history import remember_overload
 from daq_app.recorder.messages import HealthReport, Live, Report, Six
 from drivers.loads import level, loads
 from drivers.readings import ReadingBlock

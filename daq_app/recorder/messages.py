@@ -1,7 +1,7 @@
 """What recorder and client say to each other: plain data, frozen. `wire.py` packs it.
 
-Beside what stands here, the client sends every event of `sessions.steps` (what experimenter and subject do), and the
-recorder sends every command of `sessions.steps` (what they are asked for), each `LoggedEvent` once it is safe, and
+Beside what stands here, the client sends every event of `run.steps` (what experimenter and subject do), and the
+recorder sends every command of `sessions.run.steps` (what they are asked for), each `LoggedEvent` once it is safe, and
 `Status` ten times a second [session clock].
 """
 
@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from drivers.loads import Level
 from drivers.transducer import Health, TransducerInfo
-from sessions import steps
-from sessions.plan import Frame, SessionPlan
+from sessions.plan.plan import Frame, SessionPlan
 from sessions.recording import LoggedEvent, Setting
-from sessions.runner import SessionEnd, Status
+from sessions.run import steps
+from sessions.run.runner import SessionEnd, Status
 
 Array = NDArray[np.float64]
 Six = tuple[float, float, float, float, float, float]

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import msgspec
 
-from daq_app.life import remember_zero
 from daq_app.recorder.awake import awake
 from daq_app.recorder.bench import Bench, NotNow
+from daq_app.recorder.device_history import remember_zero
 from daq_app.recorder.display import Display
 from daq_app.recorder.messages import (
     AcknowledgeOverloads,
@@ -30,19 +30,21 @@ from daq_app.recorder.messages import (
     Tare,
 )
 from daq_app.recorder.pipes import Inbox
-from daq_app.wiring import SimulatedHand, SimulatedPeople, itself, planted_surface
+from daq_app.simulation.wiring import SimulatedHand, SimulatedPeople, itself, planted_surface
 from drivers.clock import Clock
 from drivers.transducer import TransducerInfo
-from sessions.plan import SessionPlan, Trial
+from sessions.plan.plan import SessionPlan, Trial
+from sessions.plan.study import StudyError
+from sessions.plan.study_file import study_key
 from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, Setting, provenance
 from sessions.recording.certificate import certificate_for
-from sessions.recording.folding import fold_log
+from sessions.recording.disk_space import RESERVE, check_room, need
 from sessions.recording.head import simulated_sentence
 from sessions.recording.manifest import is_sealed
-from sessions.recording.place import unsafe
 from sessions.recording.provenance import software_versions, without_home
-from sessions.recording.room import RESERVE, check_room, need
-from sessions.resuming import (
+from sessions.recording.storage_safety import unsafe
+from sessions.recording.wal_checkpoint import fold_log
+from sessions.run.resuming import (
     RESUMABLE,
     ContinuedClock,
     check_resumable,
@@ -51,10 +53,8 @@ from sessions.resuming import (
     resumed_data,
     resumption,
 )
-from sessions.runner import STOPPED, Ending, Operator, Resumed, Status, run_session
-from sessions.steps import Command, Event
-from sessions.study import StudyError
-from sessions.study_file import study_key
+from sessions.run.runner import STOPPED, Ending, Operator, Resumed, Status, run_session
+from sessions.run.steps import Command, Event
 
 LIFT_PATIENCE_NS = 30_000_000_000  # for a finger that touches when the client goes [session clock]
 CLIENT_GONE = "the window or terminal that ran the session is gone"

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from sessions.plan import Hand
-from sessions.steps import Chosen, NumberGiven, Scored
+from sessions.plan.plan import Hand
+from sessions.run.steps import Chosen, NumberGiven, Scored
 
 Device = Literal["mouse", "touch", "pen", "keyboard"]
 

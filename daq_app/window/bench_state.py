@@ -5,13 +5,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from daq_app.life import Life
 from daq_app.recorder import messages as m
+from daq_app.recorder.device_history import Life
 from daq_app.window.bench_load import Load
 from daq_app.window.messages import DevicesFound, LifeKnown, Loaded, Message, Searching
 from drivers.catalog import Found
 from drivers.transducer import Health, TransducerInfo
-from sessions.plan import Frame
+from sessions.plan.plan import Frame
 from sessions.recording import LoggedEvent
 
 Six = tuple[float, float, float, float, float, float]

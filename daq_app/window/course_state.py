@@ -8,10 +8,10 @@ from daq_app.recorder import messages as m
 from daq_app.recorder.messages import Kind
 from daq_app.window.messages import Judged, Message
 from daq_app.window.stroke_quality import Quality
-from sessions import steps
-from sessions.plan import Block, SessionPlan, Trial
+from sessions.plan.plan import Block, SessionPlan, Trial
 from sessions.recording import LoggedEvent
-from sessions.runner import SessionEnd, Status
+from sessions.run import steps
+from sessions.run.runner import SessionEnd, Status
 
 Phase = Literal[
     "idle",

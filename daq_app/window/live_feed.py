@@ -12,9 +12,9 @@ from daq_app.window.bench_load import Load, load_of
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.analysis import AnalysisSettings
-from sessions.analysis.forces import centre_of_pressure, in_face_frame
-from sessions.plan import Frame
+from sessions.plan.plan import Frame
+from sessions.strokes import AnalysisSettings
+from sessions.strokes.forces import centre_of_pressure, in_face_frame
 
 Array = NDArray[np.float64]
 

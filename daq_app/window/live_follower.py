@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from daq_app.window.live_model import Forces, Kinematics, Picture, Provisional, Settle, Settled, Use
-from sessions.analysis import AnalysisSettings, FrictionParameters
-from sessions.plan import SessionPlan
+from sessions.plan.plan import SessionPlan
 from sessions.prediction import DEFAULT_SPEED, SLIDES, PredictionOptions, with_own_finger
+from sessions.strokes import AnalysisSettings, FrictionParameters
 from solver.body.receptor import ROW
 from solver.equilibrium.finger import FingerModel
 from solver.failures import SolveFailure

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.recorder.messages import Live
-from sessions.analysis import FrictionParameters
-from sessions.analysis.forces import in_face_frame
-from sessions.plan import Frame, SessionPlan
+from sessions.plan.plan import Frame, SessionPlan
+from sessions.strokes import FrictionParameters
+from sessions.strokes.forces import in_face_frame
 
 Array = NDArray[np.float64]
 Kinematics = Literal["small", "finite"]

@@ -14,7 +14,7 @@ from typing import Any
 from daq_app.recorder.messages import Live
 from daq_app.window.live_model import Forces, Kinematics, Provisional, Ready, Settle, Settled, Use, forces_of, joined
 from daq_app.window.priority import give_way
-from sessions.plan import Frame, SessionPlan
+from sessions.plan.plan import Frame, SessionPlan
 
 Connection = Any  # one end of a pipe; its type is another one on each system
 WAITING = 2.0  # forces older than so long are dropped, where the model does not keep up [s]

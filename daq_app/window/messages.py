@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from daq_app.life import Life
 from daq_app.recorder import messages as m
+from daq_app.recorder.device_history import Life
 from daq_app.window.bench_load import Load
 from daq_app.window.stroke_quality import Quality
 from drivers.catalog import Found

@@ -8,14 +8,14 @@ from pathlib import Path
 
 from daq_app.recorder.messages import Kind, People, StartSession
 from daq_app.window.sentences import sentence
-from sessions.plan import Frame, Hand, Phase
-from sessions.protocols import Body, Protocol, StudyPlace, plan, protocol
-from sessions.protocols.protocol import LARGEST_SEED, phases_before
+from sessions.plan.plan import Frame, Hand, Phase
+from sessions.plan.protocols import Body, Protocol, StudyPlace, plan, protocol
+from sessions.plan.protocols.protocol import LARGEST_SEED, phases_before
+from sessions.plan.study import StudyError
+from sessions.plan.study_file import enrol, is_study, open_study, study_key
 from sessions.recording import Recording, RecordingError, Setting
 from sessions.recording.manifest import is_sealed
-from sessions.resuming import check_resumable
-from sessions.study import StudyError
-from sessions.study_file import enrol, is_study, open_study, study_key
+from sessions.run.resuming import check_resumable
 from sessions.toml_file import SettingsError
 
 HIGHEST = 500.0  # a face above the transducer's origin [mm]

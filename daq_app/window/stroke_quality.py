@@ -8,11 +8,11 @@ import numpy as np
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.analysis import AnalysisSettings, FlawName, FrictionParameters
-from sessions.analysis.analysis import analyse_blocks
-from sessions.analysis.flaws import Flaw
-from sessions.analysis.stroke import Stroke
-from sessions.plan import SessionPlan, Trial
+from sessions.plan.plan import SessionPlan, Trial
+from sessions.strokes import AnalysisSettings, FlawName, FrictionParameters
+from sessions.strokes.analysis import analyse_blocks
+from sessions.strokes.flaws import Flaw
+from sessions.strokes.stroke import Stroke
 
 FELL = 0.5  # a normal force that falls by this share along the steady window is worth a word [-]
 

@@ -5,15 +5,15 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from importlib import import_module
 from multiprocessing import get_context
 
+from daq_app.batch.workers import attend
 from daq_app.recorder import messages as m
 from daq_app.window.live_feed import LiveFeed
 from daq_app.window.messages import DrawingFailed, Judged
 from daq_app.window.priority import give_way
 from daq_app.window.state import AppState
 from daq_app.window.stroke_quality import Quality, in_newtons, stroke_quality
-from daq_app.workers import attend
-from sessions import steps
 from sessions.recording import LoggedEvent
+from sessions.run import steps
 
 AFTER = 0.35  # unloaded readings after a lift that belong to the picture of a stroke [s]
 

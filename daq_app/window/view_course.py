@@ -8,8 +8,8 @@ from daq_app.window.bench_state import BenchState
 from daq_app.window.course_state import SessionState, TrialState
 from daq_app.window.messages import Message, NewSession
 from daq_app.window.stroke_quality import Quality
-from sessions import steps
-from sessions.plan import PROXIMAL_TO_DISTAL, Trial
+from sessions.plan.plan import PROXIMAL_TO_DISTAL, Trial
+from sessions.run import steps
 
 WAYS = {1: "away from the subject", -1: "towards the subject"}
 IN_A_TRIAL = frozenset({"mounting", "taring", "ready", "stroking", "scoring", "settling"})

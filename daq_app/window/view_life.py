@@ -1,6 +1,6 @@
 """What a serial number has been through, as the bench shows it: zeros, how far they moved, its noise, its overloads."""
 
-from daq_app.life import Life
+from daq_app.recorder.device_history import Life
 from drivers.transducer import TransducerInfo
 
 NAMES = ("zeros", "moved", "noise", "overloads")

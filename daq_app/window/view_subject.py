@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from daq_app.window.course_state import SessionState
-from sessions import steps
-from sessions.plan import Hand
+from sessions.plan.plan import Hand
+from sessions.run import steps
 
 Kind = Literal["read", "line", "number", "choice"]
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from sessions.plan import SessionPlan
+from sessions.plan.plan import SessionPlan
 from solver.scene import Friction, Loading, Scene
 from solver.scene.published import SCALE
 from solver.scene.published import Reading as TauReading
@@ -18,9 +18,13 @@ class PredictionOptions:
     indentation: float | None = None  # [mm], instead of each block's own
     course: Literal["steady", "history"] = "history"
     kinematics: Literal["small", "finite"] = "small"
-    intervals: bool = False  # also what the uncertainty of friction makes of each SED, see `sessions.uncertainty`
+    intervals: bool = (
+        False  # also what the uncertainty of friction makes of each SED, see `sessions.prediction.uncertainty`
+    )
     beside_intervals: bool = False  # those of the variants at finite strain too, which takes longer
-    beside: Literal["none", "small", "both"] = "none"  # also otherwise, see `sessions.side_by_side`; at which strain
+    beside: Literal["none", "small", "both"] = (
+        "none"  # also otherwise, see `sessions.prediction.side_by_side`; at which strain
+    )
 
 
 def with_own_finger(options: PredictionOptions, plan: SessionPlan) -> PredictionOptions:

@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from sessions.analysis import Analysis
-from sessions.plan import SessionPlan
+from sessions.plan.plan import SessionPlan
 from sessions.prediction.options import PredictionOptions, template, with_own_finger
 from sessions.prediction.scenes import Prepared, opposite, prepared_cases
 from sessions.prediction.solving import Progress, quick
 from sessions.prediction.stored import SessionPrediction, TrialPrediction
+from sessions.strokes import Analysis
 from solver.equilibrium.expected_depth import matching_depths
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.load_path import March

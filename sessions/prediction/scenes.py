@@ -3,11 +3,11 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from sessions.alternative import Variant
-from sessions.analysis import Analysis, FrictionParameters, Stroke
-from sessions.plan import DISTAL_TO_PROXIMAL, PROXIMAL_TO_DISTAL, Block, SessionPlan, Trial
+from sessions.plan.plan import DISTAL_TO_PROXIMAL, PROXIMAL_TO_DISTAL, Block, SessionPlan, Trial
 from sessions.prediction.options import PredictionOptions, bound, template, with_own_finger
 from sessions.prediction.stored import TrialPrediction
+from sessions.prediction.variants import Variant
+from sessions.strokes import Analysis, FrictionParameters, Stroke
 from solver.scene import Friction, Loading, Scene, SceneError, Slide, Solve
 from solver.scene.published import SCALE
 

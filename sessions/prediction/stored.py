@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
-from sessions.alternative import Alternative
-from sessions.analysis.area import FIXED, AreaLaw
-from sessions.decisions import Decision
-from sessions.plan import Stimulus
+from sessions.plan.plan import Stimulus
 from sessions.prediction.options import PredictionOptions, template
-from sessions.sed_interval import Ends, SedInterval
+from sessions.prediction.sed_interval import Ends, SedInterval
+from sessions.prediction.variants import Alternative
+from sessions.strokes.contact_area import FIXED, AreaLaw
+from sessions.strokes.decisions import Decision
 from solver.prediction import History, Prediction, Skin
 from solver.response.fields import Fields, fields_of
 

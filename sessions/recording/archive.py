@@ -5,12 +5,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, cast
 
+from sessions.recording.atomic_file import put_in_place, write_whole
 from sessions.recording.description import description
+from sessions.recording.disk_space import release_reserve
 from sessions.recording.errors import RecordingError
-from sessions.recording.folding import fold_log
 from sessions.recording.manifest import changed_files, is_sealed, list_in_manifest
 from sessions.recording.reader import Recording
-from sessions.recording.room import release_reserve
 from sessions.recording.schema import (
     DESCRIPTION_FILE,
     LIVE_FILE,
@@ -18,7 +18,7 @@ from sessions.recording.schema import (
     SEALED_FILE,
 )
 from sessions.recording.sealed_copy import differences, write_copy
-from sessions.recording.whole_file import put_in_place, write_whole
+from sessions.recording.wal_checkpoint import fold_log
 
 SEALED = (LIVE_FILE, SEALED_FILE, DESCRIPTION_FILE)
 

@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from sessions.recording.atomic_file import write_whole
 from sessions.recording.provenance import software_versions
-from sessions.recording.whole_file import write_whole
 
 CERTIFICATE_FILE = "daq-app-selftest.json"
 FORMAT = {"name": "daq-app selftest", "version": 1}

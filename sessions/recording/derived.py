@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
+from sessions.recording.atomic_file import write_whole
 from sessions.recording.errors import RecordingError
 from sessions.recording.manifest import is_sealed, list_in_manifest
 from sessions.recording.provenance import software_versions
 from sessions.recording.reader import Recording
 from sessions.recording.schema import DESCRIPTION_FILE, LIVE_FILE, MANIFEST_FILE, SEALED_FILE
-from sessions.recording.whole_file import write_whole
 
 RECORDED = (LIVE_FILE, SEALED_FILE, DESCRIPTION_FILE, MANIFEST_FILE)
 

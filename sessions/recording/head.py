@@ -11,7 +11,7 @@ import numpy as np
 
 from drivers.calibration import Calibration
 from drivers.transducer import TransducerInfo
-from sessions.plan import SessionPlan
+from sessions.plan.plan import SessionPlan
 
 
 def simulated_sentence(info: TransducerInfo | None, subject_simulated: bool) -> str | None:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from sessions.plan import Answer, SessionPlan, Trial
+from sessions.plan.plan import Answer, SessionPlan, Trial
 
 Outcome = Literal["scored", "numbered", "chosen", "presented", "not answered", "skipped", "open"]
 OUTCOMES = "scored, numbered, chosen, presented (no answer asked for), not answered, skipped or open"

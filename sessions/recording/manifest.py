@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from sessions.recording.atomic_file import write_whole
 from sessions.recording.errors import RecordingError
 from sessions.recording.schema import FORMAT, FORMAT_VERSION, MANIFEST_FILE
-from sessions.recording.whole_file import write_whole
 
 
 def is_sealed(folder: Path) -> bool:

@@ -14,7 +14,7 @@ from urllib.parse import quote
 import numpy as np
 
 from drivers.clock import Clock
-from sessions.plan import Origin
+from sessions.plan.plan import Origin
 
 LIBRARIES = ("numpy", "scipy", "numba", "h5py", "msgspec", "matplotlib", "pyserial", "pyusb")
 OPTIONAL = ("nidaqmx", "distributed")  # told where they are installed

@@ -16,7 +16,7 @@ import numpy as np
 
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.plan import SessionPlan
+from sessions.plan.plan import SessionPlan
 from sessions.recording.errors import RecordingError
 from sessions.recording.head import info_from_dict, plan_from_dict
 from sessions.recording.log import LoggedEvent, TrialRecord, trial_records
@@ -31,7 +31,7 @@ from sessions.recording.schema import (
     event_crc,
     text_crc,
 )
-from sessions.recording.torn import log_tail
+from sessions.recording.wal_recovery import log_tail
 
 # Kinds of events that sealing, resuming and restoring add, each with a sentence on what is missing.
 TELL_LOSSES = frozenset({"log_torn", "not_restored"})

@@ -10,14 +10,14 @@ from typing import Any, NoReturn, Self
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.plan import SessionPlan
+from sessions.plan.plan import SessionPlan
+from sessions.recording.atomic_file import sync_folder
+from sessions.recording.disk_space import Reserve, release_reserve
 from sessions.recording.errors import RecordingError
-from sessions.recording.folding import fold_log
 from sessions.recording.head import info_to_dict, json_text, plan_to_dict, simulated_sentence
 from sessions.recording.log import LoggedEvent
 from sessions.recording.manifest import is_sealed
 from sessions.recording.reader import Recording
-from sessions.recording.room import Reserve, release_reserve
 from sessions.recording.schema import (
     APPLICATION_ID,
     FORMAT,
@@ -29,7 +29,7 @@ from sessions.recording.schema import (
     event_row,
     text_crc,
 )
-from sessions.recording.whole_file import sync_folder
+from sessions.recording.wal_checkpoint import fold_log
 
 COMMIT_EVERY_NS = 1_000_000_000
 LARGEST_BLOCK = 65_536  # readings: about 6 MB, far below what one SQLite row may hold

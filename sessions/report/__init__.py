@@ -4,12 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sessions.afferent import AfferentSettings, Firing
-from sessions.analysis import Analysis
-from sessions.analysis.bootstrap import drawn_from
-from sessions.analysis.scores import MeanScore, Relation, ScoreTable, joined, score_table
-from sessions.paths import Seds
+from sessions.plan.sealed_predictions import NUMBERS, sealed_sentence
 from sessions.prediction import SessionPrediction
+from sessions.prediction.afferent import AfferentSettings, Firing
+from sessions.prediction.multiverse import Seds
 from sessions.recording.provenance import software_versions
 from sessions.recording.reader import Recording
 from sessions.report import facts
@@ -31,7 +29,9 @@ from sessions.report.contents import (
 from sessions.report.experiments import experiments
 from sessions.report.predictions import fields, left_out, model_in_short, modelled, predicted_seds, predictions
 from sessions.report.strokes import course, flaws, strokes
-from sessions.sealing import NUMBERS, sealed_sentence
+from sessions.statistics.scores import MeanScore, Relation, ScoreTable, joined, score_table
+from sessions.strokes import Analysis
+from sessions.strokes.bootstrap import drawn_from
 
 __all__ = [
     "Answers",

@@ -2,10 +2,10 @@
 
 from dataclasses import asdict, dataclass, field
 
-from sessions.alternative import Alternative
-from sessions.analysis.scores import MeanScore, Relation
-from sessions.paths import PathFinding
-from sessions.sed_interval import Ends, SedInterval
+from sessions.prediction.multiverse import PathFinding
+from sessions.prediction.sed_interval import Ends, SedInterval
+from sessions.prediction.variants import Alternative
+from sessions.statistics.scores import MeanScore, Relation
 
 Numbers = tuple[float, ...]
 

@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 
-from sessions.analysis.area import FIXED, AreaLaw
-from sessions.analysis.friction import rule_for
-from sessions.analysis.scores import MeanScore, Relation, ScoreTable, mean_scores, relation, score_matrix
-from sessions.paths import PathTrial, Seds, path_findings
-from sessions.plan import Block, SessionPlan
+from sessions.plan.plan import Block, SessionPlan
+from sessions.prediction.multiverse import PathTrial, Seds, path_findings
 from sessions.report.contents import Answers, Experiment
+from sessions.statistics.scores import MeanScore, Relation, ScoreTable, mean_scores, relation, score_matrix
+from sessions.strokes.contact_area import FIXED, AreaLaw
+from sessions.strokes.friction import rule_for
 
 
 def experiments(

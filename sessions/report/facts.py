@@ -5,17 +5,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from sessions.analysis.analysis import Analysis
-from sessions.analysis.grading import grading
-from sessions.analysis.scores import ScoreTable, reversed_subjects
-from sessions.analysis.settings import AnalysisSettings
-from sessions.plan import PROXIMAL_TO_DISTAL, Block, Origin
+from sessions.plan.plan import PROXIMAL_TO_DISTAL, Block, Origin
 from sessions.recording.head import calibration_hash
 from sessions.recording.log import TrialRecord
 from sessions.recording.manifest import file_sha256
 from sessions.recording.reader import Recording
 from sessions.recording.schema import LIVE_FILE
 from sessions.report.contents import Fact, StrokeFinding
+from sessions.statistics.grading import grading
+from sessions.statistics.scores import ScoreTable, reversed_subjects
+from sessions.strokes.analysis import Analysis
+from sessions.strokes.settings import AnalysisSettings
 
 _ORIGIN: dict[Origin, str] = {"measured": "measured", "set": "set", "default": "default: nobody set it"}
 

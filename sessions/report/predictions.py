@@ -9,10 +9,10 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.afferent import AfferentSettings, Firing, parameters
-from sessions.analysis.area import AreaLaw
 from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction
+from sessions.prediction.afferent import AfferentSettings, Firing, parameters
 from sessions.report.contents import Fact, Field, History, PredictionFinding
+from sessions.strokes.contact_area import AreaLaw
 
 _SCENE = {"finger": "mm, degrees", "materials": "E in MPa", "receptor": "mm"}  # what all trials share, with its units
 _READINGS = {

@@ -5,13 +5,13 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.analysis.analysis import Analysis
-from sessions.analysis.bootstrap import NUMBERS, drawn_from, stroke_intervals
-from sessions.analysis.flaws import Flaw
-from sessions.analysis.forces import in_face_frame
-from sessions.analysis.stroke import Stroke
 from sessions.recording.reader import Recording
 from sessions.report.contents import Course, Fact, StrokeFinding, Trace
+from sessions.strokes.analysis import Analysis
+from sessions.strokes.bootstrap import NUMBERS, drawn_from, stroke_intervals
+from sessions.strokes.flaws import Flaw
+from sessions.strokes.forces import in_face_frame
+from sessions.strokes.stroke import Stroke
 
 Array = NDArray[np.float64]
 

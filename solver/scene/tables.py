@@ -195,7 +195,7 @@ class Materials:
 
 @dataclass(frozen=True, slots=True)
 class Friction:
-    """Coulomb friction whose traction never exceeds a bound: |t| <= min(mu p, tau_max)."""
+    """Coulomb friction whose traction never exceeds a bound: its size is at most min(mu p, tau_max)."""
 
     mu: float  # coefficient of friction [-]
     tau_max: float | None = None  # traction bound [MPa]; None: there is none

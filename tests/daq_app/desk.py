@@ -2,9 +2,9 @@
 
 import time
 
-from sessions.plan import Frame
-from sessions.protocols import plan, protocol
-from sessions.steps import AskBegin, AskFinish, AskMount, AskScore, Begin, Finish, Scored, StimulusMounted
+from sessions.plan.plan import Frame
+from sessions.plan.protocols import plan, protocol
+from sessions.run.steps import AskBegin, AskFinish, AskMount, AskScore, Begin, Finish, Scored, StimulusMounted
 
 PACE = 20.0
 DEADLINE = 60.0  # of a machine that hangs, not of a slow one [s]

@@ -24,8 +24,8 @@ from daq_app.analyst.shown import numbers, points, progress_words, row_words, se
 from daq_app.analyst.state import AnalystState, chosen, fold, rows
 from daq_app.analyst.transport import Transport
 from daq_app.analyst.work import Work
-from sessions.decisions import Decision, Decisions, read
-from sessions.gain_error import set_gain_error
+from sessions.recording.calibration_uncertainty import set_gain_error
+from sessions.strokes.decisions import Decision, Decisions, read
 from tests.sessions.report_example import example
 
 SESSION = Path(__file__).parents[1] / "data" / "sessions" / "version-1" / "sealed"

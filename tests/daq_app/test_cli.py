@@ -2,8 +2,8 @@ import importlib
 
 import pytest
 
-from daq_app import cli
-from daq_app.cli import VERBS, run
+from daq_app.cli import main as cli
+from daq_app.cli.main import VERBS, run
 
 
 def test_without_arguments_the_verbs_are_listed_and_the_command_line_counts_as_wrong(capsys):
@@ -24,7 +24,7 @@ def test_an_unknown_verb_is_one_sentence_and_exit_code_2(capsys):
 def test_every_verb_explains_itself_with_an_example(verb, capsys):
     assert run([verb, "--help"]) == 0
     told = capsys.readouterr().out
-    module = importlib.import_module(f"daq_app.verbs.{verb.replace('import', 'import_')}")
+    module = importlib.import_module(f"daq_app.cli.verbs.{verb.replace('import', 'import_')}")
     assert module.EXAMPLE in told
     assert "--json" in told
 

@@ -7,8 +7,8 @@ import threading
 
 import pytest
 
-from daq_app.cli import run
-from daq_app.console import Console, NotWritten, Underway, takes_all
+from daq_app.cli.console import Console, NotWritten, Underway, takes_all
+from daq_app.cli.main import run
 from solver.progress import listening, tell
 
 
@@ -63,14 +63,14 @@ def test_a_full_disk_is_told_with_what_could_not_be_written_and_where():
 
 
 def test_a_package_that_is_missing_is_named_with_what_to_install(monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "daq_app.verbs.solve", None)  # one of our own: a fault of ours
+    monkeypatch.setitem(sys.modules, "daq_app.cli.verbs.solve", None)  # one of our own: a fault of ours
     assert run(["solve", "scene.toml"]) == 1
     assert "unexpected ModuleNotFoundError" in capsys.readouterr().err
 
     def needs(_):
         raise ModuleNotFoundError("No module named 'llvmlite.binding'", name="llvmlite.binding")
 
-    monkeypatch.setattr("daq_app.cli._dispatch", needs)
+    monkeypatch.setattr("daq_app.cli.main._dispatch", needs)
     assert run(["solve", "scene.toml"]) == 1
     said = capsys.readouterr().err
     assert said.startswith("daq-app: the Python package llvmlite is not installed; 'pip install ")
@@ -95,7 +95,7 @@ def test_the_part_shown_of_work_whose_end_nobody_knows_moves_and_never_goes_back
 
 
 def test_work_whose_end_nobody_knows_shows_how_long_it_has_taken_and_can_still_be_left(monkeypatch):
-    monkeypatch.setattr("daq_app.console.PATIENCE", 0.0)
+    monkeypatch.setattr("daq_app.cli.console.PATIENCE", 0.0)
     speaker, _, err = console(as_json=False)
 
     def work():

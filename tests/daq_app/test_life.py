@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from daq_app import life
-from daq_app.life import life_of, remember_overload, remember_zero
+from daq_app.recorder import device_history as life
+from daq_app.recorder.device_history import life_of, remember_overload, remember_zero
 from drivers.calibration import Calibration
 from drivers.transducer import TransducerInfo
 

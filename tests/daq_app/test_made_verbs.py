@@ -17,16 +17,16 @@ from examples import SCENE
 from page_numbers import estimates
 from report_session import record
 
-from daq_app.cli import run
-from daq_app.computing import content_of
-from daq_app.pooling import Shelf
-from sessions.analysis import AnalysisSettings, analyse
-from sessions.gain_error import gain_error_set
-from sessions.pooling.visit import VisitOptions, visit_of
+from daq_app.batch.pool import Shelf
+from daq_app.batch.session_numbers import content_of
+from daq_app.cli.main import run
 from sessions.prediction import PredictionOptions, finger_in
 from sessions.recording import Recording
 from sessions.recording.archive import seal
+from sessions.recording.calibration_uncertainty import gain_error_set
 from sessions.report import findings
+from sessions.statistics.pooling.visit import VisitOptions, visit_of
+from sessions.strokes import AnalysisSettings, analyse
 from sessions.toml_file import SettingsError
 
 ROOT = Path(__file__).parents[2]

@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 from report_session import record
 from study_example import study
 
-from daq_app.cli import run
-from daq_app.derived import ANALYSIS, PREDICTION, kept
-from sessions.blinding import revealed
-from sessions.exports import ExportSource
-from sessions.exports.tables import tables
-from sessions.pooling.planted import checked_planted, found_flaws, found_friction, recovered
+from daq_app.batch.derived import ANALYSIS, PREDICTION, kept
+from daq_app.cli.main import run
+from sessions.exchange import ExportSource
+from sessions.exchange.session_tables import tables
+from sessions.plan.blinding import revealed
+from sessions.plan.sealed_predictions import SEAL, digest, sealed_sentence
 from sessions.recording import Recording, RecordingError
-from sessions.sealing import SEAL, digest, sealed_sentence
+from sessions.statistics.pooling.ground_truth import checked_planted, found_flaws, found_friction, recovered
 
 VERB = {ANALYSIS: "'daq-app analyse' makes it anew", PREDICTION: "'daq-app predict' makes it anew"}
 NONSENSE = st.sampled_from([None, "x", "", -7, 0.5, True, [], {}, [None], {"a": 1}, [[1, 2, 3]], "delete"])

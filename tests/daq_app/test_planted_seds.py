@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from daq_app import planted_seds
-from daq_app.planted_seds import relations
+from daq_app.simulation import ground_truth as planted_seds
+from daq_app.simulation.ground_truth import relations
 from simulators.subject import SLIPPERIEST, STICKIEST, SubjectSettings
 from simulators.surface import paper_surfaces
 

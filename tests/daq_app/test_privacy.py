@@ -10,7 +10,7 @@ from urllib.parse import quote, unquote
 import pytest
 from desk import PACE, PLAN, Desk
 
-from daq_app.cli import run
+from daq_app.cli.main import run
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Connect, Device, People, Sealed, StartSession
 from sessions.recording.provenance import without_home

@@ -36,8 +36,8 @@ from daq_app.recorder.messages import (
 )
 from daq_app.recorder.wire import Codec, Splitter
 from sessions.recording import LoggedEvent, Recording
-from sessions.runner import Status
-from sessions.steps import (
+from sessions.run.runner import Status
+from sessions.run.steps import (
     AskMount,
     AskStroke,
     MeasureZero,

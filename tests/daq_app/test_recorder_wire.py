@@ -26,10 +26,10 @@ from daq_app.recorder.messages import (
 from daq_app.recorder.pipes import Outbox
 from daq_app.recorder.wire import LENGTH, BrokenMessage, Codec, Splitter
 from drivers.transducer import Health
-from sessions.plan import Frame
-from sessions.protocols import plan, protocol
+from sessions.plan.plan import Frame
+from sessions.plan.protocols import plan, protocol
 from sessions.recording import LoggedEvent, Setting
-from sessions.steps import AskScore, Scored, Zeroed
+from sessions.run.steps import AskScore, Scored, Zeroed
 
 PLAN = plan(protocol("sensotact-friction"), "S01", 3, forces=True)
 SIX = (1.0, 2.0, 3.0, 4.0, 5.0, math.nan)

@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from daq_app.cli import run
+from daq_app.cli.main import run
 
 
 @pytest.fixture(scope="module")

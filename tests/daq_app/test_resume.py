@@ -8,7 +8,7 @@ from contextlib import suppress
 
 import pytest
 
-from daq_app.cli import run
+from daq_app.cli.main import run
 from sessions.recording import Recording, RecordingError
 
 

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 import pytest
 from recordings import ended
 
-from daq_app import selftest
-from daq_app.cli import run
+from daq_app.cli.main import run
+from daq_app.recorder import selftest
 from sessions.recording import LoggedEvent, Recording
 from sessions.recording.certificate import certificate_for, write_certificate
 

@@ -6,8 +6,7 @@ from itertools import product
 
 import pytest
 
-from daq_app.cli import run
-from daq_app.sensitivity import (
+from daq_app.batch.sensitivity import (
     Index,
     TooFewAnswers,
     checked,
@@ -17,6 +16,7 @@ from daq_app.sensitivity import (
     usual_design,
     with_values,
 )
+from daq_app.cli.main import run
 from sessions.toml_file import SettingsError
 from solver.failures import NotConverged
 from solver.scene import Friction, Loading, Scene

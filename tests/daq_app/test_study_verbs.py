@@ -5,7 +5,7 @@ import json
 import pytest
 from examples import short_protocol
 
-from daq_app.cli import run
+from daq_app.cli.main import run
 from sessions.recording import Recording
 
 FOUR = short_protocol("four", "Four surfaces", [0, 100], [0, 100])

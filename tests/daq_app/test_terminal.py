@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from daq_app.terminal import Terminal
-from sessions.protocols import plan, protocol
+from daq_app.cli.terminal import Terminal
+from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording
-from sessions.steps import Abort, AskMount, AskScore, AskStroke, Pause, Redo, Scored, StimulusMounted, StrokeDone
+from sessions.run.steps import Abort, AskMount, AskScore, AskStroke, Pause, Redo, Scored, StimulusMounted, StrokeDone
 
 TRIAL = plan(protocol("sensotact-friction"), "S01", 3).trials[0]
 ENDS = ("not at all", "very")

@@ -11,9 +11,9 @@ from dataclasses import fields
 
 import pytest
 
-from daq_app.cli import run
-from sessions.analysis import AnalysisSettings, forces
+from daq_app.cli.main import run
 from sessions.recording.schema import COLUMNS
+from sessions.strokes import AnalysisSettings, forces
 
 
 @pytest.fixture(scope="session")

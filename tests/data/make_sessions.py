@@ -17,12 +17,12 @@ sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "sessions")]
 
 from stand_ins import Hands, StandIn, ToldClock  # noqa: E402
 
-from sessions.protocols import plan, protocol  # noqa: E402
+from sessions.plan.protocols import plan, protocol  # noqa: E402
 from sessions.recording import SessionWriter, provenance  # noqa: E402
 from sessions.recording.archive import seal  # noqa: E402
 from sessions.recording.schema import FORMAT_VERSION  # noqa: E402
-from sessions.runner import run_session  # noqa: E402
-from sessions.steps import AskStroke  # noqa: E402
+from sessions.run.runner import run_session  # noqa: E402
+from sessions.run.steps import AskStroke  # noqa: E402
 
 NORMAL, TANGENTIAL, SPEED = 2.0, 1.0, 20.0  # N, N, mm/s: what was planted
 

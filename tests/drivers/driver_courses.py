@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from daq_app import wiring
-from daq_app.wiring import connected
+from daq_app.simulation import wiring
+from daq_app.simulation.wiring import connected
 from drivers import rate, streaming
 from drivers.address import parse_address
 from drivers.catalog import DRIVERS

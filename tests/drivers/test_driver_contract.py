@@ -22,7 +22,7 @@ from driver_courses import (
     undisturbed_course,
 )
 
-from daq_app.wiring import connected
+from daq_app.simulation.wiring import connected
 from drivers.catalog import DRIVERS, reachable
 from drivers.clock import PacedClock
 from drivers.transducer import SetupError

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from calibration_files import GAMMA, NANO43, parsed
 
-from daq_app.wiring import connected
+from daq_app.simulation.wiring import connected
 from drivers.address import parse_address
 from drivers.clock import PacedClock
 from drivers.loads import loads

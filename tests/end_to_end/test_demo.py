@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from daq_app.cli import run
+from daq_app.cli.main import run
 
 
 @pytest.fixture(scope="module")

@@ -8,11 +8,11 @@ import pytest
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.analysis import AnalysisSettings
-from sessions.analysis.analysis import analyse_blocks
-from sessions.analysis.forces import normal_force
-from sessions.analysis.onset import ContactDetector, Lift, Onset
-from sessions.plan import Block, Frame, SessionPlan, Stimulus, Trial
+from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
+from sessions.strokes import AnalysisSettings
+from sessions.strokes.analysis import analyse_blocks
+from sessions.strokes.forces import normal_force
+from sessions.strokes.onset import ContactDetector, Lift, Onset
 from simulators.bench import RATED, Bench, BenchSettings, PlantedStroke
 from simulators.subject import SimulatedSubject
 from simulators.surface import paper_surfaces

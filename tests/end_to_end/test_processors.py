@@ -11,8 +11,8 @@ import sys
 import numpy as np
 import pytest
 
-from daq_app.console import Console
-from daq_app.synthetic import synthetic_study
+from daq_app.cli.console import Console
+from daq_app.simulation.synthetic import synthetic_study
 
 NEAR = 1e-12
 # A mean, its spread and its interval, or an effect and its interval, are one quantity: each counts against the largest.

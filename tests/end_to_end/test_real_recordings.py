@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sessions.analysis import analyse
-from sessions.analysis.forces import friction_ratio
-from sessions.analysis.measure import EVERYTHING
-from sessions.import_csv import ImportOptions, import_csv
+from sessions.exchange.import_csv import ImportOptions, import_csv
 from sessions.recording.reader import Recording
+from sessions.strokes import analyse
+from sessions.strokes.forces import friction_ratio
+from sessions.strokes.stroke_measures import EVERYTHING
 from sessions.toml_file import SettingsError
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"

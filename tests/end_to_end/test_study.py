@@ -10,16 +10,17 @@ from pathlib import Path
 
 import pytest
 
-from daq_app import cluster, pooling
-from daq_app.cli import run
-from daq_app.computing import computed, computed_from, content_of
-from daq_app.console import Console
-from daq_app.pooling import Shelf, visits
-from daq_app.synthetic import synthetic_study
-from sessions.pooling.visit import Visit, VisitOptions
+from daq_app.batch import cluster
+from daq_app.batch import pool as pooling
+from daq_app.batch.pool import Shelf, visits
+from daq_app.batch.session_numbers import computed, computed_from, content_of
+from daq_app.cli.console import Console
+from daq_app.cli.main import run
+from daq_app.simulation.synthetic import synthetic_study
 from sessions.prediction import PredictionOptions
 from sessions.recording import RecordingError
 from sessions.recording.provenance import software_versions
+from sessions.statistics.pooling.visit import Visit, VisitOptions
 
 STEADY = VisitOptions()
 QUICK = VisitOptions(PredictionOptions(course="steady"))
@@ -341,7 +342,7 @@ def test_what_is_wrong_beside_the_sessions_is_said_before_any_is_computed(tmp_pa
     def never(*_, **__):
         raise AssertionError
 
-    monkeypatch.setattr("daq_app.verbs.study.visits", never)
+    monkeypatch.setattr("daq_app.cli.verbs.study.visits", never)
     (tmp_path / "S01").mkdir()
     (tmp_path / "S01" / "session.sqlite").touch()
     (tmp_path / name).write_text(content)

@@ -28,9 +28,9 @@ from daq_app.recorder.messages import (
 )
 from sessions.recording import LoggedEvent, Recording, RecordingError
 from sessions.recording.schema import event_row
-from sessions.resuming import check_resumable, resumption
-from sessions.runner import Status
-from sessions.steps import AskBegin, AskFinish, AskMount, AskScore, AskStroke, Pause, Resume
+from sessions.run.resuming import check_resumable, resumption
+from sessions.run.runner import Status
+from sessions.run.steps import AskBegin, AskFinish, AskMount, AskScore, AskStroke, Pause, Resume
 
 PACE = 4.0
 DEADLINE = 120.0  # of a machine that hangs [s]

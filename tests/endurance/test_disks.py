@@ -21,7 +21,7 @@ sys.path[:0] = ["tests/sessions"]
 from failing_session import PLAN, RESERVE
 from stand_ins import INFO, Hands, StandIn, ToldClock
 from sessions.recording import SessionWriter, provenance
-from sessions.runner import run_session
+from sessions.run.runner import run_session
 clock = ToldClock()
 folder = Path(sys.argv[1]) / "s"
 writer = SessionWriter.create(folder, PLAN, INFO, provenance(clock), clock=clock, reserve=RESERVE)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from kills import STATES, VICTIMS, Killing
 
-from daq_app.wiring import connected
+from daq_app.simulation.wiring import connected
 from drivers.clock import RealClock
 
 pytestmark = pytest.mark.slow

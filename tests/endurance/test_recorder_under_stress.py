@@ -30,8 +30,8 @@ from daq_app.recorder.messages import (
 )
 from drivers.clock import RealClock
 from sessions.recording import Recording
-from sessions.runner import Status
-from sessions.steps import AskBegin, AskMount, AskScore, AskStroke, Pause, Redo
+from sessions.run.runner import Status
+from sessions.run.steps import AskBegin, AskMount, AskScore, AskStroke, Pause, Redo
 from simulators.bench import Bench
 from simulators.net_ft_box import NetFtBox
 

@@ -9,14 +9,14 @@ from recordings import begun, readings
 from stand_ins import INFO, ToldClock
 from told_session import Session
 
-from sessions.analysis import analyse
-from sessions.decisions import Decision, append
-from sessions.exports import ExportSource, export
-from sessions.gain_error import set_gain_error
-from sessions.import_csv import import_csv
+from sessions.exchange import ExportSource, export
+from sessions.exchange.import_csv import import_csv
 from sessions.recording import Recording
 from sessions.recording.archive import seal
+from sessions.recording.calibration_uncertainty import set_gain_error
 from sessions.recording.provenance import software_versions
+from sessions.strokes import analyse
+from sessions.strokes.decisions import Decision, append
 
 
 def whole(folder):

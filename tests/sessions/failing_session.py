@@ -3,11 +3,11 @@
 from faulty_disk import FULL, IOERR_WRITE, OK, faulty_disk
 from stand_ins import INFO, Hands, StandIn, ToldClock
 
-from sessions.protocols import plan, protocol
+from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording, RecordingError, SessionWriter, provenance
 from sessions.recording.schema import event_row
-from sessions.resuming import check_resumable, resumption
-from sessions.runner import run_session
+from sessions.run.resuming import check_resumable, resumption
+from sessions.run.runner import run_session
 
 PLAN = plan(protocol("sensotact-friction"), "S01", 3)
 RESERVE = 2**20

@@ -7,9 +7,9 @@ import numpy as np
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.analysis.analysis import analyse_blocks
-from sessions.analysis.settings import AnalysisSettings
-from sessions.plan import Block, Frame, SessionPlan, Stimulus, Trial
+from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
+from sessions.strokes.analysis import analyse_blocks
+from sessions.strokes.settings import AnalysisSettings
 
 HEIGHT = 12.0  # [mm]
 NOISE = np.array([0.004] * 3 + [0.05] * 3)  # [N, N mm]

@@ -1,7 +1,7 @@
 """The plan of the paper's two experiments, and what an analysis says that found given friction in them."""
 
-from sessions.analysis import Analysis, AnalysisSettings, FrictionParameters, Stroke
-from sessions.plan import Block, Frame, SessionPlan, Stimulus, Trial
+from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
+from sessions.strokes import Analysis, AnalysisSettings, FrictionParameters, Stroke
 from solver.scene.published import INDENTATION, SLIPPERINESS, STICKINESS
 
 PLAN = SessionPlan(

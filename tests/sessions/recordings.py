@@ -8,7 +8,7 @@ import numpy as np
 from stand_ins import INFO, ToldClock
 
 from drivers.readings import ReadingBlock
-from sessions.plan import Block, Frame, SessionPlan, Stimulus, Trial
+from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.recording import SessionWriter, provenance
 
 TRIAL = Trial(1, "stickiness", Stimulus("stickiness", 20, "K07"), 1, 1)

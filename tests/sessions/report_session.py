@@ -7,7 +7,7 @@ import numpy as np
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.plan import Block, Frame, SessionPlan, Stimulus, Trial
+from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.recording import SessionWriter
 from simulators.bench import Bench
 from simulators.subject import SimulatedSubject

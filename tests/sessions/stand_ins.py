@@ -5,7 +5,7 @@ import numpy as np
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from drivers.transducer import Health, LinkLost, TransducerInfo
-from sessions.steps import (
+from sessions.run.steps import (
     AskBegin,
     AskChoice,
     AskFinish,

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from sessions.paths import PATHS
-from sessions.pooling.exclusions import Exclusion
-from sessions.pooling.pooled import pooled
-from sessions.pooling.visit import TrialRow, Visit, VisitOptions
+from sessions.prediction.multiverse import PATHS
+from sessions.statistics.pooling.exclusions import Exclusion
+from sessions.statistics.pooling.pooled import pooled
+from sessions.statistics.pooling.visit import TrialRow, Visit, VisitOptions
 
 INDICES = (0, 20, 50, 80, 100)
 

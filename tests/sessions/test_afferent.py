@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from sessions.afferent import (
+from sessions.prediction.afferent import (
     TOLD,
     AfferentSettings,
     firing_rate,

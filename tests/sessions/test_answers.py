@@ -1,11 +1,11 @@
 from stand_ins import Hands, ToldClock
 from told_session import PAPER, Session, once
 
-from sessions.event_log import event_of
-from sessions.protocols import plan
+from sessions.plan.protocols import plan
 from sessions.recording import Recording, SessionWriter, provenance
-from sessions.runner import run_session
-from sessions.steps import AskScore, Scored
+from sessions.run.event_log import event_of
+from sessions.run.runner import run_session
+from sessions.run.steps import AskScore, Scored
 
 GIVEN = Scored(31.5, ((4.25, 60.0), (4.75, 31.5)), 4.25, 1, "left", "pen")
 

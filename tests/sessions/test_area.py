@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from made_strokes import SETTINGS, analysed, block, felt, stroke, times, trial
 
-from sessions.analysis.area import FIXED, HERTZ, AreaLaw
-from sessions.analysis.bootstrap import BootstrapSettings, stroke_intervals
+from sessions.strokes.bootstrap import BootstrapSettings, stroke_intervals
+from sessions.strokes.contact_area import FIXED, HERTZ, AreaLaw
 
 T = times()
 PRESSED = 6.0  # N, with a mu of 0.5: 3 N sideways

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sessions.analysis.bootstrap import BootstrapSettings, stroke_intervals
-from sessions.analysis.instants import onset_draws
-from sessions.analysis.stroke import StrokeCurve
+from sessions.strokes.bootstrap import BootstrapSettings, stroke_intervals
+from sessions.strokes.event_uncertainty import onset_draws
+from sessions.strokes.stroke import StrokeCurve
 from simulators.bench import BenchSettings
 from simulators.stroke import Course
 from simulators.subject import SimulatedSubject

@@ -14,13 +14,13 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from daq_app.planted_seds import relations
-from daq_app.synthetic import CALIBRATION, PEOPLE, PROTOCOL, SUBJECTS, planted_slopes
-from daq_app.wiring import planted_surface
-from sessions.pooling.findings import CARRY_OVER, DRIFT, SED
-from sessions.pooling.pooled import pooled
-from sessions.pooling.visit import TrialRow, Visit
-from sessions.protocols import plan, protocol
+from daq_app.simulation.ground_truth import relations
+from daq_app.simulation.synthetic import CALIBRATION, PEOPLE, PROTOCOL, SUBJECTS, planted_slopes
+from daq_app.simulation.wiring import planted_surface
+from sessions.plan.protocols import plan, protocol
+from sessions.statistics.pooling.findings import CARRY_OVER, DRIFT, SED
+from sessions.statistics.pooling.pooled import pooled
+from sessions.statistics.pooling.visit import TrialRow, Visit
 from simulators.subject import SimulatedSubject
 from simulators.surface import Surface, paper_surfaces
 

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from made_strokes import INFO, SETTINGS, block, felt, plan, stroke, times, trapezium, trial, wrench
 from recordings import ended
 
-from sessions.analysis.analysis import analyse_blocks
-from sessions.analysis.bootstrap import stroke_intervals
-from sessions.analysis.decided import with_old
-from sessions.decisions import DECISIONS, Decision, DecisionError, Decisions, append, parsed, read
-from sessions.plan import Frame
+from sessions.plan.plan import Frame
 from sessions.recording import Recording
 from sessions.recording.archive import problems, seal
+from sessions.strokes.analysis import analyse_blocks
+from sessions.strokes.bootstrap import stroke_intervals
+from sessions.strokes.decision_preview import with_old
+from sessions.strokes.decisions import DECISIONS, Decision, DecisionError, Decisions, append, parsed, read
 
 WINDOW = Decision("E02", "the ramp was in it", "steady", 1, 1, (1.1, 2.9), (1.5, 2.5))
 

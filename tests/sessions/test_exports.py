@@ -20,15 +20,15 @@ from exported_sessions import MADE, Exports, source_of
 from recordings import PLAN, TRIAL, begun, ended, plainly_read, readings
 
 from drivers.readings import ReadingBlock
-from sessions.analysis import analyse
-from sessions.decisions import content_of
-from sessions.exports import FORMATS, ExportError, ExportSource, export
-from sessions.exports.tables import tables
-from sessions.gain_error import gain_error_set
-from sessions.import_csv import ImportRefused
-from sessions.import_session import exported, import_session
+from sessions.exchange import FORMATS, ExportError, ExportSource, export
+from sessions.exchange.import_csv import ImportRefused
+from sessions.exchange.import_session import exported, import_session
+from sessions.exchange.session_tables import tables
 from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems, seal
+from sessions.recording.calibration_uncertainty import gain_error_set
+from sessions.strokes import analyse
+from sessions.strokes.decisions import content_of
 
 AGAIN = [name for name, module in FORMATS.items() if hasattr(importlib.import_module(module), "read")]
 

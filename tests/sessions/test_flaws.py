@@ -22,10 +22,10 @@ from made_strokes import (
 from made_strokes import wrench as made
 
 from drivers.readings import ReadingBlock
-from sessions.analysis.analysis import analyse_blocks
-from sessions.analysis.flaws import Flaw, FlawName
-from sessions.decisions import Decision, Decisions
-from sessions.plan import Frame
+from sessions.plan.plan import Frame
+from sessions.strokes.analysis import analyse_blocks
+from sessions.strokes.decisions import Decision, Decisions
+from sessions.strokes.flaws import Flaw, FlawName
 
 T = times()
 PLAIN = stroke(T)

@@ -8,12 +8,12 @@ import h5py
 import pytest
 from recordings import begun, change, ended, rows
 
-from daq_app.cli import run
-from sessions.analysis import analyse
+from daq_app.cli.main import run
 from sessions.recording import Recording, RecordingError, writer
 from sessions.recording.archive import problems, seal
 from sessions.recording.head import plan_to_dict
 from sessions.recording.schema import FORMAT_VERSION
+from sessions.strokes import analyse
 
 KEPT = Path(__file__).parents[1] / "data" / "sessions"
 VERSIONS = range(1, FORMAT_VERSION + 1)

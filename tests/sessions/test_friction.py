@@ -22,10 +22,10 @@ from made_strokes import (
     wrench,
 )
 
-from sessions.analysis import ZERO_SETTING, ZERO_STATED, FlawName
-from sessions.analysis.friction import rule_for
-from sessions.analysis.measure import EVERYTHING
-from sessions.plan import Frame
+from sessions.plan.plan import Frame
+from sessions.strokes import ZERO_SETTING, ZERO_STATED, FlawName
+from sessions.strokes.friction import rule_for
+from sessions.strokes.stroke_measures import EVERYTHING
 
 T = times()
 PLAIN = stroke(T)

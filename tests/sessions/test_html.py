@@ -15,11 +15,11 @@ from page_numbers import estimates
 from report_example import TABLES, bare, example
 from study_example import study
 
-from sessions.exports.figures import plates
-from sessions.exports.html import page, write_figures
-from sessions.exports.report_tables import tables
-from sessions.exports.study_page import study_page
-from sessions.exports.study_prose import remarks
+from sessions.report.figures import plates
+from sessions.report.html import page, write_figures
+from sessions.report.study_page import study_page
+from sessions.report.study_prose import remarks
+from sessions.report.tables import tables
 
 PDFTOTEXT = shutil.which("pdftotext")
 SVG = "{http://www.w3.org/2000/svg}"
@@ -78,12 +78,12 @@ def drawn(drawing):
 @pytest.fixture
 def drawn_before(drawn, monkeypatch):
     """Let nothing be drawn anew."""
-    monkeypatch.setattr("sessions.exports.html.plates", lambda _: drawn)
+    monkeypatch.setattr("sessions.report.html.plates", lambda _: drawn)
 
 
 @pytest.fixture(scope="module")
 def made(report, drawn):
-    with patch("sessions.exports.html.plates", lambda _: drawn):  # drawn once for all
+    with patch("sessions.report.html.plates", lambda _: drawn):  # drawn once for all
         return page(report)
 
 

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sessions.analysis import ZERO_SETTING, ZERO_STATED
-from sessions.csv_columns import ColumnsUnknown, columns
-from sessions.import_csv import ORIGINAL_FILE, ImportOptions, ImportRefused, import_csv
+from sessions.exchange.csv_columns import ColumnsUnknown, columns
+from sessions.exchange.import_csv import ORIGINAL_FILE, ImportOptions, ImportRefused, import_csv
 from sessions.recording.errors import RecordingError
 from sessions.recording.reader import Recording
+from sessions.strokes import ZERO_SETTING, ZERO_STATED
 from sessions.toml_file import SettingsError
 
 HEADER = "t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm"

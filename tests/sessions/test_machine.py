@@ -3,10 +3,10 @@
 import pytest
 from walks import CODES, FIRST, FORCES, NUMBERS, PAIRS, RESTFUL, SCORES, made_plan
 
-from sessions.machine import advance, interrupted, start, trial_in_hand
-from sessions.plan import Frame, Rests, SessionPlan
-from sessions.states import Ended, Mounting, Resting, Scoring, Settling, Stroking, Taring
-from sessions.steps import (
+from sessions.plan.plan import Frame, Rests, SessionPlan
+from sessions.run.machine import advance, interrupted, start, trial_in_hand
+from sessions.run.states import Ended, Mounting, Resting, Scoring, Settling, Stroking, Taring
+from sessions.run.steps import (
     Abort,
     AskBegin,
     AskChoice,

@@ -3,9 +3,9 @@
 from hypothesis import given, settings
 from walks import meant, steps, walks
 
-from sessions.machine import advance, start
-from sessions.states import Closing, Ended
-from sessions.steps import Abort, AskMount, DiscardTake, KeepTake, LeaveOut, Note, Refuse, StartTake
+from sessions.run.machine import advance, start
+from sessions.run.states import Closing, Ended
+from sessions.run.steps import Abort, AskMount, DiscardTake, KeepTake, LeaveOut, Note, Refuse, StartTake
 
 
 @given(walk=walks())

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_strokes import times, trapezium
 
-from sessions.analysis.onset import Baseline, ContactDetector, DetectorSettings, Lift, Onset, onset_threshold
+from sessions.strokes.onset import Baseline, ContactDetector, DetectorSettings, Lift, Onset, onset_threshold
 
 
 def noisy(force, sd=0.004, seed=0):

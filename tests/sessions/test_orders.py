@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sessions.orders import drawn, opaque_codes, pairs, shuffled, williams
+from sessions.plan.orders import drawn, opaque_codes, pairs, shuffled, williams
 
 STIMULI = (0, 20, 50, 80, 100)
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 from report_session import record
 
-from sessions.analysis import AnalysisSettings, analyse
-from sessions.paths import (
+from sessions.prediction import PredictionOptions, predict, scenes_of, settled
+from sessions.prediction.multiverse import (
     PATHS,
     RECEPTORS,
     WINDOWS,
@@ -17,8 +17,8 @@ from sessions.paths import (
     spread,
     trial_paths,
 )
-from sessions.prediction import PredictionOptions, predict, scenes_of, settled
 from sessions.recording import Recording
+from sessions.strokes import AnalysisSettings, analyse
 
 STEADY = PredictionOptions(course="steady")
 SMALL = [path for path in PATHS if path.kinematics == "small"]

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from study_example import study, visit
 
-from sessions.analysis.area import HERTZ, AreaLaw
-from sessions.exports.study_csv import trials_csv
-from sessions.exports.study_models import missing_scores
-from sessions.exports.study_page import study_page
-from sessions.exports.study_prose import command, excluded, remarks, summary
-from sessions.paths import PATHS
-from sessions.pooling.exclusions import Exclusion, exclusions_in
-from sessions.pooling.findings import CARRY_OVER, DRIFT, FRICTION, INDEX, SED, WITHIN
-from sessions.pooling.pooled import pooled
-from sessions.pooling.visit import Visit, VisitOptions
+from sessions.exchange.study_csv import trials_csv
 from sessions.prediction import PredictionOptions
+from sessions.prediction.multiverse import PATHS
+from sessions.report.study_models import missing_scores
+from sessions.report.study_page import study_page
+from sessions.report.study_prose import command, excluded, remarks, summary
+from sessions.statistics.pooling.exclusions import Exclusion, exclusions_in
+from sessions.statistics.pooling.findings import CARRY_OVER, DRIFT, FRICTION, INDEX, SED, WITHIN
+from sessions.statistics.pooling.pooled import pooled
+from sessions.statistics.pooling.visit import Visit, VisitOptions
+from sessions.strokes.contact_area import HERTZ, AreaLaw
 from sessions.toml_file import SettingsError
 
 VISITS = [visit(number) for number in range(1, 11)]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from paper_friction import MEASURED, PLAN, analysis, parameters, stroke
 
-from sessions.plan import Finger as OwnFinger
+from sessions.plan.plan import Finger as OwnFinger
 from sessions.prediction import PredictionOptions, predict, with_own_finger
 from solver.response.fields import Sketch
 from solver.response.film import most_squeezed, stills, way_until

@@ -3,9 +3,9 @@ from itertools import pairwise
 
 import pytest
 
-from sessions.plan import Blinded, Finger, Frame
-from sessions.protocols import Body, StudyPlace, plan, protocol, protocol_names
-from sessions.protocols.protocol import FOLDER
+from sessions.plan.plan import Blinded, Finger, Frame
+from sessions.plan.protocols import Body, StudyPlace, plan, protocol, protocol_names
+from sessions.plan.protocols.protocol import FOLDER
 from sessions.toml_file import SettingsError
 
 PAPER = "sensotact-friction"

@@ -10,10 +10,10 @@ import pytest
 from recordings import change, plainly_read, rows
 from told_session import Session
 
-from sessions.analysis import analyse
-from sessions.exports import ExportSource, export
+from sessions.exchange import ExportSource, export
 from sessions.recording import Recording
 from sessions.recording.archive import seal
+from sessions.strokes import analyse
 
 READERS = Path(__file__).parents[2] / "docs" / "readers"
 

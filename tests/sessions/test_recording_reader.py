@@ -11,7 +11,7 @@ from recordings import PLAN, begun, change, ended, readings
 
 from sessions.recording import LoggedEvent, Recording, RecordingError
 from sessions.recording.log import trial_records
-from sessions.recording.torn import log_tail
+from sessions.recording.wal_recovery import log_tail
 
 
 def hashes(folder):

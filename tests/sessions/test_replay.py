@@ -8,17 +8,16 @@ from stand_ins import INFO, Hands, StandIn, ToldClock
 from told_session import resume
 
 from drivers.transducer import LinkLost, SetupError
-from sessions.analysis import analyse
-from sessions.import_csv import import_csv
-from sessions.protocols import plan, protocol, protocol_names
-from sessions.protocols.protocol import RestRules
+from sessions.exchange.import_csv import import_csv
+from sessions.plan.protocols import plan, protocol, protocol_names
+from sessions.plan.protocols.protocol import RestRules
 from sessions.recording import Recording, SessionWriter, provenance
 from sessions.recording.archive import seal
 from sessions.recording.replay import ReplayTransducer
 from sessions.recording.schema import event_crc, event_row
-from sessions.replay import different_events, different_readings, replay
-from sessions.runner import run_session
-from sessions.steps import (
+from sessions.run.replay import different_events, different_readings, replay
+from sessions.run.runner import run_session
+from sessions.run.steps import (
     Abort,
     AskMount,
     AskScore,
@@ -34,6 +33,7 @@ from sessions.steps import (
     StimulusMounted,
     StrokeDone,
 )
+from sessions.strokes import analyse
 
 PAPER = protocol("sensotact-friction")
 

@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 from report_session import CALIBRATION, INFO, PROVENANCE, ToldClock, record
 
 from drivers.readings import ReadingBlock
-from sessions.analysis.analysis import analyse
-from sessions.analysis.scores import Score, ScoreTable, score_table
-from sessions.exports.html import page
-from sessions.plan import Frame, SessionPlan
+from sessions.plan.plan import Frame, SessionPlan
 from sessions.prediction import PredictionOptions, predict
 from sessions.recording import Recording, SessionWriter
 from sessions.report import Planted, findings
+from sessions.report.html import page
 from sessions.report.strokes import _extremes
+from sessions.statistics.scores import Score, ScoreTable, score_table
+from sessions.strokes.analysis import analyse
 
 
 @pytest.fixture(scope="module")

@@ -11,19 +11,19 @@ from stand_ins import INFO, ToldClock
 from told_session import Session, resume
 from walks import FORCES, steps, walks
 
-from sessions.event_log import kind_of, line_of
-from sessions.machine import advance, start
 from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter
 from sessions.recording.archive import problems, seal
-from sessions.resuming import (
+from sessions.run.event_log import kind_of, line_of
+from sessions.run.machine import advance, start
+from sessions.run.resuming import (
     Seam,
     check_resumable,
     check_same_transducer,
     continued,
     resumption,
 )
-from sessions.states import Ended
-from sessions.steps import Abort, Refuse
+from sessions.run.states import Ended
+from sessions.run.steps import Abort, Refuse
 
 
 def logged(walk):

@@ -4,8 +4,8 @@ from stand_ins import RATE, Hands
 from told_session import Session, once
 
 from sessions.recording.replay import health_of
-from sessions.runner import RunnerSettings, run_session
-from sessions.steps import (
+from sessions.run.runner import RunnerSettings, run_session
+from sessions.run.steps import (
     AskMount,
     AskScore,
     AskStroke,

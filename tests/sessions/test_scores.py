@@ -6,8 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from recordings import begun
 
-from sessions.analysis.grading import grading
-from sessions.analysis.scores import (
+from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
+from sessions.recording import Recording
+from sessions.statistics.grading import grading
+from sessions.statistics.scores import (
     Score,
     ScoreTable,
     joined,
@@ -18,8 +20,6 @@ from sessions.analysis.scores import (
     score_table,
     subject_scores,
 )
-from sessions.plan import Block, Frame, SessionPlan, Stimulus, Trial
-from sessions.recording import Recording
 
 
 def table(subject, values, *, session=None, descriptor="stickiness", indices=(0, 20, 50, 80, 100)):

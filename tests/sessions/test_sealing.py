@@ -5,16 +5,16 @@ import json
 import pytest
 from stand_ins import Hands, ToldClock
 
-from daq_app.cli import run
-from sessions.protocols import Body, plan
-from sessions.protocols.protocol import FOLDER
+from daq_app.cli.main import run
+from sessions.plan.protocols import Body, plan
+from sessions.plan.protocols.protocol import FOLDER
+from sessions.plan.sealed_predictions import SEAL, digest, seal_prediction, sealed_sentence
+from sessions.plan.study_file import create_study, enrol, open_study, study_key
 from sessions.recording import Recording, RecordingError, SessionWriter, provenance
 from sessions.recording.archive import seal
 from sessions.recording.derived import store_derived
-from sessions.runner import run_session
-from sessions.sealing import SEAL, digest, seal_prediction, sealed_sentence
-from sessions.steps import AskScore, Scored
-from sessions.study_file import create_study, enrol, open_study, study_key
+from sessions.run.runner import run_session
+from sessions.run.steps import AskScore, Scored
 
 TEXT = (FOLDER / "sensotact-friction.toml").read_text()
 ROW = {"trial": 1, "mu": 0.3, "tau_max": 0.01, "indentation": 2.0, "direction": 1, "sed": 0.0085}

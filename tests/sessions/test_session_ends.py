@@ -7,7 +7,7 @@ import pytest
 from told_session import Session, once
 
 from sessions.recording import Recording
-from sessions.steps import Abort, AskMount, AskScore, AskStroke, MeasureZero
+from sessions.run.steps import Abort, AskMount, AskScore, AskStroke, MeasureZero
 
 
 def assert_ended(recording, reason, cause):

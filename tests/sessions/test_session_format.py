@@ -9,8 +9,8 @@ import pytest
 from recordings import rows
 from told_session import Session
 
-from sessions.plan import Shown
-from sessions.protocols.protocol import (
+from sessions.plan.plan import Shown
+from sessions.plan.protocols.protocol import (
     BlockOutline,
     Face,
     OrderRules,
@@ -20,8 +20,8 @@ from sessions.protocols.protocol import (
     Scale,
 )
 from sessions.recording.archive import seal
-from sessions.runner import LOSSES
-from sessions.steps import Event
+from sessions.run.runner import LOSSES
+from sessions.run.steps import Event
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "session-format.md").read_text(encoding="utf-8")

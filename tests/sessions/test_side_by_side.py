@@ -6,10 +6,9 @@ from dataclasses import replace
 import pytest
 from paper_friction import MEASURED, PLAN, analysis, parameters, stroke
 
-from sessions import side_by_side
-from sessions.alternative import Variant
-from sessions.prediction import PredictionOptions, predict
-from sessions.side_by_side import with_alternatives
+from sessions.prediction import PredictionOptions, predict, side_by_side
+from sessions.prediction.side_by_side import with_alternatives
+from sessions.prediction.variants import Variant
 from solver.response.solution import solve
 from solver.scene import Friction, Loading, Scene, Solve
 from solver.scene.published import STICKINESS

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_strokes import analysed, block, felt, stroke, times, trapezium, wrench
 
-from sessions.analysis.stick import Climb
+from sessions.strokes.break_away import Climb
 
 T = times()
 N = trapezium(T, 1.0, 3.0, 0.1, 2.0)

@@ -23,9 +23,9 @@ from made_strokes import (
 )
 from scipy.signal import lfilter
 
-from sessions.analysis.forces import Filter, centre_of_pressure, friction_ratio, in_face_frame, normal_force
-from sessions.analysis.steady import mean_of, movement, steady_window
-from sessions.plan import Frame
+from sessions.plan.plan import Frame
+from sessions.strokes.forces import Filter, centre_of_pressure, friction_ratio, in_face_frame, normal_force
+from sessions.strokes.steady import mean_of, movement, steady_window
 
 T = times()
 PLAIN = stroke(T)
@@ -131,7 +131,7 @@ def test_a_recording_that_ends_in_contact_has_no_lift():
 
 
 def test_onset_is_the_same_live_and_offline():
-    from sessions.analysis.onset import ContactDetector
+    from sessions.strokes.onset import ContactDetector
 
     raw = felt(PLAIN)
     live = ContactDetector().feed(T, normal_force(raw, Frame("-z")))

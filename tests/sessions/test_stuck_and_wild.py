@@ -23,8 +23,8 @@ from made_strokes import (
     wrench,
 )
 
-from sessions.analysis.stuck import stuck_axes
-from sessions.analysis.wild import wild_readings
+from sessions.strokes.clipping import stuck_axes
+from sessions.strokes.spikes import wild_readings
 
 T = times(10.0)
 BEGINS = (1.0, 4.0, 7.0)

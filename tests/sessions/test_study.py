@@ -11,21 +11,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from stand_ins import Hands, ToldClock
 
-from sessions.analysis.scores import score_table
-from sessions.blinding import UNBLINDING, Key, revealed
-from sessions.plan import Blinded, Finger
-from sessions.protocols import Body, design_rows, plan
-from sessions.protocols.protocol import FOLDER
+from sessions.plan.blinding import UNBLINDING, Key, revealed
+from sessions.plan.plan import Blinded, Finger
+from sessions.plan.protocols import Body, design_rows, plan
+from sessions.plan.protocols.protocol import FOLDER
+from sessions.plan.study import Member, StudyError, free_slot
+from sessions.plan.study_file import KEY_FILE, create_study, enrol, note, open_study, study_key, withdraw
+from sessions.plan.visits import score_visits, sessions_of
 from sessions.recording import Recording, RecordingError, SessionWriter, provenance
 from sessions.recording.archive import problems, seal
 from sessions.recording.derived import store_derived
-from sessions.replay import different_events, different_readings, replay
-from sessions.runner import run_session
-from sessions.steps import AskScore, Scored
-from sessions.study import Member, StudyError, free_slot
-from sessions.study_file import KEY_FILE, create_study, enrol, note, open_study, study_key, withdraw
+from sessions.run.replay import different_events, different_readings, replay
+from sessions.run.runner import run_session
+from sessions.run.steps import AskScore, Scored
+from sessions.statistics.scores import score_table
 from sessions.toml_file import SettingsError
-from sessions.visits import score_visits, sessions_of
 
 TEXT = (FOLDER / "sensotact-friction.toml").read_text()
 WILLIAMS = TEXT.replace('rule = "shuffled"', 'rule = "williams"')

@@ -8,8 +8,8 @@ from dataclasses import fields
 import pytest
 from study_example import study
 
-from sessions.exports.study_csv import _MEANING, columns_csv, paths_csv, trials_csv
-from sessions.pooling.visit import TrialRow
+from sessions.exchange.study_csv import _MEANING, columns_csv, paths_csv, trials_csv
+from sessions.statistics.pooling.visit import TrialRow
 
 RSCRIPT = shutil.which("Rscript")
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from made_strokes import INFO, SETTINGS, analysed, block, felt, plan, stroke, times, trapezium, trial, wrench
 
-from sessions.analysis.analysis import analyse_blocks
-from sessions.analysis.tilt import tilt_of
+from sessions.strokes.analysis import analyse_blocks
+from sessions.strokes.tilt import tilt_of
 
 T = times(12.0)
 LEAN = (2.0, -1.2)  # degrees, to +x and to +y

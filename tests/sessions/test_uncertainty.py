@@ -8,12 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sessions import uncertainty
-from sessions.analysis.bootstrap import BootstrapSettings, friction_draws, stroke_intervals
-from sessions.plan import Block, SessionPlan
-from sessions.prediction import PredictionOptions, predict, scene_along, settled, with_loads
-from sessions.side_by_side import with_alternatives
-from sessions.uncertainty import with_intervals
+from sessions.plan.plan import Block, SessionPlan
+from sessions.prediction import PredictionOptions, predict, scene_along, settled, uncertainty, with_loads
+from sessions.prediction.side_by_side import with_alternatives
+from sessions.prediction.uncertainty import with_intervals
+from sessions.strokes.bootstrap import BootstrapSettings, friction_draws, stroke_intervals
 from simulators.bench import BenchSettings
 from solver.response.derivatives import By
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
-from sessions.analysis.mixed import mixed_model
-from sessions.analysis.restricted import restricted_fit
-from sessions.analysis.spread import difference_of_squares, spreads
-from sessions.analysis.within import (
+from sessions.statistics.mixed_model import mixed_model
+from sessions.statistics.reml import restricted_fit
+from sessions.statistics.variance_components import difference_of_squares, spreads
+from sessions.statistics.within_subjects import (
     agreement,
     differences,
     equal_moduli,

@@ -4,10 +4,10 @@ from datetime import UTC, datetime, timedelta
 
 from stand_ins import INFO, Hands, StandIn, ToldClock
 
-from sessions.protocols import plan, protocol
+from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording, SessionWriter, provenance
-from sessions.resuming import check_resumable, continued, resumed_data, resumption
-from sessions.runner import Resumed, run_session
+from sessions.run.resuming import check_resumable, continued, resumed_data, resumption
+from sessions.run.runner import Resumed, run_session
 
 PAPER = protocol("sensotact-friction")
 

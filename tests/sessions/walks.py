@@ -2,11 +2,11 @@
 
 from hypothesis import strategies as st
 
-from sessions.machine import advance, start
-from sessions.plan import Block, Frame, Rests, SessionPlan, Stimulus, Trial
-from sessions.protocols import plan, protocol
-from sessions.states import Closing, Mounting, Paused, Ready, Resting, Scoring, Settling, Stroking, Taring
-from sessions.steps import (
+from sessions.plan.plan import Block, Frame, Rests, SessionPlan, Stimulus, Trial
+from sessions.plan.protocols import plan, protocol
+from sessions.run.machine import advance, start
+from sessions.run.states import Closing, Mounting, Paused, Ready, Resting, Scoring, Settling, Stroking, Taring
+from sessions.run.steps import (
     Begin,
     Chosen,
     ContactOnset,

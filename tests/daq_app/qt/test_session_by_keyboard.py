@@ -8,10 +8,10 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from sessions import steps
-from sessions.protocols import protocol_file
+from sessions.plan.protocols import protocol_file
+from sessions.plan.study_file import create_study
 from sessions.recording import Recording
-from sessions.study_file import create_study
+from sessions.run import steps
 
 pytestmark = pytest.mark.qt
 

@@ -6,7 +6,7 @@ from daq_app.window.live_feed import LiveFeed, together
 from daq_app.window.live_trace import CHANNELS
 from drivers.calibration import Calibration
 from drivers.transducer import TransducerInfo
-from sessions.plan import Frame
+from sessions.plan.plan import Frame
 
 FRAME = Frame("-z", "set", 20.0, "set")
 CALIBRATION = Calibration("FT1", "counts", np.diag([1e-6] * 3 + [1e-3] * 3), np.array([36.0] * 3 + [500.0] * 3), "test")

@@ -12,9 +12,9 @@ from daq_app.window.live_follower import Follower, settled_scene
 from daq_app.window.live_model import Forces, Provisional, Settle, Settled, Use, forces_of, joined
 from daq_app.window.live_model_process import LiveModel
 from daq_app.window.view_model import ModelTrace, model_words
-from sessions.analysis import FrictionParameters
-from sessions.plan import Frame
-from sessions.protocols import plan, protocol
+from sessions.plan.plan import Frame
+from sessions.plan.protocols import plan, protocol
+from sessions.strokes import FrictionParameters
 from solver.failures import NoSteadyState
 from solver.response.solution import solve
 

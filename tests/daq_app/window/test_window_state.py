@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from daq_app.life import Life
 from daq_app.recorder import messages as m
+from daq_app.recorder.device_history import Life
 from daq_app.window.bench_load import Load
 from daq_app.window.messages import Dismissed, DrawingFailed, Judged, LifeKnown, Loaded, NewSession, Tick
 from daq_app.window.state import AppState, fold
@@ -14,11 +14,11 @@ from daq_app.window.stroke_quality import Quality
 from daq_app.window.view import derive_view
 from drivers.calibration import Calibration
 from drivers.transducer import Health, TransducerInfo
-from sessions import steps
-from sessions.plan import Frame, Shown
-from sessions.protocols import plan, protocol
+from sessions.plan.plan import Frame, Shown
+from sessions.plan.protocols import plan, protocol
 from sessions.recording import Acknowledged, LoggedEvent
-from sessions.runner import SessionEnd, Status
+from sessions.run import steps
+from sessions.run.runner import SessionEnd, Status
 
 CALIBRATION = Calibration(
     "FT1", "counts", np.diag([1e-6] * 3 + [1e-3] * 3), np.array([36.0] * 3 + [500.0] * 3), "typed"

@@ -1,0 +1,1 @@
+"""Many sessions computed: workers, a cluster, derived numbers, sensitivity."""

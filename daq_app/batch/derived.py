@@ -1,0 +1,262 @@
+"""Numbers made from a session: made, kept in its folder, and made once more to verify them."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from daq_app.cli.console import Console
+from daq_app.cli.main import WrongValue
+from sessions.plan.blinding import revealed
+from sessions.plan.plan import SessionPlan
+from sessions.plan.study_file import is_study
+from sessions.plan.visits import force_visit
+from sessions.prediction import PredictionOptions, Progress, SessionPrediction, predict
+from sessions.prediction.afferent import AfferentSettings, firing_document
+from sessions.prediction.side_by_side import with_alternatives
+from sessions.prediction.uncertainty import with_intervals
+from sessions.recording import Recording, RecordingError
+from sessions.recording.calibration_uncertainty import checked_gain_error, gain_error_set, set_gain_error
+from sessions.recording.derived import load_derived, store_derived
+from sessions.recording.kept_shape import check_analysis, check_prediction
+from sessions.strokes import Analysis, AnalysisSettings, analyse
+from sessions.strokes.bootstrap import BootstrapSettings, drawn_from, intervals_of
+from sessions.strokes.contact_area import AreaLaw
+from sessions.strokes.decisions import Decisions
+from sessions.toml_file import SettingsError, from_table
+
+ANALYSIS = "analysis.json"
+PREDICTION = "prediction.json"
+
+
+def analysed(
+    recording: Recording,
+    console: Console,
+    area: AreaLaw | None = None,
+    *,
+    seed: int | None = None,
+    gain_error: float | None = None,
+) -> Analysis:
+    """Return the analysis of a session, tau_max told by a law of the area, and keep it in the session's folder.
+
+    `seed` is that of its intervals; `gain_error` is how uncertain each axis' gain is [-]. Where nobody
+    says, area and seed are as in the analysis that was kept before, and the gain's error as it was last set: what
+    somebody set is not lost by a verb that says nothing of it. Raises RecordingError where the last is damaged.
+    """
+    before = _kept(recording, ANALYSIS)
+    if gain_error is None:
+        gain_error = gain_error_set(recording.folder)
+    else:
+        try:
+            set_gain_error(recording.folder, gain_error)
+        except RecordingError as error:
+            console.note(f"not kept: {error}")
+    stood = settings_of(before)
+    drawn = stood.bootstrap_seed if seed is None else seed
+    analysis = analyse(
+        recording, AnalysisSettings(area=area or stood.area, gain_error=gain_error, bootstrap_seed=drawn)
+    )
+    _keep(recording, ANALYSIS, analysis_document(analysis), console)
+    return analysis
+
+
+def settings_kept(recording: Recording) -> AnalysisSettings:
+    """Return the settings that were asked for a session before. Raises RecordingError where the last is damaged."""
+    return replace(settings_of(_kept(recording, ANALYSIS)), gain_error=gain_error_set(recording.folder))
+
+
+def made_otherwise(recording: Recording, now: AnalysisSettings) -> str | None:
+    """Say that the kept prediction has another law of the area, calibration error or seed; None where it has not."""
+    before = _kept(recording, PREDICTION)
+    if not before:
+        return None
+    stood = settings_of(before)
+    other = ["another law of the contact area"] if stood.area != now.area else []
+    other += ["another calibration error"] if stood.gain_error != now.gain_error else []
+    other += ["another seed of the intervals"] if stood.bootstrap_seed != now.bootstrap_seed else []
+    if not other:
+        return None
+    return f"{PREDICTION} was made with {' and '.join(other)}: 'daq-app predict' makes it anew"
+
+
+def asked_before(recording: Recording) -> PredictionOptions | None:
+    """Return the options of the prediction that was kept before; None where there is none that can be read."""
+    before = _kept(recording, PREDICTION)
+    return from_table(before["options"], PredictionOptions, PREDICTION) if "options" in before else None
+
+
+def afferent_before(recording: Recording) -> AfferentSettings | None:
+    """Return the parameters of the afferent kept with the prediction before; None where none was kept."""
+    return _afferent_of(_kept(recording, PREDICTION))
+
+
+def _afferent_of(stored: Mapping[str, Any]) -> AfferentSettings | None:
+    """Return the parameters of the afferent in a stored prediction; None where it has none. Raises SettingsError."""
+    held: Mapping[str, Any] | None = stored.get("afferent")
+    return None if held is None else from_table(held.get("settings") or {}, AfferentSettings, PREDICTION)
+
+
+def kept(folder: Path, name: str) -> dict[str, Any] | None:
+    """Return the analysis or prediction kept in a session's folder; None where there is none.
+
+    Raises RecordingError where it is damaged: what it holds, or which verb makes it anew.
+    """
+    verb = "analyse" if name == ANALYSIS else "predict"
+    try:
+        document = load_derived(folder, name)
+        if document is not None:
+            (check_analysis if name == ANALYSIS else check_prediction)(document)
+            settings_of(document)
+            _afferent_of(document)
+    except RecordingError as damaged:
+        told = str(damaged).replace("make it anew from the recording", f"'daq-app {verb}' makes it anew")
+        raise RecordingError(told) from damaged
+    except (SettingsError, AttributeError, TypeError) as damaged:
+        why = (
+            damaged if isinstance(damaged, SettingsError) else "its parts are not of the kinds that this program writes"
+        )
+        raise RecordingError(f"{folder / name} is damaged ({why}); 'daq-app {verb}' makes it anew") from damaged
+    return document
+
+
+def _kept(recording: Recording, name: str) -> Mapping[str, Any]:
+    """Return a document as it was kept before; empty where there is none, or one that is damaged and made anew."""
+    try:
+        return kept(recording.folder, name) or {}
+    except RecordingError:
+        return {}
+
+
+def predicted(
+    recording: Recording,
+    analysis: Analysis,
+    console: Console,
+    options: PredictionOptions | None = None,
+    afferent: AfferentSettings | None = None,
+) -> SessionPrediction:
+    """Return what the model predicts for a session, and keep it in the session's folder.
+
+    The firing of an `afferent` is kept with it; where nobody asks for one, with the parameters of the one kept before.
+    What else was kept before and is not asked for again is named. Raises as `predict` does.
+    """
+
+    def shown(part: float) -> bool:
+        console.progress(part, "predicting")
+        return True
+
+    prediction = _predicted(analysis, recording.plan, options, shown)
+    before = _kept(recording, PREDICTION)
+    document = _with_firing(prediction, afferent or _afferent_of(before))
+    lost = _no_longer(before, prediction.options)
+    if lost:
+        console.note(f"{PREDICTION} held more before, which is not kept: {', '.join(lost)}")
+    _keep(recording, PREDICTION, document, console)
+    return prediction
+
+
+def _with_firing(prediction: SessionPrediction, afferent: AfferentSettings | None) -> dict[str, Any]:
+    told = {} if afferent is None else {"afferent": firing_document(prediction, afferent)}
+    return {**prediction.to_dict(), **told}
+
+
+def _no_longer(before: Mapping[str, Any], now: PredictionOptions) -> list[str]:
+    """Name what a stored prediction was asked for and another is not, with the words that ask for it."""
+    stood = from_table(before.get("options", {}), PredictionOptions, PREDICTION)
+    rank = ("none", "small", "both").index
+    lost = ["intervals of the SED (--intervals)"] if stood.intervals and not now.intervals else []
+    if before and rank(stood.beside) > rank(now.beside):
+        lost.append(f"the variants side by side (--beside {stood.beside})")
+    return lost
+
+
+def predicted_again(recording: Recording, analysis: Analysis, stored: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the prediction made once more, with the options stored beside it, as blind as it was made.
+
+    Raises SettingsError where damaged.
+    """
+    options = from_table(stored.get("options", {}), PredictionOptions, PREDICTION)
+    stimuli: list[Mapping[str, Any]] = [row.get("stimulus") or {} for row in stored.get("trials", ())]
+    blind = all(stimulus.get("index") is None for stimulus in stimuli)
+    plan = (recording if blind else revealed(recording)).plan
+    return _with_firing(_predicted(analysis, plan, options, lambda _: True), _afferent_of(stored))
+
+
+def _predicted(
+    analysis: Analysis, plan: SessionPlan, options: PredictionOptions | None, progress: Progress
+) -> SessionPrediction:
+    """Return the prediction with all that its options ask for beside it."""
+    intervals = options is not None and options.intervals
+    parts = 1 + intervals + (options is not None and options.beside != "none")
+
+    def part(number: int) -> Progress:
+        return lambda done: progress((number + done) / parts)
+
+    prediction = predict(analysis, plan, options, part(0))
+    if intervals:
+        prediction = with_intervals(analysis, prediction, progress=part(1))
+    return with_alternatives(prediction, part(parts - 1), analysis)
+
+
+def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = None) -> dict[str, Any]:
+    """Return an analysis with its bootstrap intervals, as it is kept and printed."""
+    return {
+        **analysis.to_dict(),
+        "bootstrap": intervals_of(analysis.strokes, bootstrap or drawn_from(analysis.settings)),
+    }
+
+
+def analysed_again(recording: Recording, stored: Mapping[str, Any], decisions: Decisions) -> dict[str, Any]:
+    """Return the analysis made once more as the document `stored` was. Raises SettingsError where that is damaged."""
+    drawn = bootstrap_of(stored) if "bootstrap" in stored else None
+    return analysis_document(analyse(recording, settings_of(stored), decisions), drawn)
+
+
+def bootstrap_of(stored: Mapping[str, Any]) -> BootstrapSettings:
+    """Return what the intervals of a stored analysis were drawn from. Raises SettingsError."""
+    held: Mapping[str, Any] = stored.get("bootstrap") or {}
+    return from_table(held.get("settings") or {}, BootstrapSettings, ANALYSIS)
+
+
+def settings_of(stored: Mapping[str, Any]) -> AnalysisSettings:
+    """Return the settings with which a stored analysis, or that under a stored prediction, is made once more.
+
+    The law of the contact area, the calibration's error and the seed of the intervals are all that can be asked for;
+    the rest is the program's.
+    Raises SettingsError.
+    """
+    held: Mapping[str, Any] = stored.get("settings") or stored
+    area = from_table(held.get("area") or {}, AreaLaw, "area")
+    seed = held.get("bootstrap_seed", 0)
+    if not isinstance(seed, int) or seed < 0:
+        raise SettingsError(f"bootstrap_seed = {seed!r} is not allowed: a whole number from 0 on")
+    return AnalysisSettings(area=area, gain_error=checked_gain_error(held.get("gain_error")), bootstrap_seed=seed)
+
+
+def made_under(stored: Mapping[str, Any], decisions: Decisions) -> bool:
+    """Say whether a stored document was made with the decisions that are in force now."""
+    now = json.loads(json.dumps([decision.to_dict() for decision in decisions.in_force]))
+    return stored.get("decisions", []) == now
+
+
+def visit(path: Path, subject: str | None) -> Recording:
+    """Return a session with all that is known of its stimuli, or a subject's visit with forces to a study.
+
+    Raises RecordingError, StudyError, WrongValue.
+    """
+    if is_study(path):
+        if subject is None:
+            raise WrongValue(f"{path} is a study: say whose visit with --subject")
+        return force_visit(path, subject)
+    recording = revealed(Recording.open(path))
+    if subject not in (None, recording.plan.subject):
+        raise WrongValue(f"--subject {subject} is not allowed: {path} is a session of {recording.plan.subject}")
+    return recording
+
+
+def _keep(recording: Recording, name: str, document: Mapping[str, Any], console: Console) -> None:
+    """Store a document in the session's folder; a folder that cannot be written is named, and nothing fails."""
+    try:
+        store_derived(recording.folder, name, document)
+    except RecordingError as error:
+        console.note(f"not kept: {error}")

@@ -1,0 +1,175 @@
+"""The command line: verbs, exit codes, and the one sentence a failure is told in."""
+
+import argparse
+import importlib
+import sys
+import traceback
+from types import ModuleType
+from typing import NoReturn
+
+from daq_app.cli.console import Console, harmless, takes_all
+
+DONE, FAILED, WRONG, FLAWED, STOPPED = 0, 1, 2, 3, 130
+
+# Verb to module and to what it does. A verb's module is imported only when it is the one asked for.
+VERBS = {
+    "demo": "run the whole study on the simulated transducer and simulated subjects",
+    "devices": "list the transducers that can be reached, or probe one",
+    "run": "run one session",
+    "enrol": "enrol a subject in a study, or make one",
+    "resume": "go on with a session that was cut short",
+    "import": "make a session folder of a foreign recording",
+    "replay": "run a recorded session once more and compare what comes out",
+    "analyse": "find the strokes of a session and their friction",
+    "decide": "record what a person decides about a stroke, or undo it",
+    "predict": "predict the receptor's strain-energy density for each trial",
+    "solve": "run the solver on a scene file",
+    "sensitivity": "tell which of a scene's numbers moves the SED (Sobol indices)",
+    "accuracy": "measure how fast the solver is and how true, on this machine, as one page",
+    "report": "write a session's report as one page",
+    "study": "pool many sessions: group statistics, a page, a table of all trials",
+    "export": "write a session as CSV, BIDS, HDF5 or NWB",
+    "selftest": "pull its own plug on this computer and disk, and write a certificate",
+    "simulate": "serve the other end of a wire, to try a driver without hardware",
+    "unblind": "open the sealed key of a blinded study or session",
+    "verify": "check every checksum of a session and recompute every derived number",
+}
+
+
+# Where each failure a person can act on is defined.
+_WRONG = (
+    "drivers.address.AddressError",
+    "sessions.strokes.decisions.DecisionError",
+    "sessions.toml_file.SettingsError",
+    "simulators.timetable.TimetableError",
+    "solver.scene.tables.SceneError",
+)
+_FAILED = (
+    "daq_app.batch.cluster.SchedulerError",
+    "daq_app.cli.console.NotWritten",
+    "daq_app.batch.sensitivity.TooFewAnswers",
+    "drivers.transducer.DeviceFault",
+    "drivers.transducer.LinkLost",
+    "drivers.transducer.SetupError",
+    "sessions.exchange.ExportError",
+    "sessions.report.html.ReportError",
+    "sessions.exchange.import_csv.ImportRefused",
+    "sessions.plan.plan.Blinded",
+    "sessions.recording.errors.RecordingError",
+    "sessions.plan.study.StudyError",
+    "solver.failures.SolveFailure",
+)
+
+
+_OUR_OWN = ("daq_app", "drivers", "sessions", "simulators", "solver")
+
+
+class WrongValue(Exception):
+    """The command line or a value in a file was wrong: exit code 2."""
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command line and return its exit code. Never raises, save for a broken interpreter."""
+    debug = "--debug" in arguments
+    takes_all(sys.stdout, sys.stderr)
+    try:
+        return _dispatch(arguments)
+    except KeyboardInterrupt:
+        return _said("stopped", STOPPED)
+    except BrokenPipeError:
+        return FAILED  # whoever read our output has gone; there is nobody to tell
+    except Exception as error:  # noqa: BLE001  the last resort: no traceback reaches a user
+        if debug:
+            traceback.print_exc()
+        return _said(*_failure(error))
+
+
+class _Parser(argparse.ArgumentParser):
+    """Tells what is wrong with a command line in one sentence, without printing how all of it is used."""
+
+    def error(self, message: str) -> NoReturn:
+        raise WrongValue(f"{message}; '{self.prog} --help' explains")
+
+
+def _dispatch(arguments: list[str]) -> int:
+    if not arguments or arguments[0] in {"-h", "--help"}:
+        _overview().print_help(sys.stdout if arguments else sys.stderr)
+        return DONE if arguments else WRONG
+    name, *rest = arguments
+    if name not in VERBS:
+        return _said(f"there is no verb '{name}': 'daq-app --help' lists them", WRONG)
+    verb = importlib.import_module(f"daq_app.cli.verbs.{name.replace('import', 'import_')}")
+    try:
+        options = _parser(name, verb).parse_args(_joined(rest))
+    except SystemExit as leaving:  # argparse has printed its help
+        return int(leaving.code or 0)
+    return verb.run(options, Console(as_json=options.json))
+
+
+def _joined(arguments: list[str]) -> list[str]:
+    """Join --normal to its value, which may begin with a hyphen and would be taken for an option.
+
+    >>> _joined(["a.csv", "--normal", "-z", "--json"])
+    ['a.csv', '--normal=-z', '--json']
+    """
+    if "--normal" not in arguments[:-1]:
+        return arguments
+    at = arguments.index("--normal")
+    return [*arguments[:at], f"--normal={arguments[at + 1]}", *arguments[at + 2 :]]
+
+
+def _overview() -> argparse.ArgumentParser:
+    width = max(map(len, VERBS))
+    verbs = "\n".join(f"  {name:<{width}}  {does}" for name, does in VERBS.items())
+    return argparse.ArgumentParser(
+        prog="daq-app",
+        usage="daq-app VERB [options]",
+        description="Friction psychophysics: the experiment, the transducer, the finite-element finger.",
+        epilog=f"verbs:\n{verbs}\n\n'daq-app VERB --help' explains one and shows an example.\n"
+        "'daq-app' alone opens the window, 'daq-app window SESSION' a session in it.\n"
+        "exit codes: 0 done, 1 could not be done, 2 wrong command line or value in a file, "
+        "3 done with named losses or flaws, 130 stopped",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+
+
+def _parser(name: str, verb: ModuleType) -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog=f"daq-app {name}",
+        description=verb.__doc__,
+        epilog=f"example:\n  {verb.EXAMPLE}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    verb.add_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON document on stdout, and nothing else there")
+    parser.add_argument("--debug", action="store_true", help="show the traceback of a failure")
+    return parser
+
+
+def _failure(error: Exception) -> tuple[str, int]:
+    """Return the sentence and the exit code for what went wrong."""
+    sentence = " ".join(str(error).split())
+    if isinstance(error, (WrongValue, *_loaded(_WRONG))):
+        return sentence, WRONG
+    if isinstance(error, _loaded(_FAILED)):
+        return sentence, FAILED
+    if isinstance(error, OSError):
+        if error.filename is None or error.strerror is None:
+            return sentence, FAILED
+        return f"{error.filename}: {error.strerror.lower()}", FAILED
+    if isinstance(error, ModuleNotFoundError) and error.name and error.name.partition(".")[0] not in _OUR_OWN:
+        package = error.name.partition(".")[0]
+        return f"the Python package {package} is not installed; 'pip install daq-app' brings all that is needed", FAILED
+    return f"unexpected {type(error).__name__} ({sentence}); run again with --debug and report what it shows", FAILED
+
+
+def _loaded(names: tuple[str, ...]) -> tuple[type[Exception], ...]:
+    """Return those of the exceptions whose module was imported: no other can have been raised, nor need be imported."""
+    pairs = [name.rsplit(".", 1) for name in names]
+    return tuple(getattr(sys.modules[module], name) for module, name in pairs if module in sys.modules)
+
+
+def _said(sentence: str, code: int) -> int:
+    print(f"daq-app: {harmless(sentence)}", file=sys.stderr)
+    return code

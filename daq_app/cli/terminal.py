@@ -1,0 +1,173 @@
+"""Experimenter and subject at a terminal: prompts on stderr, answers from stdin."""
+
+import sys
+import threading
+from collections import deque
+from typing import Literal, TextIO
+
+from sessions.plan.plan import Trial
+from sessions.run.steps import (
+    Abort,
+    AskBegin,
+    AskChoice,
+    AskFinish,
+    AskMount,
+    AskNumber,
+    AskRest,
+    AskScore,
+    AskStroke,
+    Begin,
+    Chosen,
+    Command,
+    EndSession,
+    Event,
+    Finish,
+    MeasureZero,
+    Note,
+    NumberGiven,
+    Pause,
+    Redo,
+    Refuse,
+    Resume,
+    Scored,
+    ShowInstruction,
+    Skip,
+    StimulusMounted,
+    StrokeDone,
+    Tell,
+)
+
+HELP = (
+    "Enter does what is asked. At any time: redo REASON, skip REASON, pause, resume, note TEXT, abort REASON. "
+    "An answer is a number, or 1 or 2 for the first or second of two, or - for no answer."
+)
+KEYBOARD = "keyboard"
+CHOICES: dict[float, Literal["first", "second"]] = {1.0: "first", 2.0: "second"}
+WAYS = {1: "from proximal to distal (away from the subject)", -1: "from distal to proximal (towards the subject)"}
+
+
+class Terminal:
+    """Reads lines in a thread of its own, so that nobody's slowness holds up the recording."""
+
+    def __init__(self, *, forces: bool, lines: TextIO | None = None, out: TextIO | None = None) -> None:
+        """Talk on stderr and listen on stdin; `forces` is False where no transducer tells when a stroke is done."""
+        self._forces = forces
+        self._out = out or sys.stderr
+        self._asked: Command | None = None
+        self._lines: deque[str] = deque()
+        self.closed = False  # nobody can type any more
+        # A daemon: a blocked read of stdin must not keep the program alive.
+        threading.Thread(target=self._read, args=(lines or sys.stdin,), daemon=True).start()
+        self._print(HELP)
+
+    def show(self, command: Command) -> None:
+        """Print what is to be done, and remember what was asked."""
+        asked = self._question(command)
+        if asked is not None:
+            self._asked = command
+            self._print(asked)
+            return
+        match command:
+            case ShowInstruction(block):
+                self._print(f"\n== {block.name}: {block.instruction}")
+            case MeasureZero():
+                self._print("Zero is being measured: hands off.")
+            case Tell(sentence) | Refuse(sentence):
+                self._print(sentence)
+            case EndSession(reason):
+                self._print(f"The session ends: {reason}.")
+            case _:
+                pass
+
+    def _question(self, command: Command) -> str | None:
+        """Return what a command asks for in words; None for one that asks for nothing."""
+        match command:
+            case AskBegin():
+                return "Press Enter to begin."
+            case AskMount(trial):
+                return f"{_called(trial)}: mount {trial.stimulus.code}, then press Enter."
+            case AskStroke(trial, allowed):
+                after = "" if self._forces else " Press Enter when it is done."
+                often = "once" if allowed == 1 else f"up to {allowed} times"
+                return f"Stroke {often}, {WAYS[trial.direction]}.{after}"
+            case AskScore(_, (low, high), question=question):
+                return f"{question} Score from 0 ({low}) to 100 ({high}):".strip()
+            case AskNumber(_, question):
+                return f"{question} A number above 0, on the subject's own scale:"
+            case AskChoice(first, second, question):
+                which = f"1 for the first ({first.stimulus.code}), 2 for the second ({second.stimulus.code}):"
+                return f"{question} {which}"
+            case AskRest(duration):
+                long = "" if duration is None else f" It goes on by itself after {duration:g} s."
+                return f"The subject rests. Press Enter to go on.{long}"
+            case AskFinish():
+                return "Every trial is done. Press Enter to end the session."
+            case _:
+                return None
+
+    def poll(self) -> tuple[Event, ...]:
+        """Return what the lines typed since the last call mean."""
+        events = [self._meant(self._lines.popleft().strip()) for _ in range(len(self._lines))]
+        return tuple(event for event in events if event is not None)
+
+    def _meant(self, line: str) -> Event | None:
+        word, _, rest = line.partition(" ")
+        orders: dict[str, Event] = {
+            "redo": Redo(rest),
+            "skip": Skip(rest),
+            "abort": Abort(rest),
+            "note": Note(rest),
+            "pause": Pause(),
+            "resume": Resume(),
+        }
+        if word in orders:
+            return orders[word]
+        event = self._done() if line == "" else self._answered(line)
+        if event is None:
+            self._print(f"'{line}' means nothing now. {HELP}" if line else "Nothing is waiting for Enter now.")
+        return event
+
+    def _done(self) -> Event | None:
+        """Return what Enter alone means."""
+        match self._asked:
+            case AskBegin():
+                return Begin()
+            case AskMount(trial):
+                return StimulusMounted(trial.stimulus.code)
+            case AskStroke() if not self._forces:
+                return StrokeDone()
+            case AskRest():
+                return Resume()
+            case AskFinish():
+                return Finish()
+            case _:
+                return None
+
+    def _answered(self, line: str) -> Event | None:
+        """Return the answer that was typed; what a keyboard cannot tell stays open."""
+        number = float(line) if line.replace(".", "", 1).isdecimal() else None
+        if number is None and line != "-":
+            return None
+        match self._asked:
+            case AskScore():
+                return Scored(number, input_device=KEYBOARD)
+            case AskNumber():
+                return NumberGiven(number, input_device=KEYBOARD)
+            case AskChoice() if number is None or number in CHOICES:
+                return Chosen(None if number is None else CHOICES[number], input_device=KEYBOARD)
+            case _:
+                return None
+
+    def _print(self, sentence: str) -> None:
+        print(sentence, file=self._out, flush=True)
+
+    def _read(self, lines: TextIO) -> None:
+        for line in lines:
+            self._lines.append(line)
+        self.closed = True
+
+
+def _called(trial: Trial) -> str:
+    """Return how a trial is announced."""
+    kind = "Trial" if trial.phase == "main" else trial.phase.capitalize() + " trial"
+    return f"{kind} {trial.number}"

@@ -1,0 +1,48 @@
+"""Measure on this machine how fast the solver is and how true, and write one page of it.
+
+Time against true error, estimates against true errors, orders of convergence, hard cases, costs, and whether what is
+asked of the speed is met. Ctrl-C stops it and keeps what was measured until then. Run it while nothing else runs.
+"""
+
+import argparse
+import os
+from pathlib import Path
+
+from daq_app.cli.console import Console, table
+
+EXAMPLE = "daq-app accuracy --quick --out accuracy"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare how much is measured, and where it goes."""
+    parser.add_argument("--quick", action="store_true", help="20 seconds instead of three minutes, and coarser truths")
+    parser.add_argument("--out", type=Path, default=Path("accuracy"), metavar="DIR", help="the folder (accuracy)")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Measure, write and tell."""
+    # Before arrays are loaded: threads cost more than they bring at these sizes, and one thread is what is asked.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from daq_app.accuracy.measuring import measured
+    from daq_app.accuracy.page import PAGE, write
+    from daq_app.accuracy.tables import tables
+
+    console.progress(0.0, "loading")
+    options.out.mkdir(parents=True, exist_ok=True)  # said before three minutes are spent
+    found = measured(options.quick, console.progress)
+    if found.stopped:
+        console.note("stopped; drawing what was measured until now")
+    console.progress(0.99, "drawing")
+    write(found, options.out)
+    console.result({"page": str(options.out / PAGE), **found.to_dict()})
+    made = tables(found)
+    if "targets" in made:
+        rows = [[cell for n, cell in enumerate(row) if n != 7] for row in made["targets"].rows]
+        console.say(table(rows, head=list(made["targets"].header[:7])))
+    for name in ("hard-small", "hard-finite"):
+        if name in made:
+            console.say(made[name].caption)
+    for sentence in found.left_out:
+        console.note(f"note: {sentence}")
+    console.say(f"{options.out / PAGE}")
+    return 130 if found.stopped else 0

@@ -1,0 +1,147 @@
+"""Record what a person decides about a stroke: its window, its ends, its direction, or that it stays out.
+
+The recording stays as it is: the decision is a line more in decisions.jsonl beside it, with who, when, why and what
+stood there before. Every analysis, prediction, report, export and study made from then on goes by it. --undo takes one
+back, by a line of its own. Times are seconds on the device's clock, as 'daq-app analyse' prints them.
+"""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from daq_app.batch.derived import ANALYSIS, PREDICTION, analysed, kept, settings_of
+from daq_app.cli.console import Console, number
+from daq_app.cli.main import DONE, FLAWED, WrongValue
+from sessions.plan.study import check_code
+from sessions.recording import Recording
+from sessions.recording.calibration_uncertainty import gain_error_set
+from sessions.strokes import Analysis, Stroke, analyse
+from sessions.strokes.decision_preview import tried, with_old
+from sessions.strokes.decisions import Decision, DecisionError, Decisions, append, read
+
+EXAMPLE = 'daq-app decide recordings/P07 --trial 4 --steady 31.2 32.6 --by E02 --why "the ramp was in it"'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the session, the stroke, and what can be decided of it."""
+    parser.add_argument("session", type=Path, metavar="SESSION")
+    parser.add_argument("--trial", type=int, metavar="N", help="whose stroke; leave out for a recording without trials")
+    parser.add_argument("--stroke", type=int, metavar="K", default=1, help="its number within the trial (1)")
+    what = parser.add_mutually_exclusive_group(required=True)
+    for name, does in (
+        ("--steady", "steady window, for mu_dynamic and speed [s]"),
+        ("--stick", "stick phase: its greatest T/N is mu_static, its end break-away [s]"),
+    ):
+        what.add_argument(name, type=float, nargs=2, metavar=("FROM", "TO"), help=does)
+    what.add_argument("--onset", type=float, metavar="S", help="contact onset [s]")
+    what.add_argument("--lift", type=float, metavar="S", help="end of contact [s]")
+    what.add_argument("--slide-onset", type=float, metavar="S", help="where the slide begins, for mu_static [s]")
+    what.add_argument("--direction", type=int, choices=[1, -1], help="1 proximal to distal, -1 distal to proximal")
+    what.add_argument(
+        "--drop", action="store_true", help="the stroke stays out: it is shown, the model does not get it"
+    )
+    what.add_argument("--keep", action="store_true", help="the stroke stays in, its flaws were looked at")
+    what.add_argument("--choose", action="store_true", help="of its trial's strokes the model gets this one")
+    what.add_argument(
+        "--tilt",
+        type=float,
+        nargs="*",
+        metavar="DEGREES",
+        help="of the session: level a face that leans so far to +x and to +y; without numbers as its presses tell",
+    )
+    what.add_argument("--undo", type=int, metavar="NUMBER", help="take a decision back")
+    what.add_argument("--list", action="store_true", help="only tell what was decided")
+    parser.add_argument("--by", metavar="CODE", help="who decides: a code, never a name")
+    parser.add_argument("--why", metavar="REASON", help="in a few words")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Record the decision and tell what it changes, or list what was decided."""
+    recording = Recording.open(options.session)
+    before = read(recording.folder)
+    if options.list:
+        return _list(before, console)
+    if options.by is None or options.why is None:
+        raise WrongValue("a decision says who decides and why: give --by CODE and --why REASON")
+    check_code("--by", options.by)
+    stored = kept(recording.folder, ANALYSIS)
+    gain_error_set(recording.folder)  # where it is damaged nothing is recorded that could not be analysed then
+    analysis = analyse(recording, settings_of(stored or {}), before)
+    asked = _asked(options) if options.tilt is None else _tilt(options, analysis)
+    decision = with_old(analysis, asked)
+    after = tried(recording, decision, before, analysis)
+    made = append(recording, decision)
+    if stored is not None:
+        analysed(recording, console)
+    older = (recording.folder / PREDICTION).is_file()
+    changed = _changes(analysis, after)
+    console.result({"decision": made.to_dict(), "changes": changed, "prediction_is_older": older})
+    if recording.simulated_sentence:
+        console.say(recording.simulated_sentence)
+    console.say(made.sentence)
+    for sentence in changed:
+        console.say(sentence)
+    if older:
+        console.say(f"{PREDICTION} was made before this decision: 'daq-app predict' makes it anew")
+    return DONE
+
+
+def _asked(options: argparse.Namespace) -> Decision:
+    decision = Decision(options.by, options.why, trial=options.trial, stroke=options.stroke)
+    if options.undo is not None:
+        return Decision(options.by, options.why, undoes=options.undo)
+    if options.choose:
+        return replace(decision, what="choice", stroke=None, new=options.stroke)
+    if options.drop or options.keep:
+        return replace(decision, what="kept", new=bool(options.keep))
+    for what in ("steady", "stick"):
+        span: list[float] | None = getattr(options, what)
+        if span is not None:
+            return replace(decision, what=what, new=(span[0], span[1]))
+    what = next(name for name in ("onset", "lift", "slide_onset", "direction") if getattr(options, name) is not None)
+    return replace(decision, what=what, new=getattr(options, what))
+
+
+def _tilt(options: argparse.Namespace, analysis: Analysis) -> Decision:
+    """Return the decision to level the face, by the angles given or by those that its presses tell."""
+    given: list[float] = options.tilt
+    if len(given) not in (0, 2):
+        raise WrongValue("--tilt takes two angles, to +x and to +y in degrees, or none")
+    if given:
+        return Decision(options.by, options.why, "tilt", new=(given[0], given[1]))
+    if analysis.tilt is None:
+        raise DecisionError("nothing pressed without sliding, so no tilt is told: give two angles after --tilt")
+    return Decision(options.by, options.why, "tilt", new=analysis.tilt.lean)
+
+
+def _list(decisions: Decisions, console: Console) -> int:
+    acting = {decision.number for decision in decisions.in_force}
+    lines = [{**line.to_dict(), "in_force": line.number in acting} for line in decisions.lines]
+    console.result({"decisions": lines, "problems": list(decisions.problems)})
+    for line in decisions.lines:
+        over = "" if line.number in acting or line.undoes is not None else " (no longer in force)"
+        console.say(f"{line.made_utc}  {line.sentence}{over}")
+    for problem in decisions.problems:
+        console.say(problem)
+    if not decisions.lines:
+        console.say("nothing was decided")
+    return FLAWED if decisions.problems else DONE
+
+
+def _changes(before: Analysis, after: Analysis) -> list[str]:
+    """Return a sentence for each stroke whose numbers a decision changes."""
+    found: list[str] = []
+    given = [{one.stroke for one in analysis.friction} for analysis in (before, after)]
+    for at, (old, new) in enumerate(zip(before.strokes, after.strokes, strict=False)):
+        words = [f"{name} {was} -> {now}" for name, was, now in _numbers(old, new) if was != now]
+        if (at in given[0]) != (at in given[1]):
+            words.append("the model gets it" if at in given[1] else "the model does not get it")
+        if words:
+            trial = "" if new.trial is None else f" of trial {new.trial}"
+            found.append(f"stroke {new.number}{trial}: {', '.join(words)}")
+    return found
+
+
+def _numbers(old: Stroke, new: Stroke) -> list[tuple[str, str, str]]:
+    names = ("mu_static", "mu_dynamic", "mu_max", "tau_max", "speed", "direction", "break_away", "slide_onset")
+    return [(name, number(getattr(old, name), 4), number(getattr(new, name), 4)) for name in names]

@@ -1,0 +1,138 @@
+"""Run the paper's study end to end on the simulated transducer and simulated subjects.
+
+Ten subjects score ten surfaces; one of them repeats the strokes on a simulated force/torque box, whose records travel
+over UDP on this computer to the driver a real box is read by. Everything is recorded, analysed, predicted and reported.
+"""
+
+import argparse
+import time
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from daq_app.batch.derived import analysed, predicted
+from daq_app.cli.console import Console, number, table
+from daq_app.cli.main import FLAWED, WrongValue
+from daq_app.simulation.demo_study import Study, StudyCutShort, simulated_study
+from drivers.clock import PacedClock, RealClock
+from sessions.prediction import PredictionOptions, SessionPrediction
+from sessions.recording import Recording
+from sessions.statistics.scores import mean_scores
+from sessions.strokes import Analysis
+
+EXAMPLE = "daq-app demo --seed 7"
+PACE = 20.0  # told seconds a real second
+LARGEST_SEED = 10_000_000
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare seed, pace and folder."""
+    parser.add_argument("--out", type=Path, metavar="DIR", help="a new folder (demo-results/TIME)")
+    parser.add_argument("--seed", type=int, default=1, help="of surfaces' noise, subjects and orders (1)")
+    parser.add_argument(
+        "--real-time", action="store_true", help=f"keep the clock; otherwise time runs {PACE:g} times faster"
+    )
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Run the study and print its table."""
+    began = time.monotonic()
+    if not 0 <= options.seed <= LARGEST_SEED:
+        raise WrongValue(f"--seed {options.seed} is not allowed: a whole number from 0 to {LARGEST_SEED}")
+    out = options.out or Path("demo-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
+    clock = RealClock() if options.real_time else PacedClock(PACE)
+    console.say(f"SIMULATED study, seed {options.seed}; time runs {clock.factor:g} times as fast as real")
+    try:
+        study = simulated_study(out, options.seed, clock, console)
+    except StudyCutShort as cut:
+        console.note(f"daq-app: {cut}")
+        return FLAWED
+    recording = Recording.open(study.stroked)
+    analysis = analysed(recording, console)
+    prediction = predicted(recording, analysis, console, PredictionOptions(intervals=True, beside="small"))
+    # Imported here: drawing is slow to load, and the session is on the disk by now.
+    from sessions.report import findings, score_table
+    from sessions.report.html import plates, write_figures, write_report
+
+    console.progress(0.9, "writing the report")
+    scores = [score_table(Recording.open(folder)) for folder in study.scored]
+    report = findings(recording, analysis, prediction, scores, study.planted)
+    page, pictures = out / "report.html", out / "pictures"
+    drawings = plates(report)
+    write_report(report, page, drawings)
+    write_figures(report, pictures, drawings)
+
+    rows = _rows(study, analysis, prediction, {(m.descriptor, m.index): m.mean for m in mean_scores(scores)})
+    summary = {
+        "simulated": True,
+        "rows": rows,
+        "report": str(page),
+        "pictures": str(pictures),
+        "session": str(study.stroked),
+        "readings": study.readings,
+        "lost": study.lost,
+        "flaws": [flaw.sentence for flaw in analysis.flaws],
+        "seconds": time.monotonic() - began,
+    }
+    console.result(summary)
+    _print(summary, rows, console)
+    return 3 if analysis.flaws or study.lost else 0
+
+
+def _rows(
+    study: Study, analysis: Analysis, prediction: SessionPrediction, means: Mapping[tuple[str, int], float | None]
+) -> list[dict[str, Any]]:
+    """Return a row for each trial: what was planted, what was found, what is predicted, what was scored."""
+    planted = {truth.trial: truth for truth in study.planted}
+    speeds = {friction.trial: friction.speed for friction in analysis.friction}
+    rows = [
+        {
+            "descriptor": row.stimulus.descriptor,
+            "index": row.stimulus.index,
+            "planted_mu": planted[row.trial].mu,
+            "mu": row.mu,
+            "planted_tau_max": planted[row.trial].tau_max,
+            "tau_max": row.tau_max,
+            "planted_speed": planted[row.trial].speed,
+            "speed": speeds.get(row.trial),
+            "sed": row.sed,
+            "error_estimate": row.error_estimate,
+            "mean_score": means.get((row.stimulus.descriptor, row.stimulus.known_index)),
+        }
+        for row in prediction.trials
+        if row.stimulus is not None and row.trial is not None
+    ]
+    return sorted(rows, key=lambda row: (row["descriptor"] != "stickiness", row["index"]))
+
+
+def _print(summary: Mapping[str, Any], rows: list[dict[str, Any]], console: Console) -> None:
+    head = ["SIMULATED", "mu planted", "found", "tau [kPa] planted", "found", "V [mm/s] planted", "found"]
+    head += ["SED [kPa]", "mean score"]
+    cells = [
+        [
+            f"{row['descriptor']} {row['index']}",
+            number(row["planted_mu"]),
+            number(row["mu"]),
+            number(_kilo(row["planted_tau_max"])),
+            number(_kilo(row["tau_max"])),
+            number(row["planted_speed"]),
+            number(row["speed"]),
+            number(_kilo(row["sed"]), 4),
+            number(row["mean_score"]),
+        ]
+        for row in rows
+    ]
+    console.say()
+    console.say(table(cells, head=head))
+    console.say()
+    console.say(f"{summary['readings']} readings, {summary['lost']} lost; {summary['seconds']:.1f} s in all")
+    for sentence in summary["flaws"]:
+        console.say(f"flaw: {sentence}")
+    console.say(f"session   {summary['session']}")
+    console.say(f"report    {summary['report']}")
+    console.say(f"pictures  {summary['pictures']}")
+
+
+def _kilo(value: float | None) -> float | None:
+    return None if value is None else value * 1e3

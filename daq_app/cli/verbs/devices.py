@@ -1,0 +1,155 @@
+"""List the transducers that can be reached now, or open one and print its health and noise for 3 s.
+
+Listing only asks who is there, at the devices' usual addresses and at those named; a device in use is not disturbed.
+Serial ports are named without being opened.
+"""
+
+import argparse
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from daq_app.cli.console import Console, number, table
+from daq_app.cli.main import WrongValue
+from daq_app.recorder.device_history import Life, life_of
+from daq_app.simulation.wiring import connected
+from drivers.catalog import Found, reachable
+from drivers.clock import Clock, RealClock
+from drivers.readings import ReadingBlock
+from drivers.serial_link import serial_ports
+from drivers.transducer import Transducer
+
+EXAMPLE = "daq-app devices probe sim:"
+AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+PROBED = 3.0  # how long a probe listens [s]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what to list or probe."""
+    parser.add_argument(
+        "words", nargs="*", metavar="URI", help="further addresses to ask; or 'probe URI' to open that one and listen"
+    )
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """List or probe."""
+    if options.words[:1] == ["probe"]:
+        if len(options.words) != 2:
+            raise WrongValue("'devices probe' takes one address, for example sim: or net-ft://192.168.1.1")
+        return _probe(options.words[1], console)
+    found = reachable(options.words)
+    lines = serial_ports()
+    described = [_described(device) for device in found] + [{"uri": "sim:", "simulated": True}]
+    console.result({"devices": described, "serial_ports": list(lines)})
+    rows = [
+        [device.uri, device.info.model, device.info.serial, device.info.calibration.source]
+        if device.info
+        else [device.uri, "–", "–", "no answer"]
+        for device in found
+    ]
+    rows.append(["sim:", "simulated bench", "–", "always there"])
+    console.say(table(rows, head=["address", "model", "serial", "calibration"]))
+    for line in lines:
+        console.say(
+            f"{line} is a serial port, which was not opened: ask it as serial-ft://{line} or digital-ft://{line}"
+        )
+    for device in found:
+        if device.problem:
+            told = device.problem.removeprefix(f"{device.uri}: ")
+            console.say(told if device.uri in told else f"{device.uri}: {told}")
+        if device.info is not None and (life := life_of(device.info.serial)) is not None:
+            console.say(f"{device.info.serial}: {_told(life)}")
+    return 0
+
+
+def _described(device: Found) -> dict[str, Any]:
+    if device.info is None:
+        return {"uri": device.uri, "problem": device.problem}
+    info = device.info
+    return {
+        "uri": info.uri,
+        "driver": info.driver,
+        "model": info.model,
+        "serial": info.serial,
+        "simulated": info.simulated,
+        "rate": info.rate if np.isfinite(info.rate) else None,
+        "calibration": info.calibration.source,
+        "life": None if (life := life_of(info.serial)) is None else asdict(life),
+    }
+
+
+def _told(life: Life) -> str:
+    """Return a transducer's history in one sentence."""
+    overloads = f"{life.overloads} overloads, the last on {life.last_overload}" if life.overloads else "no overload"
+    if not life.zeros:
+        return f"{overloads} since it is known here"
+    drift, noise = max(map(abs, life.drift[:3])), max(life.noise[:3])
+    return (
+        f"zero moved by at most {number(drift, 2)} N since {life.since} ({life.zeros} zeros), "
+        f"noise at rest {number(noise, 2)} N, {overloads}"
+    )
+
+
+def _probe(uri: str, console: Console) -> int:
+    clock = RealClock()
+    with connected(uri, clock) as bench:
+        transducer = bench.transducer
+        readings = _listened(transducer, clock, console)
+        health, info = transducer.health, transducer.info
+    wrench = info.calibration.wrench(readings.raw, np.zeros(6))
+    mean, noise = (wrench.mean(axis=0), wrench.std(axis=0, ddof=1)) if len(readings) > 1 else (None, None)
+    units = ["N"] * 3 + ["N mm"] * 3
+    console.result(
+        {
+            "uri": uri,
+            "model": info.model,
+            "serial": info.serial,
+            "simulated": info.simulated,
+            "rate": info.rate if np.isfinite(info.rate) else None,
+            "measured_rate": _measured_rate(readings),
+            "settings": dict(info.settings),
+            "health": asdict(health),
+            "mean": None if mean is None else mean.tolist(),
+            "noise": None if noise is None else noise.tolist(),
+            "units": units,
+        }
+    )
+    console.say(f"{info.model}, serial {info.serial}, {number(info.rate, 4)} Hz set")
+    console.say(f"calibration: {info.calibration.source}")
+    console.say(f"measured {number(_measured_rate(readings), 5)} Hz on the session's clock")
+    counts = {name: value for name, value in asdict(health).items() if name not in ("lag_ms", "rate_words")}
+    console.say(", ".join(f"{name} {value}" for name, value in counts.items()) + f", lag {health.lag_ms:.1f} ms")
+    if health.rate_words:
+        console.say(health.rate_words)
+    if mean is not None and noise is not None:
+        rows = [
+            [a, number(float(m)), number(float(s), 2), u] for a, m, s, u in zip(AXES, mean, noise, units, strict=True)
+        ]
+        console.say(table(rows, head=["axis", "mean", "noise (sd)", "unit"]))
+    flawed = (
+        health.lost or health.malformed or health.stalled or health.saturated or health.off_rate or not len(readings)
+    )
+    return 3 if flawed else 0
+
+
+def _listened(transducer: Transducer, clock: Clock, console: Console) -> ReadingBlock:
+    transducer.start()
+    began = clock.now_ns()
+    blocks: list[ReadingBlock] = []
+    while (passed := (clock.now_ns() - began) / 1e9) < PROBED:
+        console.progress(passed / PROBED, f"listening, {transducer.health.received} readings")
+        blocks.append(transducer.read(0.1))
+    transducer.stop()
+    return ReadingBlock.joined(blocks)
+
+
+def _measured_rate(readings: ReadingBlock) -> float | None:
+    """Return readings a second by regression of arrival on sequence [Hz]."""
+    if len(readings) < 10:
+        return None
+    numbers = readings.sequence - readings.sequence[0]
+    seconds = (readings.received_ns - readings.received_ns[0]) / 1e9
+    away = numbers - numbers.mean()
+    slope = float(away @ seconds) / float(away @ away)
+    return 1.0 / slope if slope > 0 else None

@@ -1,0 +1,115 @@
+"""Enrol a subject in a study: a row of its design is reserved, and given back when the subject is withdrawn.
+
+A study is a folder. --protocol makes it, and fixes its protocol; --blind hides which stimulus bears which code until
+'daq-app unblind' opens the key. Without a subject the study is shown as it stands.
+"""
+
+import argparse
+import secrets
+from pathlib import Path
+from typing import Any
+
+from daq_app.cli.body_option import add_body_arguments, body_of
+from daq_app.cli.console import Console, table
+from daq_app.cli.main import DONE, WrongValue
+from sessions.plan.protocols import protocol_file
+from sessions.plan.study import Member, Study, StudyError
+from sessions.plan.study_file import create_study, enrol, is_study, note, open_study, study_key, withdraw
+from sessions.recording.atomic_file import write_whole
+
+EXAMPLE = "daq-app enrol studies/friction --subject P07 --finger tip_radius=6.5 contact_angle=40"
+HEAD = ["subject", "row", "own finger, angle, depths", "withdrawn"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the study, the subject, and what is done."""
+    parser.add_argument("study", type=Path, metavar="STUDY", help="the study's folder")
+    parser.add_argument("--protocol", metavar="PROTOCOL", help="make the study: a built-in protocol, or a TOML file")
+    parser.add_argument("--seed", type=int, help="of a new study's orders (one by chance, recorded, unless given)")
+    parser.add_argument("--blind", action="store_true", help="of a new study: codes alone until it is unblinded")
+    parser.add_argument("--subject", metavar="CODE", help="a code, never a name")
+    add_body_arguments(parser)
+    parser.add_argument("--withdraw", metavar="REASON", help="take the subject out; its row is given back")
+    parser.add_argument(
+        "--labels", type=Path, metavar="FILE", help="write the code of each stimulus, for whoever puts the labels on"
+    )
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Do what was asked for, and show the study."""
+    folder: Path = options.study
+    _refuse_mixtures(options)
+    body = body_of(options)
+    if options.protocol is not None:
+        text = protocol_file(options.protocol).read_text(encoding="utf-8")
+        seed = secrets.randbelow(2**31) if options.seed is None else options.seed
+        create_study(folder, text, seed, blinded=options.blind)
+    member = None
+    if options.withdraw is not None:
+        member = withdraw(folder, options.subject, options.withdraw)
+    elif options.subject is not None:
+        member = enrol(folder, options.subject, body)
+    if options.labels is not None:
+        _write_labels(folder, options.labels)
+        console.note(f"{options.labels} tells which stimulus bears which code: it is for whoever puts the labels on")
+    _show(open_study(folder), member, console)
+    return DONE
+
+
+def _refuse_mixtures(options: argparse.Namespace) -> None:
+    making = options.protocol is not None
+    if making and is_study(options.study):
+        raise StudyError(f"{options.study} is a study already, and its protocol is fixed: enrol without --protocol")
+    if (options.blind or options.seed is not None) and not making:
+        raise WrongValue("--blind and --seed are decided when a study is made: give --protocol")
+    if options.seed is not None and not 0 <= options.seed < 2**31:
+        raise WrongValue(f"--seed {options.seed} is not allowed: a whole number from 0 to {2**31 - 1}")
+    if options.withdraw is not None and options.subject is None:
+        raise WrongValue("--withdraw needs --subject")
+    if (options.finger or options.depth) and (options.subject is None or options.withdraw is not None):
+        raise WrongValue("--finger and --depth are of a subject that is being enrolled: give --subject")
+
+
+def _write_labels(folder: Path, path: Path) -> None:
+    """Write the code of each stimulus to a file, and that it was written into the study."""
+    key, study = study_key(folder), open_study(folder)
+    labels = study.protocol.labels if key is None else {of: code for code, of in key.stimuli.items()}
+    lines = [f"{descriptor} {index}: {code}" for (descriptor, index), code in labels.items()]
+    if key is not None:
+        note(folder, "labels_told", {})
+    write_whole(path, "\n".join(["For whoever puts the labels on.", *lines, ""]).encode())
+
+
+def _show(study: Study, member: Member | None, console: Console) -> None:
+    rows = [_row(study, one) for one in study.members.values()]
+    console.result(
+        {
+            "study": study.name,
+            "protocol": study.protocol.name,
+            "blinded": study.key_sha256 is not None and not study.unblinded,
+            "rows": study.rows,
+            "subject": None if member is None else _row(study, member),
+            "subjects": rows,
+        }
+    )
+    design = "every order by chance" if study.rows is None else f"a Williams design of {study.rows} rows"
+    blind = "" if study.key_sha256 is None else ", unblinded" if study.unblinded else ", blinded"
+    console.say(f"{study.name}: {study.protocol.name}, {design}{blind}")
+    cells = [[row["subject"], str(row["row"]), row["own"] or "–", row["withdrawn"] or "–"] for row in rows]
+    console.say(table(cells, head=HEAD) if cells else "nobody is enrolled")
+
+
+def _row(study: Study, member: Member) -> dict[str, Any]:
+    body = member.body
+    own = {
+        "tip_radius": body.finger.tip_radius,
+        "width": body.finger.width,
+        "contact_angle": body.contact_angle,
+        **{f"depth of {block}": depth for block, depth in body.indentations.items()},
+    }
+    return {
+        "subject": member.subject,
+        "row": study.row(member.slot),
+        "own": ", ".join(f"{name} {value:g}" for name, value in own.items() if value is not None),
+        "withdrawn": member.withdrawn,
+    }

@@ -1,0 +1,98 @@
+"""Make a session folder of a foreign recording, or of an export of this program; every other verb accepts it.
+
+An export (a folder of csv or bids, or a file session.h5) comes back whole, compared reading by reading; nothing needs
+to be stated. Of a foreign CSV file, a header that names units and a time column (t_s, Fx_N ... Tz_Nm) needs no options:
+N = -Fz and height 0 are taken as defaults and marked so. Otherwise say what the columns are, in which units, and at
+which rate they were taken.
+"""
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from daq_app.cli.console import Console, number
+from daq_app.cli.main import FLAWED, WrongValue
+
+if TYPE_CHECKING:
+    from sessions.exchange.exported import ExportedSession
+
+EXAMPLE = "daq-app import strokes.csv --units N,Nmm --axes t,Fx,Fy,Fz,Tx,Ty,Tz --normal -z --height 12"
+
+_OF_FOREIGN = ("units", "axes", "normal", "height", "rate", "zeroed", "subject")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the file, what it holds and where it goes."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="FILE.csv, or what 'daq-app export' wrote")
+    parser.add_argument("--units", metavar="N,Nmm", help="of forces and torques: N,Nmm or N,Nm")
+    parser.add_argument("--axes", metavar="t,Fx,...", help="what the columns are, from the first on; - leaves one out")
+    parser.add_argument("--normal", metavar="AXIS", help="axis along which pressing is positive, e.g. -z")
+    parser.add_argument("--height", type=float, metavar="MM", help="of the stimulus's face above the origin")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="readings a second, where the file has no times")
+    parser.add_argument("--zeroed", action="store_true", help="the file's zeros are those of the unloaded transducer")
+    parser.add_argument("--subject", metavar="CODE", help="a code, never a name (unknown)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="the session's folder (recordings/FILE)")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Import the file, seal the session and say what nobody stated."""
+    from sessions.exchange.import_session import exported
+
+    told = exported(options.file)
+    return _foreign(options, console) if told is None else _restored(told, options, console)
+
+
+def _restored(told: "ExportedSession", options: argparse.Namespace, console: Console) -> int:
+    """Make a session of an export of ours again."""
+    from sessions.exchange.import_session import import_session
+    from sessions.recording.archive import seal
+
+    stated = [name for name in _OF_FOREIGN if getattr(options, name) not in (None, False)]
+    if stated:
+        raise WrongValue(f"--{stated[0]} says nothing of an export, which holds all that is known: leave it out")
+    folder = options.out or Path("recordings") / options.file.stem
+    made = import_session(told, folder)
+    seal(folder)
+    console.result({"session": str(folder), "format": told.form, **asdict(made)})
+    for sentence in made.differences:
+        console.say(sentence)
+    outcome = "with the above" if made.differences else "as they were"
+    console.say(f"{folder}: {made.readings} readings, {made.events} events, {outcome}")
+    return FLAWED if made.differences else 0
+
+
+def _foreign(options: argparse.Namespace, console: Console) -> int:
+    """Import a CSV file of somebody else's."""
+    from sessions.exchange.import_csv import ORIGINAL_FILE, ImportOptions, import_csv
+    from sessions.recording import Recording
+    from sessions.recording.archive import seal
+    from sessions.recording.manifest import list_in_manifest
+
+    units = _parts(options.units)
+    if units is not None and len(units) != 2:
+        raise WrongValue(f"--units {options.units} is not allowed: give two, of forces and torques, such as N,Nmm")
+    stated = ImportOptions(
+        units=None if units is None else (units[0], units[-1]),
+        axes=_parts(options.axes),
+        normal=options.normal,
+        height=options.height,
+        rate=options.rate,
+        zeroed=options.zeroed,
+        subject=options.subject or "unknown",
+    )
+    folder = options.out or Path("recordings") / options.file.stem
+    made = import_csv(options.file, folder, stated)
+    seal(made.folder)
+    list_in_manifest(made.folder, (ORIGINAL_FILE,), Recording.open(made.folder).simulated_sentence)
+    console.result({"session": str(made.folder), **{k: v for k, v in asdict(made).items() if k != "folder"}})
+    console.say(f"{made.folder}: {made.readings} readings at {number(made.rate, 4)} a second")
+    for default in made.defaults:
+        console.say(f"default: {default}")
+    if made.extra:
+        console.say(f"kept in the original file alone: {', '.join(made.extra)}")
+    return 0
+
+
+def _parts(text: str | None) -> tuple[str, ...] | None:
+    return None if text is None else tuple(part.strip() for part in text.split(","))

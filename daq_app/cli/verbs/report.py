@@ -1,0 +1,122 @@
+"""Write a session's report as one self-contained page: scores, strokes, predictions, and how they agree.
+
+Scores of further visits (other subjects, or this one without a transducer) are joined with --scores.
+"""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from daq_app.batch.derived import afferent_before, analysed, asked_before, predicted, visit
+from daq_app.cli.area_option import add_area, area_law
+from daq_app.cli.calibration_option import add_calibration, calibration_error
+from daq_app.cli.console import Console
+from sessions.plan.blinding import revealed
+from sessions.plan.plan import Blinded
+from sessions.plan.study_file import is_study
+from sessions.plan.visits import score_visits
+from sessions.prediction import PredictionOptions, Progress, SessionPrediction
+from sessions.prediction.afferent import AfferentSettings, session_firing
+from sessions.prediction.multiverse import trial_paths
+from sessions.recording import Recording
+from sessions.recording.derived import store_page
+from sessions.report import Further
+from sessions.report.predictions import afferent_facts
+
+PAGE = "report.html"
+EXAMPLE = "daq-app report recordings/P07 -o P07.html --scores recordings/P01 recordings/P02"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the session, the page and further scores."""
+    parser.add_argument("session", type=Path, metavar="SESSION|STUDY")
+    parser.add_argument("--subject", metavar="CODE", help="of a study: whose visit with forces; all its scores join in")
+    parser.add_argument("-o", "--out", type=Path, metavar="FILE.html", help="the page (SESSION/report.html)")
+    parser.add_argument("--scores", type=Path, nargs="+", default=[], metavar="SESSION", help="further visits")
+    parser.add_argument(
+        "--paths",
+        nargs="?",
+        const="small",
+        choices=["small", "finite"],
+        metavar="finite",
+        help="also along every other reasonable choice of the analysis; with 'finite' at finite strain too (a minute)",
+    )
+    parser.add_argument(
+        "--beside",
+        choices=["none", "small", "both"],
+        help="also otherwise, as for 'daq-app predict': both readings of tau_max, by depth and by force, both ways; "
+        "with 'both' at finite strain too (about a minute); small, or all that was predicted before",
+    )
+    parser.add_argument(
+        "--afferent",
+        action="store_true",
+        help="also firing rates of an SA-II afferent: an illustration (or where it was kept before)",
+    )
+    parser.add_argument("--figures", type=Path, metavar="DIR", help="also write every picture as SVG, its data as CSV")
+    add_area(parser)
+    add_calibration(parser)
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Analyse, predict and write the page."""
+    # Imported here: drawing is slow to load, and what is wrong with the session should be said before.
+    recording = visit(options.session, options.subject)
+    others = [revealed(Recording.open(folder)) for folder in options.scores]
+    if is_study(options.session):
+        others += score_visits(options.session, besides=recording)
+    for one in (recording, *others):
+        if one.plan.blinded:
+            raise Blinded(f"{one.folder} is blinded: a report tells scores by index; 'daq-app unblind' opens the key")
+    from sessions.report import html
+
+    if options.out is not None:
+        html.leave_others_alone(options.out)
+    analysis = analysed(recording, console, area_law(options), gain_error=calibration_error(options))
+    afferent = afferent_before(recording) or (AfferentSettings() if options.afferent else None)
+    prediction = predicted(recording, analysis, console, _asked(recording, options), afferent)
+    from sessions.report import findings, score_table
+
+    further = _further(recording, prediction, afferent, options, console)
+    report = findings(recording, analysis, prediction, [score_table(one) for one in others], further=further)
+    console.progress(0.9, "drawing")
+    drawings = html.plates(report)
+    if options.out is None:  # beside the recording it is one more thing made of it, and listed in its manifest
+        page = store_page(recording.folder, PAGE, html.page(report, drawings))
+    else:
+        page = options.out
+        html.write_report(report, page, drawings)
+    pictures = html.write_figures(report, options.figures, drawings) if options.figures else ()
+    console.result({"page": str(page), "pictures": [str(path) for path in pictures], "flaws": len(report.flaws)})
+    console.say(f"{page}{' (SIMULATED)' if report.simulated else ''}")
+    return 3 if analysis.flaws else 0
+
+
+def _asked(recording: Recording, options: argparse.Namespace) -> PredictionOptions:
+    """Return what to ask of the model: what was asked before, so that nothing kept is lost, and what a page shows."""
+    before = asked_before(recording) or PredictionOptions()
+    beside = max(before.beside, options.beside or "small", key=("none", "small", "both").index)
+    return replace(before, intervals=True, beside=beside, course="history")
+
+
+def _further(
+    recording: Recording,
+    prediction: SessionPrediction,
+    afferent: AfferentSettings | None,
+    options: argparse.Namespace,
+    console: Console,
+) -> Further:
+    """Return the intervals of the SEDs, and what was asked for beside."""
+
+    def shown(text: str) -> Progress:
+        def tell(part: float) -> bool:
+            console.progress(0.9 * part, text)
+            return True
+
+        return tell
+
+    reference, firing = (None, ()) if afferent is None else session_firing(prediction, afferent)
+    paths = None
+    if options.paths is not None and recording.plan.forces:
+        finite = options.paths == "finite"
+        paths = trial_paths(recording, prediction, shown("many paths of the analysis"), finite=finite)
+    return Further(firing, afferent_facts(afferent or AfferentSettings(), reference), afferent, paths)

@@ -1,0 +1,58 @@
+"""Go on with a session that was cut short: at the same trial, in the same file, with the people it began with.
+
+Nothing recorded is altered: the take that was open is discarded with its reason, and the gap is recorded.
+"""
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+
+from daq_app.cli.attending import attended
+from daq_app.cli.console import Console
+from daq_app.cli.main import DONE, FLAWED, WrongValue
+from daq_app.recorder.client import Recorder
+from daq_app.recorder.messages import People, ResumeSession
+from sessions.recording import Recording, RecordingError
+from sessions.recording.archive import seal
+from sessions.recording.manifest import is_sealed
+from sessions.run.resuming import check_resumable
+
+EXAMPLE = "daq-app resume recordings/P07 --device net-ft://192.168.1.1"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare session, device and people."""
+    parser.add_argument("session", type=Path, metavar="SESSION")
+    parser.add_argument("--device", metavar="URI", help="the transducer (where it was when the session began)")
+    parser.add_argument("--headless", action="store_true", help="no window: answers at the terminal, or simulated")
+    parser.add_argument(
+        "--simulate-subject", type=int, metavar="SEED", help="simulated people (those of the beginning)"
+    )
+    parser.add_argument("--pace", type=float, help="told seconds a real second (as at the beginning)")
+    parser.add_argument("--end", action="store_true", help="seal the session as it is, and do not go on")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Go on to the end, or seal what there is."""
+    folder: Path = options.session
+    if is_sealed(folder):
+        raise RecordingError(f"{folder} is sealed: nothing is added to it; begin a new session")
+    recording = Recording.open(folder)
+    if options.end:
+        seal(folder)
+        console.result({"session": str(folder), "sealed": True, "readings": sum(map(len, recording.blocks()))})
+        console.say(f"{folder}: sealed as it is")
+        return DONE if recording.end is not None and recording.end.get("complete") else FLAWED
+    check_resumable(recording)
+    factor = float(recording.provenance["clock"]["factor"])
+    if options.pace not in (None, factor):
+        raise WrongValue(f"--pace {options.pace:g} is not allowed: the session began with {factor:g}")
+    simulated = options.simulate_subject
+    people = None if simulated is None else People("simulated people", simulated)
+    with Recorder.start(factor, debug=options.debug) as recorder:
+        outcome = attended(recorder, ResumeSession(str(folder.absolute()), options.device, people), console)
+    end = outcome.end
+    gap = next(event.data["gap"] for event in reversed(Recording.open(folder).events) if event.kind == "resumed")
+    console.result({"session": str(folder), "end": asdict(end), "sealed": outcome.sealed, "gap": gap})
+    console.say(f"{folder}: {end.reason}; {end.readings} readings in all, {end.health.lost} lost since it was resumed")
+    return DONE if end.complete and not end.health.lost else FLAWED

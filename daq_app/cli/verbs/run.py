@@ -1,0 +1,127 @@
+"""Run one session: the plan is made from a protocol and a seed, everything is recorded as it happens, then sealed.
+
+Experimenter and subject answer at this terminal, or are simulated (on the simulated bench only).
+"""
+
+import argparse
+import secrets
+from dataclasses import asdict, replace
+from datetime import datetime
+from pathlib import Path
+from typing import get_args
+
+from daq_app.cli.attending import attended, opened
+from daq_app.cli.body_option import add_body_arguments, body_of, own_sentence
+from daq_app.cli.console import Console
+from daq_app.cli.main import DONE, FLAWED, WrongValue
+from daq_app.recorder.client import Recorder
+from daq_app.recorder.messages import People, StartSession
+from sessions.plan.plan import Frame, Phase
+from sessions.plan.protocols import Body, Protocol, StudyPlace, plan, protocol
+from sessions.plan.study_file import open_study, study_key
+from sessions.recording import Setting
+from sessions.run.resuming import RESUMABLE
+
+EXAMPLE = "daq-app run sensotact-friction --device sim:?seed=7 --subject P07 --headless --simulate-subject 7 --pace 20"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare protocol, device, people and folder."""
+    parser.add_argument(
+        "protocol", nargs="?", metavar="PROTOCOL", help="a built-in one such as sensotact-friction, or a TOML file"
+    )
+    parser.add_argument("--study", type=Path, metavar="STUDY", help="protocol, order and finger are the study's")
+    device = parser.add_mutually_exclusive_group(required=True)
+    device.add_argument("--device", metavar="URI", help="the transducer, e.g. sim: or net-ft://192.168.1.1")
+    device.add_argument("--scores-only", action="store_true", help="a visit without a transducer")
+    parser.add_argument("--subject", required=True, metavar="CODE", help="a code, never a name")
+    parser.add_argument("--seed", type=int, help="of the stimulus order (a new one, recorded, unless given)")
+    parser.add_argument("--phases", nargs="+", choices=get_args(Phase), help="of the visit (the protocol's own)")
+    add_body_arguments(parser)
+    parser.add_argument("--headless", action="store_true", help="no window: answers at the terminal, or simulated")
+    parser.add_argument("--simulate-subject", type=int, metavar="SEED", help="simulated people")
+    parser.add_argument("--pace", type=float, default=1.0, help="told seconds a real second, simulated people only (1)")
+    parser.add_argument("--height", type=float, metavar="MM", help="of the stimulus's face above the sensor's origin")
+    parser.add_argument("--normal", choices=["+x", "-x", "+y", "-y", "+z", "-z"], help="axis along which pressing is +")
+    parser.add_argument("--contact-area", type=float, metavar="MM2", help="of finger and surface, for tau_max")
+    parser.add_argument("--stroking-hand", choices=["left", "right"], help="recorded; unknown unless stated")
+    parser.add_argument("--answering-hand", choices=["left", "right"], help="recorded; unknown unless stated")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="the session's folder (one below recordings/)")
+    parser.add_argument(
+        "--any-folder",
+        action="store_true",
+        help="also on a network drive or in a synchronised folder: at your own risk",
+    )
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Run the session and say where it lies."""
+    simulated_bench = options.device is not None and options.device.startswith("sim:")
+    _refuse_mixtures(options, simulated_bench=simulated_bench)
+    chosen, seed, body, place = _decided(options)
+    planned = plan(
+        chosen,
+        options.subject,
+        seed,
+        forces=options.device is not None,
+        contact_area=options.contact_area,
+        stroking_hand=options.stroking_hand,
+        answering_hand=options.answering_hand,
+        phases=options.phases,
+        body=body,
+        place=place,
+    )
+    stamp = datetime.now().strftime("%Y%m%dT%H%M%S")
+    what = planned.protocol if place is None else "forces" if planned.forces else "scores"
+    folder = options.out or (options.study or Path("recordings")) / f"{options.subject}_{what}_{stamp}"
+    if (own := own_sentence(planned)) is not None:
+        console.note(own)
+    simulated = options.simulate_subject
+    people = People() if simulated is None else People("simulated people", simulated)
+    settings = (Setting("seed", seed, "", "default" if options.seed is None else "set"),)
+    with Recorder.start(options.pace, debug=options.debug) as recorder:
+        bench = opened(recorder, options.device) if options.device else None
+        frame = _frame(options, planned.frame if bench is None else bench.frame or planned.frame)
+        asked = StartSession(
+            replace(planned, frame=frame), str(folder.absolute()), people, settings, any_folder=options.any_folder
+        )
+        outcome = attended(recorder, asked, console)
+    end = outcome.end
+    console.result({"session": str(folder), "end": asdict(end), "sealed": outcome.sealed, "seed": seed})
+    console.say(f"{folder}: {end.reason}; {end.readings} readings, {end.health.lost} lost")
+    if end.cause in RESUMABLE:
+        console.note(
+            f"it is not sealed yet: 'daq-app resume {folder}' goes on at the same trial, with --end it is ended"
+        )
+    return DONE if end.complete and not end.health.lost else FLAWED
+
+
+def _decided(options: argparse.Namespace) -> tuple[Protocol, int, Body, StudyPlace | None]:
+    """Return protocol, seed, the subject's own and its place, as a study or the command line decides them."""
+    if options.study is None:
+        seed = secrets.randbelow(2**31) if options.seed is None else options.seed
+        return protocol(options.protocol), seed, body_of(options), None
+    study = open_study(options.study)
+    member = study.member(options.subject)
+    place = study.place(member, study_key(options.study))
+    return study.protocol, study.session_seed(member.slot), member.body, place
+
+
+def _refuse_mixtures(options: argparse.Namespace, *, simulated_bench: bool) -> None:
+    if (options.protocol is None) == (options.study is None):
+        raise WrongValue("give a PROTOCOL, or --study, which has its own; one of the two")
+    if options.study is not None and (options.seed is not None or options.finger or options.depth):
+        raise WrongValue("--seed, --finger and --depth are not allowed with --study: they were decided at enrolment")
+    if options.simulate_subject is not None and not (simulated_bench or options.scores_only):
+        raise WrongValue("--simulate-subject strokes the simulated bench only: give --device sim: or --scores-only")
+    if options.pace != 1.0 and not (options.simulate_subject is not None and 0.1 <= options.pace <= 200):
+        raise WrongValue(f"--pace {options.pace:g} is not allowed: 0.1 to 200, and only with --simulate-subject")
+
+
+def _frame(options: argparse.Namespace, stated: Frame) -> Frame:
+    """Return the frame as stated by bench or protocol, save for what the command line states."""
+    if options.normal is not None:
+        stated = replace(stated, normal=options.normal, normal_origin="set")
+    if options.height is not None:
+        stated = replace(stated, height=options.height, height_origin="set")
+    return stated

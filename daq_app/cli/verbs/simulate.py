@@ -1,0 +1,63 @@
+"""Serve the other end of a wire on this computer, to try a driver (ours or anybody's) without hardware.
+
+The networked force/torque box (net-ft) speaks UDP, TCP and HTTP on loopback, on the device's own ports unless told
+otherwise, and on a free HTTP port where 80 is refused. The stand-alone controller (serial-ft) and the RS-485 transducer
+(digital-ft) sit on a pseudo-terminal of Linux or macOS. Without a script the paper's ten surfaces are stroked again and
+again.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+from daq_app.cli.console import Console
+from daq_app.cli.main import WrongValue
+from daq_app.simulation.wiring import serve_digital_ft, serve_net_ft, serve_serial_ft
+
+EXAMPLE = "daq-app simulate net-ft --rdt-port 50000 --tcp-port 50001 --http-port 8080"
+WIRES = ("net-ft", "serial-ft", "digital-ft")
+BAUDS = (4800, 9600, 19200, 38400, 57600, 115200)
+OF_ONE_WIRE = {"rdt_port": "net-ft", "tcp_port": "net-ft", "http_port": "net-ft", "rate": "net-ft", "baud": "serial-ft"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the wire, its ports and what happens on it."""
+    parser.add_argument("wire", choices=WIRES)
+    parser.add_argument("--port", "--rdt-port", type=_port, dest="rdt_port", help="UDP port (49152)")
+    parser.add_argument("--tcp-port", type=_port, help="TCP command port (49151)")
+    parser.add_argument("--http-port", type=_port, help="HTTP port (80, or a free one)")
+    parser.add_argument("--rate", type=int, help="readings a second of net-ft, 1 to 7000 (200)")
+    parser.add_argument("--baud", type=int, help="line speed of serial-ft in bits a second (38400)")
+    parser.add_argument("--seed", type=int, default=0, help="of noise, drift and strokes (0)")
+    parser.add_argument("--factor", type=float, default=1.0, help="how much faster than real time runs (1)")
+    parser.add_argument("--script", type=Path, help="TOML timetable of strokes and faults")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Serve until Ctrl-C."""
+    given = {name: getattr(options, name) for name in OF_ONE_WIRE if getattr(options, name) is not None}
+    for name in given:
+        if OF_ONE_WIRE[name] != options.wire:
+            raise WrongValue(f"--{name.replace('_', '-')} belongs to {OF_ONE_WIRE[name]}, not to {options.wire}")
+    if not 1 <= given.get("rate", 1) <= 7000:
+        raise WrongValue(f"--rate {options.rate} is not allowed: the box gives 1 to 7000 readings a second")
+    if given.get("baud", 9600) not in BAUDS:
+        raise WrongValue(f"--baud {options.baud} is not allowed: one of {', '.join(map(str, BAUDS))}")
+    if not 0.01 <= options.factor <= 1000:
+        raise WrongValue(f"--factor {options.factor:g} is not allowed: 0.01 to 1000")
+    serve = {"net-ft": serve_net_ft, "serial-ft": serve_serial_ft, "digital-ft": serve_digital_ft}[options.wire]
+    box = serve(**given, seed=options.seed, factor=options.factor, script=options.script)
+    try:
+        console.result({"address": box.uri, "simulated": True})
+        console.say(f"SIMULATED {options.wire} at {box.uri}")
+        console.note("serving until Ctrl-C")
+        while True:
+            time.sleep(0.1)
+    finally:
+        box.close()
+
+
+def _port(text: str) -> int:
+    if not (text.isdecimal() and 0 <= int(text) <= 65535):
+        raise argparse.ArgumentTypeError(f"{text} is no port: give a number from 0 (any free port) to 65535")
+    return int(text)

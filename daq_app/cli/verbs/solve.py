@@ -1,0 +1,100 @@
+"""Run the solver once, on a scene file."""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from daq_app.cli.console import Console, number, table
+from daq_app.cli.main import DONE, STOPPED
+
+if TYPE_CHECKING:
+    from solver.prediction import Prediction
+
+EXAMPLE = "daq-app solve stickiness-100.toml --json"
+UNFINISHED = "Stopped before all that was asked for was done: this is what had been found by then."
+AUDITS = {
+    "equilibrium_x": "forces along the surface are out of balance by",
+    "equilibrium_y": "forces across the surface are out of balance by",
+    "work_balance": "work of the contact forces and energy of the tissue differ by",
+    "penetration": "the skin lies too low by, of the indentation",
+    "cone_violation": "friction exceeds its law by, of the largest force on a node",
+    "normal_force_missed": "the normal force given is missed by, of it",
+    "drag_missed": "the drag given is missed by, of what friction could carry",
+    "course_work_balance": "of the bone's work on its way, neither stored nor lost to friction",
+    "course_step_work": "of the bone's work on its way, left open by the size of the steps",
+    "course_viscous_work": "of the bone's work on its way, taken by tissues that relax",
+    "course_least_dissipation": "least work that friction took in a step, of the bone's work",
+    "smallest_det_F": "smallest ratio of a volume to what it was",
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the scene file."""
+    parser.add_argument("scene", type=Path, metavar="SCENE.toml", help="finger, materials, friction, loading, receptor")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Solve the scene and print what came out; stopped by the user, what was found by then."""
+    from sessions.toml_file import load_toml
+    from solver.failures import SolveFailure
+    from solver.response.solution import solve
+    from solver.scene import Scene
+
+    scene = load_toml(options.scene, Scene)
+    before: list[Prediction] = []
+    try:
+        with console.working("solving") as told:
+            found = solve(scene, told, rough=before.append)
+    except SolveFailure as failure:
+        console.result(failure.to_dict())
+        raise
+    except KeyboardInterrupt:
+        if not before:
+            raise
+        found = replace(before[-1], warnings=(*before[-1].warnings, UNFINISHED))
+        _print(found, scene.title or options.scene.name, console)
+        return STOPPED
+    _print(found, scene.title or options.scene.name, console)
+    return DONE
+
+
+def _print(found: "Prediction", title: str, console: Console) -> None:
+    console.result(found.to_dict())
+    console.say(title)
+    rows = [
+        ["SED at the ending", number(found.sed_ending * 1e3, 5), "kPa", _percent(found.error_estimate)],
+        ["SED at the point", number(found.sed_point * 1e3, 5), "kPa", ""],
+        ["normal force", number(found.normal_force, 5), "N/mm", _percent(found.normal_force_error)],
+        ["tangential force", number(found.tangential_force, 5), "N/mm", _percent(found.tangential_force_error)],
+        ["contact width", number(found.contact_width, 3), "mm", _percent(found.contact_width_error)],
+        ["indentation", number(found.indentation, 4), "mm", _percent(found.indentation_error)],
+        *(
+            []
+            if found.shift is None
+            else [["sideways shift", number(found.shift, 4), "mm", _length(found.shift_error)]]
+        ),
+        ["unknowns", str(found.dofs), "", ""],
+        ["solving took", number(found.wall_s * 1e3, 3), "ms", ""],
+        ["setting up took", number(found.setup_s * 1e3, 3), "ms", ""],
+        ["estimating errors took", number(found.estimate_s * 1e3, 3), "ms", ""],
+    ]
+    console.say(table(rows, head=["", "", "", "error, estimated"]))
+    left = [[name, _percent(entry["estimate"])] for name, entry in found.model["left_out"].items()]
+    console.say(
+        "\nLeft out of the model, and what of the SED that is estimated to have changed (--json says how it was found):"
+    )
+    console.say(table(left, head=["", ""]).lstrip("\n"))
+    console.say("\nChecks of the state found (0 is perfect; a volume of 1 is one that did not change):")
+    shown = [[told, number(found.audits[name] + 0.0, 2)] for name, told in AUDITS.items() if name in found.audits]
+    console.say(table(shown, head=["", ""]).lstrip("\n"))
+    for warning in found.warnings:
+        console.note(f"note: {warning}")
+
+
+def _length(error: float | None) -> str:
+    return "–" if error is None else f"{number(error, 2)} mm"
+
+
+def _percent(part: float | None) -> str:
+    return "–" if part is None else f"{number(100 * part, 2)} %"

@@ -1,0 +1,168 @@
+"""Pool many sessions: each analysed and predicted, group statistics, a page, and a table of all trials.
+
+Results are kept by the content they were made of, in OUT/results: what was computed once is not computed again, and
+Ctrl-C loses nothing that was done. A session that cannot be read is named and left out. Subjects are left out by
+decisions in FOLDER/exclusions.toml ([[exclude]] subject, why, who, and descriptor for one alone).
+With --synthetic a study of ten simulated subjects is made first, and what was planted is held against what is found.
+"""
+
+import argparse
+import json
+import re
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from daq_app.batch.pool import Shelf, visits
+from daq_app.cli.area_option import add_area, area_law
+from daq_app.cli.calibration_option import add_calibration, calibration_error
+from daq_app.cli.console import Console
+from daq_app.cli.main import WrongValue
+from sessions.prediction import PredictionOptions
+from sessions.recording import RecordingError
+from sessions.recording.atomic_file import json_text
+from sessions.recording.schema import LIVE_FILE
+from sessions.statistics.pooling.exclusions import exclusions_in
+from sessions.statistics.pooling.findings import UNITS, StudyFindings
+from sessions.statistics.pooling.ground_truth import checked_planted
+from sessions.statistics.pooling.pooled import pooled
+from sessions.statistics.pooling.visit import VisitOptions
+from sessions.strokes.contact_area import FIXED
+
+EXAMPLE = "daq-app study recordings --out results"
+PLANTED = "planted.json"
+LARGEST_SEED = 10_000_000
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the folder of sessions, or the seed of a synthetic study."""
+    parser.add_argument("folder", type=Path, nargs="?", metavar="FOLDER", help="holds a folder for each session")
+    parser.add_argument("--synthetic", type=int, metavar="SEED", help="make a study of ten simulated subjects instead")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="page, table and results (FOLDER/pooled); with --synthetic the study too",
+    )
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
+    parser.add_argument("--workers", type=int, metavar="N", help="processes on this computer (as many as cores)")
+    parser.add_argument(
+        "--kinematics",
+        choices=["small", "finite"],
+        default="small",
+        help="as for 'daq-app predict'; finite strain takes ten times as long",
+    )
+    parser.add_argument(
+        "--paths",
+        nargs="?",
+        const="small",
+        choices=["small", "finite"],
+        default="none",
+        metavar="finite",
+        help="also along every other reasonable choice of the analysis: a second or two more a session; with "
+        "'finite' at finite strain too, up to a minute more",
+    )
+    parser.add_argument(
+        "--tau", choices=["computed", "as-printed"], default="computed", help="as for 'daq-app predict'"
+    )
+    parser.add_argument(
+        "--intervals",
+        action=argparse.BooleanOptionalAction,
+        help="what the uncertainty of friction makes of each SED (usual at small strain, not at finite strain, where "
+        "it takes longer)",
+    )
+    add_area(parser, "fixed for all sessions, however each was analysed before")
+    add_calibration(parser)
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Pool the study, write page, table and numbers, and print what it says in short."""
+    folder, out = _places(options, console)
+    sessions = sorted(path.parent for path in folder.glob(f"*/{LIVE_FILE}"))
+    if not sessions:
+        raise RecordingError(f"{folder} holds no session: give the folder that holds a folder for each of them")
+    intervals = options.kinematics == "small" if options.intervals is None else options.intervals
+    model = PredictionOptions(options.tau, course="steady", kinematics=options.kinematics, intervals=intervals)
+    asked = VisitOptions(model, area_law(options) or FIXED, options.paths, calibration_error(options))
+    exclusions, truth = exclusions_in(folder), _planted(folder)  # what is wrong with them is said before hours of work
+    shelf = Shelf(out / "results", asked)
+    done, failed = visits(sessions, asked, shelf, console, scheduler=options.scheduler, workers=options.workers)
+    if truth is not None:
+        from daq_app.simulation.ground_truth import (
+            planted_relations,  # simulators are loaded only where they are asked for
+        )
+
+        truth["relation"] = planted_relations(truth["people"], asked.prediction, asked.area)
+    study = pooled(done, failed, exclusions, truth, asked)
+    console.progress(0.97, "writing the page")
+    files = _write(study, folder.resolve().name, out)
+    console.result({**files, "study": study.to_dict() | {"visits": [visit.session for visit in study.visits]}})
+    _print(study, files, console)
+    flawed = any(row.flaws for visit in study.visits for row in visit.rows) or any(v.losses for v in study.visits)
+    return 3 if failed or flawed else 0
+
+
+def _planted(folder: Path) -> dict[str, Any] | None:
+    """Return what was planted in a synthetic study, None in any other. Raises RecordingError where that is damaged."""
+    path = folder / PLANTED
+    if not path.is_file():
+        return None
+    try:
+        found = checked_planted(json.loads(path.read_bytes()))
+    except ValueError as damaged:
+        raise RecordingError(f"{path} is damaged; delete it to pool the study without what was planted") from damaged
+    return found
+
+
+def _places(options: argparse.Namespace, console: Console) -> tuple[Path, Path]:
+    """Return where the sessions lie and where the result goes; makes the synthetic study where one is asked for."""
+    if (options.folder is None) == (options.synthetic is None):
+        raise WrongValue("give a FOLDER of sessions, or --synthetic SEED, and not both")
+    if options.workers is not None and options.workers < 1:
+        raise WrongValue(f"--workers {options.workers} is not allowed: 1 or more")
+    if options.scheduler is not None and re.fullmatch(r"[a-z]+://[^/\s]+:\d+", options.scheduler) is None:
+        raise WrongValue(f"--scheduler {options.scheduler} is not allowed: scheme, host and port, as tcp://host:8786")
+    if options.synthetic is None:
+        return options.folder, options.out or options.folder / "pooled"
+    if not 0 <= options.synthetic <= LARGEST_SEED:
+        raise WrongValue(f"--synthetic {options.synthetic} is not allowed: a whole number from 0 to {LARGEST_SEED}")
+    from daq_app.simulation.synthetic import synthetic_study  # simulators are loaded only where they are asked for
+
+    folder = options.out or Path("synthetic-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
+    synthetic_study(folder, options.synthetic, console)
+    return folder, folder / "pooled"
+
+
+def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
+    """Write page, table and numbers and return where they are."""
+    # Imported here: drawing is slow to load.
+    from sessions.exchange.study_csv import COLUMNS, TRIALS, columns_csv, paths_csv, trials_csv
+    from sessions.report.html import swap_in
+    from sessions.report.study_page import study_page
+
+    files = {"page": out / "study.html", "table": out / TRIALS, "columns": out / COLUMNS, "numbers": out / "study.json"}
+    swap_in(files["page"], study_page(study, name))
+    swap_in(files["table"], trials_csv(study))
+    swap_in(files["columns"], columns_csv(study))
+    swap_in(files["numbers"], json_text(study.to_dict()))
+    if study.options.paths != "none":
+        files["paths"] = out / "paths.csv"
+        swap_in(files["paths"], paths_csv(study))
+    return {what: str(path) for what, path in files.items()}
+
+
+def _print(study: StudyFindings, files: dict[str, str], console: Console) -> None:
+    from sessions.report.study_prose import excluded, remarks, summary
+
+    if study.simulated:
+        console.say(study.simulated)
+    for sentence in (*summary(study), *excluded(study), *remarks(study)):
+        console.say(sentence)
+    for one in study.effects:
+        inside = "inside" if one.covered else "OUTSIDE"
+        console.say(
+            f"planted {one.descriptor}, {one.effect} [{UNITS[one.effect]}]: {one.planted:.3g}, found {one.found:.3g} "
+            f"({one.low:.3g} to {one.high:.3g}): {inside}"
+        )
+    for what, path in files.items():
+        console.say(f"{what:8}  {path}")

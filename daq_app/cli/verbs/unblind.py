@@ -1,0 +1,86 @@
+"""Open the sealed key of a blinded study, or for one of its sessions: from then on stimuli have their index.
+
+It is recorded with time and who, in the study and in each session's folder, together with the SHA-256 of every number
+that was made before: what was concluded blind stays provable. It cannot be taken back.
+"""
+
+import argparse
+import hashlib
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+from daq_app.cli.console import Console
+from daq_app.cli.main import DONE, FLAWED
+from sessions.plan.blinding import UNBLINDING, Key
+from sessions.plan.study import StudyError, check_code
+from sessions.plan.study_file import is_study, note, open_study, study_key
+from sessions.plan.visits import sessions_of
+from sessions.recording import Recording, RecordingError
+from sessions.recording.derived import RECORDED, load_derived, store_derived
+from sessions.recording.manifest import is_sealed
+
+EXAMPLE = "daq-app unblind studies/friction --by E02"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what is unblinded, and by whom."""
+    parser.add_argument("path", type=Path, metavar="SESSION|STUDY")
+    parser.add_argument("--by", required=True, metavar="CODE", help="who opens the key: a code, never a name")
+    parser.add_argument("--study", type=Path, metavar="DIR", help="of a session that lies elsewhere (the folder above)")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Open the key and say what was unblinded."""
+    path: Path = options.path
+    check_code("--by", options.by)
+    whole = is_study(path)
+    folder = path if whole else options.study or path.resolve().parent
+    sessions = sessions_of(path) if whole else (Recording.open(path),)
+    key = study_key(folder)
+    if key is None:
+        raise StudyError(f"{folder} is not blinded: there is nothing to open")
+    chosen, refused = _ready(sessions, key)
+    if not whole and refused:
+        raise RecordingError(refused[0])
+    if whole and open_study(folder).unblinded and not chosen:
+        raise StudyError(f"{folder} was unblinded before, and so was each of its sessions")
+    utc = datetime.now(UTC).isoformat(timespec="seconds")
+    note(folder, "unblinded", {"by": options.by, "session": None if whole else path.resolve().name})
+    for recording in chosen:
+        told = {"unblinded_utc": utc, "by": options.by, "made_before": dict(_made(recording)), "key": key.to_dict()}
+        store_derived(recording.folder, UNBLINDING, told)
+    names = [recording.folder.name for recording in chosen]
+    console.result({"study": str(folder), "sessions": names, "left_out": refused, "by": options.by, "utc": utc})
+    console.say(f"unblinded by {options.by}: {', '.join(names) or 'no session yet'}")
+    for sentence in refused:
+        console.say(sentence)
+    if not whole:
+        console.say("labels are the same throughout the study: whoever saw this session's stimuli knows them all")
+    return FLAWED if refused else DONE
+
+
+def _ready(sessions: tuple[Recording, ...], key: Key) -> tuple[list[Recording], list[str]]:
+    """Return the sessions to be unblinded, and a sentence for each that cannot be."""
+    chosen: list[Recording] = []
+    refused: list[str] = []
+    for recording in sessions:
+        name = recording.folder.name
+        if not recording.plan.blinded:
+            refused += [] if len(sessions) > 1 else [f"{name} is not blinded"]
+        elif load_derived(recording.folder, UNBLINDING) is not None:
+            refused += [] if len(sessions) > 1 else [f"{name} was unblinded before"]
+        elif recording.plan.key_sha256 != key.sha256:
+            refused.append(f"{name} was blinded with another key: name its study with --study")
+        elif not is_sealed(recording.folder):
+            refused.append(f"{name} stays blinded: it has not ended; end it ('daq-app resume --end') and unblind again")
+        else:
+            chosen.append(recording)
+    return chosen, refused
+
+
+def _made(recording: Recording) -> Iterator[tuple[str, str]]:
+    """Yield name and SHA-256 of each number and page that was made of a session while it was blinded."""
+    for path in sorted(recording.folder.iterdir()):
+        if path.is_file() and path.name not in RECORDED and path.suffix in (".json", ".jsonl", ".html"):
+            yield path.name, hashlib.sha256(path.read_bytes()).hexdigest()

@@ -1,0 +1,311 @@
+"""The program pulls its own plug on this computer and this disk, and writes down what came of it."""
+
+import random
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from daq_app.recorder.client import Recorder
+from daq_app.recorder.messages import (
+    Connect,
+    Device,
+    Failed,
+    Gone,
+    Live,
+    People,
+    Report,
+    ResumeSession,
+    SessionBegun,
+    SessionEnded,
+    StartSession,
+    Stop,
+)
+from drivers.calibration import Calibration
+from drivers.clock import RealClock
+from drivers.readings import ReadingBlock
+from drivers.transducer import TransducerInfo
+from sessions.plan.protocols import plan, protocol
+from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, provenance
+from sessions.recording.certificate import FORMAT
+from sessions.recording.disk_space import RESERVE
+from sessions.recording.provenance import machine, software_versions
+from sessions.recording.schema import LIVE_FILE, event_row
+from sessions.recording.storage_safety import file_system
+from sessions.run.runner import Status
+
+KILLS = 6
+STOPS = 3
+CUTS = 20
+PACE = 20.0  # told seconds a real second
+RUNNING = (0.2, 1.0)  # how long a session runs until it is killed [s]
+DEADLINE = 40.0  # for a recorder that does not answer [s]
+QUOTA = 4 * 2**20  # [bytes]
+RATE = 7000  # of the made-up readings that fill it [Hz]
+PLAN = plan(protocol("sensotact-friction"), "SELFTEST", 1)
+Progress = Callable[[float, str], None]
+AReport = TypeVar("AReport", bound=Report)
+
+
+class SelfTestFailed(Exception):
+    """Something that is promised did not hold; the message says what."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kills:
+    """What came of killing the recorder while a session ran, and going on with it."""
+
+    number: int
+    readings: int  # acknowledged, and there afterwards
+    events: int
+    most_lost: float  # of what was shown and not yet acknowledged [s, session clock]
+
+
+@dataclass(frozen=True, slots=True)
+class Quota:
+    """What came of filling all the room a session was given."""
+
+    bytes: int
+    readings: int  # acknowledged, and there afterwards
+    commit_ms: float  # median time in which a second of readings at 7000 Hz was made safe
+
+
+def selftest(room: Path, progress: Progress, seed: int | None = None) -> dict[str, Any]:
+    """Try everything in the folder `room`, which is empty, and return the certificate.
+
+    Raises SelfTestFailed where a promise did not hold, RecordingError where the disk allows no recording at all.
+    """
+    began = time.monotonic()
+    chance = random.Random(seed)
+    kills, logs = _killed(room, chance, progress)
+    progress(0.75, "stopping sessions")
+    stop_ms = _stopped(room / "stopped")
+    progress(0.85, "cutting the ends off logs")
+    cuts = _cut(logs, room / "cut", chance)
+    progress(0.9, "filling the room a session has")
+    quota = _filled(room / "full")
+    return {
+        "format": FORMAT,
+        "utc": datetime.now(UTC).isoformat(timespec="seconds"),
+        "sentence": (
+            f"On this computer and disk the recorder was killed {kills.number} times, the end of its log was cut off "
+            f"{cuts} times and its room was filled up: all it had acknowledged was there afterwards "
+            f"({kills.readings + quota.readings} readings, {kills.events} events), at most {kills.most_lost:.2f} s of "
+            f"what it had not was lost, and each session went on at the same trial. A stop took {stop_ms:.0f} ms."
+        ),
+        "kills": asdict(kills),
+        "cuts": cuts,
+        "quota": asdict(quota),
+        "stop_ms": stop_ms,
+        "disk": {"file_system": file_system(room)},
+        "machine": machine(),
+        "software": software_versions(),
+        "seconds": round(time.monotonic() - began, 1),
+    }
+
+
+class _Watched:
+    """A recorder on the simulated bench, and what it told."""
+
+    def __init__(self) -> None:
+        self.recorder = Recorder.start(PACE)
+        self.events: list[LoggedEvent] = []
+        self.safe = 0  # readings acknowledged
+        self.shown_ns = 0  # when the newest reading shown was received [ns, session clock]
+        self._over = False
+        self._waiting: list[Report] = []
+
+    def until(self, kind: type[AReport]) -> AReport:
+        """Note reports until one of a kind comes, and return it."""
+        deadline = time.monotonic() + DEADLINE
+        while time.monotonic() < deadline:
+            self._waiting += self.recorder.poll(0.02)
+            while self._waiting:
+                report = self._waiting.pop(0)
+                self._note(report)
+                if isinstance(report, kind):
+                    return report
+                if isinstance(report, Failed | Gone):
+                    raise SelfTestFailed(report.sentence)
+        raise SelfTestFailed(f"the recorder did not answer within {DEADLINE:g} s")
+
+    def hear(self, seconds: float) -> None:
+        """Note what comes within so many seconds."""
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            for report in (*self._waiting, *self.recorder.poll(0.01)):
+                self._note(report)
+            self._waiting = []
+
+    def killed(self) -> None:
+        """Kill it, and note what was still on its way."""
+        self.recorder.kill()
+        deadline = time.monotonic() + DEADLINE
+        while time.monotonic() < deadline:
+            reports = (*self._waiting, *self.recorder.poll(0.02))
+            self._waiting = []
+            for report in reports:
+                self._note(report)
+            if any(isinstance(report, Gone) for report in reports):
+                return
+        raise SelfTestFailed("a recorder that was killed did not end")
+
+    def _note(self, report: Report) -> None:
+        match report:
+            case LoggedEvent():
+                self.events.append(report)
+            case Status(safe=safe):
+                self.safe = max(self.safe, safe.readings)
+            case Live(received_ns=received_ns) if len(received_ns) and not self._over:
+                self.shown_ns = int(received_ns[-1])
+            case SessionEnded():
+                self._over = True  # what is shown from now on is not recorded
+            case _:
+                pass
+
+
+def _killed(room: Path, chance: random.Random, progress: Progress) -> tuple[Kills, list[Path]]:
+    """Kill the recorder again and again; also return copies of the folder as the kills left it."""
+    readings = events = 0
+    most_lost = 0.0
+    copies: list[Path] = []
+    folder = room / "killed-0"
+    for number in range(KILLS):
+        progress(0.75 * number / KILLS, f"killing the recorder, {number + 1} of {KILLS}")
+        watched = _Watched()
+        trial = _begun_or_resumed(watched, folder)
+        watched.hear(chance.uniform(*RUNNING))
+        watched.killed()
+        recording = Recording.open(folder)
+        _check_kept(recording, watched, trial)
+        block = recording.last_block()
+        if len(block):
+            most_lost = max(most_lost, (watched.shown_ns - int(block.received_ns[-1])) * 1e-9)
+        readings, events = readings + watched.safe, events + len(watched.events)
+        copies.append(room / f"copy-{number}")
+        shutil.copytree(folder, copies[-1])
+        if recording.end is not None:
+            folder = room / f"killed-{number + 1}"  # this session had come to its end before it was killed
+    return Kills(KILLS, readings, events, max(most_lost, 0.0)), copies
+
+
+def _begun_or_resumed(watched: _Watched, folder: Path) -> int | None:
+    """Have a session running, and return the trial at which it was resumed."""
+    if not folder.exists():
+        watched.recorder.send(Connect("sim:?seed=1"))
+        watched.until(Device)
+        watched.recorder.send(StartSession(PLAN, str(folder), People("simulated people", 1), any_folder=True))
+        watched.until(SessionBegun)
+        return None
+    watched.recorder.send(ResumeSession(str(folder)))
+    watched.until(SessionBegun)
+    return watched.until(Status).trial
+
+
+def _check_kept(recording: Recording, watched: _Watched, trial: int | None) -> None:
+    """Raise SelfTestFailed unless all that was acknowledged is in the file, and the session went on where it was."""
+    rows = {event.number: event_row(event) for event in recording.events}
+    if any(rows.get(event.number) != event_row(event) for event in watched.events):
+        raise SelfTestFailed("an event that had been acknowledged was not in the file after a kill")
+    block = recording.readings()
+    if len(block) < watched.safe or (np.diff(block.sequence) != 1).any():
+        raise SelfTestFailed(f"of {watched.safe} readings that had been acknowledged {len(block)} were left by a kill")
+    first = watched.events[0].number if watched.events else 1
+    done = {event.trial for event in recording.events if event.kind == "take_kept" and event.number < first}
+    if trial is not None and trial != len(done) + 1:
+        raise SelfTestFailed(f"the session went on at trial {trial}, and had been killed in trial {len(done) + 1}")
+
+
+def _stopped(room: Path) -> float:
+    """Return the median time from a stop to the written end [ms]. Raises SelfTestFailed."""
+    took: list[float] = []
+    for number in range(STOPS):
+        watched = _Watched()
+        with watched.recorder:
+            _begun_or_resumed(watched, room / str(number))
+            watched.hear(0.3)
+            began = time.monotonic()
+            watched.recorder.send(Stop())
+            watched.until(SessionEnded)
+            took.append(time.monotonic() - began)
+        if Recording.open(room / str(number)).end is None:
+            raise SelfTestFailed("a session that was stopped had no written end")
+    return round(float(np.median(took)) * 1e3, 1)
+
+
+def _cut(copies: list[Path], folder: Path, chance: random.Random) -> int:
+    """Cut the ends off copies of a log, as a power cut may; return how often. Raises SelfTestFailed."""
+    for number in range(CUTS):
+        origin = copies[number % len(copies)]
+        shutil.copytree(origin, folder)
+        log = folder / f"{LIVE_FILE}-wal"
+        if log.exists():
+            content = log.read_bytes()
+            log.write_bytes(content[: max(len(content) - chance.randrange(1, 200_000), 0)])
+        try:
+            sequence = Recording.open(folder).readings().sequence
+        except RecordingError as error:
+            # A log cut back to before its first commit leaves a session that had not begun.
+            if log.stat().st_size > 100_000:
+                raise SelfTestFailed(f"a log whose end was cut off could not be read ({error})") from error
+        else:
+            if (np.diff(sequence) != 1).any():
+                raise SelfTestFailed("a log whose end was cut off gave readings with a gap inside")
+        shutil.rmtree(folder)
+    return CUTS
+
+
+class _OnAQuota(SessionWriter):
+    """A writer whose file may grow to a size, and further when the reserve is given back."""
+
+    def limit(self, size: int) -> None:
+        """Let the file grow to so many bytes."""
+        (page,) = self._connection.execute("PRAGMA page_size").fetchone()
+        self._connection.execute(f"PRAGMA max_page_count={size // page}")
+
+    def _give_back(self) -> None:
+        super()._give_back()
+        self.limit(QUOTA + RESERVE)
+
+
+def _filled(folder: Path) -> Quota:
+    """Record until there is no more room; all must be there, and the end written. Raises SelfTestFailed."""
+    clock = RealClock()
+    calibration = Calibration("SELFTEST", "counts", np.eye(6), np.full(6, np.nan), "made up for the selftest")
+    info = TransducerInfo("selftest:", "selftest", "SIMULATED", "SELFTEST", True, float(RATE), float(RATE), calibration)
+    writer = _OnAQuota.create(folder, PLAN, info, provenance(clock), clock=clock, reserve=RESERVE)
+    writer.limit(QUOTA)
+    took: list[float] = []
+    position = 0
+    while writer.full is None:
+        if position > 100 * RATE:
+            raise SelfTestFailed("a session that had no more room went on without a word")
+        writer.readings(_made_up(position, clock.now_ns()))
+        position += RATE
+        began = time.monotonic()
+        writer.commit()
+        took.append(time.monotonic() - began)
+    safe = writer.acknowledged.readings
+    writer.event("ended", data={"reason": writer.full, "cause": "disk", "complete": False, "readings": safe})
+    writer.close()
+    recording = Recording.open(folder)
+    block = recording.readings()
+    if len(block) != safe or safe != position or recording.end is None:
+        raise SelfTestFailed(
+            f"{safe} readings had been acknowledged when the room was full, and {len(block)} were left"
+        )
+    if not np.array_equal(block.raw, _made_up(0, 0, position).raw):
+        raise SelfTestFailed("readings came back otherwise than they were written when the room was full")
+    return Quota(QUOTA, safe, round(float(np.median(took)) * 1e3, 2))
+
+
+def _made_up(first: int, received_ns: int, count: int = RATE) -> ReadingBlock:
+    """Return readings whose numbers follow from their place."""
+    i = np.arange(first, first + count, dtype=np.int64)
+    raw = np.outer(i, np.arange(1.0, 7.0))
+    return ReadingBlock(i, i, i * 0, i / RATE, np.full(count, received_ns, np.int64), raw)

@@ -1,0 +1,45 @@
+"""One session from plan to sealed folder in this process, for simulated people. All others use the recorder."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from daq_app.cli.console import Console
+from drivers.clock import Clock
+from drivers.transducer import Transducer
+from sessions.plan.plan import SessionPlan
+from sessions.recording import SessionWriter, Setting, provenance
+from sessions.recording.archive import seal
+from sessions.run.resuming import RESUMABLE
+from sessions.run.runner import Operator, RunnerSettings, SessionEnd, Status, run_session
+
+
+def conduct(
+    plan: SessionPlan,
+    folder: Path,
+    operator: Operator,
+    transducer: Transducer | None,
+    clock: Clock,
+    console: Console,
+    *,
+    settings: Sequence[Setting] = (),
+    run: RunnerSettings | None = None,
+    durable: bool = True,
+) -> SessionEnd:
+    """Run the session into `folder` and seal it, however it ended, unless it can be resumed.
+
+    `durable` as for the writer.
+
+    Raises RecordingError when the folder cannot be used or the disk takes no more.
+    """
+    info = None if transducer is None else transducer.info
+    came_from = provenance(clock, settings)
+    writer = SessionWriter.create(folder, plan, info, came_from, subject_simulated=True, clock=clock, durable=durable)
+
+    def told(status: Status) -> None:
+        done = 0.0 if status.trial is None else (status.trial - 1) / status.trials
+        console.progress(done, f"{plan.subject}: {status.state}, {status.safe.readings} readings safe")
+
+    end = run_session(plan, writer, operator, transducer, clock, settings=run, progress=told)
+    if end.cause not in RESUMABLE:
+        seal(writer.folder)
+    return end

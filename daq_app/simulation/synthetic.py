@@ -1,0 +1,245 @@
+"""A whole study of simulated people: what was planted is known, and so is what was spoilt. In told time, in seconds.
+
+Ten subjects stroke and score the ten surfaces of the paper. Fingers differ in friction, transducers in calibration,
+people in how they use the scale; scores follow the maker's index and the friction that a subject's own finger feels,
+drift within a block and carry over from one trial to the next. Nobody here knows of a model of the finger.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from daq_app.cli.console import Console
+from daq_app.simulation.conduct import conduct
+from daq_app.simulation.due_events import DueEvents
+from daq_app.simulation.wiring import planted_surface
+from drivers.clock import Clock, ToldClock
+from sessions.plan.plan import Block, Frame, SessionPlan, Trial
+from sessions.plan.protocols import plan, protocol
+from sessions.recording import RecordingError, Setting
+from sessions.recording.atomic_file import write_json
+from sessions.recording.schema import LIVE_FILE
+from sessions.run.runner import RunnerSettings
+from sessions.run.steps import (
+    Abort,
+    AskBegin,
+    AskFinish,
+    AskMount,
+    AskScore,
+    AskStroke,
+    Begin,
+    Command,
+    Event,
+    Finish,
+    Scored,
+    StimulusMounted,
+)
+from sessions.statistics.pooling.exclusions import EXCLUSIONS
+from simulators.bench import Bench, BenchSettings, PlantedStroke
+from simulators.direct import DirectTransducer, Hurt
+from simulators.subject import SimulatedSubject, SubjectSettings
+from simulators.surface import Surface
+
+PROTOCOL = "sensotact-friction"
+SUBJECTS = 10
+PLANTED = "planted.json"
+DAMAGED = "S11"
+PEOPLE = SubjectSettings(
+    gain=0.75,
+    gain_spread=0.05,
+    offset_spread=3.0,
+    judgement_noise=4.0,
+    friction_weight=0.3,
+    drift=0.4,
+    carry_over=0.04,
+    moisture=0.08,
+)
+CALIBRATION = 0.01  # standard deviation of each axis' gain about 1 [-]
+LIGHT = 0.15  # peak normal force of a stroke that presses too lightly [N]
+JUDGING = 0.8  # from lift to score [s]
+TICK = 0.1  # between two looks at the transducer [s, told]: five times as seldom as with people
+
+
+@dataclass(frozen=True, slots=True)
+class Spoilt:
+    """What goes wrong in one subject's visit, by number of the trial; 0: nowhere."""
+
+    lost: int = 0
+    frozen: int = 0
+    light: int = 0
+    unanswered: int = 0
+    aborted: int = 0
+    reversed: bool = False
+    expected: str = ""  # what the analysis should say
+
+
+SPOILT: Mapping[str, Spoilt] = {
+    "S02": Spoilt(lost=3, expected="trial 3: lost_readings"),
+    "S04": Spoilt(frozen=6, expected="trial 6: frozen_sensor"),
+    "S05": Spoilt(light=2, expected="trial 2: too_little_force"),
+    "S06": Spoilt(unanswered=8, expected="trial 8 has no score"),
+    "S07": Spoilt(reversed=True, expected="the scale was used backwards"),
+    "S09": Spoilt(aborted=9, expected="trials 9 and 10 were not done"),
+}
+
+
+def synthetic_study(out: Path, seed: int, console: Console, subjects: int = SUBJECTS) -> None:
+    """Write the study below `out`: a folder a visit, one that is damaged, decisions, and `planted.json`.
+
+    The same seed gives the same readings and answers. Raises RecordingError where `out` cannot be used.
+    """
+    if out.exists() and any(out.iterdir()):
+        raise RecordingError(f"{out} is not empty; give a new folder, for nothing is written over")
+    planted = [_visit(out, seed, number, console) for number in range(1, subjects + 1)]
+    (out / DAMAGED).mkdir()
+    (out / DAMAGED / LIVE_FILE).write_bytes((out / "S01" / LIVE_FILE).read_bytes()[:1000])
+    (out / EXCLUSIONS).write_text(_decisions(), encoding="utf-8")
+    write_json(
+        out / PLANTED,
+        {
+            "SIMULATED": "SIMULATED: this is what was planted in a simulated study",
+            "seed": seed,
+            "score": planted_slopes(PEOPLE),
+            "people": asdict(PEOPLE),
+            "calibration_sd": CALIBRATION,
+            "spoilt": {
+                **{code: asdict(spoilt) for code, spoilt in SPOILT.items() if int(code[1:]) <= subjects},
+                DAMAGED: asdict(Spoilt(expected="the file is damaged")),
+            },
+            "strokes": [row for rows in planted for row in rows],
+        },
+    )
+
+
+def planted_slopes(people: SubjectSettings) -> dict[str, Any]:
+    """Return the slopes of these people's scores on index, µ by descriptor, trials before and index before."""
+    felt = {name: SimulatedSubject(0, people).by_friction(name) for name in ("stickiness", "slipperiness")}
+    by_index = people.gain * (1.0 - people.friction_weight)
+    return {"gain": by_index, "friction": felt, "drift": people.drift, "carry_over": people.carry_over}
+
+
+def _decisions() -> str:
+    """Return the file of decisions that the experimenter of such a study would keep."""
+    return (
+        "# SIMULATED: decisions about a simulated study\n\n[[exclude]]\n"
+        'subject = "S07"\nwhy = "used both scales backwards, and said so afterwards"\nwho = "simulated experimenter"\n'
+    )
+
+
+def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str, Any]]:
+    """Record one subject's visit and return what was planted in it, a row a stroke."""
+    subject, own = f"S{number:02d}", seed * 100 + number
+    spoilt = SPOILT.get(subject, Spoilt())
+    gains = np.random.default_rng([own, 7]).normal(1.0, CALIBRATION, 6)
+    a, b, c, d, e, f = gains.tolist()
+    bench = Bench(own, BenchSettings(gains=(a, b, c, d, e, f)))
+    clock = ToldClock()
+    transducer = DirectTransducer(bench, clock, Hurt(_one(spoilt.lost), _one(spoilt.frozen)))
+    settings = replace(PEOPLE, gain=-PEOPLE.gain) if spoilt.reversed else PEOPLE
+    planned = plan(protocol(PROTOCOL), subject, own, frame=Frame("-z", "set", bench.settings.height, "set"))
+    people = SyntheticPeople(SimulatedSubject(own, settings), bench, transducer, clock, planned, spoilt)
+    told = [Setting("study seed", seed, "", "set")]
+    conduct(
+        planned,
+        out / subject,
+        people,
+        transducer,
+        clock,
+        console,
+        settings=told,
+        run=RunnerSettings(tick=TICK),
+        durable=False,
+    )
+    return [
+        {**_row(subject, trial, stroke), **people.meant(trial)}
+        for trial, stroke in zip(people.stroked, bench.planted(), strict=True)
+    ]
+
+
+def _one(number: int) -> frozenset[int]:
+    return frozenset((number,)) if number else frozenset()
+
+
+def _row(subject: str, trial: Trial, stroke: PlantedStroke) -> dict[str, Any]:
+    return {
+        "subject": subject,
+        "trial": trial.number,
+        "descriptor": trial.stimulus.descriptor,
+        "index": trial.stimulus.index,
+        "mu": stroke.mu,
+        "tau_max": stroke.tau_max,
+        "speed": stroke.speed,
+        "direction": stroke.direction,
+    }
+
+
+class SyntheticPeople:
+    """Experimenter and subject in one, on a bench in told time."""
+
+    def __init__(
+        self,
+        subject: SimulatedSubject,
+        bench: Bench,
+        transducer: DirectTransducer,
+        clock: Clock,
+        planned: SessionPlan,
+        spoilt: Spoilt,
+    ) -> None:
+        """Let the subject stroke and judge as planned, but for what is to be spoilt."""
+        self._subject, self._bench, self._transducer = subject, bench, transducer
+        self._clock, self._plan, self._spoilt = clock, planned, spoilt
+        self._due = DueEvents(clock)
+        self.stroked: list[Trial] = []
+
+    def show(self, command: Command) -> None:
+        """Do what the command asks for."""
+        match command:
+            case AskBegin():
+                self._due.put(Begin())
+            case AskMount(trial) if trial.number == self._spoilt.aborted:
+                self._due.put(Abort("the subject had to leave"))
+            case AskMount(trial):
+                self._bench.mount(self._felt(trial))
+                self._due.put(StimulusMounted(trial.stimulus.code))
+            case AskStroke(trial):
+                stroke = self._subject.stroke(self._felt(trial))
+                self._bench.begin_stroke(stroke, self._transducer.now())
+                self.stroked.append(trial)
+            case AskScore(trial):
+                self._due.put(self._scored(trial), JUDGING)
+            case AskFinish():
+                self._due.put(Finish())
+            case _:
+                pass
+
+    def poll(self) -> tuple[Event, ...]:
+        """Return what has been done by now."""
+        return self._due.taken()
+
+    def meant(self, trial: Trial) -> dict[str, Any]:
+        """Return a trial's depth, its place, what was stroked before, and the score without noise."""
+        block, place, before = self._order(trial)
+        score = self._subject.meant(self._subject.felt(planted_surface(trial)), place, before)
+        return {"indentation": block.indentation, "place": place, "before": before, "score": score}
+
+    def _order(self, trial: Trial) -> tuple[Block, int, int | None]:
+        """Return a trial's block, its place in it from 0, and the index stroked before it."""
+        block = next(block for block in self._plan.blocks if trial in block.trials)
+        place = block.trials.index(trial)
+        return block, place, block.trials[place - 1].stimulus.known_index if place else None
+
+    def _felt(self, trial: Trial) -> Surface:
+        surface = self._subject.felt(planted_surface(trial))
+        light = LIGHT / surface.peak_normal_force if trial.number == self._spoilt.light else 1.0
+        return replace(surface, tau_max=surface.tau_max * light)
+
+    def _scored(self, trial: Trial) -> Scored:
+        _, place, before = self._order(trial)
+        at = self._clock.now_ns() * 1e-9 + JUDGING
+        if trial.number == self._spoilt.unanswered:
+            return Scored(None, (), None, 0, None, "simulated")
+        score = self._subject.score(self._subject.felt(planted_surface(trial)), 1, place, before)
+        return Scored(score, ((at, score),), at, 0, None, "simulated")

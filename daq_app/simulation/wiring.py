@@ -1,0 +1,231 @@
+"""Builds real or simulated parts. Whoever runs a session reaches the simulators through here alone."""
+
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from daq_app.simulation.due_events import DueEvents
+from drivers.address import check_options, parse_address
+from drivers.catalog import open_transducer
+from drivers.clock import Clock
+from drivers.tool import without_tool
+from drivers.transducer import SetupError, Transducer
+from sessions.plan.plan import Frame, Trial
+from sessions.recording import Recording
+from sessions.recording.replay import ReplayTransducer
+from sessions.run.steps import (
+    AskBegin,
+    AskChoice,
+    AskFinish,
+    AskMount,
+    AskNumber,
+    AskRest,
+    AskScore,
+    AskStroke,
+    Begin,
+    Chosen,
+    Command,
+    Event,
+    Finish,
+    NumberGiven,
+    Resume,
+    Scored,
+    StimulusMounted,
+    StrokeDone,
+)
+from simulators.bench import Bench
+from simulators.net_ft_box import NetFtBox
+from simulators.serving import serve_digital_ft, serve_net_ft, serve_serial_ft
+from simulators.subject import SimulatedSubject
+from simulators.surface import Surface, paper_surfaces
+from simulators.timetable import TimetableError
+
+__all__ = [
+    "Connected",
+    "SimulatedHand",
+    "SimulatedPeople",
+    "TimetableError",
+    "connected",
+    "itself",
+    "planted_surface",
+    "serve_digital_ft",
+    "serve_net_ft",
+    "serve_serial_ft",
+]
+
+SIMULATED = "sim"
+REPLAY = "replay:"  # and the path of a session folder
+JUDGING = 0.8  # from lift to score [s]; an unloaded stretch in which drift shows
+INPUT = "simulated"
+_OPTIONS = frozenset({"seed", "rate", "tool"})
+
+
+@dataclass(frozen=True, slots=True)
+class Connected:
+    """An opened transducer, and the bench behind it where that is simulated in this process."""
+
+    transducer: Transducer
+    bench: Bench | None = None
+    bench_now: Callable[[], float] | None = None  # the bench's time [s]
+    recorded_frame: Frame | None = None  # of a recording that is replayed
+
+    @property
+    def frame(self) -> Frame | None:
+        """How the axes of a simulated or recorded bench lie to its face; None for a real one, which cannot tell."""
+        if self.bench is None:
+            return self.recorded_frame
+        return Frame("-z", "set", self.bench.settings.height, "set")
+
+
+@contextmanager
+def connected(uri: str, clock: Clock) -> Generator[Connected]:
+    """Open the transducer at `uri` and close it in any case.
+
+    `sim:?seed=7&rate=200` is the simulated bench: a box on loopback, read by the very driver a real box is read by.
+    `replay:recordings/P07` is the transducer of a recording, speaking as it spoke then. Raises SetupError or LinkLost
+    as the driver does, RecordingError for a folder that holds no recording.
+    """
+    if uri.startswith(REPLAY):
+        recording = Recording.open(Path(uri.removeprefix(REPLAY)))
+        replayed = ReplayTransducer(recording, clock, uri)
+        try:
+            yield Connected(replayed, recorded_frame=recording.plan.frame)
+        finally:
+            replayed.close()
+        return
+    address = parse_address(uri)
+    if address.scheme != SIMULATED:
+        transducer = open_transducer(uri, clock)
+        try:
+            yield Connected(transducer)
+        finally:
+            transducer.close()
+        return
+    check_options(address, _OPTIONS)
+    without_tool(address)  # refused in terms of this address
+    bench = Bench(address.number("seed", 0, 0, 2**31 - 1))
+    box = NetFtBox(bench, clock, rate=address.number("rate", 200, 1, 7000))
+    box.start()
+    try:
+        tool = f"&tool={address.options['tool']}" if "tool" in address.options else ""
+        with connected(box.uri + tool, clock) as inner:
+            yield Connected(inner.transducer, bench, box.now)
+    finally:
+        box.close()
+
+
+Known = Callable[[Trial], Trial]  # a trial with the index of its stimulus
+
+
+def itself(trial: Trial) -> Trial:
+    """Return the trial: its stimulus is known."""
+    return trial
+
+
+class SimulatedHand:
+    """Mounts and strokes the simulated bench when a session asks for it, and does nothing else: people do the rest."""
+
+    def __init__(self, subject_seed: int, bench: Connected, known: Known = itself) -> None:
+        """Let the subject of that seed stroke; `known` tells a blinded trial's stimulus.
+
+        Raises SetupError where the bench is not simulated in this process.
+        """
+        if bench.bench is None or bench.bench_now is None:
+            raise SetupError("a simulated hand strokes the simulated bench only: connect sim:")
+        self._subject = SimulatedSubject(subject_seed)
+        self._bench = bench.bench
+        self._now = bench.bench_now
+        self._known = known
+        self._takes: dict[int, int] = {}  # by trial number
+
+    def show(self, command: Command) -> None:
+        """Do what the command asks a hand for."""
+        match command:
+            case AskMount(trial):
+                self._bench.mount(planted_surface(self._known(trial)))
+            case AskStroke(trial):
+                self._takes[trial.number] = self._takes.get(trial.number, 0) + 1
+                stroke = self._subject.stroke(planted_surface(self._known(trial)), self._takes[trial.number])
+                self._bench.begin_stroke(stroke, self._now())
+            case _:
+                pass
+
+    def poll(self) -> tuple[Event, ...]:
+        """Return nothing: what a hand does is felt by the transducer."""
+        return ()
+
+
+class SimulatedPeople:
+    """Experimenter and subject in one, for a session nobody sits at: they do at once what is asked of them.
+
+    With a bench the subject strokes it, and judges when the finger has left; without one it strokes and judges unseen.
+    """
+
+    def __init__(self, subject_seed: int, clock: Clock, bench: Connected | None = None, known: Known = itself) -> None:
+        """Let the subject of that seed stroke the bench, where there is one; `known` tells a blinded stimulus."""
+        self._subject = SimulatedSubject(subject_seed)
+        self._clock = clock
+        self._hand = None if bench is None or bench.bench is None else SimulatedHand(subject_seed, bench, known)
+        self._known = known
+        self._takes: dict[int, int] = {}  # by trial number
+        self._due = DueEvents(clock)
+
+    def show(self, command: Command) -> None:
+        """Do what the command asks for."""
+        if self._hand is not None:
+            self._hand.show(command)
+        match command:
+            case AskBegin():
+                self._due.put(Begin())
+            case AskMount(trial):
+                self._due.put(StimulusMounted(trial.stimulus.code))
+            case AskStroke(trial):
+                self._takes[trial.number] = self._takes.get(trial.number, 0) + 1
+                if self._hand is None:
+                    self._due.put(StrokeDone())
+            case AskScore() | AskNumber() | AskChoice():
+                self._due.put(self._judgement(command), after=self._judging)
+            case AskRest(None):
+                self._due.put(Resume())
+            case AskFinish():
+                self._due.put(Finish())
+            case _:
+                pass
+
+    def poll(self) -> tuple[Event, ...]:
+        """Return what has been done by now."""
+        return self._due.taken()
+
+    def _judgement(self, command: AskScore | AskNumber | AskChoice) -> Event:
+        """Return what the subject answers."""
+        at = self._clock.now_ns() * 1e-9 + self._judging
+        match command:
+            case AskScore(trial):
+                score = self._judged(trial)
+                return Scored(score, ((at, score),), at, 0, None, INPUT)
+            case AskNumber(trial):
+                number = self._subject.number(planted_surface(self._known(trial)), self._takes[trial.number])
+                return NumberGiven(number, at, 0, None, INPUT)
+            case AskChoice(first, second):
+                more = self._judged(first) > self._judged(second)
+                return Chosen("first" if more else "second", at, 0, None, INPUT)
+
+    @property
+    def _judging(self) -> float:
+        return JUDGING if self._hand else 0.0
+
+    def _judged(self, trial: Trial) -> float:
+        return self._subject.score(planted_surface(self._known(trial)), self._takes[trial.number])
+
+
+def planted_surface(trial: Trial) -> Surface:
+    """Return the simulated surface of a trial, stroked as the trial asks. Raises SetupError where there is none."""
+    stimulus = trial.stimulus
+    surface = paper_surfaces().get((stimulus.descriptor, stimulus.known_index))
+    if surface is None:
+        raise SetupError(
+            f"the simulated bench has no surface '{stimulus.descriptor} {stimulus.index}': it holds the ten of "
+            "sensotact-friction; run this protocol with people"
+        )
+    return replace(surface, direction=trial.direction)

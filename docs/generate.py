@@ -1,0 +1,90 @@
+"""Reference pages made from the program itself: the command line from argparse, files from the types they become."""
+
+import ast
+import dataclasses
+import importlib
+import inspect
+from pathlib import Path
+
+from daq_app.cli import main
+
+SCENE = "solver.scene.tables"
+PROTOCOL = "sessions.plan.protocols.protocol"
+
+
+def write(folder: Path) -> None:
+    """Write every generated page into `folder`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    pages = {"command-line": command_line(), "scene-keys": scene_keys(), "protocol-keys": protocol_keys()}
+    for name, text in pages.items():
+        file = folder / f"{name}.md"
+        if not file.exists() or file.read_text(encoding="utf-8") != text:
+            file.write_text(text, encoding="utf-8")
+
+
+def command_line() -> str:
+    """Return the help of every verb, as argparse prints it."""
+    lines = ["# Command line", "", "`daq-app VERB --help` prints the same.", ""]
+    for name, does in main.VERBS.items():
+        verb = importlib.import_module(f"daq_app.cli.verbs.{name.replace('import', 'import_')}")
+        parser = main._parser(name, verb)  # noqa: SLF001 - the one place that makes a verb's parser
+        lines += [
+            f"## {name}",
+            "",
+            f"{does[0].upper()}{does[1:]}.",
+            "",
+            "```text",
+            parser.format_help().rstrip(),
+            "```",
+            "",
+        ]
+    return "\n".join(lines)
+
+
+def scene_keys() -> str:
+    """Return the keys of a scene file, table by table."""
+    tables = ["Finger", "Material", "Relaxation", "Friction", "Loading", "Receptor", "Solve"]
+    return _keys("Keys of a scene file", SCENE, tables)
+
+
+def protocol_keys() -> str:
+    """Return the keys of a protocol file, table by table."""
+    module = importlib.import_module(PROTOCOL)
+    tables = [name for name, kind in vars(module).items() if _is_table(kind) and kind.__module__ == PROTOCOL]
+    return _keys("Keys of a protocol file", PROTOCOL, tables)
+
+
+def _keys(title: str, module: str, tables: list[str]) -> str:
+    lines = [f"# {title}", ""]
+    for name in tables:
+        table = getattr(importlib.import_module(module), name)
+        meaning = _comments(table)
+        lines += [f"## {name}", "", inspect.getdoc(table).split("\n")[0], ""]
+        lines += ["| key | default | meaning |", "| --- | --- | --- |"]
+        for one in dataclasses.fields(table):
+            lines.append(f"| `{one.name}` | {_default(one)} | {_cell(meaning.get(one.name, ''))} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _is_table(kind: object) -> bool:
+    return inspect.isclass(kind) and dataclasses.is_dataclass(kind)
+
+
+def _default(one: "dataclasses.Field[object]") -> str:
+    if one.default is not dataclasses.MISSING:
+        return f"`{_cell(repr(one.default))}`"
+    return "its own defaults" if one.default_factory is not dataclasses.MISSING else "required"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+def _comments(table: type) -> dict[str, str]:
+    """Return the comment that ends the line of each field in the source of `table`."""
+    source = inspect.getsource(table)
+    lines = source.split("\n")
+    body = ast.parse(inspect.cleandoc(source)).body[0].body
+    fields = [node for node in body if isinstance(node, ast.AnnAssign)]
+    return {node.target.id: lines[node.end_lineno - 1].partition("  # ")[2] for node in fields}

@@ -1,0 +1,315 @@
+"""A session as a data set of the Brain Imaging Data Structure: behaviour, events, forces, and what was made of them.
+
+Behavioural experiments (`beh`) as BIDS 1.10 tells them. Forces and torques have no data type of their own there yet, so
+the readings are a continuous recording (`physio`), one file for each stretch without a break; a reading that never
+arrived is a row of n/a, so that row and sampling rate agree. The last column tells of a simulation.
+"""
+
+import gzip
+import io
+import json
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drivers.readings import ReadingBlock
+from sessions.exchange import ExportSource, Progress
+from sessions.exchange.exported import ExportedSession, head_of
+from sessions.exchange.readings_text import MISSING, columns, read_rows, rows, write_rows
+from sessions.exchange.session_tables import Column, Table, tables
+from sessions.recording import LoggedEvent, Recording
+from sessions.recording.atomic_file import write_json
+from sessions.recording.calibration_uncertainty import GAIN_ERROR, gain_error_content
+from sessions.recording.description import description
+from sessions.recording.head import json_text
+from sessions.strokes.decisions import DECISIONS, content_of
+
+VERSION = "1.10.0"
+BREAK = 1.0  # a longer silence of the transducer begins a new file [s]
+PIPELINE = "daq-app"
+SOURCE = "sourcedata"  # BIDS lets it hold anything
+_KNOWN = frozenset({"onset", "duration"})  # BIDS itself says what they are
+_MARK = Column("simulated", "", "1: transducer or subject were simulated", ())
+
+
+def write(source: ExportSource, folder: Path, progress: Progress) -> None:
+    """Write the data set into an empty folder."""
+    recording = source.recording
+    names = _Names(recording)
+    write_json(folder / "dataset_description.json", _dataset(recording, "raw", recording.provenance["software"]))
+    (folder / "README.md").write_text(_readme(recording), encoding="utf-8")
+    _write_table(folder / "participants", _participants(recording, names), recording)
+    beh = folder / names.subject / "beh"
+    beh.mkdir(parents=True)
+    found = {table.name: table for table in tables(source)}
+    task = {"TaskName": names.task, "TaskDescription": f"protocol {recording.plan.protocol}"}
+    told = task | {"Instructions": " / ".join(block.instruction for block in recording.plan.blocks)}
+    _write_table(beh / f"{names.stem}_beh", found["trials"], recording, told)
+    whole = {"DaqAppSession": description(recording)}  # all that is needed to make the session again
+    _write_table(beh / f"{names.stem}_events", _events(recording), recording, told | whole)
+    if recording.info is not None:
+        _write_readings(recording, beh, names, progress)
+    set_by_people = {DECISIONS: content_of(recording.folder), GAIN_ERROR: gain_error_content(recording.folder)}
+    for name, content in set_by_people.items():
+        if content:
+            (folder / SOURCE).mkdir(exist_ok=True)
+            (folder / SOURCE / name).write_bytes(content)
+    derived = folder / "derivatives" / PIPELINE
+    made = derived / names.subject / "beh"
+    made.mkdir(parents=True)
+    write_json(derived / "dataset_description.json", _dataset(recording, "derivative", source.analysis["made_by"]))
+    (derived / "README.md").write_text(_readme(recording), encoding="utf-8")
+    for name in ("answers", "positions", "strokes", "friction", "flaws", "decisions", "predictions", "alternatives"):
+        if name in found:
+            _write_table(made / f"{names.stem}_desc-{name}_beh", found[name], recording, task)
+
+
+def read(path: Path) -> ExportedSession:
+    """Return the session of a data set of one subject that `write` wrote. Raises OSError, ValueError."""
+    tables_found = sorted(path.glob("sub-*/beh/*_events.tsv"))
+    if len(tables_found) != 1:
+        raise ValueError(f"it holds the events of {len(tables_found)} sessions, and one is needed")
+    (events_file,) = tables_found
+    told = json.loads(events_file.with_suffix(".json").read_text(encoding="utf-8"))
+    header, *lines = events_file.read_text(encoding="utf-8").splitlines()
+    places = {name: place for place, name in enumerate(header.split("\t"))}
+    events = tuple(_event(line.split("\t"), places) for line in lines)
+    parts = sorted(events_file.parent.glob("*_physio.tsv.gz"), key=lambda part: _start(part))
+    beside = content_of(path / SOURCE), gain_error_content(path / SOURCE)
+    return ExportedSession("bids", path, head_of(told["DaqAppSession"]), events, lambda: _blocks(parts), *beside)
+
+
+class _Names:
+    """What the files of a session are called: letters and digits alone."""
+
+    def __init__(self, recording: Recording) -> None:
+        self.subject = f"sub-{_label(recording.plan.subject)}"
+        self.task = _label(recording.plan.protocol)
+        self.stem = f"{self.subject}_task-{self.task}"
+
+
+def _label(text: str) -> str:
+    """Return a text as a BIDS label.
+
+    >>> _label("sensotact-friction")
+    'sensotactfriction'
+    """
+    return re.sub(r"[^0-9A-Za-z]", "", text) or "unknown"
+
+
+def _dataset(recording: Recording, kind: str, software: Mapping[str, str]) -> dict[str, Any]:
+    by = {
+        "Name": PIPELINE,
+        "Version": software.get("daq-app", "unknown"),
+        "Description": "; ".join(f"{name} {version}" for name, version in software.items()),
+    }
+    what = "Recording" if kind == "raw" else "Strokes, friction and predictions"
+    name = f"{what} of {recording.plan.subject}, protocol {recording.plan.protocol}"
+    simulated = recording.simulated_sentence
+    return {
+        **({"SIMULATED": simulated} if simulated else {}),
+        "Name": f"SIMULATED: {name}" if simulated else name,
+        "BIDSVersion": VERSION,
+        "DatasetType": kind,
+        "GeneratedBy": [by],
+        **({"SourceDatasets": [{"URL": "../.."}]} if kind == "derivative" else {}),
+    }
+
+
+def _participants(recording: Recording, names: _Names) -> Table:
+    plan = recording.plan
+    simulated = "subject" in (recording.simulated_sentence or "")
+    columns = (
+        Column("participant_id", "", "BIDS label of the participant", (names.subject,)),
+        Column("code", "", "code of the participant, never a name", (plan.subject,)),
+        Column("stroking_hand", "", "hand that stroked; n/a: nobody stated it", (plan.stroking_hand,)),
+        Column("answering_hand", "", "hand that answered; n/a: nobody stated it", (plan.answering_hand,)),
+        Column("species", "", "binomial name, or simulation", ("simulation" if simulated else "homo sapiens",)),
+    )
+    return Table("participants", "a row for each participant", columns)
+
+
+def _events(recording: Recording) -> Table:
+    events = recording.events
+    first = events[0].time_ns if events else 0
+    return Table(
+        "events",
+        "a row for each thing that happened, in order",
+        (
+            Column("onset", "", "s from the first event", tuple((e.time_ns - first) * 1e-9 for e in events)),
+            Column("duration", "", "s; n/a: an event is an instant, or its end is an event", (None,) * len(events)),
+            Column(
+                "trial_type", "", "what happened, see Levels of the program's manual", tuple(e.kind for e in events)
+            ),
+            Column("trial", "", "number of the trial it belongs to", tuple(e.trial for e in events)),
+            Column("number", "", "from 1", tuple(e.number for e in events)),
+            Column("time", "ns", "session clock", tuple(e.time_ns for e in events)),
+            Column("readings", "", "how many readings were recorded before it", tuple(e.readings for e in events)),
+            Column("data", "", "what else is known, as JSON", tuple(json_text(dict(e.data)) for e in events)),
+        ),
+    )
+
+
+def _event(cells: Sequence[str], places: Mapping[str, int]) -> LoggedEvent:
+    def cell(name: str) -> str:
+        return cells[places[name]]
+
+    trial = None if cell("trial") == MISSING else int(cell("trial"))
+    data = json.loads(cell("data"))
+    return LoggedEvent(
+        int(cell("number")), int(cell("time_ns")), cell("trial_type"), trial, int(cell("readings")), data
+    )
+
+
+# ---- readings
+
+
+def _write_readings(recording: Recording, folder: Path, names: _Names, progress: Progress) -> None:
+    """Write a file for each stretch of readings without a break."""
+    assert recording.info is not None
+    calibration = recording.info.calibration
+    told = [*columns(calibration), *([_MARK] if recording.simulated else [])]
+    mark = (1,) if recording.simulated else ()
+    first_ns = recording.events[0].time_ns if recording.events else 0
+    expected = max((event.readings for event in recording.events), default=0) or 1
+    several = sum(begins for _, begins in _stretches(recording)) > 1
+    file: Any = None
+    written, part, last = 0, 0, None
+    try:
+        for block, begins in _stretches(recording):
+            if begins:
+                part += 1
+                stem = f"{names.stem}{f'_recording-{part}' if several else ''}_physio"
+                if file is not None:
+                    file.close()
+                file = io.TextIOWrapper(_Packed(folder / f"{stem}.tsv.gz"), encoding="utf-8", newline="")
+                write_json(
+                    folder / f"{stem}.json",
+                    {
+                        **({"SIMULATED": recording.simulated_sentence} if recording.simulated else {}),
+                        "SamplingFrequency": recording.info.rate,
+                        "StartTime": (int(block.received_ns[0]) - first_ns) * 1e-9,
+                        "PhysioType": "generic",
+                        "TaskName": names.task,
+                        "Columns": [column.heading for column in told],
+                        "Manufacturer": recording.info.driver,
+                        "ManufacturersModelName": recording.info.model,
+                        "DeviceSerialNumber": recording.info.serial,
+                        **{column.heading: _described(column) for column in told},
+                    },
+                )
+                last = None
+            write_rows(file, _filled(block, last, rows(block, calibration), len(told), mark), "\t")
+            last = int(block.sequence[-1])
+            written += len(block)
+            progress(min(written / expected, 1.0))
+    finally:
+        if file is not None:
+            file.close()
+
+
+def _stretches(recording: Recording) -> Iterator[tuple[ReadingBlock, bool]]:
+    """Yield the readings in order, and whether a break lies before them."""
+    last: float | None = None
+    previous: int | None = None
+    rate = recording.info.rate if recording.info is not None else math.nan
+    most = BREAK * rate if math.isfinite(rate) else math.inf
+    for block in recording.blocks():
+        if not len(block):
+            continue
+        steps = np.diff(block.time, prepend=np.nan if last is None else last)
+        missing = np.diff(block.sequence, prepend=block.sequence[0] if previous is None else previous) - 1
+        breaks = [int(i) for i in np.flatnonzero(~(np.abs(steps) <= BREAK) | (missing > most))]
+        cuts = [0, *(i for i in breaks if i), len(block)]
+        for start, stop in pairwise(cuts):
+            yield block.between(start, stop), start in breaks
+        last, previous = float(block.time[-1]), int(block.sequence[-1])
+
+
+def _filled(
+    block: ReadingBlock, last: int | None, found: Iterable[tuple[Any, ...]], width: int, mark: tuple[int, ...]
+) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows, with one of n/a for each that never arrived; what BIDS knows not (NaN, infinity) is n/a too."""
+    finite = bool(np.isfinite(block.raw).all())
+    expected = None if last is None else last + 1
+    for row in found:
+        if expected is not None:
+            for _ in range(row[0] - expected):
+                yield (MISSING,) * (width - len(mark)) + mark
+        yield (row if finite else tuple(cell if math.isfinite(cell) else MISSING for cell in row)) + mark
+        expected = row[0] + 1
+
+
+class _Packed(gzip.GzipFile):
+    """A gzip file that tells neither its name nor when it was written: the same session gives the same bytes."""
+
+    def __init__(self, path: Path) -> None:
+        self._raw = path.open("wb")
+        super().__init__("", "wb", compresslevel=6, fileobj=self._raw, mtime=0)
+
+    def close(self) -> None:
+        super().close()
+        self._raw.close()
+
+
+def _start(part: Path) -> float:
+    return float(_sidecar(part)["StartTime"])
+
+
+def _sidecar(part: Path) -> dict[str, Any]:
+    return json.loads((part.parent / part.name.replace(".tsv.gz", ".json")).read_text(encoding="utf-8"))
+
+
+def _blocks(parts: Iterable[Path]) -> Iterator[ReadingBlock]:
+    for part in parts:
+        with gzip.open(part, "rt", encoding="utf-8") as lines:
+            yield from read_rows(lines, _sidecar(part)["Columns"], "\t")
+
+
+# ---- files
+
+
+def _write_table(stem: Path, table: Table, recording: Recording, more: Mapping[str, Any] | None = None) -> None:
+    """Write a table beside the description of its columns."""
+    told = table.columns
+    if recording.simulated:
+        count = len(told[0].values) if told else 0
+        told = (*told, Column(_MARK.name, "", _MARK.meaning, (1,) * count))
+    with stem.with_name(f"{stem.name}.tsv").open("w", encoding="utf-8", newline="") as file:
+        for row in ([column.heading for column in told], *Table("", "", told).rows):
+            # Tabs and line ends have no place in a cell, and a BIDS table knows no quotes.
+            cells = (MISSING if cell is None or cell == "" else re.sub(r"[\t\r\n]+", " ", str(cell)) for cell in row)
+            file.write("\t".join(cells) + "\n")
+    head = {"SIMULATED": recording.simulated_sentence} if recording.simulated else {}
+    described = {column.heading: _described(column) for column in told if column.heading not in _KNOWN}
+    sidecar = {**head, "Description": table.meaning, **(more or {}), **described}
+    write_json(stem.with_name(f"{stem.name}.json"), sidecar)
+
+
+def _described(column: Column) -> dict[str, str]:
+    return {"Description": column.meaning, **({"Units": column.unit} if column.unit else {})}
+
+
+def _readme(recording: Recording) -> str:
+    simulated = recording.simulated_sentence
+    lines = [
+        *([simulated, ""] if simulated else []),
+        f"# Session of {recording.plan.subject}, protocol {recording.plan.protocol}",
+        "",
+        "A subject strokes surfaces over a six-axis force transducer and judges each of them.",
+        "",
+        "- `*_beh.tsv`: a row for each trial, with the score",
+        "- `*_events.tsv`: everything that happened; its JSON holds the whole description of the session",
+        "- `*_physio.tsv.gz`: the transducer's readings, raw and as a wrench, nothing subtracted; a row of n/a stands",
+        "  for a reading that never arrived; a silence of more than a second begins a new file. `time_s` is the",
+        "  device's own clock, and counts where it differs from the sampling frequency",
+        f"- `derivatives/{PIPELINE}`: strokes, friction, flaws and predictions made from them",
+        "",
+        "`daq-app import FOLDER` makes a session of this data set again.",
+    ]
+    return "\n".join([*lines, ""])

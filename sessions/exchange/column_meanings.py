@@ -1,0 +1,182 @@
+"""The unit and the meaning of every column of a session's tables: column to (unit, "" for none; meaning)."""
+
+from sessions.report.given_and_made import MADE_WITH
+
+STROKE = {
+    "trial": ("", "number of its trial"),
+    "onset": ("s", "first contact, device clock"),
+    "lift": ("s", "end of contact, device clock"),
+    "steady": ("s", "steady window, device clock"),
+    "break_away": ("s", "end of the stick phase: where T/N stops climbing, a change point, device clock"),
+    "slide_onset": ("s", "from here on the centre of pressure slides, device clock"),
+    "direction": ("", "+1 proximal to distal, -1 back, as measured"),
+    "direction_from": ("", "what the direction was told from"),
+    "direction_agrees": ("", "share of bootstrap repeats with that direction"),
+    "heading": ("deg", "angle of the movement, or else of the drag, from +x towards +y of the face"),
+    "speed": ("mm/s", "of the centre of pressure over the steady window"),
+    "speed_error": ("mm/s", "standard error of the speed"),
+    "mu_static": ("", "height of the static peak of T/N"),
+    "mu_dynamic": ("", "mean of T/N over the steady window"),
+    "mu_dynamic_sd": ("", "standard deviation of T/N over the steady window"),
+    "mu_dynamic_interval": ("", "confidence interval of mu_dynamic"),
+    "mu_max": ("", "greatest T/N"),
+    "tau_max": ("MPa", "greatest tangential force over the contact area"),
+    "normal_force": ("N", "mean over the steady window"),
+    "tangential_force": ("N", "mean over the steady window"),
+    "peak_normal": ("N", "greatest normal force"),
+    "peak_tangential": ("N", "greatest tangential force"),
+    "readings": ("", "how many in the steady window"),
+    "zero": ("", "where the zero of the forces came from"),
+    "zero_drift": ("N", "how far the zero moved from before the stroke to after it"),
+    "flaws": ("", "names of what is wrong with it"),
+    **{
+        f"{n}_bootstrap": ("", f"95 % bootstrap interval of {n}, in its unit")
+        for n in ("mu_static", "mu_dynamic", "mu_max")
+    },
+    **{
+        f"{n}_bootstrap": (unit, f"95 % bootstrap interval of {n}")
+        for n, unit in {
+            "tau_max": "MPa",
+            "speed": "mm/s",
+            "normal_force": "N",
+            "tangential_force": "N",
+            "peak_normal": "N",
+            "peak_tangential": "N",
+            "heading": "deg",
+            "onset": "s",
+            "break_away": "s",
+            "slide_onset": "s",
+        }.items()
+    },
+    "gain_error": ("", "calibration: standard uncertainty of each axis' gain, which the bootstrap intervals hold"),
+    "gain_error_origin": ("", "of that: set, or assumed where nobody stated it"),
+    "contact_area": ("mm2", "by which tau_max was told"),
+    "area_exponent": ("", "with which that area follows the normal force"),
+    "number": ("", "of the stroke within its trial, from 1"),
+    "kept": ("", "false: a person left it out, and the model is not given it"),
+    "decided": ("", "what a person decided about it, who and why"),
+    "reasons": ("", "for each number left out, why"),
+}
+
+FRICTION = {
+    "trial": ("", "number of the trial"),
+    "stroke": ("", "position of the stroke, from 0"),
+    "mu": ("", "coefficient of friction the model is given"),
+    "mu_interval": ("", "95 % interval of that very number"),
+    "mu_interval_by": ("", "the kind of that interval, and of which number of strokes it is"),
+    "tau_max": ("MPa", "traction bound the model is given"),
+    "tau_max_interval": ("MPa", "95 % interval of it; the contact area is taken as given"),
+    "tau_max_interval_by": ("", "the kind of that interval"),
+    "contact_area": ("mm2", "that tau_max was told for"),
+    "speed": ("mm/s", "of the stroke"),
+    "direction": ("", "+1 proximal to distal, -1 back, as measured"),
+    "rule": ("", "which T/N mu is"),
+    "flaws": ("", "names of what is wrong with the stroke"),
+}
+
+FLAW = {
+    "flaw": ("", "its name"),
+    "sentence": ("", "what it is"),
+    "grade": ("", "note, doubtful or refused"),
+    "trial": ("", "number of the trial it belongs to"),
+    "stroke": ("", "position of the stroke it belongs to, from 0"),
+}
+
+DECISION = {
+    "number": ("", "of its line in decisions.jsonl"),
+    "made_utc": ("", "when"),
+    "by": ("", "who, a code"),
+    "why": ("", "the reason given"),
+    "what": ("", "what was decided"),
+    "trial": ("", "number of the trial"),
+    "stroke": ("", "number of the stroke within the trial, from 1; none: of the trial"),
+    "old": ("", "what stood there before"),
+    "new": ("", "what was decided for it"),
+}
+
+ANSWER = {
+    "trial": ("", "number of the trial"),
+    "time": ("ns", "when the answer was recorded, session clock"),
+    "kind": ("", "scored, number_given or chosen"),
+    "score": ("", "the answer, 0 to 100; none where the subject gave none"),
+    "first_touch": ("s", "when the line was first touched, session clock"),
+    "corrections": ("", "how often the answer was changed"),
+    "hand": ("", "that answered"),
+    "input_device": ("", "with which the answer was given"),
+}
+
+POSITION = {
+    "trial": ("", "number of the trial"),
+    "instant": ("s", "session clock"),
+    "position": ("", "on the line, 0 to 100"),
+}
+
+FORCES = {
+    "normal_force_error": ("", "relative, estimated by the solver, of normal_force"),
+    "tangential_force_error": ("", "relative, estimated by the solver, of tangential_force"),
+    "normal_force_interval": ("N", "95 % interval of normal_force that the uncertainty of friction makes"),
+    "tangential_force_interval": ("N", "95 % interval of tangential_force that the uncertainty of friction makes"),
+}
+
+ALTERNATIVE = {
+    "trial": ("", "number of the trial"),
+    "kinematics": ("", "small or finite strain"),
+    "tau_reading": ("", "of tau_max: computed, or as-printed (a hundredth)"),
+    "driven": ("", "by depth, by force (measured), or by depth the other way"),
+    "tau_max": ("MPa", "traction bound the model was given"),
+    "indentation": ("mm", "given, or found under the force"),
+    "sed": ("MPa", "strain-energy density averaged over the ending"),
+    "error_estimate": ("", "relative, of sed"),
+    "normal_force": ("N", "the model's, times the finger's width"),
+    "tangential_force": ("N", "likewise"),
+    **FORCES,
+    "indentation_error": ("", "relative, estimated by the solver, of a depth that was found"),
+    "indentation_interval": ("mm", "95 % interval that friction, and the force, make of a depth that was found"),
+    "reason": ("", "why there is no number"),
+    "doubt": ("", "why the numbers are not to be believed: the model was driven beyond its range"),
+    "traction": ("MPa", "greatest friction traction on the skin; a tau_max above it bounds nothing"),
+    "sed_interval": ("MPa", "95 % interval of sed that the uncertainty of friction, and of a driving force, makes"),
+    "sed_interval_by": (
+        "",
+        "derivatives (by the converged tangent) or sampling (of draws), or why there is no interval",
+    ),
+}
+
+PREDICTION = {
+    "trial": ("", "number of the trial"),
+    "stroke": ("", "position of the stroke it was made for, from 0"),
+    "block": ("", "name of the trial's block"),
+    "stimulus_descriptor": ("", "what was judged"),
+    "stimulus_index": ("", "the maker's number of the stimulus"),
+    "stimulus_code": ("", "label on the stimulus"),
+    "mu": ("", "coefficient of friction the model was given"),
+    "mu_rule": ("", "which T/N that is"),
+    "tau_max": ("MPa", "traction bound the model was given"),
+    "indentation": ("mm", "of the model's finger"),
+    "direction": ("", "+1 proximal to distal, -1 back"),
+    "speed": ("mm/s", "of the slide"),
+    "sed": ("MPa", "strain-energy density averaged over the ending (mJ/mm3)"),
+    "sed_interval": ("MPa", "95 % interval of sed that the uncertainty of friction makes, where it was asked for"),
+    "sed_interval_by": (
+        "",
+        "derivatives (by the converged tangent) or sampling (of draws), or why there is no interval",
+    ),
+    "opposite_sed_interval": ("MPa", "likewise of opposite_sed"),
+    "opposite_sed_interval_by": ("", "likewise"),
+    "error_estimate": ("", "relative, of sed"),
+    "normal_per_mm": ("N/mm", "the model's normal force"),
+    "tangential_per_mm": ("N/mm", "the model's tangential force"),
+    "normal_force": ("N", "the same times the finger's width"),
+    "tangential_force": ("N", "the same times the finger's width"),
+    "measured_normal": ("N", "mean over the steady window"),
+    "measured_tangential": ("N", "mean over the steady window"),
+    **FORCES,
+    "matching_depth": ("mm", "indentation at which the model presses as was measured"),
+    "matching_depth_error": ("", "relative, estimated by the solver; none where found on a rough mesh"),
+    "matching_depth_interval": ("mm", "95 % interval that friction and the measured force make of it"),
+    "opposite_sed": ("MPa", "slid the other way"),
+    "opposite_error": ("", "relative, of opposite_sed"),
+    "wall_s": ("", "time the solve took, in s"),
+    **MADE_WITH,
+    "reasons": ("", "for each number left out, why"),
+}

@@ -1,0 +1,144 @@
+"""A session as CSV: a file for each table, a README that tells every column, and the session's own description."""
+
+import csv
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, TextIO
+
+from drivers.readings import ReadingBlock
+from sessions.exchange import ExportSource, Progress
+from sessions.exchange.exported import ExportedSession, head_of
+from sessions.exchange.readings_text import columns, read_rows, rows, write_rows
+from sessions.exchange.session_tables import Column, Table, tables
+from sessions.recording import LoggedEvent, Recording
+from sessions.recording.atomic_file import write_json
+from sessions.recording.calibration_uncertainty import GAIN_ERROR, gain_error_content
+from sessions.recording.description import description
+from sessions.recording.head import json_text
+from sessions.recording.schema import DESCRIPTION_FILE
+from sessions.strokes.decisions import DECISIONS, content_of
+
+READINGS, EVENTS, README = "readings.csv", "events.csv", "README.md"
+SIMULATED = Column("SIMULATED", "", "yes: transducer or subject were simulated", ())  # a comment would hide the header
+
+
+def write(source: ExportSource, folder: Path, progress: Progress) -> None:
+    """Write the session into an empty folder."""
+    recording = source.recording
+    made = [*tables(source), _events(recording)]
+    mark = (SIMULATED,) if recording.simulated_sentence else ()
+    for table in made:
+        with _opened(folder / f"{table.name}.csv") as file:
+            _write_rows(file, mark, [[column.heading for column in table.columns]], table.rows)
+    told = [(f"{table.name}.csv", table.meaning, (*mark, *table.columns)) for table in made]
+    if recording.info is not None:
+        meaning = "a row for each reading, in the order recorded"
+        told.append((READINGS, meaning, (*mark, *columns(recording.info.calibration))))
+        _write_readings(recording, mark, folder / READINGS, progress)
+    write_json(folder / DESCRIPTION_FILE, description(recording))
+    for name, document in (("analysis.json", source.analysis), ("prediction.json", source.prediction)):
+        if document is not None:
+            head = {"SIMULATED": recording.simulated_sentence} if recording.simulated_sentence else {}
+            write_json(folder / name, {**head, **document})
+    decided = content_of(recording.folder)
+    if decided:
+        (folder / DECISIONS).write_bytes(decided)
+    uncertain = gain_error_content(recording.folder)
+    if uncertain:
+        (folder / GAIN_ERROR).write_bytes(uncertain)
+    (folder / README).write_text(_readme(recording, told), encoding="utf-8")
+
+
+def read(path: Path) -> ExportedSession:
+    """Return the session that `write` put into the folder `path`. Raises OSError, ValueError."""
+    told = json.loads((path / DESCRIPTION_FILE).read_text(encoding="utf-8"))
+    events = tuple(_event(row) for row in _rows_of(path / EVENTS))
+    beside = content_of(path), gain_error_content(path)
+    return ExportedSession("csv", path, head_of(told), events, lambda: _read_readings(path / READINGS), *beside)
+
+
+def _events(recording: Recording) -> Table:
+    events = recording.events
+    return Table(
+        "events",
+        "a row for each thing that happened, in order",
+        (
+            Column("number", "", "from 1", tuple(e.number for e in events)),
+            Column("time", "ns", "session clock", tuple(e.time_ns for e in events)),
+            Column("kind", "", "what happened, see docs/session-format.md", tuple(e.kind for e in events)),
+            Column("trial", "", "number of the trial it belongs to", tuple(e.trial for e in events)),
+            Column("readings", "", "how many readings were recorded before it", tuple(e.readings for e in events)),
+            Column("data", "", "what else is known, as JSON", tuple(json_text(dict(e.data)) for e in events)),
+        ),
+    )
+
+
+def _event(row: dict[str, str]) -> LoggedEvent:
+    trial = row["trial"]
+    return LoggedEvent(
+        int(row["number"]),
+        int(row["time_ns"]),
+        row["kind"],
+        int(trial) if trial else None,
+        int(row["readings"]),
+        json.loads(row["data"]),
+    )
+
+
+def _opened(path: Path) -> TextIO:
+    return path.open("w", encoding="utf-8", newline="")
+
+
+def _write_rows(file: TextIO, mark: Sequence[Column], header: list[list[str]], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a header and rows; where they are marked, a column that says so comes first."""
+    write_rows(file, [[*(column.heading for column in mark), *names] for names in header], ",")
+    write_rows(file, ([*("yes" for _ in mark), *row] for row in rows), ",")
+
+
+def _write_readings(recording: Recording, mark: Sequence[Column], path: Path, progress: Progress) -> None:
+    assert recording.info is not None
+    calibration = recording.info.calibration
+    expected = max((event.readings for event in recording.events), default=0) or 1
+    written = 0
+    with _opened(path) as file:
+        _write_rows(file, mark, [[column.heading for column in columns(calibration)]], ())
+        for block in recording.blocks():
+            _write_rows(file, mark, [], rows(block, calibration))
+            written += len(block)
+            progress(min(written / expected, 1.0))
+
+
+def _read_readings(path: Path) -> Iterator[ReadingBlock]:
+    if not path.is_file():  # a visit that only scored
+        return
+    with path.open(encoding="utf-8", newline="") as file:
+        header = next(file, "")
+        yield from read_rows(file, header.strip().split(","), ",")
+
+
+def _rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def _readme(recording: Recording, told: Sequence[tuple[str, str, Sequence[Column]]]) -> str:
+    """Return the page that tells every file and column."""
+    simulated = recording.simulated_sentence
+    lines = [
+        *([simulated, ""] if simulated else []),
+        f"# Session of {recording.plan.subject}, protocol {recording.plan.protocol}",
+        "",
+        "Comma-separated values, UTF-8, a point in every decimal number; an empty cell is a number that is not known,",
+        "or that honesty does not allow. Units stand at the end of a column's name. `session.json` holds plan,",
+        "transducer, calibration and where the recording came from; `daq-app import FOLDER` makes a session of this",
+        "folder again.",
+        "",
+        "Clocks: `_ns` is nanoseconds on the session clock of the recording computer; seconds of strokes and readings",
+        "are those of the transducer's own clock, 0 at its first reading.",
+    ]
+    row: Callable[[Column], str] = lambda c: f"| `{c.heading}` | {c.unit or '–'} | {c.meaning} |"  # noqa: E731
+    for name, meaning, found in told:
+        lines += ["", f"## {name}", "", f"{meaning[0].upper()}{meaning[1:]}.", "", "| column | unit | meaning |"]
+        lines += ["| --- | --- | --- |", *map(row, found)]
+    return "\n".join([*lines, ""])

@@ -1,0 +1,217 @@
+"""A session as one file of Neurodata Without Borders: readings, wrench, trials, events and the numbers made from them.
+
+Needs the optional library pynwb. Raw numbers and forces are acquired time series on the session clock; trials,
+answers, strokes, friction and predictions are tables.
+"""
+
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false, reportMissingImports=false, reportCallIssue=false
+# pyright: reportAttributeAccessIssue=false
+# pynwb brings no types, and is not installed everywhere.
+
+import hashlib
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from sessions.exchange import ExportError, ExportSource, Progress
+from sessions.exchange.session_tables import Column, Table, tables
+from sessions.recording import LoggedEvent, Recording
+from sessions.recording.description import description
+from sessions.recording.head import json_text
+
+if TYPE_CHECKING:
+    from pynwb import NWBFile
+
+FILE = "session.nwb"
+RAW_WRENCH = "N, N mm"
+MISSING = "NWB needs the library pynwb, which is not installed: run 'pip install daq-app[nwb]' and export again"
+_WHOLE = (
+    ("sequence", "n/a", "Record number given by the device; missing numbers are readings that never arrived."),
+    ("counter", "ticks", "The device's own clock."),
+    ("status", "n/a", "Status word as the device sent it; 0 is healthy."),
+    ("time", "seconds", "The device's own clock, 0 at the first reading."),
+    ("received_ns", "nanoseconds", "Session clock when the reading arrived."),
+)
+
+
+def write(source: ExportSource, folder: Path, progress: Progress) -> None:
+    """Write the file into an empty folder. Raises ExportError where pynwb is missing."""
+    try:
+        import pynwb
+        from pynwb.file import Subject
+    except ImportError as error:
+        raise ExportError(MISSING) from error
+    recording = source.recording
+    plan = recording.plan
+    mark = f"{recording.simulated_sentence}. " if recording.simulated_sentence else ""
+    told = description(recording)
+    first_ns = recording.events[0].time_ns if recording.events else 0
+    file = pynwb.NWBFile(
+        session_description=f"{mark}A subject strokes surfaces over a six-axis force transducer and judges them.",
+        identifier=hashlib.sha256(json_text(told["sha256"]).encode()).hexdigest(),
+        session_start_time=_utc(recording, first_ns),
+        experiment_description=f"{mark}Protocol {plan.protocol}, stimulus order {plan.order_rule}, seed {plan.seed}.",
+        session_id=plan.subject,
+        keywords=["friction", "touch", "psychophysics", *(["SIMULATED"] if mark else [])],
+        source_script=f"daq-app {source.analysis['made_by'].get('daq-app', '')}",
+        source_script_file_name="daq-app export",
+        notes=json_text(  # all that the file lacks
+            {**told, "log": [asdict(event) for event in recording.events], "calibration_error": _calibration(source)}
+        ),
+        subject=Subject(
+            subject_id=plan.subject,
+            species="Homo sapiens",
+            sex="U",
+            age="P0D/",  # from no days on: nobody asked
+            description=f"{mark}A code; nothing personal is recorded, age and sex among it.",
+        ),
+    )
+    if recording.info is not None:
+        _add_readings(file, recording, first_ns, mark)
+    _add_trials(file, recording, first_ns)
+    events = _events(recording, first_ns)
+    if events.rows:
+        file.add_acquisition(_dynamic(events, mark))
+    made = [_dynamic(table, mark) for table in tables(source) if table.rows]
+    if made:
+        module = file.create_processing_module("behavior", f"{mark}What was answered, and what was made of it.")
+        for table in made:
+            module.add(table)
+    progress(0.5)
+    with pynwb.NWBHDF5IO(folder / FILE, "w") as io:
+        io.write(file)
+    progress(1.0)
+
+
+def _calibration(source: ExportSource) -> dict[str, Any]:
+    """Return how uncertain each axis' gain is, which the intervals hold, and whether somebody set that."""
+    drawn: Mapping[str, Any] = (source.analysis.get("bootstrap") or {}).get("settings") or {}
+    return {name: drawn.get(name) for name in ("gain_error", "gain_error_origin")}
+
+
+def _add_readings(file: "NWBFile", recording: Recording, first_ns: int, mark: str) -> None:
+    """Add raw numbers and wrench on the device's clock, laid on the session's at the first reading."""
+    from pynwb import TimeSeries
+
+    info = recording.info
+    block = recording.readings()
+    if info is None or not len(block):
+        return
+    file.create_device(
+        name="transducer",
+        description=f"{mark}{info.model} ({info.driver}), serial {info.serial}, {info.rate:g} readings a second",
+    )
+    calibration = info.calibration
+    with np.errstate(invalid="ignore", over="ignore"):  # what the device sent is written, whatever it is
+        wrench = calibration.wrench(block.raw, np.zeros(6))
+    start = (int(block.received_ns[0]) - first_ns) * 1e-9
+    clock: dict[str, Any] = {"timestamps": block.time - block.time[0] + start}
+    if len(set(np.diff(block.time).round(9).tolist())) == 1:  # no gap, and no reading off its place
+        clock = {"starting_time": start, "rate": info.rate}
+    unit = "see comments" if calibration.raw_unit == RAW_WRENCH else calibration.raw_unit
+    raw = TimeSeries(
+        name="raw",
+        data=block.raw,
+        unit=unit,
+        **clock,
+        description=f"{mark}The six raw numbers as the device sent them.",
+        comments=f"Unit: {calibration.raw_unit}. wrench = matrix (raw - bias), matrix in the notes of this file.",
+    )
+    file.add_acquisition(raw)
+    shared = clock if "rate" in clock else {"timestamps": raw}
+    for name, axes, unit in (("forces", slice(0, 3), "newtons"), ("torques", slice(3, 6), "N mm")):
+        what = f"{mark}{name.capitalize()} of the finger on the stimulus (x y z), nothing subtracted."
+        file.add_acquisition(TimeSeries(name=name, data=wrench[:, axes], unit=unit, description=what, **shared))
+    for name, unit, what in _WHOLE:
+        data = getattr(block, name)
+        file.add_acquisition(TimeSeries(name=name, data=data, unit=unit, description=f"{mark}{what}", **shared))
+
+
+def _add_trials(file: "NWBFile", recording: Recording, first_ns: int) -> None:
+    """Add the span of each trial's take that counts; all trials stand in the table of that name."""
+    taken = [record for record in recording.trials if record.take is not None and record.take.stop_ns is not None]
+    if not taken:
+        return
+    for name, what in (
+        ("number", "of the trial"),
+        ("descriptor", "what was judged"),
+        ("index", "the maker's number of the stimulus; -1: sealed"),
+        ("outcome", "scored or not answered"),
+        ("score", "the subject's answer, 0 to 100; NaN: none"),
+    ):
+        file.add_trial_column(name, what)
+    for record in taken:
+        start, stop = record.start_ns or 0, record.stop_ns or 0
+        file.add_trial(
+            start_time=(start - first_ns) * 1e-9,
+            stop_time=(stop - first_ns) * 1e-9,
+            number=record.trial.number,
+            descriptor=record.trial.stimulus.descriptor,
+            index=-1 if record.trial.stimulus.index is None else record.trial.stimulus.index,
+            outcome=record.outcome,
+            score=math.nan if record.score is None else record.score,
+        )
+
+
+def _events(recording: Recording, first_ns: int) -> Table:
+    events = recording.events
+    return Table(
+        "events",
+        "Everything that happened, in order.",
+        (
+            Column("timestamp", "", "s from the start", tuple((e.time_ns - first_ns) * 1e-9 for e in events)),
+            Column("time", "ns", "session clock", tuple(e.time_ns for e in events)),
+            Column("kind", "", "what happened, see docs/session-format.md", tuple(e.kind for e in events)),
+            Column("trial", "", "number of the trial; 0 for none", tuple(e.trial or 0 for e in events)),
+            Column("readings", "", "how many readings were recorded before it", tuple(e.readings for e in events)),
+            Column("data", "", "what else is known, for people; exact in the notes", tuple(map(_told, events))),
+        ),
+    )
+
+
+def _told(event: LoggedEvent) -> str:
+    return "; ".join(f"{name}: {value}" for name, value in _flat(event.data))
+
+
+def _flat(data: Mapping[str, Any], within: str = "") -> Iterator[tuple[str, object]]:
+    for name, value in data.items():
+        if isinstance(value, Mapping):
+            yield from _flat(cast("Mapping[str, Any]", value), f"{within}{name}.")
+        else:
+            yield f"{within}{name}", value
+
+
+def _dynamic(table: Table, mark: str) -> object:
+    """Return a table as NWB holds it: NaN, or an empty text, where there is nothing."""
+    from hdmf.common import DynamicTable, VectorData
+
+    columns = [
+        VectorData(name=column.heading, description=column.meaning, data=_values(column))
+        for column in table.columns
+        if any(value not in (None, "") for value in column.values)
+    ]
+    return DynamicTable(name=table.name, description=f"{mark}{table.meaning}", columns=columns)
+
+
+def _values(column: Column) -> list[str] | list[int] | list[float]:
+    values = column.values
+    if any(isinstance(value, str) for value in values):
+        return ["" if value is None else str(value) for value in values]
+    if any(value is None or isinstance(value, float) for value in values):
+        return [math.nan if value is None else float(value) for value in values]
+    return [int(value or 0) for value in values]
+
+
+def _utc(recording: Recording, instant_ns: int) -> datetime:
+    """Return the date of an instant of the session clock; told time that moves when waited on passes as the date's."""
+    known = datetime.fromisoformat(str(recording.provenance["created_utc"]))
+    clock = recording.provenance.get("clock")
+    if clock is None:  # how the session clock goes with the date was not recorded: only when it began
+        return known
+    return known + timedelta(seconds=(instant_ns - int(clock["now_ns"])) * 1e-9 / (float(clock["factor"]) or 1.0))

@@ -1,0 +1,122 @@
+"""A study as CSV files that R's read.csv and pandas' read_csv open as they are: its trials, its many paths."""
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import fields
+
+from sessions.prediction.multiverse import Path
+from sessions.statistics.pooling.exclusions import decided
+from sessions.statistics.pooling.findings import StudyFindings
+
+SIMULATED = "SIMULATED"
+TRIALS, COLUMNS = "trials.csv", "trials-columns.csv"  # as they lie beside the page
+_SUFFIXES = {"mm/s": "mm_per_s"}
+# What each column of the table of trials means, with its unit: all fields of a trial's row but its paths.
+_MEANING: Mapping[str, tuple[str, str]] = {
+    "trial": ("", "number of the trial in its session, from 1"),
+    "block": ("", "name of its block"),
+    "descriptor": ("", "what was judged"),
+    "index": ("", "its maker's number of the surface on the descriptor, 0 to 100"),
+    "code": ("", "label on the back of the surface"),
+    "direction": ("", "planned: 1 from proximal to distal, -1 back"),
+    "repetition": ("", "how often this surface has been met in the block, from 1"),
+    "place": ("", "trials of the block before this one"),
+    "before": ("", "index stroked just before in the same block; empty for the first"),
+    "outcome": ("", "how the trial ended"),
+    "score": ("", "answer on the line, 0 to 100"),
+    "estimate": ("", "number on the subject's own scale, where numbers were asked for"),
+    "choice": ("", "the subject's answer where two were compared: first or second"),
+    "rule": ("", "which mu the model got: maximum, or mean over the steady window"),
+    "mu": ("", "coefficient of friction that the model got"),
+    "mu_low": ("", "lower end of its 95 % bootstrap interval"),
+    "mu_high": ("", "upper end"),
+    "mu_dynamic": ("", "mean of T/N over the steady window"),
+    "mu_static": ("", "T/N at a static peak; empty where none stands out"),
+    "tau_max": ("MPa", "greatest tangential force over the contact area: the traction bound"),
+    "tau_max_low": ("MPa", "lower end of its 95 % bootstrap interval"),
+    "tau_max_high": ("MPa", "upper end"),
+    "speed": ("mm/s", "of the centre of pressure over the steady window"),
+    "speed_low": ("mm/s", "lower end of its 95 % bootstrap interval"),
+    "speed_high": ("mm/s", "upper end"),
+    "normal_force": ("N", "measured, mean over the steady window"),
+    "normal_force_low": ("N", "lower end of its 95 % bootstrap interval"),
+    "normal_force_high": ("N", "upper end"),
+    "sed": ("MPa", "predicted strain-energy density, averaged over the ending"),
+    "sed_low": ("MPa", "lower end of the 95 % interval that the uncertainty of friction alone makes"),
+    "sed_high": ("MPa", "upper end"),
+    "sed_interval": ("", "how that interval was found, or why there is none"),
+    "error_estimate": ("", "of sed, from its mesh, relative"),
+    "model_normal_force": ("N", "of the model, pressed to the planned depth, times the finger's width"),
+    "model_normal_force_error": ("", "its relative error, estimated by the solver"),
+    "matching_depth": ("mm", "depth at which the model would press as hard as the subject did"),
+    "flaws": ("", "names of the flaws graded doubtful or worse, with blanks between"),
+    "why": ("", "why there is no SED"),
+}
+_OWN: Mapping[str, str] = {
+    SIMULATED: "yes where transducer or subject were simulated",
+    "session": "folder of the session",
+    "subject": "code of the subject",
+    "excluded": "why the trial is left out of every number of the study; empty where it counts",
+}
+
+
+def _heading(name: str) -> str:
+    unit = _MEANING[name][0]
+    return f"{name}_{_SUFFIXES.get(unit, unit)}" if unit else name
+
+
+def columns_csv(study: StudyFindings) -> str:
+    """Return a row for each column of `trials_csv`: its name, its unit and its meaning."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["column", "unit", "meaning"])
+    first = [name for name in _OWN if name != "excluded" and (study.simulated or name != SIMULATED)]
+    writer.writerows([name, "", _OWN[name]] for name in first)
+    writer.writerows([_heading(name), *_MEANING[name]] for name in _MEANING)
+    writer.writerow(["excluded", "", _OWN["excluded"]])
+    return out.getvalue()
+
+
+def paths_csv(study: StudyFindings) -> str:
+    """Return a row for each path and descriptor, for R and pandas as `trials_csv`."""
+    mark = [SIMULATED] if study.simulated else []
+    names = [field.name for field in fields(Path)]
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    heads = ("usual", "surfaces", "trials", "r_of_means", "r_within_subjects", "low", "high")
+    writer.writerow([*mark, "descriptor", *names, *heads])
+    for one in study.descriptors:
+        for found in one.paths:
+            numbers = (found.surfaces, found.trials, found.r, found.within, found.low, found.high)
+            told = [*(["yes"] if mark else []), one.descriptor, *(getattr(found.path, name) for name in names)]
+            writer.writerow([*told, "yes" if found.usual else "no", *(_plain(number) for number in numbers)])
+    return out.getvalue()
+
+
+def trials_csv(study: StudyFindings) -> str:
+    """Return a row for each trial of each visit: one header line, a point in decimals, empty where there is no number.
+
+    R's read.csv and pandas' read_csv open it as it is. Of a simulated study the first column is called SIMULATED.
+    """
+    names = list(_MEANING)  # paths have a table of their own
+    heads = [_heading(name) for name in names]
+    mark = [SIMULATED] if study.simulated else []
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow([*mark, "session", "subject", *heads, "excluded"])
+    copies = dict(study.copies)
+    for visit in study.visits:
+        for row in visit.rows:
+            decision = decided(study.excluded, visit.subject, row.descriptor)
+            why = "" if decision is None else decision.why
+            why = f"the same recording as {copies[visit.session]}" if visit.session in copies else why
+            told = ["yes" if visit.simulated else "no"] if mark else []
+            writer.writerow([*told, visit.session, visit.subject, *(_plain(getattr(row, n)) for n in names), why])
+    return out.getvalue()
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, tuple):
+        return " ".join(str(one) for one in value)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+    return "" if value is None else value

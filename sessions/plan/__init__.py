@@ -1,0 +1,1 @@
+"""What a session will do: protocols, orders, study design and blinding."""

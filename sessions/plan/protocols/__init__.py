@@ -1,0 +1,27 @@
+"""The protocols we run, a validated TOML file each, their reader, and the plan of a session. The folder is the list."""
+
+from sessions.plan.protocols.planning import Body, StudyPlace, blinded, design_rows, plan
+from sessions.plan.protocols.protocol import (
+    BlockOutline,
+    Face,
+    Labels,
+    Protocol,
+    protocol,
+    protocol_file,
+    protocol_names,
+)
+
+__all__ = [
+    "BlockOutline",
+    "Body",
+    "Face",
+    "Labels",
+    "Protocol",
+    "StudyPlace",
+    "blinded",
+    "design_rows",
+    "plan",
+    "protocol",
+    "protocol_file",
+    "protocol_names",
+]

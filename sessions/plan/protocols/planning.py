@@ -1,0 +1,254 @@
+"""The plan of one session, made from its protocol: who, which stimuli under which labels, in which order."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import count, pairwise
+
+from sessions.plan.orders import drawn, pairs, shuffled, williams
+from sessions.plan.plan import (
+    DISTAL_TO_PROXIMAL,
+    PROXIMAL_TO_DISTAL,
+    Block,
+    Finger,
+    Frame,
+    Hand,
+    Phase,
+    Rests,
+    SessionPlan,
+    Stimulus,
+    Trial,
+)
+from sessions.plan.protocols.protocol import BlockOutline, Labels, Protocol, check_phases, check_seed
+from sessions.toml_file import NotAllowed, SettingsError
+
+DIRECTIONS = {"proximal to distal": PROXIMAL_TO_DISTAL, "distal to proximal": DISTAL_TO_PROXIMAL}
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """What is a subject's own; None where the protocol's or the model's holds."""
+
+    finger: Finger = field(default_factory=Finger)
+    contact_angle: float | None = None  # between the finger's axis and the face [degrees]
+    indentations: Mapping[str, float] = field(default_factory=dict[str, float])  # block -> [mm]
+
+
+@dataclass(frozen=True, slots=True)
+class StudyPlace:
+    """A subject's place in a study: the row of its design, and the labels that hold throughout it."""
+
+    study: str
+    row: int  # from 1
+    seed: int  # of the study: decides which stimulus is which letter of the design
+    labels: Labels
+    key_sha256: str | None = None  # of the sealed key; None: not blinded
+
+
+def plan(
+    protocol: Protocol,
+    subject: str,
+    seed: int,
+    *,
+    forces: bool = True,
+    frame: Frame | None = None,
+    contact_area: float | None = None,
+    stroking_hand: Hand | None = None,
+    answering_hand: Hand | None = None,
+    phases: Sequence[Phase] | None = None,
+    body: Body | None = None,
+    place: StudyPlace | None = None,
+) -> SessionPlan:
+    """Return the plan of one session.
+
+    `forces` is False for a visit that only scores. `frame`, `contact_area` [mm2] and `phases`, where given, replace the
+    protocol's. Raises SettingsError where `subject` is no code or another value is out of range.
+    """
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", subject):
+        raise SettingsError(f'subject = "{subject}" is not allowed: a code of letters, digits, - and _, never a name')
+    own = body or Body()
+    asked = protocol.phases if phases is None else phases
+    try:
+        check_seed("seed", seed)
+        check_phases(protocol, asked)
+        check_body(own, protocol)
+    except NotAllowed as error:
+        raise SettingsError(str(error)) from error
+    area = protocol.face.contact_area if contact_area is None else contact_area
+    rows = design_rows(protocol)
+    row = None if rows is None else (seed % rows if place is None else place.row - 1) % rows + 1
+    design_seed = protocol.label_seed if place is None else place.seed
+    blocks = _Blocks(protocol, seed, row, design_seed, own, protocol.labels if place is None else place.labels)
+    made = SessionPlan(
+        protocol=protocol.name,
+        subject=subject,
+        seed=seed,
+        order_rule=protocol.order.rule if row is None else f"{protocol.order.rule}, row {row} of {rows}",
+        blocks=tuple(blocks.of(asked)),
+        forces=forces,
+        frame=frame or protocol.face.frame,
+        contact_angle=protocol.contact_angle if own.contact_angle is None else own.contact_angle,
+        contact_angle_origin="set" if own.contact_angle is None else "measured",
+        stroking_hand=stroking_hand,
+        answering_hand=answering_hand,
+        finger=own.finger,
+        rests=Rests(protocol.rests.after_trials, protocol.rests.between_blocks, protocol.rests.duration),
+        shown=protocol.shown,
+        masking=protocol.masking,
+        study=None if place is None else place.study,
+        order_row=row,
+        order_seed=None if row is None else design_seed,
+        key_sha256=None if place is None else place.key_sha256,
+    )
+    if made.key_sha256 is not None:
+        made = blinded(made)
+    return made if area is None else replace(made, contact_area=area, contact_area_origin="set")
+
+
+def design_rows(protocol: Protocol) -> int | None:
+    """Return how many rows the protocol's design has; None where every order is drawn for itself."""
+    if protocol.order.rule != "williams":
+        return None
+    return max(len(williams(len(block.indices))) for block in protocol.blocks)
+
+
+def blinded(plan: SessionPlan) -> SessionPlan:
+    """Return the plan with codes alone: which stimulus bears which is hidden."""
+    return replace(plan, blocks=tuple(replace(b, trials=tuple(map(_hidden, b.trials))) for b in plan.blocks))
+
+
+def _hidden(trial: Trial) -> Trial:
+    return replace(trial, stimulus=replace(trial.stimulus, index=None))
+
+
+def check_body(body: Body, protocol: Protocol) -> None:
+    """Raise NotAllowed where a subject's own value is out of range."""
+    ranges = (
+        ("contact_angle", body.contact_angle, 10, 90, "degrees"),
+        ("tip_radius", body.finger.tip_radius, 3, 15, "mm"),
+        ("width", body.finger.width, 5, 40, "mm"),
+    )
+    for key, value, low, high, unit in ranges:
+        if value is not None and not low <= value <= high:
+            raise NotAllowed(key, value, f"it must lie between {low} and {high} {unit}")
+    names = [block.name for block in protocol.blocks]
+    for name, depth in body.indentations.items():
+        if name not in names:
+            raise NotAllowed("depth", name, f"there is no such block; {protocol.name} has {', '.join(names)}")
+        if not 0 < depth <= 10:
+            raise NotAllowed(f"depth of {name}", depth, "it must lie above 0 and up to 10 mm")
+
+
+class _Blocks:
+    """Makes the blocks of a plan one after the other, trials numbered on."""
+
+    def __init__(
+        self, protocol: Protocol, seed: int, row: int | None, design_seed: int, body: Body, labels: Labels
+    ) -> None:
+        self._protocol = protocol
+        self._seed = seed
+        self._row = row
+        self._design_seed = design_seed
+        self._body = body
+        self._labels = labels
+        self._numbers = count(1)
+
+    def of(self, phases: Sequence[Phase]) -> Iterator[Block]:
+        """Yield the pre-evaluation of every descriptor, then each block after its practice."""
+        if "pre-evaluation" in phases:
+            yield from (self._pre_evaluation(outline) for outline in self._protocol.blocks)
+        for outline in self._protocol.blocks:
+            if "practice" in phases and outline.practice:
+                yield self._practice(outline)
+            if "main" in phases:
+                yield self._block(outline, "main", outline.name, self._orders(outline), outline.instruction)
+
+    def _pre_evaluation(self, outline: BlockOutline) -> Block:
+        """Return the block in which every stimulus is judged once, shuffled."""
+        name = f"{outline.name}, pre-evaluation"
+        told = self._protocol.pre_evaluation
+        instruction = outline.instruction if told is None else told.instruction
+        return self._block(outline, "pre-evaluation", name, [self._shuffled(outline, name)], instruction)
+
+    def _practice(self, outline: BlockOutline) -> Block:
+        """Return the practice of a block, in the order the protocol lists."""
+        order = outline.practice
+        if self._protocol.scale.answer == "choice":
+            order = tuple(index for pair in pairwise(order) for index in pair)
+        return self._block(outline, "practice", f"{outline.name}, practice", [order], outline.instruction)
+
+    def _orders(self, outline: BlockOutline) -> list[tuple[int, ...]]:
+        """Return the order of each repetition."""
+        made: list[tuple[int, ...]] = []
+        for repetition in range(1, outline.repetitions + 1):
+            name = outline.name if repetition == 1 else f"{outline.name}#{repetition}"
+            if self._protocol.scale.answer == "choice":
+                by_code = self._by_code(outline)
+                drawn_pairs = pairs(tuple(by_code), self._seed, name)
+                made.append(tuple(by_code[str(code)] for pair in drawn_pairs for code in pair))
+            elif self._row is not None:
+                made.append(self._row_of_design(outline, self._row - 1 + repetition - 1))
+            else:
+                made.append(self._shuffled(outline, name, [order[0] for order in made]))
+        return made
+
+    def _shuffled(self, outline: BlockOutline, name: str, begun_with: Sequence[int] = ()) -> tuple[int, ...]:
+        """Return an order by chance that meets the protocol's constraints. Codes are drawn: an order tells no index."""
+        by_code = self._by_code(outline)
+        order = drawn(
+            tuple(by_code),
+            self._seed,
+            name,
+            lambda codes: self._protocol.order.meets([by_code[str(code)] for code in codes], begun_with),
+        )
+        if order is None:
+            raise SettingsError(f"no order of {outline.name} was found that meets the constraints; use another seed")
+        return tuple(by_code[str(code)] for code in order)
+
+    def _row_of_design(self, outline: BlockOutline, row: int) -> tuple[int, ...]:
+        """Return a row of the Williams design, whose letters chance deals to the codes for the whole study."""
+        by_code = self._by_code(outline)
+        letters = shuffled(tuple(by_code), self._design_seed, f"{outline.name}/letters")
+        rows = williams(len(letters))
+        return tuple(by_code[str(letters[letter])] for letter in rows[row % len(rows)])
+
+    def _by_code(self, outline: BlockOutline) -> dict[str, int]:
+        return {self._labels[outline.descriptor, index]: index for index in outline.indices}
+
+    def _block(
+        self, outline: BlockOutline, phase: Phase, name: str, orders: Sequence[Sequence[int]], instruction: str
+    ) -> Block:
+        own = self._body.indentations.get(outline.name)
+        direction = DIRECTIONS[outline.direction]
+        answer = self._protocol.scale.answer
+        times: Counter[int] = Counter()
+        trials: list[Trial] = []
+        for index in (index for order in orders for index in order):
+            times[index] += 1
+            second = answer == "choice" and len(trials) % 2 == 1
+            trials.append(
+                Trial(
+                    number=next(self._numbers),
+                    block=name,
+                    stimulus=Stimulus(outline.descriptor, index, self._labels[outline.descriptor, index]),
+                    direction=direction,
+                    repetition=times[index],
+                    phase=phase,
+                    answer="none" if answer == "choice" and not second else answer,
+                    compared_with=trials[-1].number if second else None,
+                )
+            )
+        return Block(
+            name=name,
+            instruction=instruction,
+            direction=direction,
+            indentation=outline.indentation if own is None else own,
+            scale_ends=outline.scale_ends or ("", ""),
+            trials=tuple(trials),
+            phase=phase,
+            question=outline.question,
+            strokes_allowed=outline.strokes_allowed,
+            ticks=self._protocol.scale.ticks,
+            indentation_origin="set" if own is None else "measured",
+        )

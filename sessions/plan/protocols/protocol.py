@@ -1,0 +1,274 @@
+"""Protocol: a readable file that says how sessions are run. It is checked before anybody sits down."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal
+
+from sessions.plan.orders import Item, drawn, opaque_codes
+from sessions.plan.plan import Frame, Phase, Shown
+from sessions.toml_file import NotAllowed, SettingsError, load_toml
+
+FOLDER = Path(__file__).parent
+LARGEST_SEED = 2**31 - 1
+Labels = dict[tuple[str, int], str]  # descriptor and index of a stimulus -> the code on its back
+
+
+@dataclass(frozen=True, slots=True)
+class BlockOutline:
+    """The stimuli of one descriptor and how they are stroked and judged; their order is not decided yet."""
+
+    name: str
+    descriptor: str
+    direction: Literal["proximal to distal", "distal to proximal"]
+    indentation: float  # depth the model presses the finger to [mm]
+    indices: tuple[int, ...]  # of the stimuli, 0 to 100
+    instruction: str  # read to the subject before the block
+    scale_ends: tuple[str, str] | None = None  # what 0 and 100 mean, where the answer is on a line
+    question: str = ""  # asked when an answer is due
+    strokes_allowed: int = 1  # in a trial, before the answer
+    repetitions: int = 1  # of each stimulus, or of each pair
+    practice: tuple[int, ...] = ()  # stimuli of the practice trials, in their order
+
+    def __post_init__(self) -> None:
+        """Check ranges."""
+        for name in ("name", "descriptor", "instruction"):
+            if not getattr(self, name).strip():
+                raise NotAllowed(name, getattr(self, name), "it must not be empty")
+        if not 0 < self.indentation <= 10:
+            raise NotAllowed("indentation", self.indentation, "it must lie above 0 and up to 10 mm")
+        if not self.indices or len(set(self.indices)) < len(self.indices):
+            raise NotAllowed("indices", list(self.indices), "there must be at least one, and none may come twice")
+        if not all(0 <= index <= 100 for index in self.indices):
+            raise NotAllowed("indices", list(self.indices), "each must lie between 0 and 100")
+        if self.scale_ends is not None and not all(end.strip() for end in self.scale_ends):
+            raise NotAllowed("scale_ends", list(self.scale_ends), "both ends of the scale must be named")
+        if not 1 <= self.strokes_allowed <= 20:
+            raise NotAllowed("strokes_allowed", self.strokes_allowed, "it must lie between 1 and 20")
+        if not 1 <= self.repetitions <= 20:
+            raise NotAllowed("repetitions", self.repetitions, "it must lie between 1 and 20")
+        if not set(self.practice) <= set(self.indices):
+            raise NotAllowed("practice", list(self.practice), f"each must be one of indices {list(self.indices)}")
+
+
+@dataclass(frozen=True, slots=True)
+class Face:
+    """Where the stimulus's face lies, and the area the finger touches it with; None where nobody stated it."""
+
+    normal: Literal["+x", "-x", "+y", "-y", "+z", "-z"] | None = None
+    height: float | None = None  # above the transducer's origin [mm]
+    height_origin: Literal["measured", "set"] = "set"
+    contact_area: float | None = None  # [mm2]
+
+    def __post_init__(self) -> None:
+        """Check ranges."""
+        if self.height is not None and not -500 <= self.height <= 500:
+            raise NotAllowed("height", self.height, "it must lie between -500 and 500 mm")
+        if self.contact_area is not None and not 1 <= self.contact_area <= 2000:
+            raise NotAllowed("contact_area", self.contact_area, "it must lie between 1 and 2000 mm2")
+
+    @property
+    def frame(self) -> Frame:
+        """Return the frame, each value with its origin."""
+        frame = Frame()
+        if self.normal is not None:
+            frame = replace(frame, normal=self.normal, normal_origin="set")
+        if self.height is not None:
+            frame = replace(frame, height=self.height, height_origin=self.height_origin)
+        return frame
+
+
+@dataclass(frozen=True, slots=True)
+class OrderRules:
+    """How stimulus orders are made."""
+
+    rule: Literal["shuffled", "williams"] = "shuffled"
+    neighbours_apart: bool = False  # no two neighbours of the scale in a row
+    not_first: tuple[int, ...] = ()  # indices that begin no block
+    first_differs: bool = False  # repetitions of a block begin with different stimuli
+
+    @property
+    def constrained(self) -> bool:
+        """Say whether not every order will do."""
+        return self.neighbours_apart or bool(self.not_first) or self.first_differs
+
+    def meets(self, order: Sequence[int], begun_with: Sequence[int] = ()) -> bool:
+        """Say whether an order of indices will do, where repetitions before it began with `begun_with`."""
+        rank = {index: place for place, index in enumerate(sorted(order))}
+        return (
+            not (self.neighbours_apart and any(abs(rank[a] - rank[b]) == 1 for a, b in pairwise(order)))
+            and order[0] not in self.not_first
+            and not (self.first_differs and order[0] in begun_with)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """How the subject answers."""
+
+    answer: Literal["line", "number", "choice"] = "line"
+    ticks: int = 0  # marks on the line between its ends; answers gather at marks, so there are none unless asked for
+
+    def __post_init__(self) -> None:
+        """Check ranges."""
+        if not 0 <= self.ticks <= 99:
+            raise NotAllowed("ticks", self.ticks, "it must lie between 0 and 99")
+        if self.ticks and self.answer != "line":
+            raise NotAllowed("ticks", self.ticks, "only a line has marks")
+
+
+@dataclass(frozen=True, slots=True)
+class RestRules:
+    """When the subject rests."""
+
+    after_trials: int | None = None  # of a block
+    between_blocks: bool = False
+    duration: float | None = None  # [s]; left out: until the experimenter goes on
+
+    def __post_init__(self) -> None:
+        """Check ranges."""
+        if self.after_trials is not None and not 1 <= self.after_trials <= 1000:
+            raise NotAllowed("after_trials", self.after_trials, "it must lie between 1 and 1000")
+        if self.duration is not None and not 1 <= self.duration <= 3600:
+            raise NotAllowed("duration", self.duration, "it must lie between 1 and 3600 s")
+
+
+@dataclass(frozen=True, slots=True)
+class PreEvaluation:
+    """Every stimulus judged once beforehand, to see whether the maker's grading holds."""
+
+    instruction: str
+
+    def __post_init__(self) -> None:
+        """Check that there is one."""
+        if not self.instruction.strip():
+            raise NotAllowed("instruction", self.instruction, "it must not be empty")
+
+
+@dataclass(frozen=True, slots=True)
+class Protocol:
+    """How sessions are run."""
+
+    name: str
+    title: str
+    label_seed: int  # decides the opaque labels: the same stimulus bears the same label throughout a study
+    contact_angle: float  # between the finger's axis and the surface [degrees]
+    blocks: tuple[BlockOutline, ...]
+    phases: tuple[Phase, ...] = ("main",)  # of a visit that asks for no others
+    masking: str = ""  # of sounds, such as "pink noise in headphones"; empty: none
+    order: OrderRules = field(default_factory=OrderRules)
+    scale: Scale = field(default_factory=Scale)
+    rests: RestRules = field(default_factory=RestRules)
+    shown: Shown = field(default_factory=Shown)
+    pre_evaluation: PreEvaluation | None = None
+    face: Face = field(default_factory=Face)
+
+    def __post_init__(self) -> None:
+        """Check ranges, that blocks and stimuli can be told apart, and that answers and orders can be had."""
+        if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.name):
+            raise NotAllowed("name", self.name, "it must be of small letters, digits and single hyphens")
+        check_seed("label_seed", self.label_seed)
+        if not 10 <= self.contact_angle <= 90:
+            raise NotAllowed("contact_angle", self.contact_angle, "it must lie between 10 and 90 degrees")
+        if not self.blocks:
+            raise NotAllowed("blocks", [], "there must be at least one")
+        check_phases(self, self.phases)
+        names = [block.name for block in self.blocks]
+        for i, (name, block) in enumerate(zip(names, self.blocks, strict=True)):
+            if name in names[:i]:
+                raise NotAllowed(f"blocks[{i}].name", name, "no two blocks may have the same name")
+            self._check_answers(f"blocks[{i}]", block)
+            self._check_order(f"blocks[{i}]", block)
+
+    @property
+    def labels(self) -> Labels:
+        """Return the code on the back of each stimulus; a stimulus of several blocks has one."""
+        stimuli = dict.fromkeys((block.descriptor, index) for block in self.blocks for index in block.indices)
+        return dict(zip(stimuli, opaque_codes(len(stimuli), self.label_seed), strict=True))
+
+    def _check_answers(self, key: str, block: BlockOutline) -> None:
+        """Check that a block says what its answers need, and nothing that they do not have."""
+        answer = self.scale.answer
+        if answer == "line" and block.scale_ends is None:
+            raise NotAllowed(f"{key}.scale_ends", None, "both ends of the line must be named")
+        if answer != "line" and block.scale_ends is not None:
+            raise NotAllowed(
+                f"{key}.scale_ends", list(block.scale_ends), f"a {answer} is given on no line: leave it out"
+            )
+        if answer != "line" and not block.question.strip():
+            raise NotAllowed(f"{key}.question", block.question, f"say what the subject is asked for a {answer}")
+        if answer == "choice" and len(block.indices) < 2:
+            raise NotAllowed(f"{key}.indices", list(block.indices), "a choice takes at least two")
+        if answer == "choice" and block.practice and len(block.practice) < 2:
+            raise NotAllowed(f"{key}.practice", list(block.practice), "a choice takes at least two")
+
+    def _check_order(self, key: str, block: BlockOutline) -> None:
+        """Check that there is an order as asked for."""
+        if self.order.constrained and (self.order.rule == "williams" or self.scale.answer == "choice"):
+            what = (
+                "a Williams design fixes its orders" if self.order.rule == "williams" else "pairs are in no such order"
+            )
+            raise NotAllowed("order.rule", self.order.rule, f"{what}: leave the other keys of [order] out")
+        if self.order.rule == "williams" and self.scale.answer == "choice":
+            raise NotAllowed("order.rule", self.order.rule, 'pairs are "shuffled"')
+        if self.order.first_differs and block.repetitions > len(set(block.indices) - set(self.order.not_first)):
+            what = "more repetitions than stimuli that may be first, and first_differs asks for another each time"
+            raise NotAllowed(f"{key}.repetitions", block.repetitions, what)
+        if self.order.constrained and drawn(block.indices, 0, block.name, self._meets) is None:
+            raise NotAllowed(f"{key}.indices", list(block.indices), "no order of these meets what [order] asks for")
+
+    def _meets(self, order: Sequence[Item]) -> bool:
+        return self.order.meets([int(item) for item in order])
+
+
+def check_phases(protocol: Protocol, phases: Sequence[Phase]) -> None:
+    """Raise NotAllowed unless the protocol has these phases."""
+    shown = list(phases)
+    if not phases or len(set(phases)) < len(phases):
+        raise NotAllowed("phases", shown, "there must be at least one, and none may come twice")
+    if "pre-evaluation" in phases and protocol.pre_evaluation is None:
+        raise NotAllowed("phases", shown, "a pre-evaluation needs a table [pre_evaluation] with its instruction")
+    if "pre-evaluation" in phases and protocol.scale.answer == "choice":
+        raise NotAllowed("phases", shown, "a pre-evaluation grades each stimulus, which a choice of two does not")
+    if "practice" in phases and not any(block.practice for block in protocol.blocks):
+        raise NotAllowed("phases", shown, "a practice needs blocks that list their stimuli under practice")
+
+
+def phases_before(protocol: Protocol) -> tuple[Phase, ...]:
+    """Return the phases that may come before the trials of the experiment."""
+    judged = protocol.pre_evaluation is not None and protocol.scale.answer != "choice"
+    practised = any(block.practice for block in protocol.blocks)
+    has: dict[Phase, bool] = {"pre-evaluation": judged, "practice": practised}
+    return tuple(phase for phase, there in has.items() if there)
+
+
+def protocol_names() -> tuple[str, ...]:
+    """Return the names of the protocols that come with the program: the files of this folder."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+
+def protocol(name_or_path: str | Path) -> Protocol:
+    """Return the built-in protocol of that name, or the one in the file of that path.
+
+    Raises SettingsError for an unknown name and for anything wrong in the file, FileNotFoundError for a missing file.
+    """
+    return load_toml(protocol_file(name_or_path), Protocol)
+
+
+def protocol_file(name_or_path: str | Path) -> Path:
+    """Return the file of a built-in protocol, or the path given. Raises SettingsError for an unknown name."""
+    given = str(name_or_path)
+    if given in protocol_names():
+        return FOLDER / f"{given}.toml"
+    if not given.endswith(".toml"):
+        built_in = ", ".join(protocol_names())
+        raise SettingsError(f"there is no protocol {given}; built in: {built_in}; or give the path of a .toml file")
+    return Path(given)
+
+
+def check_seed(key: str, seed: int) -> None:
+    """Raise NotAllowed unless the seed is a whole number every language can hold."""
+    if not 0 <= seed <= LARGEST_SEED:
+        raise NotAllowed(key, seed, f"it must lie between 0 and {LARGEST_SEED}")

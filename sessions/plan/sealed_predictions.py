@@ -1,0 +1,109 @@
+"""Predictions sealed before anybody may know which score belongs to which stimulus, and what a report says of it.
+
+The seal is a file in the session's folder: what was predicted, its SHA-256 and the time. `daq-app unblind` writes the
+SHA-256 of that file beside the key it opens, so a seal that came later, or was changed, is found.
+"""
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any, cast
+
+from sessions.plan.blinding import UNBLINDING
+from sessions.recording import Recording, RecordingError
+from sessions.recording.derived import load_derived, store_derived
+
+SEAL = "sealed-prediction.json"
+NUMBERS = ("trial", "mu", "tau_max", "indentation", "direction", "sed")
+SAME = 1e-12  # numbers made on another machine may differ by so much [-]
+
+
+def seal_prediction(recording: Recording, prediction: Mapping[str, Any]) -> str:
+    """Seal what `SessionPrediction.to_dict` told, in the session's folder; return the SHA-256 of its numbers.
+
+    Raises RecordingError where a prediction was sealed before, for no seal replaces another, or where nothing can be
+    written.
+    """
+    before = load_derived(recording.folder, SEAL)
+    if before is not None:
+        raise RecordingError(
+            f"{recording.folder / SEAL}: sealed on {before.get('sealed_utc')}, and none is sealed over it"
+        )
+    numbers = [{name: row[name] for name in NUMBERS} for row in prediction["trials"]]
+    sha256 = digest(numbers)
+    document = {
+        "sealed_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+        "blinded": _closed(recording),
+        "sha256": sha256,
+        "numbers": numbers,
+        "options": prediction["options"],
+    }
+    store_derived(recording.folder, SEAL, document)
+    return sha256
+
+
+def digest(numbers: Sequence[Mapping[str, Any]]) -> str:
+    """Return the SHA-256 of the numbers as JSON, names sorted, no spaces.
+
+    >>> digest([])[:8]
+    '4f53cda1'
+    """
+    text = json.dumps(list(numbers), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def sealed_sentence(recording: Recording, predicted: Sequence[Mapping[str, Any]]) -> str:
+    """Return what a report says: whether the predictions it shows (`NUMBERS` of each) were sealed, when and how blind.
+
+    A seal that cannot be read proves nothing, and stands in the way of nothing else.
+    """
+    try:
+        seal = load_derived(recording.folder, SEAL)
+    except RecordingError:
+        return f"A seal of predictions is there, but {SEAL} is damaged and proves nothing; restore a copy of it."
+    if seal is None:
+        return "The predictions were made after the scores had been given, and had not been sealed before."
+    held: Any = seal.get("numbers")
+    if not isinstance(held, list) or not all(isinstance(row, dict) for row in cast("list[object]", held)):
+        return f"A seal of predictions is there, but {SEAL} is damaged and proves nothing; restore a copy of it."
+    numbers = cast("list[dict[str, Any]]", held)
+    sha256 = str(seal.get("sha256"))
+    if digest(numbers) != sha256:
+        return f"A seal of predictions is there, but its numbers are not those of its SHA-256: {SEAL} was changed."
+    when = f"sealed on {seal.get('sealed_utc')} (SHA-256 {sha256[:16]}…)"
+    now = [{name: row[name] for name in NUMBERS} for row in predicted]
+    same = _same(numbers, now)
+    shown = "the predictions shown are those" if same else "the predictions shown here are others, made since"
+    return f"Predictions were {when} {_how_blind(recording, blinded=bool(seal.get('blinded')))}; {shown}."
+
+
+def _closed(recording: Recording) -> bool:
+    """Say whether the session's key is still sealed."""
+    return recording.plan.key_sha256 is not None and load_derived(recording.folder, UNBLINDING) is None
+
+
+def _how_blind(recording: Recording, *, blinded: bool) -> str:
+    if not blinded:
+        return "when nothing hid which score belongs to which stimulus"
+    opened = load_derived(recording.folder, UNBLINDING)
+    if opened is None:
+        return "while the key of the stimuli was sealed, as it still is"
+    content = (recording.folder / SEAL).read_bytes()
+    before: Any = opened.get("made_before")
+    if not isinstance(before, dict) or cast("dict[str, Any]", before).get(SEAL) != hashlib.sha256(content).hexdigest():
+        return "but the record of unblinding does not hold this seal: it was made or changed after the key was opened"
+    return f"while the key of the stimuli was sealed; it was opened on {opened.get('unblinded_utc')}"
+
+
+def _same(sealed: Sequence[Any], shown: Sequence[Mapping[str, Any]]) -> bool:
+    if len(sealed) != len(shown):
+        return False
+    return all(_alike(then.get(name), now[name]) for then, now in zip(sealed, shown, strict=True) for name in NUMBERS)
+
+
+def _alike(then: object, now: object) -> bool:
+    if isinstance(then, float | int) and isinstance(now, float | int):
+        return math.isclose(then, now, rel_tol=SAME)
+    return then == now

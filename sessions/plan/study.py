@@ -1,0 +1,121 @@
+"""A study: one protocol, its design's rows, and who is enrolled in which. What happened in it, in order, tells all."""
+
+import hashlib
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import count
+from typing import Any
+
+import msgspec
+
+from sessions.plan.blinding import Key
+from sessions.plan.orders import shuffled
+from sessions.plan.protocols import Body, Labels, Protocol, StudyPlace, design_rows
+
+
+class StudyError(Exception):
+    """Something that a study does not allow, or a study that cannot be read; the message says what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class StudyEvent:
+    """One thing that happened in a study."""
+
+    number: int  # from 1, without gaps
+    utc: str
+    kind: str  # created, enrolled, withdrawn, labels_told, unblinded
+    subject: str  # code; empty where it is about no subject
+    data: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One subject of a study."""
+
+    subject: str  # a code, never a name
+    slot: int  # reserved, from 0; given back on withdrawal
+    body: Body  # what is the subject's own
+    withdrawn: str | None = None  # why; None while enrolled
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """A study as it stands."""
+
+    name: str
+    protocol: Protocol
+    seed: int
+    key_sha256: str | None  # of the sealed key; None: not blinded
+    events: tuple[StudyEvent, ...]
+
+    @property
+    def members(self) -> dict[str, Member]:
+        """Return everybody who was ever enrolled, by code, in the order of enrolment."""
+        found: dict[str, Member] = {}
+        for event in self.events:
+            if event.kind == "enrolled":
+                body = msgspec.convert(event.data["body"], Body)
+                found[event.subject] = Member(event.subject, event.data["slot"], body)
+            elif event.kind == "withdrawn":
+                before = found[event.subject]
+                found[event.subject] = Member(before.subject, before.slot, before.body, event.data["reason"])
+        return found
+
+    @property
+    def unblinded(self) -> bool:
+        """Say whether the key of the whole study was opened."""
+        return any(event.kind == "unblinded" and event.data.get("session") is None for event in self.events)
+
+    @property
+    def rows(self) -> int | None:
+        """Return how many rows the design has; None where every order is drawn for itself."""
+        return design_rows(self.protocol)
+
+    def member(self, subject: str) -> Member:
+        """Return a subject that is enrolled. Raises StudyError."""
+        found = self.members.get(subject)
+        if found is None:
+            raise StudyError(f"{subject} is not enrolled in {self.name}: 'daq-app enrol' reserves a row")
+        if found.withdrawn is not None:
+            raise StudyError(f"{subject} was withdrawn from {self.name} ({found.withdrawn}); enrol under another code")
+        return found
+
+    def row(self, slot: int) -> int:
+        """Return the row of the design, from 1, that a slot stands for.
+
+        Slots are filled one after the other. Each round of the design has its rows in an order by chance; where there
+        is no design the slot itself is the row.
+        """
+        if self.rows is None:
+            return slot + 1
+        done, within = divmod(slot, self.rows)
+        return int(shuffled(range(self.rows), self.seed, f"rows/{done}")[within]) + 1
+
+    def session_seed(self, slot: int) -> int:
+        """Return the seed of what else chance decides for a slot: the same for all visits of a subject."""
+        digest = hashlib.sha256(f"{self.seed}/slot/{slot}".encode()).digest()
+        return int.from_bytes(digest[:4], "big") % 2**31
+
+    def place(self, member: Member, key: Key | None) -> StudyPlace:
+        """Return the place of a subject, from which its plan is made; `key` is needed where the study is blinded."""
+        labels = self.protocol.labels if key is None else labels_of(key)
+        sealed = None if self.unblinded else self.key_sha256
+        return StudyPlace(self.name, self.row(member.slot), self.seed, labels, sealed)
+
+
+def free_slot(members: Sequence[Member]) -> int:
+    """Return the first slot that nobody holds: one that was given back comes first."""
+    taken = {member.slot for member in members if member.withdrawn is None}
+    return next(slot for slot in count() if slot not in taken)
+
+
+def labels_of(key: Key) -> Labels:
+    """Return the code of each stimulus."""
+    return {stimulus: code for code, stimulus in key.stimuli.items()}
+
+
+def check_code(what: str, code: str) -> None:
+    """Raise StudyError unless `code` is one: no name, nothing a file's name could not hold."""
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", code):
+        raise StudyError(f'{what} "{code}" is not allowed: a code of letters, digits, - and _, never a name')

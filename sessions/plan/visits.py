@@ -1,0 +1,40 @@
+"""Visits of a study joined by the subject's code: who scored, and who stroked on a transducer."""
+
+from pathlib import Path
+
+from sessions.plan.blinding import revealed
+from sessions.plan.study import StudyError
+from sessions.recording import Recording
+from sessions.recording.schema import LIVE_FILE
+
+
+def sessions_of(folder: Path, subject: str | None = None) -> tuple[Recording, ...]:
+    """Return the sessions in a study's folder, by name, those of one subject where a code is given."""
+    paths = sorted(path.parent for path in folder.glob(f"*/{LIVE_FILE}"))
+    found = (revealed(Recording.open(path)) for path in paths)
+    return tuple(recording for recording in found if subject in (None, recording.plan.subject))
+
+
+def force_visit(folder: Path, subject: str) -> Recording:
+    """Return the visit in which a subject stroked on the transducer: the latest that came to its end.
+
+    Raises StudyError where there is none.
+    """
+    visits = [recording for recording in sessions_of(folder, subject) if recording.plan.forces]
+    if not visits:
+        raise StudyError(f"{subject} has no visit with forces in {folder}: run one with --device, or give another code")
+    return max(visits, key=lambda visit: (_complete(visit), str(visit.provenance.get("created_utc", ""))))
+
+
+def score_visits(folder: Path, besides: Recording | None = None) -> tuple[Recording, ...]:
+    """Return every visit of every subject in which scores were given on the line, but for the one named."""
+    return tuple(
+        recording
+        for recording in sessions_of(folder)
+        if any(record.score is not None for record in recording.trials)
+        and (besides is None or recording.folder.resolve() != besides.folder.resolve())
+    )
+
+
+def _complete(recording: Recording) -> bool:
+    return bool(recording.end is not None and recording.end.get("complete"))

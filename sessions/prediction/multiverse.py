@@ -1,0 +1,330 @@
+"""One recording along many paths: every reasonable choice of the analysis crossed with every other (a multiverse).
+
+What a study concludes should not hang on a choice that somebody else would have made differently (Steegen, Tuerlinckx,
+Gelman and Vanpaemel 2016, Perspect. Psychol. Sci. 11:702). Friction is found along each path, and contact is solved
+at every friction that is met: nothing is interpolated.
+"""
+
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Literal
+
+import numpy as np
+
+from sessions.prediction import (
+    Friction,
+    Prediction,
+    Progress,
+    Scene,
+    SessionPrediction,
+    scenes_of,
+    settled,
+    slides,
+)
+from sessions.recording import Recording
+from sessions.statistics.adjusted_means import surface_means
+from sessions.statistics.scores import pearson
+from sessions.statistics.within_subjects import repeated_correlation
+from sessions.strokes import Analysis, FrictionParameters, analyse
+from sessions.strokes.contact_area import FIXED, HERTZ, AreaLaw
+from sessions.strokes.friction import Rule
+from sessions.strokes.settings import AnalysisSettings, WindowRule
+
+Kinematics = Literal["small", "finite"]
+Seds = tuple[float | None, ...]  # along each of `PATHS`, or only those at small strain [MPa]
+
+# Of each choice the usual one comes first.
+FILTERS: Mapping[str, float] = {"20 Hz": 20.0, "none": math.inf}
+WINDOWS: Mapping[str, WindowRule] = {
+    "least variance, widened": "widened",
+    "least variance, half the slide": "least variance",
+    "middle half of the slide": "middle half",
+    "whole slide": "whole slide",
+}
+MUS: tuple[Rule, ...] = ("mean over steady window", "maximum")  # the usual one is the paper's for the descriptor
+AREAS: Mapping[str, tuple[AreaLaw, float]] = {  # law of the contact area, and its share of the planned one [-]
+    "planned": (FIXED, 1.0),
+    "half": (FIXED, 0.5),
+    "twice": (FIXED, 2.0),
+    "grows as N^2/3": (AreaLaw("hertz", HERTZ), 1.0),
+}
+RECEPTORS = ("ending", "its middle")
+SAME = 0.005  # correlations that differ by less are one result: pages print two decimals
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """One choice of everything."""
+
+    filter: str
+    window: str
+    mu: Rule
+    area: str
+    receptor: str
+    kinematics: Kinematics
+
+    def usual(self, rule: str, kinematics: str, law: AreaLaw = FIXED) -> bool:
+        """Say whether it is the way that every other number went, mu being told by `rule` and tau_max by `law`."""
+        first = (next(iter(FILTERS)), next(iter(WINDOWS)), RECEPTORS[0], (law, 1.0))
+        own = (self.filter, self.window, self.receptor, AREAS[self.area])
+        return own == first and self.mu == rule and self.kinematics == kinematics
+
+
+CHOICES = ("filter", "window", "mu", "area", "receptor", "kinematics")
+TOLD: Mapping[str, str] = {
+    "filter": "cut-off of the forces' filter",
+    "window": "steady window",
+    "mu": "µ of the model",
+    "area": "contact area",
+    "receptor": "SED at the receptor",
+    "kinematics": "strain of the model",
+}
+
+
+def _paths() -> tuple[Path, ...]:
+    small = tuple(Path(*choice, "small") for choice in product(FILTERS, WINDOWS, MUS, AREAS, RECEPTORS))
+    first = (next(iter(FILTERS)), next(iter(WINDOWS)))
+    # Finite strain takes many times as long: filter, window and area are the usual ones there.
+    finite = tuple(Path(*first, mu, next(iter(AREAS)), receptor, "finite") for mu, receptor in product(MUS, RECEPTORS))
+    return (*small, *finite)
+
+
+PATHS = _paths()
+
+
+def trial_paths(
+    recording: Recording,
+    prediction: SessionPrediction,
+    progress: Progress | None = None,
+    *,
+    finite: bool = False,
+) -> Mapping[int, Seds]:
+    """Return the settled SED of each trial along each of `PATHS`; None where a path gives none.
+
+    `prediction` is that of the session: what it found is where its paths begin, on its mesh. Without `finite` only
+    paths at small strain, which come first. Direction and speed are those of the usual path: neither is a matter of
+    choice. Raises as `predict` does.
+    """
+    paths = [path for path in PATHS if finite or path.kinematics == "small"]
+    asked = replace(prediction.options, course="steady")
+    analyses = _analyses(recording)
+    usual = {one.trial: one for one in next(iter(analyses.values())).friction}
+    scenes: dict[tuple[str, ...], Mapping[int, Scene]] = {}
+    for path in paths:
+        if path.receptor == RECEPTORS[0]:
+            varied = _varied(analyses, path, usual)
+            kind = replace(asked, kinematics=path.kinematics)
+            scenes[_without_receptor(path)] = scenes_of(varied, recording.plan, kind)
+    wanted = dict.fromkeys(scene for of_path in scenes.values() for scene in of_path.values())
+    found = _solved(
+        tuple(wanted), [row.prediction for row in prediction.trials if row.prediction is not None], progress
+    )
+    trials = sorted({trial for of_path in scenes.values() for trial in of_path})
+    return {trial: tuple(_sed(found, scenes[_without_receptor(p)].get(trial), p) for p in paths) for trial in trials}
+
+
+def _without_receptor(path: Path) -> tuple[str, ...]:
+    return (path.filter, path.window, path.mu, path.area, path.kinematics)
+
+
+def _analyses(recording: Recording) -> Mapping[tuple[str, str, AreaLaw], Analysis]:
+    """Return the analysis by filter, window and law of the area; with other laws than the first for one window only."""
+    first, *others = dict.fromkeys(law for law, _ in AREAS.values())
+    asked = [*product(FILTERS, WINDOWS, [first]), *product(FILTERS, list(WINDOWS)[:1], others)]
+    return {
+        (f, w, law): analyse(recording, AnalysisSettings(cut_off=FILTERS[f], steady_rule=WINDOWS[w], area=law))
+        for f, w, law in asked
+    }
+
+
+def _varied(
+    analyses: Mapping[tuple[str, str, AreaLaw], Analysis],
+    path: Path,
+    usual: Mapping[int | None, FrictionParameters],
+) -> Analysis:
+    """Return the analysis with the friction that a path gives each trial; no window has a say in tau_max."""
+    (law, share), (window, *_) = AREAS[path.area], WINDOWS
+    analysis = analyses[path.filter, path.window, AREAS[next(iter(AREAS))][0]]
+    bounds = analyses[path.filter, window, law].strokes
+    friction: list[FrictionParameters] = []
+    for one in analysis.friction:
+        stroke, bound = analysis.strokes[one.stroke], bounds[one.stroke].tau_max
+        mu = stroke.mu_max if path.mu == "maximum" else stroke.mu_dynamic
+        tau_max = None if bound is None else bound / share
+        same = usual.get(one.trial, one)
+        friction.append(replace(one, mu=mu, tau_max=tau_max, direction=same.direction, speed=same.speed))
+    return replace(analysis, friction=tuple(friction))
+
+
+def _sed(found: Mapping[Scene, tuple[float, float] | None], scene: Scene | None, path: Path) -> float | None:
+    answer = None if scene is None else found[scene]
+    return None if answer is None else answer[RECEPTORS.index(path.receptor)]
+
+
+def _solved(
+    scenes: Sequence[Scene], known: Sequence[Prediction], progress: Progress | None
+) -> Mapping[Scene, tuple[float, float] | None]:
+    """Return SED over the ending and at its middle [MPa] of each scene, None where it has no settled state.
+
+    Scenes that differ in friction alone are found beside one that is known, on its mesh, or else beside that of least
+    friction, which is solved; where that fails they are solved themselves.
+    """
+    alike: defaultdict[Scene, list[Scene]] = defaultdict(list)
+    for scene in sorted(scenes, key=_friction):
+        alike[_kind(scene)].append(scene)
+    first = {kind: group[0] for kind, group in alike.items()}
+    held = {kind: one for one in known if (kind := _kind(one.scene)) in first}
+    new = [kind for kind in first if kind not in held]
+    answers = settled([first[kind] for kind in new], _part(progress, 0.0, 0.5))
+    held |= {kind: answer for kind, answer in zip(new, answers, strict=True) if answer is not None}
+    found: dict[Scene, tuple[float, float] | None] = {}
+    for kind, slide in zip(held, slides(list(held.values()), _part(progress, 0.5, 0.7)), strict=True):
+        if slide is not None:
+            beside = zip(alike[kind], slide.seds(alike[kind]).tolist(), strict=True)
+            found |= {scene: (ending, point) for scene, (ending, point) in beside if not np.isnan(ending)}
+    rest = [scene for scene in scenes if scene not in found]
+    for scene, answer in zip(rest, settled(rest, _part(progress, 0.7, 1.0)), strict=True):
+        found[scene] = None if answer is None else (answer.sed_ending, answer.sed_point)
+    return found
+
+
+def _kind(scene: Scene) -> Scene:
+    """Return a scene settled and without friction: the same of all that differ in that alone."""
+    return replace(scene, friction=Friction(0.0), solve=replace(scene.solve, course="steady"))
+
+
+def _friction(scene: Scene) -> tuple[float, float]:
+    return scene.friction.mu, np.inf if scene.friction.tau_max is None else scene.friction.tau_max
+
+
+def _part(progress: Progress | None, low: float, high: float) -> Progress | None:
+    return None if progress is None else lambda done: progress(low + (high - low) * done)
+
+
+@dataclass(frozen=True, slots=True)
+class PathFinding:
+    """How predicted SED and scores go together along one path. None where too few numbers are left."""
+
+    path: Path
+    usual: bool
+    surfaces: int  # with an SED on this path
+    trials: int
+    r: float | None  # Pearson's, of the mean SED of each surface against its mean score
+    within: float | None  # repeated-measures correlation of each subject's own scores and SEDs
+    low: float | None  # 95 % interval of `within`, for other people on the same surfaces
+    high: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class PathTrial:
+    """One trial as the paths need it."""
+
+    subject: str
+    index: int
+    score: float | None
+    rule: str  # which mu is the usual one
+    seds: Seds
+
+
+def path_findings(
+    trials: Sequence[PathTrial],
+    kinematics: str,
+    law: AreaLaw = FIXED,
+    *,
+    within: bool,
+) -> tuple[PathFinding, ...]:
+    """Return how predictions go with scores along each path.
+
+    Correlations within subjects are taken where `within` says so. Empty where no trial went along the paths.
+    """
+    held = [trial for trial in trials if trial.seds]
+    if not held:
+        return ()
+    rule, gone = held[0].rule, min(len(trial.seds) for trial in held)
+    return tuple(
+        _finding(n, path, held, usual=path.usual(rule, kinematics, law), within=within)
+        for n, path in enumerate(PATHS[:gone])
+    )
+
+
+def _finding(number: int, path: Path, trials: Sequence[PathTrial], *, usual: bool, within: bool) -> PathFinding:
+    held = [(trial, sed) for trial in trials if (sed := trial.seds[number]) is not None]
+    points = [(trial, sed, trial.score) for trial, sed in held if trial.score is not None]
+    pairs = [(trial.subject, sed, score) for trial, sed, score in points]
+    seds = surface_means([(trial.subject, trial.index, sed) for trial, sed, _ in points]) or {}
+    scores = surface_means([(trial.subject, trial.index, score) for trial, _, score in points]) or {}
+    inner = repeated_correlation(*zip(*pairs, strict=True)) if within and pairs else None
+    low, high = (None, None) if inner is None or inner.people is None else inner.people
+    return PathFinding(
+        path=path,
+        usual=usual,
+        surfaces=len({trial.index for trial, _ in held}),
+        trials=len(held),
+        r=pearson(list(seds.values()), list(scores.values())),
+        within=None if inner is None else inner.r,
+        low=low,
+        high=high,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """The correlations of some paths as a distribution."""
+
+    paths: int
+    told: int  # of them with a correlation; the numbers below are theirs
+    distinct: int  # of these correlations, as many differ by more than `SAME`
+    least: float
+    lower: float  # quartile
+    median: float
+    upper: float  # quartile
+    greatest: float
+
+
+def correlations(findings: Iterable[PathFinding]) -> list[float | None]:
+    """Return the correlation of each path: within subjects where any path has that, else of the means."""
+    listed = list(findings)
+    inner = any(one.within is not None for one in listed)
+    return [one.within if inner else one.r for one in listed]
+
+
+def spread(values: Sequence[float | None]) -> Spread | None:
+    """Return the distribution of correlations; None where there is none.
+
+    >>> of = spread([0.5, None, 0.7, 0.701])
+    >>> of.median, of.told, of.distinct
+    (0.7, 3, 2)
+    """
+    held = sorted(value for value in values if value is not None)
+    if not held:
+        return None
+    least, lower, median, upper, greatest = np.quantile(held, [0.0, 0.25, 0.5, 0.75, 1.0]).tolist()
+    return Spread(len(values), len(held), _distinct(held), least, lower, median, upper, greatest)
+
+
+def _distinct(ordered: Sequence[float]) -> int:
+    """Return how many of some numbers in order lie more than `SAME` beyond the one counted before."""
+    counted: list[float] = []
+    for value in ordered:
+        if not counted or value - counted[-1] > SAME:
+            counted.append(value)
+    return len(counted)
+
+
+def by_choice(findings: Sequence[PathFinding]) -> tuple[tuple[str, str, Spread | None, bool], ...]:
+    """Return for each choice and each of its values the distribution over all paths with it, and whether it is usual.
+
+    Medians that lie far apart within a choice say that it matters.
+    """
+    values = correlations(findings)
+    told: list[tuple[str, str, Spread | None, bool]] = []
+    for choice in CHOICES:
+        names = dict.fromkeys(getattr(one.path, choice) for one in findings)
+        usual = {getattr(one.path, choice) for one in findings if one.usual}
+        for name in names:
+            held = [r for one, r in zip(findings, values, strict=True) if getattr(one.path, choice) == name]
+            told.append((choice, name, spread(held), name in usual))
+    return tuple(told)

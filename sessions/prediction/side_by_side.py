@@ -1,0 +1,142 @@
+"""The same trials predicted side by side: both readings of tau_max, both kinds of strain, by depth and by force.
+
+Each variant is solved for all trials together on a mesh of its own, so that the surfaces' differences within one are
+accurate; between two they are as good as each one's error estimate.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from sessions.prediction import (
+    Prediction,
+    PredictionOptions,
+    Progress,
+    SessionPrediction,
+    TrialPrediction,
+    doubt_of,
+    scene_along,
+    solved,
+    tau_scale,
+    traction_reached,
+)
+from sessions.prediction.sed_interval import SedInterval
+from sessions.prediction.uncertainty import Drawn, draws_of, intervals_of
+from sessions.prediction.variants import Alternative, Variant, variants
+from sessions.strokes import Analysis
+
+
+def with_alternatives(
+    prediction: SessionPrediction, progress: Progress | None = None, analysis: Analysis | None = None
+) -> SessionPrediction:
+    """Return a prediction with every trial predicted in the variants that its options ask for (`beside`) as well.
+
+    Where the options ask for `intervals`, each at small strain has its own, and each at finite strain where they ask
+    for `beside_intervals`; `analysis` is what the friction came from.
+    Raises Cancelled where `progress`, told the part done, returns False.
+    """
+    asked, options = tuple(variants(prediction.options.beside)), prediction.options
+    drawn = draws_of(analysis, prediction) if asked and analysis is not None and options.intervals else None
+
+    def told(variant: Variant) -> Sequence[Drawn] | None:
+        return drawn if variant.kinematics == "small" or options.beside_intervals else None
+
+    along = [
+        _along(prediction, variant, told(variant), _part(progress, number / len(asked), (number + 1) / len(asked)))
+        for number, variant in enumerate(asked)
+    ]
+    trials = tuple(
+        _with_depth(replace(row, alternatives=tuple(found[number] for found in along)), options)
+        for number, row in enumerate(prediction.trials)
+    )
+    return replace(prediction, trials=trials)
+
+
+def _with_depth(row: TrialPrediction, options: PredictionOptions) -> TrialPrediction:
+    """Return a row whose matching depth is that of its own solve under the measured force, where there is one.
+
+    The depth of `predict` is of a rough mesh; one question has one answer.
+    """
+    driven = Variant(options.kinematics, options.tau_reading, "force")
+    found = next((one for one in row.alternatives if one.variant == driven and one.sed is not None), None)
+    if found is None:
+        return row
+    reasons = {name: why for name, why in row.reasons.items() if name != "matching_depth"}
+    return replace(
+        row,
+        matching_depth=found.indentation,
+        matching_depth_error=found.indentation_error,
+        matching_depth_interval=None if found.interval is None else found.interval.indentation,
+        reasons=reasons,
+    )
+
+
+def _along(
+    prediction: SessionPrediction, variant: Variant, drawn: Sequence[Drawn] | None, progress: Progress | None
+) -> tuple[Alternative, ...]:
+    """Return what each trial gives in one variant, with intervals where draws of its friction are given."""
+    rows, options = prediction.trials, prediction.options
+    known = _known(prediction, variant)
+    found = known or _solved(prediction, variant, _part(progress, 0.0, 0.8))
+    out = [_alternative(row, variant, tau_max, one) for row, (tau_max, one) in zip(rows, found, strict=True)]
+    if drawn is not None:
+        before = [row.interval if variant.driven == "depth" else row.opposite_interval for row in rows]
+        if known is not None and None not in before:  # they are those of the trials themselves
+            intervals: Sequence[SedInterval | None] = before
+        else:
+            scale = tau_scale(replace(options, tau_reading=variant.tau_reading))
+            intervals = intervals_of([one for _, one in found], drawn, scale, _part(progress, 0.8, 1.0))
+        out = [replace(one, interval=interval) for one, interval in zip(out, intervals, strict=True)]
+    return tuple(out)
+
+
+_Found = list[
+    tuple[float | None, Prediction | str]
+]  # for each trial the tau_max [MPa] that the model got, and what of it
+
+
+def _known(prediction: SessionPrediction, variant: Variant) -> _Found | None:
+    """Return what was predicted anyway: at the planned depth, slid either way."""
+    options = prediction.options
+    if (variant.kinematics, variant.tau_reading) != (options.kinematics, options.tau_reading):
+        return None
+    if variant.driven == "depth":
+        return [(row.tau_max, row.prediction or row.reasons.get("sed", "")) for row in prediction.trials]
+    if variant.driven == "other way":
+        return [(row.tau_max, row.opposite or row.reasons.get("opposite_sed", "")) for row in prediction.trials]
+    return None
+
+
+def _solved(prediction: SessionPrediction, variant: Variant, progress: Progress | None) -> _Found:
+    """Return the same of a variant that is solved now."""
+    scenes = [scene_along(row, variant, prediction.options) for row in prediction.trials]
+    answers = iter(solved([scene for scene in scenes if not isinstance(scene, str)], progress))
+    return [(None, scene) if isinstance(scene, str) else (scene.friction.tau_max, next(answers)) for scene in scenes]
+
+
+def _alternative(row: TrialPrediction, variant: Variant, tau_max: float | None, found: Prediction | str) -> Alternative:
+    if isinstance(found, str):
+        return replace(_none(row, variant, found), tau_max=tau_max)
+    width = found.scene.finger.width
+    return Alternative(
+        variant,
+        tau_max,
+        found.indentation,
+        found.sed_ending,
+        found.error_estimate,
+        found.normal_force * width,
+        found.tangential_force * width,
+        traction=traction_reached(found),
+        normal_force_error=found.normal_force_error,
+        tangential_force_error=found.tangential_force_error,
+        indentation_error=found.indentation_error,
+        doubt=doubt_of(found),
+    )
+
+
+def _none(row: TrialPrediction, variant: Variant, reason: str) -> Alternative:
+    depth = None if variant.driven == "force" else row.indentation
+    return Alternative(variant, None, depth, None, None, None, None, reason)
+
+
+def _part(progress: Progress | None, low: float, high: float) -> Progress | None:
+    return None if progress is None else lambda done: progress(low + (high - low) * done)

@@ -1,0 +1,190 @@
+"""How uncertain a predicted SED is because its friction is: the draws of the friction's bootstrap through the solver.
+
+Derivatives from the solver's converged tangent carry all draws. Whether that suffices is seen from a few draws that are
+solved: those at both ends of the interval, and those at both ends of every direction in which the draws spread, for
+those of mu and tau_max hang together. Where it does not, the solver is run at draws themselves. Each interval says
+which. A trial predicted by the force measured has the uncertainty of that force in it too.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.prediction import (
+    Nearby,
+    Prediction,
+    Progress,
+    Scene,
+    SessionPrediction,
+    TrialPrediction,
+    derivatives_by,
+    slides,
+    tau_scale,
+    with_loads,
+)
+from sessions.prediction.sed_interval import Ends, SedInterval
+from sessions.strokes import Analysis
+from sessions.strokes.bootstrap import BootstrapSettings, FrictionDraws, drawn_from, friction_draws
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Drawn = FrictionDraws | str  # what the friction of a trial may have been, or why that is not known
+
+SAMPLES = 60  # draws that are solved where derivatives do not suffice
+MISS = 0.05  # part of the interval's width by which derivatives may miss a draw that is solved [-]
+_FLAT = 1e-5  # a miss below this share of the SED is of no account [-]
+_QUANTILES = (0.025, 0.975)
+
+
+def with_intervals(
+    analysis: Analysis,
+    prediction: SessionPrediction,
+    settings: BootstrapSettings | None = None,
+    progress: Progress | None = None,
+    *,
+    both_ways: bool = True,
+) -> SessionPrediction:
+    """Return a prediction with an interval of each SED it holds, where its options ask for them.
+
+    They are of each trial, and of the same slid the other way (where asked for by `both_ways`). Raises Cancelled where
+    `progress`, told the part done, returns False.
+    """
+    if not prediction.options.intervals:
+        return prediction
+    rows = prediction.trials
+    drawn = draws_of(analysis, prediction, settings)
+    column: list[Prediction | str] = [row.prediction or _why(row, "sed") for row in rows]
+    if both_ways:
+        column += [row.opposite or _why(row, "opposite_sed") for row in rows]
+    found = intervals_of(column, [*drawn, *drawn][: len(column)], tau_scale(prediction.options), progress)
+    back = found[len(rows) :] or [None] * len(rows)
+    trials = tuple(
+        replace(row, interval=one, opposite_interval=other)
+        for row, one, other in zip(rows, found[: len(rows)], back, strict=True)
+    )
+    return replace(prediction, trials=trials)
+
+
+def draws_of(
+    analysis: Analysis, prediction: SessionPrediction, settings: BootstrapSettings | None = None
+) -> list[Drawn]:
+    """Return for each trial what its friction may have been in each repeat, or why that is not known."""
+    settings = settings or drawn_from(analysis.settings)
+    return [_draws(analysis, row, settings) for row in prediction.trials]
+
+
+def _draws(analysis: Analysis, row: TrialPrediction, settings: BootstrapSettings) -> Drawn:
+    if row.stroke is None or row.mu is None or row.tau_max is None:
+        return _why(row, "sed")
+    rule = "maximum" if row.mu_rule == "maximum" else "mean over steady window"
+    found = friction_draws(analysis.strokes[row.stroke], row.stroke, rule, settings)
+    return "the stroke is too short for an interval of its friction" if found is None else found
+
+
+def _why(row: TrialPrediction, name: str) -> str:
+    return row.reasons.get(name, "nothing was predicted")
+
+
+def intervals_of(
+    column: Sequence[Prediction | str], drawn: Sequence[Drawn], scale: float, progress: Progress | None = None
+) -> list[SedInterval]:
+    """Return the interval of each settled SED of a column, or what stands there why there is none.
+
+    `scale` is what tau_max as drawn is multiplied by before the model gets it. Raises Cancelled.
+    """
+    taken_up = slides([found for found in column if not isinstance(found, str)], progress)
+    return [
+        SedInterval(None, None, None, reason=found)
+        if isinstance(found, str)
+        else _interval(found, next(taken_up), draws, scale)
+        for found, draws in zip(column, drawn, strict=True)
+    ]
+
+
+def _interval(found: Prediction, slide: Nearby | None, drawn: Drawn, scale: float) -> SedInterval:
+    """Return the interval of the settled SED that was found."""
+    if slide is None:
+        return SedInterval(None, None, None, reason="the state found depends on the way to it")
+    loads = _loads(found.scene, drawn, scale)
+    if isinstance(loads, str):
+        return SedInterval(None, None, None, reason=loads)
+    names, draws, told = loads
+    by, width = derivatives_by(slide, found.scene), found.scene.finger.width
+
+    def along(number: str, value: float) -> Array:
+        return value + (draws - told) @ [by[number][name] for name in names]
+
+    carried = along("sed", found.sed_ending)
+    low, high = _ends(carried)
+    felt = by["sed"]
+    slopes = felt["mu"], felt["tau_max"], felt["force"] if "force" in names else None
+    whole = SedInterval(
+        low,
+        high,
+        "derivatives",
+        *slopes,
+        normal_force=_ends(along("normal_force", found.normal_force * width)),
+        tangential_force=_ends(along("tangential_force", found.tangential_force * width)),
+        indentation=_ends(along("indentation", found.indentation)),
+    )
+
+    def solved(which: Indices) -> Array:
+        scenes = [with_loads(found.scene, dict(zip(names, draw, strict=True))) for draw in draws[which].tolist()]
+        seds = slide.seds([found.scene, *scenes])[:, 0]
+        return found.sed_ending + (seds[1:] - seds[0])
+
+    tried = _extremes(carried, draws)
+    missed = np.abs(solved(tried) - carried[tried])  # nan, and so no less, where one has no settled state
+    if bool((missed <= max(MISS * (high - low), _FLAT * found.sed_ending)).all()):
+        return whole
+    some = solved(_spread_out(carried))
+    lost = int(np.isnan(some).sum())
+    if lost:
+        reason = f"{lost} of {SAMPLES} draws of the friction have no settled state, or lie too near the limit to tell"
+        return replace(whole, low=None, high=None, method="sampling", reason=reason)
+    low, high = np.quantile(some, _QUANTILES, method="hazen").tolist()  # each stands for the middle of its share
+    return replace(whole, low=low, high=high, method="sampling")
+
+
+def _ends(draws: Array) -> Ends:
+    low, high = np.quantile(draws, _QUANTILES).tolist()
+    return low, high
+
+
+def _spread_out(carried: Array) -> Indices:
+    """Return draws each of which stands for an equal share of all: the middle one, by what the derivatives carry."""
+    middles = (np.arange(SAMPLES) + 0.5) / SAMPLES * len(carried)
+    return np.argsort(carried, kind="stable")[middles.astype(np.int64)]
+
+
+def _loads(scene: Scene, drawn: Drawn, scale: float) -> tuple[tuple[str, ...], Array, Array] | str:
+    """Return the names of the loads that were drawn (p,), the draws (repeats, p) and what each is in the scene (p,)."""
+    if isinstance(drawn, str):
+        return drawn
+    names, columns = ["mu", "tau_max"], [np.maximum(drawn.mu, 0.0), drawn.tau_max * scale]
+    told = [scene.friction.mu, scene.friction.tau_max or 0.0]
+    if scene.loading.normal_force is not None:
+        if drawn.normal_force is None:
+            return "the stroke is too short for an interval of its normal force"
+        names.append("force")
+        columns.append(drawn.normal_force)
+        told.append(scene.loading.normal_force)
+    return tuple(names), np.stack(columns, axis=1), np.array(told)
+
+
+def _extremes(carried: Array, draws: Array) -> Indices:
+    """Return the draws at both ends of the interval carried, and of each direction in which draws (repeats, p) spread.
+
+    The directions are the principal components of the draws, each load by its own spread: where loads hang together,
+    the corners that the draws do reach.
+
+    >>> _extremes(np.arange(5.0), np.array([[0.0, 0.0], [1.0, 1.1], [2.0, 1.9], [3.0, 3.0], [4.0, 4.2]])).tolist()
+    [0, 2, 4]
+    """
+    spread = draws.std(axis=0)
+    units = (draws - draws.mean(axis=0)) / np.where(spread > 0.0, spread, 1.0)
+    axes = np.linalg.svd(units, full_matrices=False)[2]
+    ranks = [round(end * (len(draws) - 1)) for end in _QUANTILES]
+    return np.unique([np.argsort(way, kind="stable")[ranks] for way in (carried, *(units @ axes.T).T)])

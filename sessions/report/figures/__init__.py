@@ -1,0 +1,145 @@
+"""The figures of a report: every picture with its caption and its numbers."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+from sessions.report import Report, StrokeFinding
+from sessions.report.figures.finger import common_levels, finger_panels
+from sessions.report.figures.multiverse import CAPTION, paths_panel
+from sessions.report.figures.recording import course_panel
+from sessions.report.figures.relation import relation_panel
+from sessions.report.figures.responses import response_panel
+from sessions.report.figures.scores import score_panel
+from sessions.report.figures.strokes import friction_panel, speed_panel
+from sessions.report.figures.style import Panel, Plate, look
+
+__all__ = ["Panel", "Plate", "picture", "plates"]
+
+
+def plates(report: Report) -> tuple[Plate, ...]:
+    """Return the figures that a report has numbers for, in their order."""
+    with look():
+        made = tuple(draw(report) for draw in _PLATES.values())
+    return tuple(plate for plate in made if plate.panels)
+
+
+def picture(report: Report, plate: str, experiment: str | None = None) -> Panel | None:
+    """Return the first panel of a plate, of one experiment where it is named; None where it has no numbers."""
+    if experiment is not None:
+        report = replace(
+            report,
+            experiments=tuple(e for e in report.experiments if e.name == experiment),
+            strokes=tuple(s for s in report.strokes if s.experiment == experiment),
+            predictions=tuple(p for p in report.predictions if p.experiment == experiment),
+        )
+    with look():
+        return next(iter(_PLATES[plate](report).panels), None)
+
+
+def _course(report: Report) -> Plate:
+    caption = (
+        "Normal and tangential force over the whole recording, unfiltered; each stretch is drawn by its least and its"
+        " greatest value. Grey: the strokes that were found, with their numbers; discarded takes are not searched."
+    )
+    panels = () if report.course is None else (course_panel(report.course, report.strokes, simulated=report.simulated),)
+    return Plate("course", caption, panels)
+
+
+def _scores(report: Report) -> Plate:
+    caption = (
+        "Scores against the index its maker gave each stimulus. Large dots: mean over subjects; bars: 95 % interval "
+        "of the mean, mean ± t(0.975, n − 1) s / √n with n subjects. Small dots, moved left: each subject's own score"
+        " (the mean of its repeats). Grey line: score equal to index."
+    )
+    panels = tuple(score_panel(e, simulated=report.simulated) for e in report.experiments if e.scores)
+    return Plate("scores", caption, panels)
+
+
+def _friction(report: Report) -> Plate:
+    caption = (
+        "Ratio of tangential to normal force from contact onset on. Thick: the steady window, over which the dynamic "
+        "coefficient is averaged. Dashed: a stroke of which no coefficient is given, the tables say why. The ratio is "
+        "left out where the normal force is too small to divide by."
+    )
+    panels = [friction_panel(strokes, name, simulated=report.simulated) for name, strokes in _grouped(report)]
+    return Plate("friction", caption, tuple(panel for panel in panels if panel is not None))
+
+
+def _speed(report: Report) -> Plate:
+    caption = (
+        "Speed of the centre of pressure along the stroke from contact onset on. Thick: the steady window. It moves "
+        "by rolling and by skin shear as well as by sliding, most of all at onset; the tables give its mean slope "
+        "over the steady window. Strokes whose speed was refused are left out."
+    )
+    panels = [speed_panel(strokes, name, simulated=report.simulated) for name, strokes in _grouped(report)]
+    return Plate("speed", caption, tuple(panel for panel in panels if panel is not None))
+
+
+def _fingers(report: Report) -> Plate:
+    caption = (
+        "Strain-energy density (SED) in the deformed finger in its settled state, sliding; lengths are true. Thin "
+        "lines: skin and the boundaries between epidermis, dermis and fat; outlined: the ending. The close view adds "
+        "the traction of the surface on the skin as arrows and, under them, which part of the skin slips. One scale of "
+        "colours for all; it ends below the peaks at bone and contact."
+        f"{_model(report)}"
+    )
+    levels = common_levels(report.fields) if report.fields else ()
+    pairs = [finger_panels(field, levels, simulated=report.simulated) for field in report.fields]
+    return Plate("finger", caption, tuple(panel for pair in pairs for panel in pair))
+
+
+def _responses(report: Report) -> Plate:
+    caption = (
+        "Predicted response: SED averaged over the ending while the finger is pressed down for 1 s and then slides. "
+        "Above the whole course, below the sliding alone on its own scale, which does not begin at 0. Dashed: "
+        f"settled, not computed further.{_model(report)}"
+    )
+    panels = [
+        response_panel([p for p in report.predictions if p.experiment == name], name, simulated=report.simulated)
+        for name in dict.fromkeys(p.experiment for p in report.predictions)
+    ]
+    return Plate("response", caption, tuple(panel for panel in panels if panel is not None))
+
+
+def _relations(report: Report) -> Plate:
+    caption = (
+        "Predicted SED against mean score; each point is a stimulus with its index. Across: 95 % t interval of the "
+        "mean score. Upright: estimated error of each SED from its mesh; all share one mesh, so that differences "
+        "between them are more accurate than that. Line: least squares. r: Pearson's, with its 95 % interval by "
+        "Fisher's z. Range of SED: greatest less least, and its share of their middle. Beside it the same SEDs on an "
+        f"axis from 0.{_model(report)}"
+    )
+    panels = [
+        relation_panel(e, [p for p in report.predictions if p.experiment == e.name], simulated=report.simulated)
+        for e in report.experiments
+    ]
+    return Plate("relation", caption, tuple(panel for panel in panels if panel is not None))
+
+
+def _paths(report: Report) -> Plate:
+    panels = [paths_panel(e.name, e.paths, simulated=report.simulated) for e in report.experiments if e.paths]
+    return Plate("paths", CAPTION, tuple(panel for panel in panels if panel is not None))
+
+
+def _model(report: Report) -> str:
+    return f" Model: {report.model}." if report.model else ""
+
+
+def _grouped(report: Report) -> list[tuple[str, Sequence[StrokeFinding]]]:
+    """Return the strokes by experiment, in the order of the experiments; those of none come last."""
+    names = [experiment.name for experiment in report.experiments]
+    groups = [(name, [s for s in report.strokes if s.experiment == name]) for name in names]
+    others = [s for s in report.strokes if s.experiment not in names]
+    return [group for group in [*groups, ("", others)] if group[1]]
+
+
+_PLATES: Mapping[str, Callable[[Report], Plate]] = {
+    "course": _course,
+    "scores": _scores,
+    "friction": _friction,
+    "speed": _speed,
+    "finger": _fingers,
+    "response": _responses,
+    "relation": _relations,
+    "paths": _paths,
+}

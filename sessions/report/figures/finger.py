@@ -1,0 +1,209 @@
+"""The deformed finger at true scale: strain-energy density in it, layers, receptor, tractions of the contact."""
+
+# pyright: reportUnknownMemberType=false
+# matplotlib does not type the keyword arguments it passes on.
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.tri import Triangulation, TriContourSet
+
+from sessions.report import Field
+from sessions.report.figures.style import GREY, INK, PALE, Panel, Sheet, sheet, svg
+
+# Perceptually uniform, darker for more, in the same order in grey; its black end is left to the lines.
+COLOURS = ListedColormap(colormaps["magma_r"](np.linspace(0.0, 0.8, 256)))
+LONGEST_ARROW = 1.5  # of the tractions in the picture [mm]
+ARROWS = 22  # at most
+HALF_WIDTH = 4.6  # of the close view [mm]
+_STYLE = {"slip": "solid", "cap": (0, (4, 1.2)), "stick": (0, (1, 1))}
+_WORDS = {"slip": "slips", "cap": "slips at the bound", "stick": "sticks"}
+
+
+def finger_panels(field: Field, levels: tuple[float, ...], *, simulated: bool) -> tuple[Panel, Panel]:
+    """Return the whole finger and a close view of its contact; `levels` [kPa] are the borders of the colours."""
+    whole, close = sheet(328, 330), sheet(328, 330)
+    filled = _tissue(whole.axes[0], field, levels)
+    _tissue(close.axes[0], field, levels)
+    x = np.array([place[0] for place in field.nodes])
+    y = np.array([place[1] for place in field.nodes])
+    whole.axes[0].set_xlim(x.min() - 0.5, x.max() + 0.5)
+    whole.axes[0].set_ylim(-1.2, y.max() + 0.5)
+    _bar(whole, filled, levels)
+    _name_layers(whole.axes[0], field)
+    _tractions(close, field)
+    inside = np.mean(np.asarray(field.patch), axis=0)
+    close.axes[0].annotate("ending", tuple(inside), xytext=(0, 7), textcoords="offset points", ha="center", va="bottom")
+    middle = _middle(field)
+    close.axes[0].set_xlim(middle - HALF_WIDTH, middle + HALF_WIDTH)
+    close.axes[0].set_ylim(-3.1, 4.4)
+    for drawn in (whole, close):
+        drawn.axes[0].set_xlabel("along the surface, proximal to distal [mm]")
+        drawn.axes[0].set_ylabel("above the surface [mm]")
+        drawn.axes[0].set_title(f"{field.experiment}, index {field.index}")
+    stem = f"finger-{field.experiment}-{field.index}"
+    of = f"index {field.index} of {field.experiment}"
+    title, near = f"Strain-energy density in the finger, {of}", f"Contact and receptor, {of}"
+    nodes = tuple((*place, sed) for place, sed in zip(field.nodes, field.sed, strict=True))
+    skin = tuple(
+        (*place, p, t, state)
+        for place, p, t, state in zip(field.contact, field.pressure, field.traction, field.state, strict=True)
+    )
+    return (
+        Panel(stem, title, svg(whole, stem, title, simulated=simulated), ("x [mm]", "y [mm]", "SED [MPa]"), nodes),
+        Panel(
+            f"{stem}-contact",
+            near,
+            svg(close, f"{stem}-contact", near, simulated=simulated),
+            ("x [mm]", "y [mm]", "pressure [MPa]", "traction along +x [MPa]", "state"),
+            skin,
+        ),
+    )
+
+
+def common_levels(fields: Sequence[Field]) -> tuple[float, ...]:
+    """Return the borders of the colours for all fields together [kPa]: few nodes, at bone and contact, lie above.
+
+    They rise from 0 in steps of 1, 2 or 5 times a power of ten.
+    """
+    values = np.concatenate([np.asarray(field.sed) for field in fields]) * 1e3
+    high = float(np.quantile(values, 0.97))
+    step = _nice(high / 8)
+    return tuple(round(step * n, 9) for n in range(int(np.ceil(high / step)) + 1))
+
+
+def _tissue(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSet:
+    """Fill the finger by its SED, outline layers, bone and ending, and draw the surface it rests on."""
+    nodes = np.asarray(field.nodes)
+    mesh = Triangulation(nodes[:, 0], nodes[:, 1], np.asarray(field.triangles))
+    filled = axes.tricontourf(
+        mesh,
+        np.asarray(field.sed) * 1e3,
+        levels=levels,
+        cmap=COLOURS,
+        extend="max",
+    )
+    filled.set_edgecolor("face")  # else hairlines of the page show between the levels
+    filled.set_linewidth(0.3)
+    for name, outline in field.outlines.items():
+        line = np.asarray(outline)
+        if name == "bone":
+            axes.fill(line[:, 0], line[:, 1], facecolor="#f2f2f2", edgecolor=INK, linewidth=0.4)
+        else:
+            axes.plot(line[:, 0], line[:, 1], color=INK, linewidth=0.8 if name == "skin" else 0.4)
+    patch = np.asarray([*field.patch, field.patch[0]])
+    axes.plot(patch[:, 0], patch[:, 1], color="white", linewidth=2.2)
+    axes.plot(patch[:, 0], patch[:, 1], color=INK, linewidth=1.0)
+    axes.axhline(0.0, color=INK, linewidth=1.0)
+    axes.axhspan(-50.0, 0.0, color=PALE, alpha=0.45, linewidth=0, zorder=0)
+    axes.set_aspect("equal", anchor="N")
+    return filled
+
+
+def _bar(drawn: Sheet, filled: TriContourSet, levels: tuple[float, ...]) -> None:
+    bar = drawn.figure.colorbar(
+        filled,
+        ax=drawn.axes[0],
+        location="bottom",
+        ticks=levels[:: -(-len(levels) // 6)],
+        spacing="proportional",
+        aspect=28,
+        pad=0.02,
+    )
+    bar.set_label("SED [kPa]")
+
+
+def _name_layers(axes: Axes, field: Field) -> None:
+    """Write the layers' names beside the finger's back, each with a line into its layer, and the bone's on it."""
+    if "bone" in field.outlines:
+        x, y = np.asarray(field.outlines["bone"]).mean(axis=0).tolist()
+        axes.text(x, y, "bone", ha="center", va="center", clip_on=True)
+    lines = [
+        np.asarray(field.outlines[name]) for name in ("skin", "epidermis", "dermis", "bone") if name in field.outlines
+    ]
+    if len(lines) < 4 or len({len(line) for line in lines}) > 1:
+        return  # the outlines have no points in common that would lie across the layers
+    for row, (name, outer, inner) in enumerate(zip(("epidermis", "dermis", "fat"), lines[:-1], lines[1:], strict=True)):
+        at = int((0.88 - 0.04 * row) * len(outer))
+        axes.annotate(
+            name,
+            xy=tuple((outer[at] + inner[at]) / 2),
+            xytext=(0.75, 0.95 - 0.1 * row),
+            textcoords="axes fraction",
+            ha="left",
+            va="center",
+            arrowprops={
+                "arrowstyle": "-",
+                "color": INK,
+                "linewidth": 0.4,
+                "shrinkA": 1.0,
+                "shrinkB": 0.0,
+                "relpos": (0.0, 0.5),
+            },
+        )
+
+
+def _middle(field: Field) -> float:
+    touching = [x for (x, _), state in zip(field.contact, field.state, strict=True) if state != "open"]
+    return (min(touching) + max(touching)) / 2 if touching else 0.0
+
+
+def _tractions(drawn: Sheet, field: Field) -> None:
+    """Draw what the surface does to the skin: arrows that end where it acts, and how each part of it moves."""
+    axes = drawn.axes[0]
+    touching = [i for i, state in enumerate(field.state) if state != "open"]
+    if not touching:
+        axes.text(0.5, 0.02, "no contact", transform=axes.transAxes, ha="center", va="bottom")
+        return
+    strongest = max(float(np.hypot(field.pressure[i], field.traction[i])) for i in touching)
+    scale = LONGEST_ARROW / strongest
+    for i in touching[:: max(1, -(-len(touching) // ARROWS))]:
+        x = field.contact[i][0]
+        vector = (scale * field.traction[i], scale * field.pressure[i])
+        text = f"pressure {1e3 * field.pressure[i]:.1f} kPa, traction {1e3 * field.traction[i]:.1f} kPa"
+        axes.quiver(
+            x - vector[0],
+            -0.08 - vector[1],
+            *vector,
+            angles="xy",
+            scale_units="xy",
+            scale=1.0,
+            units="xy",
+            width=0.045,
+            headwidth=4.0,
+            headlength=5.0,
+            headaxislength=4.5,
+            color=INK,
+            gid=drawn.note(text),
+        )
+    _states(axes, field)
+    unit = _nice(strongest)
+    left = _middle(field) - HALF_WIDTH + 0.3
+    axes.plot([left, left], [-2.8, -2.8 + unit * scale], color=INK, linewidth=1.0, solid_capstyle="butt")
+    axes.text(left + 0.2, -2.8 + unit * scale / 2, f"{1e3 * unit:g} kPa", ha="left", va="center", fontsize=7.5)
+
+
+def _states(axes: Axes, field: Field) -> None:
+    """Draw a line under the surface for each stretch that slips or sticks, and name the stretches with room for it."""
+    for state, run in itertools.groupby(range(len(field.state)), key=lambda i: field.state[i]):
+        if state == "open":
+            continue
+        places = [field.contact[i][0] for i in run]
+        level = -LONGEST_ARROW - 0.35
+        axes.plot([places[0], places[-1]], [level, level], color=GREY, linewidth=1.6, linestyle=_STYLE[state])
+        if places[-1] - places[0] > 0.16 * len(_WORDS[state]):
+            axes.text((places[0] + places[-1]) / 2, level - 0.12, _WORDS[state], ha="center", va="top", fontsize=7.5)
+
+
+def _nice(value: float) -> float:
+    """Return the greatest of 1, 2 or 5 times a power of ten that is no greater than value.
+
+    >>> _nice(0.073)
+    0.05
+    """
+    step = 10.0 ** np.floor(np.log10(value))
+    return float(max(m * step for m in (1, 2, 5) if m * step <= value * (1 + 1e-9)))

@@ -1,0 +1,105 @@
+"""Scores of the subjects on each stimulus: every answer, the mean, its 95 % interval."""
+
+# pyright: reportUnknownMemberType=false
+# matplotlib does not type the keyword arguments it passes on.
+
+import numpy as np
+
+from sessions.report import Experiment
+from sessions.report.figures.style import GREY, INK, PALE, Panel, sheet, svg
+
+_LONG, _HIGH = 22.0, 6.0  # of the words along the line and across it [points of either axis]
+_AWAY = 3.0  # that no dot may come nearer [points]
+
+
+def _free_place(experiment: Experiment) -> tuple[float, bool] | None:
+    """Return where on the line of equal score and index its words may begin, and whether above it; None: nowhere.
+
+    That is where dots and bars lie farthest from them.
+    """
+    dots = [
+        (index - 3.0, score)
+        for answers in experiment.answers
+        for index, score in zip(experiment.indices, answers.scores, strict=True)
+        if score is not None
+    ]
+    for mean in experiment.scores:
+        low, high = (mean.mean if end is None else end for end in (mean.low, mean.high))
+        dots += [(mean.index, y) for y in np.linspace(low, high, 9).tolist()]
+    along = np.array([(x + y) / 2.0 for x, y in dots])
+    across = np.array([y - x for x, y in dots])
+
+    def room(start: float, *, above: bool) -> float:
+        beside = np.maximum(np.maximum(start - along, along - start - _LONG), 0.0)
+        low, high = (1.0, 2.0 * _HIGH) if above else (-2.0 * _HIGH, -1.0)  # y - x grows twice as fast as the way across
+        over = np.maximum(np.maximum(low - across, across - high), 0.0) / 2.0
+        return float(np.hypot(beside, over).min(initial=np.inf))
+
+    places = [(start, above) for start in range(2, 70) for above in (True, False)]
+    best = max(places, key=lambda place: room(float(place[0]), above=place[1]))
+    return (float(best[0]), best[1]) if room(float(best[0]), above=best[1]) >= _AWAY else None
+
+
+def score_panel(experiment: Experiment, *, simulated: bool) -> Panel:
+    """Return mean score against index, with 95 % t intervals and every subject's answer beside them."""
+    drawn = sheet(328, 280)
+    (axes,) = drawn.axes
+    axes.plot([0, 100], [0, 100], color=PALE, linewidth=0.8, zorder=0)
+    place = _free_place(experiment)
+    if place is not None:
+        start, above = place
+        off = 1.5 if above else -1.5
+        axes.text(
+            start - off,
+            start + off,
+            "score = index",
+            color=GREY,
+            rotation=45,
+            rotation_mode="anchor",
+            transform_rotates_text=True,
+            va="bottom" if above else "top",
+            fontsize=7.5,
+        )
+    for answers in experiment.answers:
+        places = [
+            index - 3.0 for index, score in zip(experiment.indices, answers.scores, strict=True) if score is not None
+        ]
+        given = [score for score in answers.scores if score is not None]
+        axes.plot(places, given, "o", markersize=2, color=GREY, alpha=0.55, markeredgewidth=0)
+    for mean in experiment.scores:
+        text = f"index {mean.index}: mean {mean.mean:.1f}, {mean.n} subjects"
+        if mean.low is not None and mean.high is not None:
+            text += f", 95 % interval {mean.low:.1f} to {mean.high:.1f}"
+            axes.errorbar(
+                mean.index,
+                mean.mean,
+                yerr=[[mean.mean - mean.low], [mean.high - mean.mean]],
+                color=INK,
+                linewidth=1.1,
+                capsize=3,
+                capthick=0.8,
+            )
+        axes.plot(mean.index, mean.mean, "o", markersize=5, color=INK, gid=drawn.note(text))
+    axes.set_xlim(-9, 106)
+    axes.set_ylim(min([-4.0, *(m.low - 2 for m in experiment.scores if m.low is not None)]), 109)
+    axes.set_xticks(list(experiment.indices))
+    axes.set_yticks([0, 20, 40, 60, 80, 100])
+    axes.set_title(experiment.name)
+    axes.set_xlabel(f"index of {experiment.descriptor} [–]")
+    axes.set_ylabel(f"score of {experiment.descriptor} [0–100]")
+    name, title = f"scores-{experiment.name}", f"Scores of {experiment.descriptor} against the stimuli's index"
+    header = ("index", "subjects", "mean score", "standard deviation", "95 % interval low", "95 % interval high")
+    header += tuple(f"score of {answers.subject}" for answers in experiment.answers)
+    rows = tuple(
+        (
+            m.index,
+            m.n,
+            m.mean,
+            m.sd,
+            m.low,
+            m.high,
+            *(a.scores[experiment.indices.index(m.index)] for a in experiment.answers),
+        )
+        for m in experiment.scores
+    )
+    return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, rows)

@@ -1,0 +1,111 @@
+"""Friction and speed in the course of the strokes, with their steady windows."""
+
+# pyright: reportUnknownMemberType=false
+# matplotlib does not type the keyword arguments it passes on.
+
+import math
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+
+from sessions.report import StrokeFinding, Trace
+from sessions.report.figures.labels import Label, label_right
+from sessions.report.figures.style import GREY, PURPLE, Panel, Sheet, shades, sheet, svg
+
+MOST_LABELLED = 12  # more curves in one picture cannot be told apart by labels
+
+
+def friction_panel(strokes: Sequence[StrokeFinding], name: str, *, simulated: bool) -> Panel | None:
+    """Return mu(t) of the strokes of one experiment from contact onset on; None where nothing can be drawn."""
+    curves = [(stroke, stroke.trace, stroke.trace.mu) for stroke in strokes if stroke.trace is not None]
+    drawn = sheet(328, 290)
+    title = f"mu against time, {name or 'all strokes'}"
+    levels = {stroke.number: stroke.mu_dynamic for stroke in strokes}
+    drawn.axes[0].set_title(name)
+    drawn.axes[0].set_ylabel("µ = T / N [–]")
+    rows = _draw(drawn, curves, levels, PURPLE, "µ")
+    if not rows:
+        return None
+    name = f"friction-{name}" if name else "friction"
+    header = ("stroke", "index", "time since contact [s]", "mu [-]", "in steady window")
+    return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, rows)
+
+
+def speed_panel(strokes: Sequence[StrokeFinding], name: str, *, simulated: bool) -> Panel | None:
+    """Return the speed of the centre of pressure likewise; strokes whose speed was refused are left out."""
+    curves = [
+        (stroke, stroke.trace, stroke.trace.speed)
+        for stroke in strokes
+        if stroke.trace is not None and stroke.speed is not None
+    ]
+    drawn = sheet(328, 290)
+    title = f"speed against time, {name or 'all strokes'}"
+    levels = {stroke.number: stroke.speed for stroke in strokes}
+    drawn.axes[0].set_title(name)
+    drawn.axes[0].set_ylabel("speed of the centre of pressure [mm/s]")
+    rows = _draw(drawn, curves, levels, GREY, "speed")
+    if not rows:
+        return None
+    fastest = max(stroke.speed for stroke, _, _ in curves if stroke.speed is not None)
+    low, high = drawn.axes[0].get_ylim()
+    drawn.axes[0].set_ylim(max(low, -0.3 * fastest), min(high, 2.0 * fastest))
+    name = f"speed-{name}" if name else "speed"
+    header = ("stroke", "index", "time since contact [s]", "speed [mm/s]", "in steady window")
+    return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, rows)
+
+
+Row = tuple[int, int | None, float, float, int]
+
+
+def _draw(
+    drawn: Sheet,
+    curves: Sequence[tuple[StrokeFinding, Trace, Sequence[float | None]]],
+    levels: dict[int, float | None],
+    colour: str,
+    what: str,
+) -> tuple[Row, ...]:
+    """Draw curves thin, thick in their steady windows, labelled at their steady level; return what was drawn."""
+    (axes,) = drawn.axes
+    ordered = sorted(curves, key=lambda c: (c[0].index is None, c[0].index or 0, c[0].number))
+    rows: list[Row] = []
+    labels: list[Label] = []
+    for (stroke, trace, values), shade in zip(ordered, shades(colour, max(len(ordered), 1)), strict=False):
+        inside = [in_window(stroke, t) for t in trace.time]
+        y = [math.nan if v is None else v for v in values]
+        level = levels[stroke.number]
+        text = _name(stroke) + (f", {what} {level:.3g} over the steady window" if level is not None else "")
+        style = "solid" if level is not None else (0, (3, 2))
+        axes.plot(trace.time, y, color=shade, linewidth=0.7, linestyle=style, gid=drawn.note(text))
+        steady = [v if within else math.nan for v, within in zip(y, inside, strict=True)]
+        axes.plot(trace.time, steady, color=shade, linewidth=2.2, solid_capstyle="butt")
+        drawn_values = [
+            (t, v, within) for t, v, within in zip(trace.time, values, inside, strict=True) if v is not None
+        ]
+        rows += [(stroke.number, stroke.index, t, v, int(within)) for t, v, within in drawn_values]
+        if drawn_values:
+            at = [(t, v) for t, v, within in drawn_values if within] or [(t, v) for t, v, _ in drawn_values]
+            labels.append(Label(str(stroke.number if stroke.index is None else stroke.index), *at[-1]))
+    axes.set_xlabel("time since contact onset [s]")
+    axes.set_xlim(0.0, max((t for _, _, t, _, _ in rows), default=1.0))
+    _settle(axes, [v for _, _, _, v, _ in rows])
+    if len(labels) <= MOST_LABELLED:
+        label_right(drawn, axes, labels, "index" if ordered and ordered[0][0].index is not None else "stroke")
+    return tuple(rows)
+
+
+def in_window(stroke: StrokeFinding, time: float) -> bool:
+    """Say whether an instant [s since the trace's zero] lies in the steady window."""
+    if stroke.steady is None or stroke.trace is None:
+        return False
+    return stroke.steady[0] <= stroke.trace.origin + time <= stroke.steady[1]
+
+
+def _settle(axes: Axes, values: Sequence[float]) -> None:
+    """Fix the limits at all that was drawn, from 0 on where nothing lies below."""
+    if values:
+        low, high = min(*values, 0.0), max(values)
+        axes.set_ylim(low - (0.03 * (high - low) if low < 0 else 0.0), high + 0.06 * (high - low))
+
+
+def _name(stroke: StrokeFinding) -> str:
+    return f"stroke {stroke.number}" + (f", index {stroke.index}" if stroke.index is not None else "")

@@ -1,0 +1,162 @@
+"""The report as one self-contained page, and its figures as files with their numbers."""
+
+import base64
+import csv
+import io
+import os
+from collections.abc import Sequence
+from functools import partial
+from itertools import chain
+from pathlib import Path
+
+from markupsafe import Markup
+
+from sessions.report import Report
+from sessions.report import tables as report_tables
+from sessions.report.figures import Panel, Plate, plates
+from sessions.report.prose import question, summary
+from sessions.report.tables import Table
+from sessions.report.templates import template
+
+HEAD = "<!DOCTYPE html>"
+
+
+class ReportError(Exception):
+    """A report that could not be written: where, why, what to do."""
+
+
+def page(report: Report, drawings: Sequence[Plate] | None = None) -> str:
+    """Return the page: no script, nothing asked of any network; the same report gives the same bytes.
+
+    `drawings` are its `plates`, where they were drawn already.
+    """
+    figures = {plate.name: plate for plate in (plates(report) if drawings is None else drawings)}
+    tables = report_tables.tables(report)
+    return template("report.html.jinja").render(
+        report=report,
+        question=question(report),
+        summary=summary(report),
+        figures=figures,
+        drawing=drawn,
+        data_address=partial(data_address, head=report.head if report.simulated else ""),
+        scene_address="" if report.scene is None else text_address(report.scene.text, "application/toml"),
+        numbers=_numbers(figures, tables),
+        contents=_contents(report, figures, tables),
+        tables=tables,
+    )
+
+
+def write_report(report: Report, path: Path, drawings: Sequence[Plate] | None = None) -> None:
+    """Write the page to `path`: a new file, then swapped in, so that readers see the old page or the new one.
+
+    Raises ReportError when that cannot be done, or when `path` holds something that is no page.
+    """
+    leave_others_alone(path)
+    swap_in(path, page(report, drawings))
+
+
+def leave_others_alone(path: Path) -> None:
+    """Raise ReportError where a page would replace something that is none."""
+    if path.exists() and not _is_page(path):
+        raise ReportError(f"{path} holds something that is no report, so it is left alone: choose another file")
+
+
+def write_figures(report: Report, folder: Path, drawings: Sequence[Plate] | None = None) -> tuple[Path, ...]:
+    """Write every picture of the report to `folder` as SVG, each with its numbers as CSV; return the files."""
+    written: list[Path] = []
+    for plate in plates(report) if drawings is None else drawings:
+        for panel in plate.panels:
+            for ending, text in (
+                (".svg", panel.svg),
+                (".csv", panel_csv(panel, report.head if report.simulated else "")),
+            ):
+                path = folder / (_file_name(panel.name) + ending)
+                swap_in(path, text)
+                written.append(path)
+    return tuple(written)
+
+
+def _numbers(figures: dict[str, Plate], tables: dict[str, tuple[Table, ...]]) -> dict[str, int]:
+    """Return the numbers of figures and of tables, each counted from 1 in the order of the page."""
+    order = ("scores", "course", "friction", "speed", "finger", "response", "relation", "paths")
+    numbered = {name: n for n, name in enumerate((name for name in order if name in figures), 1)}
+    return numbered | {table.name: n for n, table in enumerate(chain.from_iterable(tables.values()), 1)}
+
+
+def _contents(
+    report: Report, figures: dict[str, Plate], tables: dict[str, tuple[Table, ...]]
+) -> tuple[tuple[str, str], ...]:
+    """Return anchor and words of the sections that the page has."""
+    parts = (
+        ("who", "who and what", True),
+        ("excluded", "excluded", True),
+        ("scores", "scores", "scores" in figures),
+        ("friction", "forces and friction", "course" in figures or bool(tables["strokes"])),
+        ("predictions", "predicted responses", bool(tables["predictions"])),
+        ("relation", "prediction against score", bool(tables["relation"])),
+        ("paths", "many paths", bool(tables["paths"])),
+        ("planted", "planted against recovered", bool(tables["planted"])),
+        ("model", "the model", bool(report.modelled or report.left_out)),
+        ("again", "to do it again", True),
+    )
+    return tuple((anchor, words) for anchor, words, there in parts if there)
+
+
+def drawn(panel: Panel) -> Markup:
+    """Return the picture as it stands in a page: without the head an SVG file has."""
+    return Markup(panel.svg[panel.svg.index("<svg") :])
+
+
+def data_address(panel: Panel, head: str) -> str:
+    """Return an address that holds the numbers of a picture as CSV, so that a page needs no file beside it."""
+    return text_address(panel_csv(panel, head))
+
+
+def text_address(text: str, kind: str = "text/csv") -> str:
+    """Return an address that holds a text file, a CSV file unless another media type is given."""
+    return f"data:{kind};charset=utf-8;base64," + base64.b64encode(text.encode()).decode()
+
+
+def panel_csv(panel: Panel, head: str) -> str:
+    """Return the numbers of a picture, empty where there is none; `head` is told first where something is simulated."""
+    out = io.StringIO()
+    if head:
+        out.write(f"# {head}\n")
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(panel.header)
+    writer.writerows(["" if value is None else value for value in row] for row in panel.rows)
+    return out.getvalue()
+
+
+def _file_name(name: str) -> str:
+    """Return a name any file system takes."""
+    return "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "-" for c in name)
+
+
+def _is_page(path: Path) -> bool:
+    """Say whether a file begins as our pages do; an empty one may be replaced as well."""
+    try:
+        with path.open("rb") as file:
+            start = file.read(len(HEAD))
+    except OSError as error:
+        raise ReportError(f"{path} cannot be read ({error.strerror}): choose another file") from error
+    return start in (b"", HEAD.encode())
+
+
+def swap_in(path: Path, text: str) -> None:
+    """Write a file beside its place, then put it there in one step."""
+    beside = path.with_name(f".{path.name}.{os.getpid()}.new")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            with beside.open("w", encoding="utf-8", newline="\n") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            beside.replace(path)
+        finally:
+            beside.unlink(missing_ok=True)
+    except OSError as error:
+        raise ReportError(
+            f"{path} cannot be written ({error.strerror}): choose a folder you may write to, with room on its disk"
+        ) from error

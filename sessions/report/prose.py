@@ -1,0 +1,122 @@
+"""What a report says in sentences: its question and, in short, its answer."""
+
+from sessions.prediction.variants import Variant
+from sessions.report import Experiment, Report
+from sessions.report.tables.multiverse import paths_sentence
+from sessions.report.wording import correlation, digits, plural, spread_share
+from sessions.statistics.scores import Relation, relation
+
+
+def question(report: Report) -> str:
+    """Return what the session asks, as far as what it holds can answer it."""
+    judged = " and ".join(e.descriptor for e in report.experiments)
+    if not report.experiments:
+        return "What forces does this recording hold, where does something stroke the surface, and with what friction?"
+    if not report.predictions:
+        return f"How do people scale {judged}, and with what friction do fingers stroke the same surfaces?"
+    return (
+        f"People scale the {judged} of surfaces they stroke. Does the strain-energy density that a finger model "
+        "predicts at a receptor, from nothing but the friction of one finger on the same surfaces, follow their scores?"
+    )
+
+
+def summary(report: Report) -> tuple[str, ...]:
+    """Return the findings in short, a sentence each."""
+    sentences: list[str] = []
+    subjects = {answers.subject for e in report.experiments for answers in e.answers}
+    if subjects:
+        stimuli = sum(len(e.scores) for e in report.experiments)
+        sentences.append(
+            f"{_capital(plural(len(subjects), 'subject'))} scored {_plural(stimuli, 'stimulus', 'stimuli')}."
+        )
+    if report.course is not None or report.strokes:
+        sentences.append(_strokes(report))
+    for experiment in report.experiments:
+        seds = [p.sed for p in report.predictions if p.experiment == experiment.name and p.sed is not None]
+        if seds:
+            sentences.append(_predicted(experiment, min(seds), max(seds), report.model.split(",")[0]))
+        if experiment.paths:
+            sentences.append(paths_sentence(experiment.name, experiment.paths))
+    if any(p.sed is not None for p in report.predictions):
+        sentences.append(_otherwise(report))
+    missing = sum(p.sed is None for p in report.predictions)
+    if missing:
+        sentences.append(f"{_capital(plural(missing, 'trial'))} got no prediction; the tables say why.")
+    return tuple(sentences)
+
+
+def _strokes(report: Report) -> str:
+    """Return how many strokes were found and how many gave friction."""
+    n = len(report.strokes)
+    if n == 0:
+        return "No stroke was found in the recording; the flaws below say why."
+    measured = sum(s.mu_dynamic is not None for s in report.strokes)
+    words = f"{_capital(plural(n, 'stroke'))} {'was' if n == 1 else 'were'} found; {measured} gave a dynamic friction"
+    values = [s.mu_dynamic for s in report.strokes if s.mu_dynamic is not None]
+    if len(values) < 2:
+        return words + (f", µ = {digits(values[0], 2)}." if values else ".")
+    return words + f", from µ = {digits(min(values), 2)} to {digits(max(values), 2)}."
+
+
+def _predicted(experiment: Experiment, low: float, high: float, strain: str) -> str:
+    """Return how prediction and score go together in one experiment."""
+    words = f"{_capital(experiment.name)}: the SED predicted{f' at {strain}' if strain else ''}"
+    if high > low:
+        words += f" runs from {digits(1e3 * low, 2)} to {digits(1e3 * high, 2)} kPa"
+        words += f" (a range of {spread_share(low, high)})"
+    else:
+        words += f" is {digits(1e3 * low, 2)} kPa"
+    return words + related_words(experiment.score_relation) + "."
+
+
+def _otherwise(report: Report) -> str:
+    """Return what the other strain says of the same scores, or that it was not asked."""
+    other = "finite" if report.model.startswith("small") else "small"
+    told: list[str] = []
+    for experiment in report.experiments:
+        means = {mean.index: mean.mean for mean in experiment.scores}
+        points = [
+            (p.index, means[p.index], one.sed)
+            for p in report.predictions
+            for one in p.alternatives
+            if p.experiment == experiment.name and p.index in means and one.sed is not None
+            and one.variant == Variant(other, "computed", "depth")
+        ]  # fmt: skip
+        asked = any(
+            one.variant.kinematics == other
+            for p in report.predictions
+            if p.experiment == experiment.name
+            for one in p.alternatives
+        )
+        if asked:
+            seds, scores = [point[2] for point in points], [point[1] for point in points]
+            found = relation(seds, scores, [point[0] for point in points])
+            r = found.reason if found.pearson is None else f"r = {correlation(found.pearson)}{_ends(found)}"
+            told.append(f"{experiment.name} {r}, n = {found.n} {'stimulus' if found.n == 1 else 'stimuli'}")
+    if told:
+        return f"At {other} strain the SED goes with the mean scores thus: {'; '.join(told)}."
+    return f"At {other} strain, which was not tried here, the sign of r may be another."
+
+
+def related_words(related: Relation | None) -> str:
+    """Return r with its interval and n as the end of a sentence, or why there is none."""
+    if related is None:
+        return "; there are no scores to hold it against"
+    if related.pearson is None:
+        return f"; no correlation with the scores: {related.reason}"
+    words = f"; against the mean scores r = {correlation(related.pearson)}{_ends(related)}"
+    return words + f", n = {related.n} stimuli"
+
+
+def _ends(related: Relation) -> str:
+    if related.low is None or related.high is None:
+        return ""
+    return f", 95 % interval {correlation(related.low)} to {correlation(related.high)}"
+
+
+def _plural(n: int, one: str, many: str) -> str:
+    return f"{n} {one if n == 1 else many}"
+
+
+def _capital(words: str) -> str:
+    return words[:1].upper() + words[1:]

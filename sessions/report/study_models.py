@@ -1,0 +1,141 @@
+"""Tables of a study's page: mixed models, and what was planted beside what was found."""
+
+from collections import defaultdict
+
+from sessions.report.study_cells import between, p_value, study_table
+from sessions.report.tables.cells import Cell, Table
+from sessions.report.wording import NONE, digits, plural, significant
+from sessions.statistics.mixed_model import INTERCEPT, MixedModel
+from sessions.statistics.pooling.findings import LEVELS, NOISE, SED, UNITS, StudyFindings
+
+
+def models_table(study: StudyFindings) -> Table:
+    """Return the mixed models of scores on SED and on index, with how far subjects differ."""
+    models = [
+        (f"{one.descriptor}: score on {what}", model)
+        for one in study.descriptors
+        for what, model in (("SED", one.on_sed), ("index", one.on_index), ("index and µ", one.on_friction))
+    ]
+    groups = [(f"{name}, {_fitted(model)}", _terms(model)) for name, model in models if not isinstance(model, str)]
+    caption = (
+        "Mixed models of the score, fitted by restricted maximum likelihood: level and first slope differ between "
+        "subjects; drift is the slope on the trials before in the block, carry-over that on the index stroked before. "
+        "The first trial of a block counts as if index 50 had been stroked before. "
+        "Exploratory: p is not corrected, for terms, models or descriptors. "
+        "The level is that at the mean of SED or index. t intervals, for other people on these surfaces. "
+        "Standard deviations of the subjects' own levels and slopes, and of single scores about them: by least "
+        "squares, the error of each subject's own line taken away; intervals by modified large sample (Ting et al. "
+        "1990), of single scores by chi squared. A singular fit "
+        "finds that subjects differ in fewer ways than it allows."
+    )
+    return study_table("table-models", caption, ("term", "unit", "estimate", "95 % interval", "p"), groups)
+
+
+def missing_models(study: StudyFindings) -> list[str]:
+    """Return why there is no correlation of means, and no mixed model: a sentence for each reason."""
+    told: defaultdict[str, list[str]] = defaultdict(list)
+    for one in study.descriptors:
+        for what, model in (("SED", one.on_sed), ("index", one.on_index), ("index and µ", one.on_friction)):
+            if isinstance(model, str):
+                told[model].append(f"{one.descriptor} on {what}")
+    related = [(one.descriptor, one.mean_relation) for one in study.descriptors]
+    return [
+        *(
+            f"No correlation of means on {name}: {r.reason}."
+            for name, r in related
+            if r is not None and r.pearson is None
+        ),
+        *(f"No mixed model of {', '.join(names)}: {why}." for why, names in told.items()),
+    ]
+
+
+def missing_scores(study: StudyFindings) -> list[str]:
+    """Return why there is no agreement, and no difference of surfaces: a sentence for each reason."""
+    told: list[str] = []
+    for one in study.descriptors:
+        whole = sum(None not in answers for answers in one.answers.values())
+        have = f"{one.descriptor} has {plural(whole, 'such subject')} and {plural(len(one.indices), 'surface')}"
+        if not one.scores:
+            continue
+        if one.agreement is None:
+            told.append(
+                f"No agreement on the order: it takes two subjects who scored each of three surfaces or more, not all "
+                f"alike; {have}."
+            )
+        if not one.within:
+            told.append(
+                f"No intervals within subjects: they take two subjects who scored each of two surfaces; {have}."
+            )
+        if not one.differences:
+            told.append(
+                f"No differences of surfaces of {one.descriptor}: they take three subjects who scored both, "
+                "not all with the same difference."
+            )
+    return told
+
+
+def _fitted(model: MixedModel) -> str:
+    singular = ", singular fit" if model.singular else ""
+    return f"{model.n} scores of {plural(model.subjects, 'subject')}{singular}"
+
+
+def _terms(model: MixedModel) -> tuple[tuple[Cell, ...], ...]:
+    first = model.terms[1].name
+    middle = f"{digits(model.middle, 3)} kPa" if first == SED else f"index {digits(50 + model.middle, 1)}"
+
+    def row(name: str, unit: str, estimate: float, low: float, high: float, p: float | None) -> tuple[Cell, ...]:
+        told = NONE if p is None else p_value(p)
+        return Cell(name), Cell(unit), Cell(significant(estimate, 3)), Cell(between(low, high)), Cell(told)
+
+    rows = [
+        row(
+            f"level at {middle}" if t.name == INTERCEPT else t.name,
+            UNITS.get(t.name, "points"),
+            t.estimate,
+            t.low,
+            t.high,
+            t.p,
+        )
+        for t in model.terms
+    ]
+    if model.spreads is not None:
+        told = (
+            (LEVELS, "points", model.spreads.level),
+            ("spread of subjects' slopes", UNITS[first], model.spreads.slope),
+            (NOISE, "points", model.spreads.left),
+        )
+        rows += [row(name, unit, s.sd, s.low, s.high, None) for name, unit, s in told if s is not None]
+    return tuple(rows)
+
+
+def planted_table(study: StudyFindings) -> Table:
+    """Return what was planted in a simulated study beside what was found."""
+    rows = tuple(
+        (
+            Cell(one.descriptor),
+            Cell(one.effect),
+            Cell(UNITS[one.effect]),
+            Cell(significant(one.planted, 3)),
+            Cell(significant(one.found, 3)),
+            Cell(between(one.low, one.high)),
+            Cell("yes" if one.covered else "no"),
+        )
+        for one in study.effects
+    )
+    columns = ("descriptor", "effect", "unit", "planted", "found", "95 % interval", "inside")
+    caption = (
+        "What was planted and what was found. Slopes of the score, spreads of levels and slopes, and noise, which are "
+        "standard deviations: by the mixed model on index and µ, both of which the simulated people judged by. "
+        "They know no model of a finger: the planted r, and the planted slope on SED, are those of 2000 more such "
+        "people, each with a finger of its own, on the same surfaces, with the SEDs that the model gives at their "
+        "friction (the noise of judgement is added by its variance). Every interval is for other people on these "
+        "surfaces; one in twenty misses."
+    )
+    return study_table("table-planted", caption, columns, [("", rows)])
+
+
+def flaws_table(study: StudyFindings) -> Table:
+    """Return what was spoilt in a simulated study, and whether it was found."""
+    rows = tuple((Cell(one.session), Cell(one.expected), Cell("yes" if one.found else "no")) for one in study.flaws)
+    caption = "What was spoilt in the simulated sessions, and whether the analysis, which does not know of it, says so."
+    return study_table("table-planted-flaws", caption, ("session", "planted", "found"), [("", rows)])

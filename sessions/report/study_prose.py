@@ -1,0 +1,274 @@
+"""What a study's page says in sentences and facts: its answer in short, who, what was excluded, what made it."""
+
+import re
+import shlex
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+
+from sessions.recording.provenance import software_versions
+from sessions.report import Fact
+from sessions.report.commands import area_words, calibration_words, model_words
+from sessions.report.predictions import UNKNOWNS
+from sessions.report.tables.multiverse import paths_sentence
+from sessions.report.wording import correlation, digits, plural, significant
+from sessions.statistics.pooling.exclusions import Exclusion
+from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
+
+_FEW = 12  # trials named one by one
+
+
+def summary(study: StudyFindings) -> list[str]:
+    """Return the findings in short, a sentence each."""
+    subjects = {visit.subject for visit in study.visits}
+    read = "was" if len(study.visits) == 1 else "were"
+    said = [f"{plural(len(study.visits), 'session')} of {plural(len(subjects), 'subject')} {read} read."]
+    strain = study.options.prediction.kinematics
+    for one in study.descriptors:
+        said += _related(one, strain)
+        said += [paths_sentence(one.descriptor, one.paths)] if one.paths else []
+    if study.friction is not None:
+        f = study.friction
+        said.append(
+            f"Of {f.strokes} strokes the planted µ came back with a median error of "
+            f"{digits(100 * f.median_error, 2)} %, {digits(100 * f.worst_error, 2)} % at worst; "
+            f"{f.covered} of {f.intervals} intervals of µ hold it, and those of one subject hold or miss together, for "
+            "the error of a transducer's calibration is one for all its strokes."
+        )
+    return said
+
+
+def _related(one: DescriptorFindings, strain: str) -> list[str]:
+    name = one.descriptor[:1].upper() + one.descriptor[1:]
+    other = "finite" if strain == "small" else "small"
+    if one.repeated is None:
+        return [f"{name}: {_unrelated(one)}"]
+    r = one.repeated
+    interval = f"no interval from {plural(r.subjects, 'subject')} with two trials or more"
+    if r.people is not None:
+        low, high = r.people
+        interval = f"95 % interval for other people on these surfaces {correlation(low)} to {correlation(high)}"
+    return [
+        f"{name}: within subjects, score and the SED predicted at {strain} strain go together by "
+        f"r = {correlation(r.r)}, {interval}; {_otherwise(one, other)}."
+    ]
+
+
+def _unrelated(one: DescriptorFindings) -> str:
+    """Say why there is no correlation within subjects."""
+    trials = Counter(subject for subject, *_ in one.points)
+    if sum(trials.values()) - len(trials) - 1 < 2:
+        return "too few subjects with scores and strokes of their own for a correlation within subjects."
+    return "no correlation within subjects, in none of whom score and SED both vary."
+
+
+def _otherwise(one: DescriptorFindings, other: str) -> str:
+    """Return what the same trials give at the other strain, as far as the many paths went there."""
+    usual = next((found.path for found in one.paths if found.usual), None)
+    there = None if usual is None else replace(usual, kinematics=other)
+    tried = next((found for found in one.paths if found.path == there), None)
+    if tried is None:
+        return f"at {other} strain, which was not tried here, the sign may be another"
+    trials = plural(tried.trials, "trial")
+    if tried.within is None or tried.low is None or tried.high is None:
+        return f"at {other} strain {trials} of {len(one.points)} had an SED, too few for a correlation"
+    interval = f"{correlation(tried.low)} to {correlation(tried.high)}"
+    return f"at {other} strain r = {correlation(tried.within)} ({interval}) of the {trials} that have an SED there"
+
+
+def who(study: StudyFindings) -> list[Fact]:
+    """Return who took part."""
+    subjects = sorted({visit.subject for visit in study.visits})
+    stroked = sorted({visit.subject for visit in study.visits if visit.forces})
+    protocols = sorted({visit.protocol for visit in study.visits})
+    return [
+        Fact("subjects", f"{len(subjects)}: {', '.join(subjects)}"),
+        Fact("of them with forces", f"{len(stroked)}: {', '.join(stroked)}" if stroked else "none"),
+        Fact("protocol", ", ".join(protocols)),
+    ]
+
+
+def excluded(study: StudyFindings) -> list[str]:
+    """Return a sentence for all that was kept out of the results, by whom and why."""
+    said = [f"Session {folder} could not be read, and nothing of it counts: {why}." for folder, why in study.failed]
+    said += [
+        f"Session {session} holds the same recording as {first} (their SHA-256 agree), and counts nothing."
+        for session, first in study.copies
+    ]
+    said += [
+        f"Subject {one.subject}: {_whats(one)} left out by {one.who}: {_stopped(one.why)}"
+        for one in study.excluded
+        if _fits(study, one)
+    ]
+    said += [
+        f"Session {visit.session}: {_stopped(decision)}"
+        for visit in study.visits
+        for decision in visit.decisions
+        if " is left out: " in decision
+    ]
+    return [*said, *_missing(study)]
+
+
+def remarks(study: StudyFindings) -> list[str]:
+    """Return what is missing though nobody excluded it, what people decided of what counts, and doubts about it."""
+    said = [
+        f"Session {visit.session}: {_stopped(decision)}"
+        for visit in study.visits
+        for decision in visit.decisions
+        if " is left out: " not in decision
+    ]
+    said += [
+        f"Session {visit.session} ended before its last trial; what it holds counts."
+        for visit in study.visits
+        if not visit.complete
+    ]
+    said += [f"Session {visit.session}: {loss}." for visit in study.visits for loss in visit.losses]
+    for visit in study.visits:
+        choices = sum(row.choice is not None for row in visit.rows)
+        if choices:
+            said.append(
+                f"The answers of session {visit.session} are {choices} choices of one of two: they stand in the table "
+                "of trials, no mean or correlation of scores is taken of them, and its strokes count as any other."
+            )
+    for outcome, words in (("not answered", "No score, for the subject did not answer"), ("open", "Not done")):
+        places = [f"{v.session} trial {r.trial}" for v in study.visits for r in v.rows if r.outcome == outcome]
+        said += [f"{words}: {_listed(places)}."] if places else []
+    said += [
+        f"A decision of {one.who} leaves out {_whats(one)} of subject {one.subject} ({one.why}), and no session read "
+        "has such trials; see exclusions.toml."
+        for one in study.excluded
+        if not _fits(study, one)
+    ]
+    said += [
+        f"The {descriptor} scores of {subject} fall as the index rises (r = {correlation(r)}); the scale may have been "
+        "used backwards."
+        for subject, descriptor, r in study.reversed
+    ]
+    return [*said, *_meshes(study)]
+
+
+def _meshes(study: StudyFindings) -> list[str]:
+    """Return what it makes of the SEDs that sessions were not all solved on one mesh; nothing where they were."""
+    solved: defaultdict[str, list[str]] = defaultdict(list)
+    for visit in study.visits:
+        for name, value, _ in visit.model:
+            if name == UNKNOWNS:
+                solved[value].append(visit.session)
+    errors = [row.error_estimate for visit in study.visits for row in visit.rows if row.error_estimate is not None]
+    if len(solved) < 2 or not errors:
+        return []
+    meshes = "; ".join(f"{value}: {_listed(sessions)}" for value, sessions in solved.items())
+    said = (
+        f"The sessions were solved on meshes of {len(solved)} finenesses ({meshes}), each as fine as telling its own "
+        "trials apart asks for. Within a subject all trials share one mesh; between subjects an SED may differ for its "
+        f"mesh alone by as much as its estimated error, {_range_of(errors)} of it."
+    )
+    spreads = [
+        s.sed.sd / s.sed.mean for one in study.descriptors for s in one.surfaces if s.sed is not None and s.sed.sd
+    ]
+    if spreads:
+        said += (
+            f" Standard deviations between subjects are {_range_of(spreads)} of the SED of a surface: where they are "
+            "no larger than that error, part of them may be the mesh."
+        )
+    return [said]
+
+
+def _range_of(shares: Sequence[float]) -> str:
+    return f"{significant(100 * min(shares), 2)} to {significant(100 * max(shares), 2)} %"
+
+
+def _whats(one: Exclusion) -> str:
+    return f"trials on {one.descriptor}" if one.descriptor else "every trial"
+
+
+def _fits(study: StudyFindings, one: Exclusion) -> bool:
+    """Say whether some session has a trial that a decision leaves out."""
+    return any(v.subject == one.subject and one.descriptor in ("", r.descriptor) for v in study.visits for r in v.rows)
+
+
+def _stopped(sentence: str) -> str:
+    return sentence if sentence.endswith(".") else f"{sentence}."
+
+
+def _missing(study: StudyFindings) -> list[str]:
+    """Return which trials that were done have no SED, and why, those that differ in numbers alone together."""
+    said: list[str] = []
+    alike: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
+    for visit in study.visits:
+        for row in visit.rows if visit.forces else ():
+            if row.sed is None and row.why and row.outcome != "open":
+                alike[re.sub(r"[\d.]+", "#", row.why)].append((f"{visit.session} trial {row.trial}", row.why))
+    for places in alike.values():
+        first = "" if len({told for _, told in places}) == 1 else "of the first: "
+        named = _listed([place for place, _ in places])
+        why = f"{first}{_stopped(places[0][1])}"
+        said.append(f"The model gives no SED for {plural(len(places), 'trial')} ({named}): {why}")
+    return said
+
+
+def _listed(places: Sequence[str]) -> str:
+    return ", ".join(places[:_FEW]) + (f" and {len(places) - _FEW} more" if len(places) > _FEW else "")
+
+
+def sealed(study: StudyFindings) -> str:
+    """Return whether predictions were sealed before scores."""
+    told = [(visit.session, visit.sealed) for visit in study.visits if visit.sealed]
+    if not told:
+        return ""
+    alike: defaultdict[str, list[str]] = defaultdict(list)
+    for session, sentence in told:
+        alike[sentence].append(session)
+    if len(alike) == 1:
+        return f"In {'each' if len(told) > 1 else 'the one'} of {plural(len(told), 'session')}: {told[0][1]}"
+    return " ".join(f"{', '.join(sessions)}: {sentence}" for sentence, sessions in alike.items())
+
+
+def modelled(study: StudyFindings) -> list[Fact]:
+    """Return what was modelled; where sessions differ, each of the first few that do."""
+    told: defaultdict[str, dict[tuple[str, str], list[str]]] = defaultdict(dict)
+    for visit in study.visits:
+        for name, value, remark in visit.model:
+            told[name].setdefault((value, remark), []).append(visit.session)
+    facts: list[Fact] = []
+    for name, values in told.items():
+        for (value, remark), sessions in list(values.items())[:_FEW]:
+            whose = "" if len(values) == 1 else f"in {_listed(sessions)}"
+            facts.append(Fact(name, value, "; ".join(part for part in (remark, whose) if part)))
+    return facts
+
+
+def versions() -> list[Fact]:
+    """Return the versions that made the page."""
+    return [Fact(name, version) for name, version in software_versions().items()]
+
+
+def again(study: StudyFindings) -> list[Fact]:
+    """Return what the numbers were made with: options, versions, and the hash of each recording."""
+    model = study.options.prediction
+    facts = [
+        Fact("strain of the model", model.kinematics),
+        Fact("τ max", model.tau_reading),
+        Fact("contact area", study.options.area.sentence),
+        Fact("many paths", study.options.paths),
+    ]
+    made: defaultdict[str, list[str]] = defaultdict(list)
+    for visit in study.visits:
+        made[", ".join(f"{name} {version}" for name, version in visit.made_by.items())].append(visit.session)
+    facts += [Fact("computed with", text, f"{plural(len(sessions), 'session')}") for text, sessions in made.items()]
+    facts += [Fact(visit.session, f"SHA-256 {visit.sha256}", "session.sqlite") for visit in study.visits]
+    return [fact for fact in facts if fact.value]
+
+
+def command(study: StudyFindings, name: str) -> str:
+    """Return what to type to get the same numbers, where the study's folder lies or is to be made."""
+    options = study.options
+    model = options.prediction
+    usual = model.kinematics == "small"  # see 'daq-app study --intervals'
+    words = ["daq-app", "study", shlex.quote(name)]
+    if study.synthetic is not None:
+        words = ["daq-app", "study", "--synthetic", str(study.synthetic), "--out", shlex.quote(name)]
+    words += [*model_words(model), *area_words(options.area), *calibration_words(options.gain_error)]
+    words += [] if model.intervals == usual else ["--intervals" if model.intervals else "--no-intervals"]
+    words += {"none": [], "small": ["--paths"], "finite": ["--paths", "finite"]}[options.paths]
+    return " ".join(words)

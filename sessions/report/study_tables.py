@@ -1,0 +1,393 @@
+"""Tables of a study's page."""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+
+from sessions.exchange.study_trials import trials_table
+from sessions.report.study_cells import between, correlations, interval, model_in_short, p_value, study_table
+from sessions.report.study_models import flaws_table, models_table, planted_table
+from sessions.report.tables.cells import Cell, Column, Notes, Table
+from sessions.report.tables.multiverse import paths_table
+from sessions.report.tables.scores import spread_cell
+from sessions.report.wording import NONE, correlation, digits, significant
+from sessions.statistics.pooling.averages import Average
+from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
+from sessions.statistics.pooling.visit import Visit
+from sessions.statistics.scores import MeanScore, Relation
+from sessions.statistics.within_subjects import RepeatedCorrelation
+
+POINTS = "0–100"  # unit of scores
+
+
+def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
+    """Return the tables a study has numbers for, by section."""
+    sections = {
+        "visits": (_visits(study),),
+        "scores": (_scores(study), _normalised(study), _differences(study), _agreement(study), _estimates(study)),
+        "surfaces": (_surfaces(study), _forces(study)),
+        "relation": (_relation(study), models_table(study)),
+        "paths": (paths_table((one.descriptor, one.paths) for one in study.descriptors),),
+        "planted": (planted_table(study), flaws_table(study)),
+        "trials": (trials_table(study),),
+    }
+    return {
+        name: tuple(table for table in made if table is not None and table.groups) for name, made in sections.items()
+    }
+
+
+def _visits(study: StudyFindings) -> Table:
+    rows = tuple(_visit_row(visit, study) for visit in study.visits)
+    columns = ("session", "subject", "answers", "strokes with SED", "ended as planned", "flawed trials", "counted")
+    caption = "Visits in the order of their names; flawed: doubtful or worse, the table of trials names each flaw."
+    return study_table("table-visits", caption, columns, [("", rows)])
+
+
+def _visit_row(visit: Visit, study: StudyFindings) -> tuple[Cell, ...]:
+    out = ["nothing"] if visit.session in dict(study.copies) else []
+    out += [e.descriptor or "nothing" for e in study.excluded if e.subject == visit.subject]
+    counted = "yes" if not out else ("no" if "nothing" in out else f"without {', '.join(out)}")
+    return (
+        Cell(visit.session),
+        Cell(visit.subject),
+        Cell(f"{sum(row.score is not None for row in visit.rows)} of {len(visit.rows)}"),
+        Cell(str(sum(row.sed is not None for row in visit.rows)) if visit.forces else NONE),
+        Cell("yes" if visit.complete else "no"),
+        Cell(str(sum(bool(row.flaws) for row in visit.rows))),
+        Cell(counted),
+    )
+
+
+def _scores(study: StudyFindings) -> Table:
+    notes = Notes()
+
+    def rows(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
+        within = {mean.index: mean for mean in one.within}
+        for mean in one.scores:
+            inner = within.get(mean.index)
+            yield (
+                Cell(str(mean.index)),
+                Cell(str(mean.n)),
+                Cell(digits(mean.mean, 1)),
+                _of_scores(mean, notes),
+                interval(None, None, 1) if inner is None else interval(inner.low, inner.high, 1),
+                spread_cell(mean.sd, mean.n, lambda v: digits(v, 1), mean.reason, notes),
+            )
+
+    columns = (
+        Column("index"),
+        Column("subjects"),
+        Column("mean score", POINTS),
+        Column("95 % interval of the mean", POINTS),
+        Column("within subjects", POINTS),
+        Column("standard deviation", POINTS),
+    )
+    complete = ", ".join(f"{one.within[0].n} for {one.descriptor}" for one in study.descriptors if one.within)
+    caption = (
+        "Scores: t interval of the mean over subjects; and interval within subjects (Cousineau 2005, Morey 2008), for "
+        f"comparing surfaces with one another, of the subjects who scored every surface ({complete or 'none'}). Under "
+        "the standard deviation: its 95 % interval by chi squared."
+    )
+    groups = _by_descriptor(study, rows)
+    return study_table("table-scores", caption, columns, groups, notes)
+
+
+def _of_scores(mean: MeanScore, notes: Notes) -> Cell:
+    """Return the t interval of a mean score; where that leaves the scale, with what cannot."""
+    told = interval(mean.low, mean.high, 1)
+    if mean.bootstrap is None:
+        return told
+    low, high = (digits(end, 1) for end in mean.bootstrap)
+    where = f"{mean.descriptor} {mean.index}: the t interval leaves the scale; resampling the subjects {low} to {high}"
+    return Cell(told.text, notes.mark(where))
+
+
+def _agreement(study: StudyFindings) -> Table:
+    rows = tuple(
+        (
+            Cell(one.descriptor),
+            Cell(str(found.n)),
+            Cell(digits(found.kendall_w, 2)),
+            Cell(p_value(found.friedman_p)),
+            Cell(p_value(found.page_p)),
+        )
+        for one in study.descriptors
+        if (found := one.agreement) is not None
+    )
+    columns = ("descriptor", "subjects", "Kendall's W", "Friedman's p", "Page's p")
+    caption = (
+        "Agreement on the order of the surfaces; Friedman: that they differ; Page: that scores rise with the index. "
+        "Exploratory: neither p is corrected, and neither belongs to a family that is."
+    )
+    return study_table("table-agreement", caption, columns, [("", rows)])
+
+
+def _normalised(study: StudyFindings) -> Table:
+    def rows(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
+        raw = {mean.index: mean for mean in one.scores}
+        for index, mean in one.normalised.means.items():
+            given = raw[index]
+            yield (
+                Cell(str(index)),
+                Cell(str(given.n)),
+                Cell(digits(given.mean, 1)),
+                interval(given.low, given.high, 1),
+                Cell(str(mean.n)),
+                Cell(digits(mean.mean, 2)),
+                interval(mean.low, mean.high, 2),
+            )
+
+    columns = (
+        Column("index"),
+        Column("subjects"),
+        Column("as given", POINTS),
+        Column("95 % interval", POINTS),
+        Column("subjects"),
+        Column("standardised", "1"),
+        Column("95 % interval", "1"),
+    )
+    caption = (
+        "Scores as they were given and standardised: each subject's own mean taken away and the rest divided by its "
+        "own standard deviation over the surfaces, which takes away what part of the scale a subject uses; of the "
+        "subjects who scored every surface. t intervals of the mean over subjects."
+    )
+    return study_table("table-normalised", caption, columns, _by_descriptor(study, rows))
+
+
+def _differences(study: StudyFindings) -> Table:
+    def rows(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
+        for pair in one.differences:
+            yield (
+                Cell(f"{pair.high_index} − {pair.low_index}"),
+                Cell(str(pair.n)),
+                Cell(digits(pair.mean, 1)),
+                interval(pair.low, pair.high, 1),
+                Cell(p_value(pair.p)),
+                Cell(p_value(pair.p_holm)),
+            )
+
+    columns = (
+        Column("index"),
+        Column("subjects"),
+        Column("difference of scores", POINTS),
+        Column("95 % interval", POINTS),
+        Column("p"),
+        Column("p, Holm"),
+    )
+    caption = (
+        "How much higher one surface was scored than another, within subjects: mean and t interval of the differences, "
+        "paired t test, and its p corrected for all pairs of the descriptor (Holm 1979), a family of its own for each "
+        "descriptor. Exploratory; the intervals are not corrected."
+    )
+    return study_table("table-differences", caption, columns, _by_descriptor(study, rows))
+
+
+def _estimates(study: StudyFindings) -> Table:
+    notes = Notes()
+
+    def rows(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
+        if one.estimates is None:
+            return
+        for index, given in one.estimates.geometric.items():
+            level = one.estimates.equal_moduli[index]
+            cells = [Cell(str(index)), Cell(str(given.n))]
+            for mean in (given, level):
+                cells.append(Cell(significant(math.exp(mean.mean), 3)))
+                if mean.low is None or mean.high is None:
+                    cells.append(notes.number(None, str, "one subject alone has no interval"))
+                else:
+                    cells.append(Cell(between(math.exp(mean.low), math.exp(mean.high))))
+            yield tuple(cells)
+
+    columns = ("index", "subjects", "geometric mean", "95 % interval", "at one modulus", "95 % interval")
+    out = [f"{name}: {', '.join(s)}" for name, s in _without_logarithm(study)]
+    left = f" Left out for an estimate that is not above 0: {'; '.join(out)}." if out else ""
+    caption = (
+        "Magnitude estimates, each subject on a scale of its own: geometric means over subjects with t intervals of "
+        f"the logarithms, as they were given and with every subject's own modulus taken away (Stevens 1957).{left}"
+    )
+    groups = _by_descriptor(study, rows)
+    return study_table("table-estimates", caption, columns, groups, notes)
+
+
+def _without_logarithm(study: StudyFindings) -> list[tuple[str, tuple[str, ...]]]:
+    return [(o.descriptor, o.estimates.left_out) for o in study.descriptors if o.estimates and o.estimates.left_out]
+
+
+def _surfaces(study: StudyFindings) -> Table:
+    notes = Notes()
+
+    def row(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
+        for s in one.surfaces:
+            kilopascal = None if s.sed is None else _scaled(s.sed, 1e3)
+            yield (
+                Cell(str(s.index)),
+                Cell(str(s.subjects)),
+                *_mean(s.mu, 3, notes),
+                *_mean(kilopascal, 3, notes),
+                _spread(kilopascal, notes),
+            )
+
+    columns = (
+        Column("index"),
+        Column("subjects"),
+        Column("µ", "1"),
+        Column("95 % interval", "1"),
+        Column("SED", "kPa"),
+        Column("95 % interval", "kPa"),
+        Column("standard deviation", "kPa"),
+    )
+    caption = (
+        "Friction that the model got, and predicted SED: means over subjects, each from its own strokes, with t "
+        "intervals; standard deviation of the SED with its interval by chi squared. "
+        f"Model: {model_in_short(study)}."
+    )
+    groups = [(one.descriptor, tuple(row(one))) for one in study.descriptors if any(s.subjects for s in one.surfaces)]
+    return study_table("table-surfaces", caption, columns, groups, notes)
+
+
+def _spread(mean: Average | None, notes: Notes) -> Cell:
+    if mean is None:
+        return notes.number(None, str, "no subject's stroke gives this number")
+    return spread_cell(mean.sd, mean.n, lambda v: significant(v, 2), "one subject alone has no spread", notes)
+
+
+def _forces(study: StudyFindings) -> Table:
+    notes = Notes()
+
+    def row(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
+        for s in one.surfaces:
+            if s.normal_force is not None or s.model_normal_force is not None:
+                numbers = (s.normal_force, s.model_normal_force, s.matching_depth)
+                yield (
+                    Cell(str(s.index)),
+                    Cell(str(s.subjects)),
+                    *(cell for number in numbers for cell in _mean(number, 2, notes)),
+                )
+
+    columns = (
+        Column("index"),
+        Column("subjects"),
+        Column("measured N", "N"),
+        Column("95 % interval", "N"),
+        Column("model N", "N"),
+        Column("95 % interval", "N"),
+        Column("depth to match", "mm"),
+        Column("95 % interval", "mm"),
+    )
+    caption = (
+        "Model against measurement: normal force over the steady window, the force of the model pressed to the depth "
+        "of its block (times the finger's width, assumed unless it was measured), and the depth at which the model "
+        "would press as hard as the subject did (on a rough mesh, to some tenths of a per cent). Means over "
+        f"subjects with t intervals, which hold what errs from trial to trial. Model: {model_in_short(study)}."
+    )
+    return study_table(
+        "table-forces", caption, columns, [(one.descriptor, tuple(row(one))) for one in study.descriptors], notes
+    )
+
+
+def _scaled(mean: Average, by: float) -> Average:
+    def times(value: float | None) -> float | None:
+        return None if value is None else by * value
+
+    return Average(mean.n, by * mean.mean, times(mean.sd), times(mean.low), times(mean.high))
+
+
+def _mean(mean: Average | None, decimals: int, notes: Notes) -> tuple[Cell, Cell]:
+    """Return a mean and its interval, or dashes with the reason."""
+    if mean is None:
+        missing = notes.number(None, str, "no subject's stroke gives this number")
+        return missing, missing
+    if mean.low is None or mean.high is None:
+        return Cell(digits(mean.mean, decimals)), notes.number(None, str, "one subject alone has no interval")
+    return Cell(digits(mean.mean, decimals)), interval(mean.low, mean.high, decimals)
+
+
+def _relation(study: StudyFindings) -> Table:
+    notes = Notes()
+
+    def or_why(cell: Cell, why: str | None) -> Cell:
+        return notes.number(None, str, why) if cell.text == NONE else cell
+
+    def means(name: str, related: Relation | None) -> Iterable[tuple[Cell, ...]]:
+        if related is not None and related.pearson is not None:
+            rho = NONE if related.spearman is None else correlation(related.spearman)
+            yield (
+                Cell(name),
+                Cell(f"{related.n} surfaces"),
+                Cell(correlation(related.pearson)),
+                or_why(correlations(related.low, related.high), related.reason),
+                Cell(rho),
+                or_why(correlations(related.spearman_low, related.spearman_high), _no_rank_interval(related)),
+                Cell(NONE if related.spearman_p is None else p_value(related.spearman_p)),
+                Cell(NONE),
+                _without([(f"index {label}", r) for label, r in related.without if r is not None]),
+            )
+
+    def within(
+        name: str, found: RepeatedCorrelation | None, adjusted: float | None, without: Sequence[tuple[str, float]]
+    ) -> Iterable[tuple[Cell, ...]]:
+        if found is not None:
+            yield (
+                Cell(name),
+                Cell(f"{found.dof} d.f."),
+                Cell(correlation(found.r)),
+                correlations(*(found.people or (None, None))),
+                Cell(NONE),
+                Cell(NONE),
+                Cell(NONE if found.people_p is None else p_value(found.people_p)),
+                Cell(NONE if adjusted is None else p_value(adjusted)),
+                _without(without),
+            )
+
+    def rows(one: DescriptorFindings) -> tuple[tuple[Cell, ...], ...]:
+        estimated = None if one.estimates is None else one.estimates.repeated
+        return (
+            *means("means", one.mean_relation),
+            *means("means, standardised", one.normalised.mean_relation),
+            *within("within subjects", one.repeated, one.repeated_holm, one.without_subject),
+            *within("within, standardised", one.normalised.repeated, None, ()),
+            *within("within, log estimates", estimated, None, ()),
+        )
+
+    columns = (
+        "scores",
+        "n",
+        "r",
+        "95 % interval",
+        "rho",
+        "95 % interval of rho",
+        "p",
+        "p, Holm",
+        "r with one left out",
+    )
+    caption = (
+        f"Predicted SED ({model_in_short(study)}) with scores. Means: Pearson's r of means over the subjects who have "
+        "both, interval by Fisher's z; Spearman's rho with an interval likewise (Bonett and Wright 2000) and exact p. "
+        "Within subjects: repeated-measures correlation of each subject's scores with the SEDs of its own strokes "
+        "(Bakdash and Marusich 2017), with an interval and a p for other people who meet these very surfaces "
+        "(jackknife of Fisher's z over subjects, Miller 1974). Of other surfaces only the intervals of means speak. "
+        "Confirmatory are these correlations of scores as given alone, one for each descriptor: they are the family "
+        "of p, Holm (Holm "
+        "1979). Every other p, of means, of standardised scores and of estimates, is exploratory and not corrected; "
+        "nor are the intervals. Last column: least and greatest r when one surface, or one subject, is left out, and "
+        "which."
+    )
+    groups = [(one.descriptor, rows(one)) for one in study.descriptors]
+    return study_table("table-relation", caption, columns, groups, notes)
+
+
+def _no_rank_interval(related: Relation) -> str:
+    return "no interval of a perfect rho" if related.n > 3 else f"no interval of rho from {related.n} points"
+
+
+def _without(left_out: Sequence[tuple[str, float]]) -> Cell:
+    if not left_out:
+        return Cell(NONE)
+    least, greatest = min(left_out, key=lambda one: one[1]), max(left_out, key=lambda one: one[1])
+    return Cell(", ".join(f"{correlation(r)} ({name})" for name, r in (least, greatest)))
+
+
+def _by_descriptor(
+    study: StudyFindings, rows: Callable[[DescriptorFindings], Iterable[tuple[Cell, ...]]]
+) -> list[tuple[str, tuple[tuple[Cell, ...], ...]]]:
+    return [(one.descriptor, tuple(rows(one))) for one in study.descriptors]

@@ -1,0 +1,37 @@
+"""The tables of a report: cells as text, and for every number that is missing the reason."""
+
+from sessions.report import Report
+from sessions.report.tables.cells import Cell, Column, Group, Table
+from sessions.report.tables.multiverse import paths_table
+from sessions.report.tables.predictions import (
+    afferent_table,
+    beside_forces_table,
+    beside_table,
+    direction_table,
+    force_table,
+    prediction_table,
+)
+from sessions.report.tables.scores import answer_tables, relation_table, score_table
+from sessions.report.tables.strokes import course_table, planted_table, stroke_table
+
+__all__ = ["Cell", "Column", "Group", "Table", "tables"]
+
+
+def tables(report: Report) -> dict[str, tuple[Table, ...]]:
+    """Return the tables a report has numbers for, by section, in their order."""
+    sections = {
+        "scores": (score_table(report), *answer_tables(report)),
+        "strokes": (stroke_table(report), course_table(report)),
+        "predictions": (
+            prediction_table(report),
+            force_table(report),
+            direction_table(report),
+            beside_table(report),
+            beside_forces_table(report),
+        ),
+        "afferent": (afferent_table(report),),
+        "relation": (relation_table(report),),
+        "paths": (paths_table((e.name, e.paths) for e in report.experiments),),
+        "planted": (planted_table(report),),
+    }
+    return {name: tuple(table for table in made if table is not None) for name, made in sections.items()}

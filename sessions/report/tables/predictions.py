@@ -1,0 +1,311 @@
+"""Tables of predictions: responses, forces beside measured ones, both directions."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from sessions.prediction.sed_interval import Ends, SedInterval
+from sessions.prediction.variants import Alternative
+from sessions.report import PredictionFinding, Report
+from sessions.report.tables.cells import Cell, Column, Group, Notes, Table, grouped
+from sessions.report.tables.strokes import model_mu
+from sessions.report.wording import direction, places, sed, significant, tau, with_error
+
+
+def prediction_table(report: Report) -> Table | None:
+    """Return what the model was given, and the SED it predicts."""
+    if not report.predictions:
+        return None
+    notes = Notes()
+    columns = (
+        *_who(report),
+        Column("µ", "1"),
+        Column("which µ"),
+        Column("τ max", "kPa"),
+        Column("depth", "mm"),
+        Column("SED", "kPa"),
+        Column("estimated error", "%"),
+        Column("solved in", "s"),
+    )
+    strokes = {stroke.number: stroke for stroke in report.strokes}
+
+    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+        stroke = None if p.stroke is None else strokes.get(p.stroke)
+        held = {} if stroke is None else stroke.bootstrap
+        mu = held.get(model_mu(stroke, p)[0])
+        bound = held.get("tau_max")
+        if bound is not None and p.tau_max is not None and stroke is not None and stroke.tau_max:
+            bound = bound[0] * p.tau_max / stroke.tau_max, bound[1] * p.tau_max / stroke.tau_max  # as it was read
+        missing = p.reasons.get("sed")
+        return (
+            *_named(p),
+            notes.estimate(p.mu, places(3), p.reasons.get("mu") or missing, mu, _SHORT),
+            Cell({"mean over steady window": "mean"}.get(p.mu_rule, p.mu_rule)),
+            notes.estimate(p.tau_max, tau, p.reasons.get("tau_max") or missing, bound, _SHORT, unit=1e3),
+            _depth(p, notes),
+            _stroked_sed(p, notes),
+            notes.number(p.error_estimate, lambda v: significant(100 * v, 2), p.reasons.get("error_estimate")),
+            notes.number(p.wall_s, lambda v: significant(v, 2), p.reasons.get("wall_s")),
+        )
+
+    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
+    caption = (
+        "Predictions: SED averaged over the ending in the settled state (1 kPa = 1 mJ/cm³). Which µ: the mean over the "
+        "steady window, or the maximum; under µ and τ max their bootstrap intervals. Under the SED: the 95 % interval "
+        f"that the uncertainty of friction alone makes of it, {_HOW}; the model's own error is not in it. ± and "
+        "estimated error: of one SED, from the mesh; differences between stimuli, which share the mesh, are more "
+        f"accurate. Model: {report.model}."
+    )
+    return Table("table-predictions", caption, columns, groups, notes.listed())
+
+
+_HOW = "by derivatives (the solver's converged tangent), or where marked * by solving draws"
+_SHORT = "the stroke has too few readings"
+
+
+def _stroked_sed(p: PredictionFinding, notes: Notes) -> Cell:
+    interval = p.sed_interval
+    why = p.reasons.get("sed_interval")
+    star = p.interval_by == "sampling"
+    return _sed(notes, p.sed, p.error_estimate, p.reasons.get("sed"), interval, why, star=star)
+
+
+def _sed(
+    notes: Notes,
+    value: float | None,
+    error: float | None,
+    reason: str | None,
+    ends: Ends | None,
+    without: str | None,
+    *,
+    star: bool,
+) -> Cell:
+    """Return an SED in kPa, ± its relative error from the mesh, over the interval that friction makes."""
+    return notes.estimate(value, _with(error, 3, 1e3), reason, ends, without, told=sed, unit=1e3, star=star)
+
+
+def _with(error: float | None, least: int, unit: float = 1.0) -> Callable[[float], str]:
+    """Return what shows a number with its relative error, in another unit."""
+    return lambda value: with_error(unit * value, None if error is None else unit * error * abs(value), least)
+
+
+def _of(interval: SedInterval | None) -> tuple[Ends | None, str | None, bool]:
+    """Return the ends of an interval, why it has none, and whether draws were solved for it."""
+    if interval is None or interval.low is None or interval.high is None:
+        return None, None if interval is None else interval.reason, False
+    return (interval.low, interval.high), None, interval.method == "sampling"
+
+
+def afferent_table(report: Report) -> Table | None:
+    """Return the firing rates of an afferent, where they were asked for."""
+    if all(p.settled_rate is None for p in report.predictions):
+        return None
+    notes = Notes()
+    columns = (*_who(report), Column("SED", "kPa"), Column("peak rate", "imp/s"), Column("settled rate", "imp/s"))
+
+    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+        told = ((p.peak_rate, p.peak_rate_interval), (p.settled_rate, p.settled_rate_interval))
+        why, without = p.reasons.get("sed"), p.reasons.get("sed_interval")
+        rates = (notes.estimate(rate, places(1), why, ends, without) for rate, ends in told)
+        return (*_named(p), _stroked_sed(p, notes), *rates)
+
+    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
+    caption = (
+        "Firing of an SA-II afferent: an illustration. No fitted map from SED to the rate of a human SA-II afferent is "
+        "known; every parameter is told below, assumed unless it says that somebody set it. The order of the settled "
+        "rates is that of the SED as long as no rate lies at a bound, every SED is beyond the threshold and the "
+        "adaptation gain stays below the static gain. Under each number: the 95 % interval that the uncertainty of "
+        "friction makes of it, parameters and reference as given; ±: the SED's error from the mesh. Model of the SED: "
+        f"{report.model}."
+    )
+    return Table("table-afferent", caption, columns, groups, notes.listed())
+
+
+def beside_table(report: Report) -> Table | None:
+    """Return each trial's SED in every variant it was predicted in, side by side; strains one under another."""
+    ways = _ways(report)
+    if not ways:
+        return None
+    notes = Notes()
+
+    def cell(one: Alternative) -> Cell:
+        ends, why, star = _of(one.interval)
+        cell = _sed(notes, one.sed, one.error_estimate, one.reason, ends, why, star=star)
+        if one.doubt and one.sed is not None:
+            doubt = notes.mark(one.doubt)
+            return replace(cell, mark=f"{cell.mark},{doubt}" if cell.mark else doubt, hover=one.doubt)
+        return cell
+
+    told = "; ".join(f"({n}) {way}" for n, way in enumerate(ways, 1))
+    caption = (
+        f"The same trials predicted otherwise, SED in kPa: {told}. ±: the solver's estimate of its error, from the "
+        "mesh. Under it: the 95 % interval that the uncertainty of friction makes, and of the force where that drives "
+        f"the model, {_HOW}. At one strain all trials of a column share a mesh. A dash says why."
+    )
+    columns = (*_who(report), *(Column(f"({n})", "kPa") for n in range(1, len(ways) + 1)))
+    return Table("table-beside", caption, columns, _by_strain(report, cell), notes.listed())
+
+
+def beside_forces_table(report: Report) -> Table | None:
+    """Return the normal force of each variant, or the depth that the measured force presses it to."""
+    ways, notes = _ways(report), Notes()
+    if not ways:
+        return None
+
+    def cell(one: Alternative) -> Cell:
+        pressed = one.variant.driven == "force"
+        value = one.indentation if pressed else one.normal_force
+        error = one.indentation_error if pressed else one.normal_force_error
+        interval = one.interval
+        ends = None if interval is None else interval.indentation if pressed else interval.normal_force
+        why = None if interval is None else interval.reason
+        value = None if one.sed is None else value
+        return notes.estimate(value, _with(error, 2), one.reason, ends, why, told=places(2))
+
+    units = {
+        one.variant.way: "mm" if one.variant.driven == "force" else "N"
+        for p in report.predictions
+        for one in p.alternatives
+    }
+    caption = (
+        "The model's normal force in each column of the table before, or the depth that the measured force presses it "
+        "to. ±: the solver's estimate of its error, from the mesh. Under it: the 95 % interval that the uncertainty of "
+        "friction makes, and of the force where that drives the model, by derivatives."
+    )
+    columns = (*_who(report), *(Column(f"({n})", units[way]) for n, way in enumerate(ways, 1)))
+    return Table("table-beside-forces", caption, columns, _by_strain(report, cell), notes.listed())
+
+
+def _ways(report: Report) -> tuple[str, ...]:
+    """Return the ways trials were predicted otherwise, the same at each strain."""
+    first = next((p.alternatives for p in report.predictions if p.alternatives), ())
+    return tuple(dict.fromkeys(one.variant.way for one in first))
+
+
+def _by_strain(report: Report, cell: Callable[[Alternative], Cell]) -> tuple[Group, ...]:
+    """Return the rows of each experiment at each strain."""
+    first = next((p.alternatives for p in report.predictions if p.alternatives), ())
+    groups: list[Group] = []
+    for strain in dict.fromkeys(one.variant.kinematics for one in first):
+
+        def row(p: PredictionFinding, strain: str = strain) -> tuple[Cell, ...]:
+            return (*_named(p), *(cell(one) for one in p.alternatives if one.variant.kinematics == strain))
+
+        found = grouped(report, report.predictions, lambda p: p.experiment, row)
+        groups += [Group(f"{group.name or 'trials'}, at {strain} strain", group.rows) for group in found]
+    return tuple(groups)
+
+
+def force_table(report: Report) -> Table | None:
+    """Return the model's forces beside the measured ones."""
+    if not report.predictions:
+        return None
+    notes = Notes()
+    columns = (
+        *_who(report),
+        Column("model N", "N/mm"),
+        Column("model N × width", "N"),
+        Column("measured N", "N"),
+        Column("model T × width", "N"),
+        Column("measured T", "N"),
+        Column("depth of the model", "mm"),
+        Column("depth to match", "mm"),
+    )
+    strokes = {stroke.number: stroke.bootstrap for stroke in report.strokes}
+
+    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+        held = {} if p.stroke is None else strokes.get(p.stroke, {})
+        normal = p.normal_force_interval
+        per_mm = None if normal is None or not report.width else (normal[0] / report.width, normal[1] / report.width)
+
+        def cell(name: str, error: float | None, ends: Ends | None, without: str | None, decimals: int = 2) -> Cell:
+            value, shown = getattr(p, name), places(decimals)
+            return notes.estimate(value, _with(error, decimals), p.reasons.get(name), ends, without, told=shown)
+
+        why = p.reasons.get("sed_interval")
+        return (
+            *_named(p),
+            cell("normal_per_mm", p.normal_force_error, per_mm, why, 4),
+            cell("normal_force", p.normal_force_error, normal, why),
+            cell("measured_normal", None, held.get("normal_force"), _SHORT),
+            cell("tangential_force", p.tangential_force_error, p.tangential_force_interval, why),
+            cell("measured_tangential", None, held.get("tangential_force"), _SHORT),
+            _depth(p, notes),
+            cell("matching_depth", p.matching_depth_error, p.matching_depth_interval, why or _ROUGH),
+        )
+
+    width = "the finger's width" if report.width is None else f"a width of {report.width:g} mm"
+    caption = (
+        f"Forces of the model, per mm and times {width} (assumed), beside the means measured over the steady window. "
+        "Depth to match: indentation at which the model would press as hard as the subject did. ±: the solver's "
+        "estimate of its error, from the mesh. Under each number of the model: the 95 % interval that the uncertainty "
+        "of friction makes, and of the measured force where that is to be matched, by derivatives; the width is taken "
+        f"as given. Under what was measured: its bootstrap interval. Model: {report.model}."
+    )
+    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
+    return Table("table-forces", caption, columns, groups, notes.listed())
+
+
+_ROUGH = "found on a rough mesh; under the measured force trials are solved with tau_max computed (--beside small)"
+
+
+def direction_table(report: Report) -> Table | None:
+    """Return the SED of both directions at equal depth."""
+    if all(p.opposite_sed is None for p in report.predictions):
+        return None
+    notes = Notes()
+    columns = (
+        *_who(report),
+        Column("depth", "mm"),
+        Column("stroked"),
+        Column("SED as stroked", "kPa"),
+        Column("SED the other way", "kPa"),
+        Column("d → p over p → d", "1"),
+    )
+
+    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+        back, without, star = _of(p.opposite_interval)
+        why = p.reasons.get("opposite_sed") or p.reasons.get("sed")
+        ratio, ends = _ratio(p, back)
+        return (
+            *_named(p),
+            _depth(p, notes),
+            Cell(direction(p.direction)),
+            _stroked_sed(p, notes),
+            _sed(notes, p.opposite_sed, p.opposite_error, why, back, without, star=star),
+            notes.estimate(ratio, places(3), why, ends, without or p.reasons.get("sed_interval")),
+        )
+
+    caption = (
+        "Both directions at equal depth, each with its trial's friction. ±: the solver's estimate of its error, from "
+        f"the mesh. Under each: the 95 % interval that the uncertainty of friction makes, {_HOW}. "
+        "Last column: SED while sliding from distal to proximal over SED while sliding from proximal to distal, and "
+        "the least and greatest that both intervals allow: no narrower than 95 %, for both move with one friction. "
+        f"Model: {report.model}."
+    )
+    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
+    return Table("table-directions", caption, columns, groups, notes.listed())
+
+
+def _ratio(p: PredictionFinding, back: Ends | None) -> tuple[float | None, Ends | None]:
+    """Return the SED slid from distal to proximal over that slid back, with the range that their intervals allow."""
+    if p.sed is None or p.opposite_sed is None or p.direction is None:
+        return None, None
+    upper, lower = (p.sed, p.opposite_sed) if p.direction < 0 else (p.opposite_sed, p.sed)
+    if back is None or p.sed_interval is None:
+        return upper / lower, None
+    over, under = (p.sed_interval, back) if p.direction < 0 else (back, p.sed_interval)
+    return upper / lower, (over[0] / under[1], over[1] / under[0])
+
+
+def _who(report: Report) -> tuple[Column, ...]:
+    """Return the columns that name a row: trial and index, or the stroke where there are no trials."""
+    planned = any(p.trial is not None for p in report.predictions)
+    return (Column("trial"), Column("index")) if planned else (Column("stroke"),)
+
+
+def _named(p: PredictionFinding) -> tuple[Cell, ...]:
+    return (Cell(str(p.stroke)),) if p.trial is None else (Cell(str(p.trial)), Cell(str(p.index)))
+
+
+def _depth(p: PredictionFinding, notes: Notes) -> Cell:
+    return notes.number(p.indentation, lambda v: f"{v:g}", "no plan tells how deep the model is to press")

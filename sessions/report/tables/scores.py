@@ -1,0 +1,139 @@
+"""Tables of scores, and of how predictions go with them."""
+
+from collections.abc import Callable
+
+from sessions.report import Report
+from sessions.report.tables.cells import Cell, Column, Group, Notes, Table
+from sessions.report.wording import NONE, correlation, digits, places, significant
+from sessions.statistics.scores import MeanScore, Relation, sd_interval, slope_interval
+
+
+def score_table(report: Report) -> Table | None:
+    """Return mean scores with their intervals."""
+    notes = Notes()
+    groups = tuple(Group(e.name, tuple(_score_row(m, notes) for m in e.scores)) for e in report.experiments if e.scores)
+    if not groups:
+        return None
+    columns = (
+        Column("index"),
+        Column("subjects"),
+        Column("mean score", "0–100"),
+        Column("95 % interval of the mean", "0–100"),
+        Column("standard deviation", "0–100"),
+    )
+    caption = (
+        "Scores: mean ± t(0.975, n − 1) s / √n, n subjects. Repeats of one subject are averaged first. Under the "
+        "standard deviation s: its 95 % interval by chi squared."
+    )
+    return Table("table-scores", caption, columns, groups, notes.listed())
+
+
+def _score_row(mean: MeanScore, notes: Notes) -> tuple[Cell, ...]:
+    if mean.low is None or mean.high is None:
+        interval = notes.number(None, str, mean.reason)
+    else:
+        text = f"{digits(mean.low, 1)} to {digits(mean.high, 1)}"
+        interval = Cell(text)
+        if mean.bootstrap is not None:
+            within = f"{digits(mean.bootstrap[0], 1)} to {digits(mean.bootstrap[1], 1)}"
+            why = (
+                "The t interval leaves the scale, where no score can be. Resampling the subjects gives instead, "
+                f"for index {mean.index} of {mean.descriptor}, {within}."
+            )
+            interval = Cell(text, notes.mark(why), why)
+    return (
+        Cell(str(mean.index)),
+        Cell(str(mean.n)),
+        Cell(digits(mean.mean, 1)),
+        interval,
+        spread_cell(mean.sd, mean.n, places(1), mean.reason, notes),
+    )
+
+
+def spread_cell(
+    sd: float | None, n: int, shown: Callable[[float], str], reason: str | None, notes: Notes, unit: float = 1.0
+) -> Cell:
+    """Return the standard deviation of n values over its interval."""
+    ends = None if sd is None else sd_interval(sd, n)
+    return notes.estimate(sd, shown, reason, ends, unit=unit)
+
+
+def answer_tables(report: Report) -> tuple[Table, ...]:
+    """Return every subject's scores, a table an experiment."""
+    tables: list[Table] = []
+    for e in report.experiments:
+        if e.answers:
+            notes = Notes()
+            rows = tuple(
+                (Cell(a.subject), *(notes.number(s, places(1), "no score") for s in a.scores)) for a in e.answers
+            )
+            columns = (Column("subject"), *(Column(f"index {index}") for index in e.indices))
+            caption = f"Every score of {e.descriptor} [0–100]; repeats of one subject averaged."
+            tables.append(Table(f"table-answers-{e.name}", caption, columns, (Group("", rows),), notes.listed()))
+    return tuple(tables)
+
+
+def relation_table(report: Report) -> Table | None:
+    """Return how the predicted SED goes with mean scores and with the indices."""
+    notes = Notes()
+    groups: list[Group] = []
+    for e in report.experiments:
+        related = [("mean score", e.score_relation), ("index", e.index_relation)]
+        rows = tuple(_relation_row(name, r, notes) for name, r in related if r is not None)
+        if rows:
+            groups.append(Group(e.name, rows))
+    if not groups:
+        return None
+    columns = (
+        Column("SED against"),
+        Column("stimuli"),
+        Column("Pearson's r"),
+        Column("95 % interval"),
+        Column("Spearman's rho"),
+        Column("rho's 95 % interval"),
+        Column("exact p of rho"),
+        Column("slope", "Pa a point"),
+        Column("r without one"),
+    )
+    caption = (
+        f"Relation of the predicted SED ({report.model}) to scores and to the stimuli's indices. The forces are those "
+        "of one subject: a case study. Intervals: Fisher's z, for rho as by Bonett and Wright (2000). p: two-sided, "
+        "counted over all orders. Slope: of the SED on the score or index, over its t interval. Last column: r when "
+        "the stimulus of that index is left out."
+    )
+    return Table("table-relation", caption, columns, tuple(groups), notes.listed())
+
+
+def _rank(related: Relation, notes: Notes) -> Cell:
+    if related.spearman_low is None or related.spearman_high is None:
+        alike = "no interval of a perfect rho" if related.n > 3 else f"no interval of rho from {related.n} points"
+        return notes.number(None, str, alike if related.spearman is not None else related.reason)
+    return Cell(f"{correlation(related.spearman_low)} to {correlation(related.spearman_high)}")
+
+
+def _relation_row(name: str, related: Relation, notes: Notes) -> tuple[Cell, ...]:
+    if related.low is None or related.high is None:
+        interval = notes.number(None, str, related.reason)
+    else:
+        interval = Cell(f"{correlation(related.low)} to {correlation(related.high)}")
+    left_out = ", ".join(
+        f"{label}:\N{NO-BREAK SPACE}{NONE if r is None else correlation(r)}" for label, r in related.without
+    )
+    return (
+        Cell(name),
+        Cell(str(related.n)),
+        notes.number(related.pearson, correlation, related.reason),
+        interval,
+        notes.number(related.spearman, correlation, related.reason),
+        _rank(related, notes),
+        notes.number(related.spearman_p, places(3), related.reason or "too many orders to count"),
+        notes.estimate(
+            related.slope,
+            lambda v: significant(1e6 * v, 3),
+            related.reason,
+            slope_interval(related),
+            "no line has one through two points, or through points wholly on it",
+            unit=1e6,
+        ),
+        Cell(left_out),
+    )

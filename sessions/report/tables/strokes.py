@@ -1,0 +1,195 @@
+"""Tables of strokes: what was found, and what had been planted."""
+
+from collections.abc import Callable
+
+from sessions.report import Planted, PredictionFinding, Report, StrokeFinding
+from sessions.report.tables.cells import Cell, Column, Notes, Table, grouped
+from sessions.report.wording import NONE, places, signed, tau, with_error
+
+Told = Callable[[float], str]
+
+_TOO_SHORT = "the stroke has too few readings"
+_WITHOUT = {
+    "onset": "the force had left its noise before, or too few readings tell how large that is",
+    "break_away": "too few readings tell how T/N climbs",
+    "slide_onset": "too few readings tell the speed",
+}
+_MISSING = {
+    "break_away": "the ratio does not climb before the slide, so there is no stick phase, or climbs on while it slides",
+    "slide_onset": "nothing tells when the slide begins",
+}
+_OF_DECISION = {"onset": "onset", "break_away": "stick", "slide_onset": "slide_onset"}
+
+
+def stroke_table(report: Report) -> Table | None:
+    """Return the strokes with their friction, speed and flaws, each number over its interval."""
+    if not report.strokes:
+        return None
+    notes = Notes()
+    planned = any(stroke.trial is not None for stroke in report.strokes)
+    columns = (
+        *_who(planned=planned),
+        Column("µ static", "1"),
+        Column("µ dynamic", "1"),
+        Column("µ maximum", "1"),
+        Column("τ max", "kPa"),
+        Column("speed", "mm/s"),
+        Column("direction"),
+        Column("flaws"),
+    )
+
+    def row(stroke: StrokeFinding) -> tuple[Cell, ...]:
+        def cell(name: str, shown: Told, ends: Told | None = None, unit: float = 1.0) -> Cell:
+            return _estimate(notes, stroke, name, shown, ends, unit)
+
+        half = None if stroke.mu_interval is None else (stroke.mu_interval[1] - stroke.mu_interval[0]) / 2
+        error = stroke.speed_error
+        return (
+            *_named(stroke, notes, planned=planned),
+            cell("mu_static", places(3)),
+            cell("mu_dynamic", lambda v: with_error(v, half, 3), places(3)),
+            cell("mu_max", places(3)),
+            cell("tau_max", tau, unit=1e3),
+            cell("speed", lambda v: with_error(v, error, 1), places(1)),
+            notes.number(
+                stroke.direction, lambda v: {1: "p → d", -1: "d → p"}[int(v)], stroke.reasons.get("direction")
+            ),
+            Cell(", ".join(name.replace("_", " ") for name in stroke.flaws) or "none"),
+        )
+
+    groups = grouped(report, report.strokes, lambda s: s.experiment, row)
+    kind = f" Under each number: {report.interval_kind}." if report.interval_kind else ""
+    caption = (
+        "Strokes. µ dynamic: mean over the steady window (± half its 95 % t interval, noise and zero alone); µ static: "
+        "height of the static peak; µ maximum: greatest above the force floor; τ max: greatest tangential force over "
+        "the contact area, which is taken as given; speed: slope of the centre of pressure (± its standard error)."
+        f"{kind}"
+    )
+    return Table("table-strokes", caption, columns, groups, notes.listed())
+
+
+def course_table(report: Report) -> Table | None:
+    """Return each stroke's forces, direction and instants, each over its bootstrap interval."""
+    if not any(stroke.bootstrap for stroke in report.strokes):
+        return None
+    notes = Notes()
+    planned = any(stroke.trial is not None for stroke in report.strokes)
+    columns = (
+        *_who(planned=planned),
+        Column("normal force", "N"),
+        Column("tangential force", "N"),
+        Column("heading", "°"),
+        Column("agree", "1"),
+        Column("onset", "s"),
+        Column("break-away", "s"),
+        Column("slide onset", "s"),
+    )
+
+    def row(stroke: StrokeFinding) -> tuple[Cell, ...]:
+        def cell(name: str, shown: Told) -> Cell:
+            return _estimate(notes, stroke, name, shown)
+
+        why = stroke.reasons.get("direction") or _TOO_SHORT
+        return (
+            *_named(stroke, notes, planned=planned),
+            cell("normal_force", places(2)),
+            cell("tangential_force", places(2)),
+            cell("heading", places(1)),
+            notes.number(stroke.direction_agrees, places(3), why),
+            cell("onset", places(3)),
+            cell("break_away", places(3)),
+            cell("slide_onset", places(3)),
+        )
+
+    kinds = "; ".join(f"{name.replace('_', ' ')}: {what}" for name, what in report.interval_kinds.items())
+    caption = (
+        "Forces, direction and instants of the strokes, each over its interval from the same repeats. Forces: means "
+        "over the steady window. Heading: angle of the movement from +x (proximal to distal) towards +y; agree: share "
+        "of repeats with the direction told. Onset: where N leaves its noise. Break-away: where T/N stops climbing. "
+        "Slide onset: from when the centre of pressure keeps a fifth of its steady speed. What each interval holds: "
+        f"{kinds}."
+    )
+    groups = grouped(report, report.strokes, lambda s: s.experiment, row)
+    return Table("table-courses", caption, columns, groups, notes.listed())
+
+
+def _who(*, planned: bool) -> tuple[Column, ...]:
+    return (Column("stroke"), *((Column("trial"), Column("index")) if planned else ()))
+
+
+def _named(stroke: StrokeFinding, notes: Notes, *, planned: bool) -> tuple[Cell, ...]:
+    if not planned:
+        return (Cell(str(stroke.number)),)
+    asked = (notes.number(v, places(0), "no trial asks for it") for v in (stroke.trial, stroke.index))
+    return (Cell(str(stroke.number)), *asked)
+
+
+def _estimate(
+    notes: Notes, stroke: StrokeFinding, name: str, shown: Told, told: Told | None = None, unit: float = 1.0
+) -> Cell:
+    """Return one number of a stroke over its bootstrap interval, or why it has none."""
+    without = "a person decided it" if _OF_DECISION.get(name) in stroke.decided else _WITHOUT.get(name, _TOO_SHORT)
+    why = stroke.reasons.get(name) or _MISSING.get(name)
+    return notes.estimate(getattr(stroke, name), shown, why, stroke.bootstrap.get(name), without, told=told, unit=unit)
+
+
+def planted_table(report: Report) -> Table | None:
+    """Return what the simulator planted beside what the analysis found."""
+    if not report.planted:
+        return None
+    notes = Notes()
+    # Of several strokes in a trial the model gets the first.
+    found = {stroke.trial: stroke for stroke in reversed(report.strokes) if stroke.trial is not None}
+    given = {prediction.trial: prediction for prediction in report.predictions}
+    columns = (
+        Column("trial"),
+        Column("index"),
+        Column("µ planted", "1"),
+        Column("µ found", "1"),
+        Column("off by", "%"),
+        Column("τ max planted", "kPa"),
+        Column("τ max found", "kPa"),
+        Column("off by", "%"),
+        Column("speed planted", "mm/s"),
+        Column("speed found", "mm/s"),
+        Column("off by", "%"),
+        Column("direction"),
+    )
+
+    def row(p: Planted) -> tuple[Cell, ...]:
+        stroke = found.get(p.trial)
+        cells: list[Cell] = [
+            Cell(str(p.trial)),
+            Cell(NONE if stroke is None or stroke.index is None else str(stroke.index)),
+        ]
+        prediction = given.get(p.trial)
+        name, mu = model_mu(stroke, prediction)
+        quantities: tuple[tuple[str, float, float | None, Told, float], ...] = (
+            (name, p.mu, mu, places(3), 1.0),
+            ("tau_max", p.tau_max, stroke.tau_max if stroke else None, tau, 1e3),
+            ("speed", p.speed, stroke.speed if stroke else None, places(1), 1.0),
+        )
+        for name, truth, value, shown, unit in quantities:
+            reason = stroke.reasons.get(name) if stroke else "no stroke was found in this trial"
+            ends = stroke.bootstrap.get(name) if stroke else None
+            found_cell = notes.estimate(value, shown, reason, ends, _TOO_SHORT, unit=unit)
+            off = None if value is None else 100 * (value / truth - 1)
+            cells += [Cell(shown(truth)), found_cell, notes.number(off, signed, reason)]
+        right = stroke is not None and stroke.direction == p.direction
+        cells.append(Cell("as planted" if right else NONE if stroke is None or stroke.direction is None else "wrong"))
+        return tuple(cells)
+
+    names = {p.trial: s.experiment for p in report.planted if (s := found.get(p.trial)) is not None}
+    groups = grouped(report, report.planted, lambda p: names.get(p.trial, ""), row)
+    caption = (
+        "Planted friction beside what the analysis found: the µ and τ max that the model gets, and the speed. The "
+        "analysis does not know what was planted. Under what was found: its 95 % bootstrap interval."
+    )
+    return Table("table-planted", caption, columns, groups, notes.listed())
+
+
+def model_mu(stroke: StrokeFinding | None, prediction: PredictionFinding | None) -> tuple[str, float | None]:
+    """Return the mu that the model got, and the name of the stroke's number that it is."""
+    if prediction is not None and prediction.mu is not None:
+        return ("mu_max" if prediction.mu_rule == "maximum" else "mu_dynamic"), prediction.mu
+    return "mu_dynamic", None if stroke is None else stroke.mu_dynamic

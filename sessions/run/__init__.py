@@ -1,0 +1,1 @@
+"""A session as it runs: machine, states, steps, runner, live detection, resuming."""

@@ -1,0 +1,115 @@
+"""What is made of readings while they come: the zero of a take, touch and lift, and when the finger stays off.
+
+Readings are never altered. The rule of a take: it begins with an unloaded stretch of at least `zero_duration`, so
+before any contact, and ends no earlier than `after_lift` seconds after the last lift.
+"""
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.readings import ReadingBlock
+from drivers.transducer import TransducerInfo
+from sessions.plan.plan import Frame
+from sessions.run.steps import ContactOnset, FingerLifted, Settled, Zeroed
+from sessions.strokes.forces import normal_force
+from sessions.strokes.onset import ContactEvent, DetectorSettings, Onset, is_quiet
+
+Array = NDArray[np.float64]
+Noticed = Zeroed | ContactOnset | FingerLifted | Settled
+
+
+class Detector(Protocol):
+    """What tells touch and lift; `sessions.strokes.onset.ContactDetector` is one."""
+
+    def feed(self, time: Array, normal_force: Array) -> tuple[ContactEvent, ...]:
+        """Take readings, time (n,) [s] and normal force (n,) [N, not zeroed], and return what they tell."""
+        ...
+
+
+class TakeWatch:
+    """Watches the readings of one take: first until its zero is measured, then for the finger."""
+
+    def __init__(
+        self,
+        info: TransducerInfo,
+        frame: Frame,
+        zero_duration: float,
+        detection: DetectorSettings,
+        make_detector: Callable[[DetectorSettings], Detector],
+        after_lift: float = 0.5,
+    ) -> None:
+        """Begin to measure the zero over `zero_duration` seconds; what `make_detector` makes watches from then on.
+
+        The finger stays off when nothing touched for `after_lift` seconds.
+        """
+        self._info = info
+        self._frame = frame
+        self._duration = zero_duration
+        self._detection = detection
+        self._make_detector = make_detector
+        self._detector: Detector | None = None
+        self._stretch = ReadingBlock.empty()
+        self._after_lift = after_lift
+        self._lifted: float | None = None  # when the finger left [s, device time]; None while it touches, or stayed off
+
+    def feed(self, block: ReadingBlock) -> tuple[Noticed, ...]:
+        """Take readings and return what they tell, in order."""
+        if not len(block):
+            return ()
+        if self._detector is not None:
+            return self._touches(self._detector, block)
+        self._stretch = ReadingBlock.joined([self._stretch, block])
+        self._stretch = self._stretch.between(_last(self._stretch.time, self._duration), len(self._stretch))
+        zero = self._zero()
+        if zero is None:
+            return ()
+        self._detector = self._make_detector(self._detection)
+        # The detector learns the noise from the same stretch; nothing touched during it.
+        self._detector.feed(self._stretch.time, self._normal_force(self._stretch))
+        return (zero,)
+
+    def _zero(self) -> Zeroed | None:
+        """Return the zero of the stretch once it is long enough and nothing moves in it."""
+        stretch = self._stretch
+        duration = float(stretch.time[-1] - stretch.time[0])
+        normal = self._normal_force(stretch)
+        # One reading's step is allowed for, since the stretch holds whole readings only.
+        step = duration / max(len(stretch) - 1, 1)
+        if duration + step < self._duration or not is_quiet(normal.tolist(), self._detection):
+            return None
+        return Zeroed(
+            mean=tuple(stretch.raw.mean(axis=0).tolist()),
+            spread=tuple(stretch.raw.std(axis=0, ddof=1).tolist()),
+            readings=len(stretch),
+            duration=duration,
+            first_sequence=int(stretch.sequence[0]),
+            last_sequence=int(stretch.sequence[-1]),
+            normal_force=float(normal.mean()),
+            noise=float(normal.std(ddof=1)),
+        )
+
+    def _touches(self, detector: Detector, block: ReadingBlock) -> tuple[Noticed, ...]:
+        found: list[Noticed] = []
+        for event in detector.feed(block.time, self._normal_force(block)):
+            if isinstance(event, Onset):
+                found.append(ContactOnset(event.time, event.noticed))
+                self._lifted = None
+            else:
+                found.append(FingerLifted(event.time, event.noticed))
+                self._lifted = event.time
+        last = float(block.time[-1])
+        if self._lifted is not None and last - self._lifted >= self._after_lift:
+            found.append(Settled(last))
+            self._lifted = None
+        return tuple(found)
+
+    def _normal_force(self, block: ReadingBlock) -> Array:
+        return normal_force(self._info.calibration.wrench(block.raw, np.zeros(6)), self._frame)
+
+
+def _last(time: Array, duration: float) -> int:
+    """Return the position of the first reading of the last `duration` seconds."""
+    return int(np.count_nonzero(time < time[-1] - duration))

@@ -1,0 +1,366 @@
+"""The course of a session as a table of cases: state and event to state and commands. It does nothing itself."""
+
+from sessions.plan.answers import Given, problem
+from sessions.plan.plan import SessionPlan
+from sessions.run.states import (
+    Closing,
+    Ended,
+    Idle,
+    Mounting,
+    Paused,
+    Place,
+    Progress,
+    Ready,
+    Resting,
+    Scoring,
+    Settling,
+    State,
+    Stroking,
+    Taring,
+)
+from sessions.run.steps import (
+    Abort,
+    AskBegin,
+    AskChoice,
+    AskFinish,
+    AskMount,
+    AskNumber,
+    AskRest,
+    AskScore,
+    AskStroke,
+    Begin,
+    Chosen,
+    Command,
+    ContactOnset,
+    DiscardTake,
+    EndSession,
+    Event,
+    FingerLifted,
+    Finish,
+    KeepTake,
+    LeaveOut,
+    MeasureZero,
+    Note,
+    NumberGiven,
+    Pause,
+    Redo,
+    Refuse,
+    RestOver,
+    Resume,
+    Scored,
+    Settled,
+    ShowInstruction,
+    Skip,
+    StartTake,
+    StimulusMounted,
+    StrokeDone,
+    Tell,
+    Zeroed,
+)
+
+Step = tuple[State, tuple[Command, ...]]
+
+
+def start(plan: SessionPlan) -> Step:
+    """Return the state a session is in before it begins, and the first commands.
+
+    Raises ValueError for a plan without trials: an imported recording is not run.
+    """
+    if not plan.trials:
+        raise ValueError(f"the plan of {plan.subject} has no trials, so there is nothing to run")
+    return Idle(Place(plan, 0, (Progress(),) * len(plan.trials))), (AskBegin(),)
+
+
+def advance(state: State, event: Event) -> Step:
+    """Return the next state and the commands that enter it; an event that is not meant now is refused."""
+    match state, event:
+        case Ended(), _:
+            return state, (_refusal(state, event),)
+        case _, Abort(reason):
+            why = reason.strip() or "no reason given"
+            return Ended(why, complete=False), (*_discarding(state, why), EndSession(why, complete=False))
+        case _, Note(text):
+            return state, () if text.strip() else (Refuse("an empty note says nothing: write what is to be kept"),)
+        case _, Pause() | Resume() | RestOver():
+            return _resting(state, event)
+        case _, Redo(reason) | Skip(reason) if not reason.strip():
+            return state, (Refuse(f"say why: {type(event).__name__.lower()} needs a reason"),)
+        case _, Redo(reason):
+            return _again(state, reason)
+        case _, Skip(reason):
+            return _left_out(state, reason)
+        case _, ContactOnset() | FingerLifted() | Settled():
+            return _touched(state, event)
+        case Scoring(), Scored() | NumberGiven() | Chosen():
+            return _answered(state, event)
+        case _:
+            return _went_on(state, event)
+
+
+def interrupted(state: State, reason: str) -> Step:
+    """Return the state in which a session that was cut short goes on, and the commands that enter it.
+
+    It goes on at the same trial. A take that was open is discarded for `reason`: nobody knows what came after its last
+    reading. A pause or a rest is over. The second of two that are compared begins with the first again.
+    """
+    match state:
+        case Idle():
+            return state, (AskBegin(),)
+        case Closing():
+            return state, (AskFinish(),)
+        case Ended():
+            return state, ()
+        case _:
+            place, undone = _pair_undone(state.place, reason)
+            return Mounting(place), (*_discarding(state, reason), *undone, *_asking_for(place, new_block=True))
+
+
+def trial_in_hand(state: State) -> int | None:
+    """Return the number of the trial a state belongs to; None before the first, after the last."""
+    return None if isinstance(state, Idle | Closing | Ended) else state.place.trial.number
+
+
+def _went_on(state: State, event: Event) -> Step:
+    """Follow the plan."""
+    match state, event:
+        case Idle(place), Begin():
+            return Mounting(place), _asking_for(place, new_block=True)
+        case Mounting(place), StimulusMounted(code) if code == place.trial.stimulus.code:
+            return _take_begun(place)
+        case Mounting(place), StimulusMounted(code):
+            wanted = place.trial.stimulus.code
+            return state, (Refuse(f"trial {place.trial.number} needs the stimulus {wanted}, not {code}"),)
+        case Taring(place), Zeroed():
+            return Ready(place), (_ask_stroke(place),)
+        case Ready(place), StrokeDone() if not place.plan.forces:
+            return _stroke_over(place)
+        case Closing(), Finish():
+            reason = "every trial is done"
+            return Ended(reason, complete=True), (EndSession(reason, complete=True),)
+        case _:
+            return state, (_refusal(state, event),)
+
+
+def _touched(state: State, event: ContactOnset | FingerLifted | Settled) -> Step:
+    """Follow the finger, where a transducer tells of it."""
+    match state, event:
+        case Ready(place), ContactOnset() if place.plan.forces:
+            return Stroking(place), ()
+        case Stroking(place), FingerLifted():
+            return _stroke_over(place)
+        case Scoring(place, touching=False, strokes=strokes), ContactOnset() if place.plan.forces:
+            return Scoring(place, touching=True, strokes=strokes + 1), _further_stroke(place, strokes + 1)
+        case Scoring(place, touching=True, strokes=strokes), FingerLifted():
+            return Scoring(place, strokes=strokes), ()
+        case Scoring(place, touching=False, strokes=strokes, settled=False), Settled() if place.plan.forces:
+            return Scoring(place, strokes=strokes, settled=True), ()
+        case Settling(place, touching=False), ContactOnset():
+            return Settling(place, touching=True), (Tell("the finger touches again: the take runs on until it is off"),)
+        case Settling(place, touching=True), FingerLifted():
+            return Settling(place), ()
+        case Settling(place, touching=False), Settled():
+            return _kept(place)
+        case _:
+            return state, (_refusal(state, event),)
+
+
+def _answered(state: Scoring, given: Given) -> Step:
+    """Take an answer; the take ends once the finger has been off for a moment, so that what follows it is recorded."""
+    place = state.place
+    wrong = problem(given, place.trial.answer)
+    if wrong is not None:
+        return state, (Refuse(wrong),)
+    if state.settled or not place.plan.forces:
+        return _kept(place)
+    return Settling(place, touching=state.touching), ()
+
+
+def _resting(state: State, event: Pause | Resume | RestOver) -> Step:
+    """Stop asking, and go on where it is safe: the stimulus is confirmed and the zero measured anew."""
+    match state, event:
+        case Scoring(place, strokes=strokes), Pause():
+            return Paused(place, scoring=True, strokes=strokes), ()
+        case ((Mounting(place) | Taring(place) | Ready(place) | Stroking(place)), Pause()):
+            why = "a pause came before the stroke was done"
+            return Paused(place, scoring=False), _discarding(state, why)
+        case Paused(place, scoring=True, strokes=strokes), Resume():
+            return Scoring(place, strokes=strokes, settled=True), (_ask_answer(place),)
+        case Paused(place), Resume():
+            before, undone = _pair_undone(place, "a pause parted the two stimuli")
+            return Mounting(before), (*undone, AskMount(before.trial))
+        case Resting(place), Resume() | RestOver():
+            return Mounting(place), _asking_for(place, new_block=place.trial == place.block.trials[0])
+        case _:
+            return state, (_refusal(state, event),)
+
+
+def _again(state: State, reason: str) -> Step:
+    """Repeat the trial in hand, or the one before where none is in hand yet; the order after it stays as it was."""
+    match state:
+        case Taring(place) | Ready(place) | Stroking(place) | Scoring(place) | Settling(place):
+            if place.trial.compared_with is not None:
+                before, undone = _pair_undone(place, reason)
+                return Mounting(before), (*_discarding(state, reason), *undone, AskMount(before.trial))
+            after, commands = _take_begun(place)
+            return after, (*_discarding(state, reason), *commands)
+        case Mounting(place) if place.take > 0:
+            return state, (Refuse(f"trial {place.trial.number} is about to be repeated already"),)
+        case Mounting(place) | Resting(place) if place.index > 0:
+            return _taken_up(place.at(place.index - 1), reason)
+        case Closing(place):
+            return _taken_up(place, reason)
+        case _:
+            return state, (_refusal(state, Redo(reason)),)
+
+
+def _left_out(state: State, reason: str) -> Step:
+    """Leave the trial in hand out and go on to the next."""
+    match state:
+        case Mounting(place) | Taring(place) | Ready(place) | Stroking(place) | Scoring(place) | Settling(place):
+            why = f"skipped: {reason}"
+            more: tuple[Command, ...] = ()
+            discarded = _discarding(state, why)
+            if place.first_of_two:
+                place = place.at(place.index + 1)
+                more = (LeaveOut(place.trial.number, why),)
+            after, commands = _next(place)
+            return after, (*discarded, *more, *commands)
+        case _:
+            return state, (_refusal(state, Skip(reason)),)
+
+
+def _take_begun(place: Place) -> Step:
+    """Open the next take of the trial in hand, its stimulus being on."""
+    place = place.with_progress(Progress(place.take + 1))
+    begun = StartTake(place.trial.number, place.take)
+    if place.plan.forces:
+        return Taring(place), (begun, MeasureZero())
+    return Ready(place), (begun, _ask_stroke(place))
+
+
+def _stroke_over(place: Place) -> Step:
+    """Ask for the answer; where none is due the take ends, once the finger has been off for a moment."""
+    if place.trial.answer != "none":
+        return Scoring(place), (_ask_answer(place),)
+    return (Settling(place), ()) if place.plan.forces else _kept(place)
+
+
+def _further_stroke(place: Place, strokes: int) -> tuple[Command, ...]:
+    """Say so where a stroke is one more than allowed."""
+    allowed = place.block.strokes_allowed
+    if strokes <= allowed:
+        return ()
+    return (Tell(f"stroke {strokes} where {allowed} may be made: it is recorded and will be flagged"),)
+
+
+def _kept(place: Place) -> Step:
+    kept = KeepTake(place.trial.number, place.take)
+    after, commands = _next(place.with_progress(Progress(place.take, kept=True)))
+    return after, (kept, *commands)
+
+
+def _taken_up(place: Place, reason: str) -> Step:
+    """Return to a trial that was done or left out."""
+    before, undone = _pair_undone(place, reason)
+    return Mounting(before), (*_undoing(place, reason), *undone, AskMount(before.trial))
+
+
+def _pair_undone(place: Place, reason: str) -> tuple[Place, tuple[Command, ...]]:
+    """Return to the first of two that are compared, its take discarded; any other place stays as it is, not kept."""
+    if place.trial.compared_with is None:
+        return _not_kept(place), ()
+    first = _not_kept(place).at(place.index - 1)
+    return _not_kept(first), _undoing(first, reason)
+
+
+def _undoing(place: Place, reason: str) -> tuple[Command, ...]:
+    """Return the command that discards the take that was kept of the trial in hand, where one was."""
+    return (DiscardTake(place.trial.number, place.take, reason),) if place.progress[place.index].kept else ()
+
+
+def _not_kept(place: Place) -> Place:
+    return place.with_progress(Progress(place.take))
+
+
+def _next(place: Place) -> Step:
+    """Go on to the next trial, if there is one, or to the rest before it."""
+    if place.last:
+        return Closing(place), (AskFinish(),)
+    after = place.at(place.index + 1)
+    if after.rest_due:
+        return Resting(after), (AskRest(after.plan.rests.duration),)
+    return Mounting(after), _asking_for(after, new_block=after.block != place.block)
+
+
+def _asking_for(place: Place, *, new_block: bool) -> tuple[Command, ...]:
+    instruction = (ShowInstruction(place.block),) if new_block else ()
+    return (*instruction, AskMount(place.trial))
+
+
+def _ask_stroke(place: Place) -> AskStroke:
+    return AskStroke(place.trial, place.block.strokes_allowed)
+
+
+def _ask_answer(place: Place) -> Command:
+    trial, block = place.trial, place.block
+    if trial.answer == "number":
+        return AskNumber(trial, block.question)
+    if trial.answer == "choice":
+        return AskChoice(place.at(place.index - 1).trial, trial, block.question)
+    return AskScore(trial, block.scale_ends, block.ticks, block.question)
+
+
+def _discarding(state: State, reason: str) -> tuple[Command, ...]:
+    """Return the command that discards the take that is open, where one is."""
+    match state:
+        case (
+            Taring(place)
+            | Ready(place)
+            | Stroking(place)
+            | Scoring(place)
+            | Settling(place)
+            | Paused(place, scoring=True)
+        ):
+            return (DiscardTake(place.trial.number, place.take, reason),)
+        case _:
+            return ()
+
+
+def _refusal(state: State, event: Event) -> Refuse:
+    """Say what came, and what is waited for."""
+    waiting: dict[type[State], str] = {
+        Idle: "the session has not begun",
+        Mounting: "a stimulus is to be mounted",
+        Taring: "the zero is being measured",
+        Ready: "the subject is to stroke",
+        Stroking: "the finger is touching",
+        Scoring: "the subject is to answer",
+        Settling: "the take ends when the finger has been off for a moment",
+        Resting: "the subject rests",
+        Paused: "the session is paused",
+        Closing: "every trial is done",
+        Ended: "the session has ended",
+    }
+    return Refuse(f"{WORDS[type(event)]} means nothing now: {waiting[type(state)]}")
+
+
+WORDS: dict[type[Event], str] = {
+    Abort: "abort",
+    Begin: "begin",
+    StimulusMounted: "a mounted stimulus",
+    Zeroed: "a measured zero",
+    ContactOnset: "a touch",
+    FingerLifted: "a lift",
+    Settled: "a finger that stays off",
+    StrokeDone: "a stroke reported by hand",
+    Scored: "a score",
+    NumberGiven: "a number",
+    Chosen: "a choice",
+    Note: "a note",
+    Redo: "redo",
+    Skip: "skip",
+    Pause: "pause",
+    Resume: "resume",
+    RestOver: "the end of a rest",
+    Finish: "finish",
+}

@@ -1,0 +1,396 @@
+"""A recorded session goes through the same course once more, from its readings and from what people did."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from difflib import SequenceMatcher
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from drivers.readings import ReadingBlock
+from drivers.transducer import Health, LinkLost, TransducerInfo
+from sessions.plan.plan import SessionPlan
+from sessions.recording import Acknowledged, LoggedEvent, Recording, RecordingError, SessionWriter
+from sessions.recording.digests import digest_of
+from sessions.recording.reader import TELL_LOSSES
+from sessions.recording.replay import RecordedReadings, health_of
+from sessions.recording.verification import differences
+from sessions.run.resuming import Seam, resumption
+from sessions.run.runner import STOPPED, Ending, Resumed, RunnerSettings, run_session
+from sessions.run.session_history import Step, parts, steps
+from sessions.run.steps import Command, Event
+
+SLICE = 0.02  # longest wait before a stop is noticed [s]
+PART = 16_384  # readings written at once
+LATER = TELL_LOSSES  # written by sealing and the like, not by the course
+Progress = Callable[[float, str], None]  # part done (0 to 1), what is happening
+
+
+class Stopped(Exception):
+    """The replay was stopped before its end."""
+
+
+def replay(recording: Recording, folder: Path, speed: float | None, progress: Progress) -> Recording:
+    """Run a recorded session once more into `folder`, `speed` times as fast as it was (None: as fast as can be).
+
+    An imported recording has no course: its readings are handed over once more, at once, and its events written again.
+    A session that was resumed is run part by part, as it was; where its readings were joined is taken from its log.
+    Raises Stopped on Ctrl-C, RecordingError when the folder takes no more.
+    """
+    clock = _RecordedClock(recording)
+    writer = _Rewriter.create(
+        folder,
+        recording.plan,
+        recording.info,
+        recording.provenance,
+        subject_simulated="subject" in (recording.simulated_sentence or ""),
+        clock=clock,
+    )
+    writer.follow(recording)
+    if recording.plan.trials:
+        _run(recording, clock, writer, speed, progress)
+    else:
+        _copy(recording, writer)
+    return Recording.open(folder)
+
+
+def different_events(recorded: Recording, replayed: Recording) -> Iterator[str]:
+    """Yield a sentence for each event that came out otherwise, is new, or came no more."""
+    then, now = ([event for event in made.events if event.kind not in LATER] for made in (recorded, replayed))
+    matcher = SequenceMatcher(None, [_key(event) for event in then], [_key(event) for event in now], autojunk=False)
+    for what, i, i_end, j, j_end in matcher.get_opcodes():
+        if what == "equal":
+            for before, after in zip(then[i:i_end], now[j:j_end], strict=True):
+                yield from differences(_plain(before), _plain(after), _name(before))
+        else:
+            yield from (f"{_name(event)} came no more" for event in then[i:i_end])
+            yield from (f"{_name(event)} of the replay is new" for event in now[j:j_end])
+
+
+def different_readings(recorded: Recording, replayed: Recording) -> Iterator[str]:
+    """Yield a sentence for each column of the readings that is not what it was."""
+    before, after = (digest_of(made.blocks(), ()) for made in (recorded, replayed))
+    if before.readings != after.readings:
+        yield f"the recording holds {before.readings} readings and the replay {after.readings}"
+    yield from (
+        f"{name} of the readings came out otherwise"
+        for name, digest in before.columns.items()
+        if digest != after.columns[name]
+    )
+
+
+class _Rewriter(SessionWriter):
+    """Writes a replay: each event has the instant at which it was recorded, for a replay makes no time of its own.
+
+    A recording that was cut short is cut short here too, and the disk is not waited for: nothing can be lost.
+    """
+
+    def follow(self, recording: Recording) -> None:
+        """Begin to follow `recording`."""
+        self._later = [event for event in recording.events if event.kind in LATER]
+        self._log: Sequence[LoggedEvent] = ()
+        self._cut = False
+        self._told = 0
+        self._closing = False
+        self.made: list[LoggedEvent] = []
+        self._connection.execute("PRAGMA synchronous=OFF")
+
+    def follow_part(self, log: Sequence[LoggedEvent]) -> None:
+        """Take the instants from the log of a part, which may have been cut short."""
+        super().commit()  # a part begins with all that came before acknowledged
+        self._log = log
+        self._cut = not any(event.kind == "ended" for event in log)
+        self._told = 0
+
+    def event(
+        self,
+        kind: str,
+        trial: int | None = None,
+        data: Mapping[str, Any] | None = None,
+        *,
+        time_ns: int | None = None,
+        commit: bool = True,
+    ) -> LoggedEvent:
+        """Write an event down. Raises _CutShort where the recording ends without an end."""
+        if self._cut and (kind == "ended" or self._told == len(self._log)):
+            raise _CutShort("the recording was cut short here")
+        ahead = range(self._told, len(self._log))
+        place = next((i for i in ahead if (self._log[i].kind, self._log[i].trial) == (kind, trial)), None)
+        if place is not None:
+            self._told = place + 1
+            time_ns = self._log[place].time_ns
+        self.made.append(super().event(kind, trial, data, time_ns=time_ns, commit=commit))
+        return self.made[-1]
+
+    def commit(self) -> Acknowledged:
+        """Write in large parts: nobody waits for an acknowledgement."""
+        waiting = self._readings - self._acknowledged.readings
+        return super().commit() if self._closing or waiting >= PART else self._acknowledged
+
+    def close(self) -> None:
+        """Wait: what ended may have been resumed."""
+
+    def finish(self) -> None:
+        """Write down what sealing said of a torn log, and close."""
+        self._closing = True
+        for event in self._later:
+            super().event(event.kind, data=event.data)
+        super().close()
+
+
+class _CutShort(RecordingError):
+    """The recording ends here, without an end."""
+
+
+class _Again(Exception):
+    """An error of the program that the recording tells of, raised where it was raised."""
+
+
+class _RecordedClock:
+    """The session clock of the recording: it stands where the last step was, and nobody waits for it."""
+
+    def __init__(self, recording: Recording) -> None:
+        self.factor = float(recording.provenance.get("clock", {}).get("factor", 1.0))
+        self._now_ns = recording.events[0].time_ns if recording.events else 0
+
+    def now_ns(self) -> int:
+        return self._now_ns
+
+    def move(self, instant_ns: int) -> None:
+        """Go on to an instant; never back."""
+        self._now_ns = max(self._now_ns, instant_ns)
+
+    def sleep(self, seconds: float) -> None:
+        """Pass no time: the steps do."""
+
+
+class _Player:
+    """Transducer, experimenter and subject of a part of a recording. One look of the runner is one step of the log."""
+
+    def __init__(
+        self,
+        info: TransducerInfo | None,
+        log: Sequence[LoggedEvent],
+        readings: RecordedReadings,
+        limit: int | None,
+        clock: _RecordedClock,
+        settings: RunnerSettings,
+        speed: float | None,
+        progress: Progress,
+    ) -> None:
+        """Play the part whose log is `log`, its readings from where `readings` stands up to number `limit`."""
+        self._steps = steps(log)
+        self._clock = clock
+        self._settings = settings
+        self._readings = readings
+        self._limit = limit
+        self._info = info
+        self._speed = speed
+        self._progress = progress
+        self._first_ns = log[0].time_ns if log else 0
+        self._began = time.monotonic()
+        self._next = 0
+        self._step: Step | None = None  # None while waiting for the next
+        self._reported: list[LoggedEvent] = []
+        self._said_ns: dict[str, int] = {}  # when losses, and a zero that cannot be measured, were last told of
+        self._health: Health | None = None  # at the end
+        self._stopped = False
+
+    @property
+    def done(self) -> bool:
+        """Say whether the last step was taken."""
+        return self._next == len(self._steps)
+
+    def go_on(self) -> Ending | None:
+        """Take the next step when its time has come, and say why the session is to be ended in it."""
+        self._step = None
+        if self.done:
+            return "stopped", STOPPED  # the course went another way, and waits for what never comes
+        step = self._steps[self._next]
+        if self._waiting(step):
+            return None
+        self._step = step
+        self._next += 1
+        self._progress(self._next / len(self._steps), "replaying")
+        match step.end:
+            case None | {"cause": "device" | "program"}:
+                return None
+            case {"cause": "client" | "disk" as cause, "reason": str(reason)}:
+                return cause, reason
+            case _:
+                return "stopped", STOPPED
+
+    # ---- as an operator
+
+    def show(self, command: Command) -> None:
+        """Take a command: what was done about it is known."""
+
+    def poll(self) -> Sequence[Event]:
+        """Return what was done in this step."""
+        step = self._step
+        if step is None:
+            return ()
+        if step.end is not None and step.end.get("cause") == "program":
+            name, _, message = str(step.end.get("reason", "")).partition(": ")
+            raise type(name, (_Again,), {})(message)
+        self._clock.move(step.instant_ns)
+        return () if step.act is None else (step.act,)
+
+    # ---- as a transducer
+
+    @property
+    def info(self) -> TransducerInfo:
+        if self._info is None:
+            raise AssertionError("a visit without a transducer has none to ask")
+        return self._info
+
+    @property
+    def health(self) -> Health:
+        if self._health is not None:
+            return self._health
+        return replace(health_of(self._reported), received=self._readings.position)
+
+    def start(self) -> None:
+        """Begin."""
+
+    def read(self, timeout: float) -> ReadingBlock:  # noqa: ARG002  nothing is waited for
+        """Return the readings of this step; once stopped, all that are left."""
+        step = self._step
+        if self._stopped:
+            return self._readings.up_to(self._limit)
+        if step is None:
+            return ReadingBlock.empty()
+        if step.end is not None and step.end.get("cause") == "device":
+            raise LinkLost(str(step.end.get("reason", "")))
+        if step.losses is not None:
+            self._reported.append(step.losses)
+            self._move_past("losses", step, self._settings.losses_every)
+        elif step.told:
+            self._move_past("told", step, self._settings.zero_patience)
+        elif step.act is None:
+            self._clock.move(step.instant_ns)
+        return self._readings.up_to(step.readings)
+
+    def stop(self) -> None:
+        """End: the health at the end is known where the recording has one."""
+        self._stopped = True
+        end = self._steps[-1].end
+        if end:
+            self._health = msgspec.convert(end.get("health", {}), Health)
+
+    def close(self) -> None:
+        """Give back nothing."""
+
+    def _waiting(self, step: Step) -> bool:
+        """Wait a little for a step whose time has not come, and say so."""
+        if self._speed is None:
+            return False
+        due = self._began + (step.instant_ns - self._first_ns) * 1e-9 / self._speed
+        left = due - time.monotonic()
+        if left > 0.0:
+            time.sleep(min(left, SLICE))
+        return left > SLICE
+
+    def _move_past(self, what: str, step: Step, every: float) -> None:
+        """Go on to the step, and so far that the runner, which tells such things now and then, tells it once more."""
+        last_ns = self._said_ns.get(what)
+        instant = step.instant_ns if last_ns is None else max(step.instant_ns, last_ns + round(every * 1e9))
+        self._clock.move(instant)
+        self._said_ns[what] = self._clock.now_ns()
+
+
+def recorded_settings(log: Sequence[LoggedEvent]) -> RunnerSettings:
+    """Return how a session, or a part of it, was run, as its log tells; what it does not tell is as it is now."""
+    for event in log:
+        if event.kind in ("started", "resumed"):
+            told = event.data["settings"] if event.kind == "started" else event.data["run"]
+            return msgspec.convert({name: setting["value"] for name, setting in told.items()}, RunnerSettings)
+    return RunnerSettings()
+
+
+def _run(
+    recording: Recording, clock: _RecordedClock, writer: _Rewriter, speed: float | None, progress: Progress
+) -> None:
+    """Let the runner conduct the session once more, part by part."""
+    logs = parts([event for event in recording.events if event.kind not in LATER])
+    readings = RecordedReadings(recording)
+    try:
+        for number, log in enumerate(logs):
+            after = logs[number + 1] if number + 1 < len(logs) else None
+            limit = None if after is None else after[0].readings
+
+            def shown(part: float, what: str, number: int = number) -> None:
+                progress((number + part) / len(logs), what)
+
+            settings = recorded_settings(log)
+            player = _Player(recording.info, log, readings, limit, clock, settings, speed, shown)
+            resumed = None if number == 0 else _resumed(recording.plan, writer.made, log)
+            writer.follow_part(log)
+            _run_part(recording.plan, player, writer, clock, settings, resumed)
+    finally:
+        writer.finish()
+
+
+def _run_part(
+    plan: SessionPlan,
+    player: _Player,
+    writer: _Rewriter,
+    clock: _RecordedClock,
+    settings: RunnerSettings,
+    resumed: Resumed | None,
+) -> None:
+    transducer = player if plan.forces else None
+    with suppress(_CutShort, _Again):  # as the part ends
+        end = run_session(
+            plan, writer, player, transducer, clock, settings=settings, resumed=resumed, stop=player.go_on
+        )
+        if end.cause == "stopped" and not player.done:
+            raise Stopped
+
+
+def _resumed(plan: SessionPlan, before: Sequence[LoggedEvent], log: Sequence[LoggedEvent]) -> Resumed:
+    """Return how a part goes on after those before it, as they came out in the replay."""
+    told = next(event.data for event in log if event.kind == "resumed")
+    seams = [event.data for event in log if event.kind == "readings_joined"]
+
+    def joins(_last: ReadingBlock, _first: ReadingBlock) -> Seam:
+        return _JoinedBefore(**seams[0]) if seams else _JoinedBefore(0, 0.0)
+
+    data = {name: value for name, value in told.items() if name != "run"}
+    return Resumed(resumption(plan, before), data, ReadingBlock.empty(), joins)
+
+
+@dataclass(frozen=True, slots=True)
+class _JoinedBefore(Seam):
+    """A seam whose readings were recorded as they go on."""
+
+    def joined(self, block: ReadingBlock) -> ReadingBlock:
+        return block
+
+
+def _copy(recording: Recording, writer: _Rewriter) -> None:
+    """Hand the readings over once more, and write each event where it stood."""
+    writer.follow_part([event for event in recording.events if event.kind not in LATER])
+    readings = RecordedReadings(recording)
+    for event in recording.events:
+        if event.kind not in LATER:
+            writer.readings(readings.up_to(event.readings))
+            writer.event(event.kind, event.trial, event.data)
+    writer.readings(readings.up_to(None))
+    writer.finish()
+
+
+def _key(event: LoggedEvent) -> tuple[str, int | None]:
+    return event.kind, event.trial
+
+
+def _name(event: LoggedEvent) -> str:
+    where = "" if event.trial is None else f" in trial {event.trial}"
+    return f"event {event.number} ({event.kind}{where})"
+
+
+def _plain(event: LoggedEvent) -> dict[str, Any]:
+    return {"time_ns": event.time_ns, "readings": event.readings, "data": event.data}

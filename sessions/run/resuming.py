@@ -1,0 +1,195 @@
+"""A session that was cut short goes on: where it was, by its log; and how the new clock and readings join the old."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+
+from drivers.clock import Clock
+from drivers.readings import ReadingBlock
+from drivers.transducer import TransducerInfo
+from sessions.plan.plan import SessionPlan
+from sessions.recording import LoggedEvent, Recording, RecordingError
+from sessions.recording.head import calibration_hash
+from sessions.run.event_log import Line, event_of, line_of
+from sessions.run.machine import advance, interrupted, start
+from sessions.run.states import State
+from sessions.run.steps import Command, Refuse
+
+CUT_SHORT = "the recording was cut short in the middle of it"
+OF_TAKES = frozenset({"take_started", "take_kept", "take_discarded", "left_out"})
+RESUMABLE = frozenset({"device", "client", "disk"})  # causes of an end that cut a session short
+LEAST_GAP_NS = 1_000_000  # where the wall clock shows none: the session clock never stands still or runs backwards
+
+
+@dataclass(frozen=True, slots=True)
+class Resumption:
+    """Where a session that was cut short goes on."""
+
+    state: State
+    owed: tuple[Line, ...]  # about takes: decided, or now due, and not in the log yet
+    commands: tuple[Command, ...]  # that enter the state, without those about takes
+
+
+def resumption(plan: SessionPlan, events: Sequence[LoggedEvent]) -> Resumption:
+    """Return where a session with this log goes on: at the same trial, its open take discarded.
+
+    Raises RecordingError where an event does not follow from those before it.
+    """
+    state, _ = start(plan)
+    owed: list[Line] = []
+    for logged in events:
+        line = (logged.kind, logged.trial, dict(logged.data))
+        try:
+            event = event_of(logged)
+        except ValueError as error:
+            raise RecordingError(f"event {logged.number} of the log is not readable ({error})") from error
+        if event is not None:
+            state, commands = advance(state, event)
+            if any(isinstance(command, Refuse) for command in commands):
+                raise RecordingError(
+                    f"event {logged.number} ({logged.kind}) of the log does not follow from those before it:"
+                    " the session can be analysed, not resumed"
+                )
+            owed = _of_takes(commands)
+        elif line in owed:
+            owed.remove(line)
+        elif logged.kind in ("take_discarded", "resumed"):  # by the end of an earlier part, or by its resumption
+            state, _ = interrupted(state, CUT_SHORT)
+    state, commands = interrupted(state, CUT_SHORT)
+    due = _of_takes(commands)
+    shown = tuple(command for command in commands if line_of(command) not in due)
+    return Resumption(state, (*owed, *due), shown)
+
+
+def check_resumable(recording: Recording) -> None:
+    """Raise RecordingError unless the session was cut short and its log is whole."""
+    numbers = [event.number for event in recording.events]
+    if numbers != list(range(1, len(numbers) + 1)):
+        raise RecordingError(f"{recording.folder} cannot be resumed: its log is damaged; it can still be analysed")
+    end = recording.end
+    if end is not None and end.get("cause") not in RESUMABLE:
+        raise RecordingError(
+            f"{recording.folder} has ended ({end.get('reason')}); only one that was cut short is resumed"
+        )
+
+
+def check_same_transducer(recorded: TransducerInfo | None, opened: TransducerInfo | None) -> None:
+    """Raise RecordingError unless the transducer is the one the session began with, set and calibrated alike."""
+    if recorded is None or opened is None:
+        if recorded is not opened:
+            raise RecordingError("the session began without a transducer, or is to go on without its own")
+        return
+    if opened.serial != recorded.serial:
+        raise RecordingError(
+            f"the session began on the transducer with serial number {recorded.serial}, and this one has"
+            f" {opened.serial}; connect the first, or begin a new session"
+        )
+    if calibration_hash(opened.calibration) != calibration_hash(recorded.calibration):
+        raise RecordingError(f"transducer {opened.serial} is calibrated otherwise than before; begin a new session")
+    if not np.isclose(opened.rate, recorded.rate, rtol=1e-3, equal_nan=True):
+        raise RecordingError(
+            f"transducer {opened.serial} gives {opened.rate:g} readings a second, and gave {recorded.rate:g};"
+            " set it as it was"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ContinuedClock:
+    """A clock that goes on where the session's clock was."""
+
+    clock: Clock
+    offset_ns: int  # added to the clock's time [ns]
+
+    @property
+    def factor(self) -> float:
+        """Return the told seconds in one real second."""
+        return self.clock.factor
+
+    def now_ns(self) -> int:
+        """Return the time [ns]."""
+        return self.clock.now_ns() + self.offset_ns
+
+    def sleep(self, seconds: float) -> None:
+        """Wait."""
+        self.clock.sleep(seconds)
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """The time between the last thing recorded and the resumption, told by the wall clock."""
+
+    last_ns: int  # session clock of the last thing recorded [ns]
+    duration: float | None  # [s]; None where the wall clock ran backwards meanwhile
+    clock_offset_ns: int  # session clock minus the clock of the program that goes on [ns]
+    resumed_utc: str
+
+
+def continued(recording: Recording, last: ReadingBlock, clock: Clock, now: datetime) -> tuple[ContinuedClock, Gap]:
+    """Return the session's clock going on, and the gap.
+
+    `last` holds the last readings (or none), `now` is the date. The session clock goes on from its last instant by as
+    much as the wall clock says has passed, a second more or less: no two clocks of a computer survive its restart.
+    """
+    known = [(str(recording.provenance["created_utc"]), int(recording.provenance["clock"]["now_ns"]))]
+    known += [(e.data["resumed_utc"], e.time_ns) for e in recording.events if e.kind == "resumed"]
+    utc, at_ns = known[-1]
+    instants = [at_ns, *(event.time_ns for event in recording.events), *last.received_ns.tolist()]
+    last_ns = max(instants)
+    elapsed_ns = round((now - datetime.fromisoformat(utc)).total_seconds() * 1e9)
+    # A told clock ran faster; while nothing ran, time passed as on the wall.
+    gap_ns = elapsed_ns - round((last_ns - at_ns) / float(recording.provenance["clock"]["factor"]))
+    offset_ns = last_ns + max(gap_ns, LEAST_GAP_NS) - clock.now_ns()
+    duration = gap_ns * 1e-9 if elapsed_ns >= 0 else None
+    gap = Gap(last_ns, None if duration is None else max(duration, 0.0), offset_ns, _text(now))
+    return ContinuedClock(clock, offset_ns), gap
+
+
+@dataclass(frozen=True, slots=True)
+class Seam:
+    """What is added to readings after a resumption, so that their numbers and times go on from those before."""
+
+    sequence_offset: int
+    time_offset: float  # [s]
+
+    @staticmethod
+    def between(before: ReadingBlock, after: ReadingBlock) -> "Seam":
+        """Return the seam of the last readings before and the first after it; the time between is the session clock's.
+
+        A seam after no reading adds nothing.
+        """
+        if not len(before):
+            return Seam(0, 0.0)
+        passed = max(int(after.received_ns[0]) - int(before.received_ns[-1]), LEAST_GAP_NS) * 1e-9
+        return Seam(
+            int(before.sequence[-1]) + 1 - int(after.sequence[0]),
+            float(before.time[-1]) + passed - float(after.time[0]),
+        )
+
+    def joined(self, block: ReadingBlock) -> ReadingBlock:
+        """Return the readings as they go on; raw numbers, counter and status stay what the device said."""
+        return replace(block, sequence=block.sequence + self.sequence_offset, time=block.time + self.time_offset)
+
+
+def resumed_data(gap: Gap, info: TransducerInfo | None, software: Mapping[str, str]) -> dict[str, Any]:
+    """Return what the event `resumed` holds."""
+    return {
+        "gap": gap.duration,
+        "last_ns": gap.last_ns,
+        "clock_offset_ns": gap.clock_offset_ns,
+        "resumed_utc": gap.resumed_utc,
+        "uri": None if info is None else info.uri,
+        "settings": {} if info is None else dict(info.settings),
+        "software": dict(software),
+    }
+
+
+def _of_takes(commands: Sequence[Command]) -> list[Line]:
+    lines = [line_of(command) for command in commands]
+    return [line for line in lines if line is not None and line[0] in OF_TAKES]
+
+
+def _text(now: datetime) -> str:
+    return now.astimezone(UTC).isoformat(timespec="milliseconds")

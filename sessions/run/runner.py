@@ -1,0 +1,358 @@
+"""Runs a session: carries out the machine's commands with a transducer, a writer and a clock, and feeds events back."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any, Literal, Protocol
+
+from drivers.clock import Clock
+from drivers.readings import ReadingBlock
+from drivers.transducer import DeviceFault, Health, LinkLost, Transducer
+from sessions.plan.plan import SessionPlan
+from sessions.recording import Acknowledged, RecordingError, SessionWriter
+from sessions.run.event_log import data_of, kind_of, line_of
+from sessions.run.interruptions import Interruptions, interruptions
+from sessions.run.live_detection import Detector, TakeWatch
+from sessions.run.machine import advance, start, trial_in_hand
+from sessions.run.resuming import Resumption, Seam
+from sessions.run.states import Ended, Ready, Resting, Scoring, Settling, Stroking, Taring
+from sessions.run.steps import Abort, AskRest, Command, Event, MeasureZero, Refuse, RestOver, Tell
+from sessions.strokes.onset import ContactDetector, DetectorSettings
+
+Cause = Literal["finished", "aborted", "stopped", "device", "client", "disk", "program"]
+STOPPED = "stopped by the user"
+Ending = tuple[Cause, str]  # why a session ends, for programs and for people
+LOSSES = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated", "off_rate")  # counts of Health
+
+
+class Operator(Protocol):
+    """Experimenter and subject, as the runner sees them: a terminal, a window, or simulated ones. No call waits."""
+
+    def show(self, command: Command) -> None:
+        """Take a command; those that ask for something are answered through `poll` when it is done."""
+        ...
+
+    def poll(self) -> Sequence[Event]:
+        """Return what has happened since the last call, in order."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class RunnerSettings:
+    """How a session is run; written into its log."""
+
+    tick: float = 0.02  # between two looks at transducer and operator [s, session clock]
+    zero_duration: float = 0.5  # unloaded stretch before each take [s, device time]
+    zero_patience: float = 5.0  # waiting for it, until somebody is told [s, session clock]
+    after_lift: float = 0.5  # the finger stays off, before a take ends [s, device time]
+    losses_every: float = 1.0  # least time between two reports of lost readings [s, session clock]
+    status_every: float = 0.1  # between two calls of `progress` [s, session clock]
+    detection: DetectorSettings = field(default_factory=DetectorSettings)  # of the live detector, and of a quiet zero
+
+
+@dataclass(frozen=True, slots=True)
+class Resumed:
+    """How a session that was cut short goes on."""
+
+    at: Resumption
+    data: Mapping[str, Any]  # of the event `resumed`
+    last: ReadingBlock  # last readings before; empty where there were none
+    joins: Callable[[ReadingBlock, ReadingBlock], Seam] = Seam.between  # last readings before and first after it
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """How far a running session is, for a lamp or a line of progress."""
+
+    state: str  # name of the machine's state
+    trial: int | None  # number of the trial in hand
+    trials: int  # in the plan
+    readings: int  # handed to the recording
+    lost: int  # readings that never arrived
+    lag_ms: float  # age of the newest reading when it was handed over
+    safe: Acknowledged  # what the recording has acknowledged
+
+
+@dataclass(frozen=True, slots=True)
+class SessionEnd:
+    """How a session ended; the same stands in its log."""
+
+    reason: str
+    cause: Cause
+    complete: bool  # True when every trial was done or skipped
+    readings: int
+    health: Health
+
+
+def run_session(
+    plan: SessionPlan,
+    writer: SessionWriter,
+    operator: Operator,
+    transducer: Transducer | None,
+    clock: Clock,
+    *,
+    detector: Callable[[DetectorSettings], Detector] = ContactDetector,
+    settings: RunnerSettings | None = None,
+    resumed: Resumed | None = None,
+    stop: Callable[[], Ending | None] = lambda: None,
+    progress: Callable[[Status], None] = lambda _: None,
+) -> SessionEnd:
+    """Run the session to its end, record all of it, and close the writer.
+
+    The session ends when the machine does, when `stop` gives a reason or Ctrl-C is pressed, and when the transducer is
+    lost: each time with a written end that names the reason. With `resumed` a session that was cut short goes on. The
+    transducer is started and stopped, not closed. Raises RecordingError when the disk takes no more; any other error
+    of ours is raised again after the end was written.
+    """
+    if plan.forces != (transducer is not None):
+        raise ValueError("a visit with forces needs a transducer, and one without has none")
+    with interruptions() as interrupted:
+        run = _Run(plan, writer, operator, transducer, clock, detector, settings or RunnerSettings(), progress)
+        if resumed is not None:
+            run.go_on(resumed)
+        return run.to_the_end(interrupted, stop)
+
+
+class _Run:
+    """The one thing that changes while a session runs."""
+
+    def __init__(
+        self,
+        plan: SessionPlan,
+        writer: SessionWriter,
+        operator: Operator,
+        transducer: Transducer | None,
+        clock: Clock,
+        detector: Callable[[DetectorSettings], Detector],
+        settings: RunnerSettings,
+        progress: Callable[[Status], None],
+    ) -> None:
+        self._plan = plan
+        self._writer = writer
+        self._operator = operator
+        self._transducer = transducer
+        self._clock = clock
+        self._detector = detector
+        self._settings = settings
+        self._progress = progress
+        self._state, self._first_commands = start(plan)
+        self._watch: TakeWatch | None = None
+        self._readings = writer.acknowledged.readings
+        self._resumed: Resumed | None = None
+        self._seam: Seam | None = None
+        self._reported = Health()
+        self._due_ns: dict[str, int] = dict.fromkeys(("losses", "status", "zero"), clock.now_ns())
+        self._rested_ns: int | None = None  # when the rest is over [session clock]
+
+    def go_on(self, resumed: Resumed) -> None:
+        """Begin where a session that was cut short left off."""
+        self._resumed = resumed
+        self._state, self._first_commands = resumed.at.state, resumed.at.commands
+
+    def to_the_end(self, interrupted: Interruptions, stop: Callable[[], Ending | None]) -> SessionEnd:
+        """Run, and write the end whatever it was."""
+        try:
+            self._write_beginning()
+            if self._transducer is not None:
+                with interrupted.raised():  # a device that does not answer may take its time
+                    self._transducer.start()
+            cause, reason = self._go_round(lambda: ("stopped", STOPPED) if interrupted.heard else stop())
+        except (LinkLost, DeviceFault) as error:
+            cause, reason = "device", str(error)
+        except KeyboardInterrupt:
+            cause, reason = "stopped", STOPPED
+        except RecordingError:
+            if self._transducer is not None:
+                self._transducer.stop()
+            self._writer.close()
+            raise
+        except BaseException as error:
+            self._end("program", f"{type(error).__name__}: {error}")
+            raise
+        return self._end(cause, reason)
+
+    def _write_beginning(self) -> None:
+        """Write down how the session is run; of one that goes on also the gap, and the take that was open."""
+        settings = {"settings": _with_origin(self._settings)}
+        if self._resumed is None:
+            self._writer.event("started", data=settings)
+            return
+        for line in self._resumed.at.owed:
+            self._writer.event(*line, commit=False)
+        self._writer.event("resumed", data={**self._resumed.data, "run": settings["settings"]})
+
+    def _go_round(self, stop: Callable[[], Ending | None]) -> Ending:
+        """Look at transducer and operator again and again, until there is a reason to end."""
+        self._carry_out(self._first_commands)
+        while True:
+            began_ns = self._clock.now_ns()
+            if (ending := stop()) is not None:
+                return ending
+            if self._writer.full is not None:
+                return "disk", self._writer.full
+            self._listen()
+            if isinstance(self._state, Resting) and self._rest_is_over():
+                self._take(RestOver())
+            for event in self._operator.poll():
+                self._take(event)
+            if isinstance(self._state, Ended):
+                return ("finished" if self._state.complete else "aborted"), self._state.reason
+            self._tell_status()
+            self._clock.sleep(max(self._settings.tick - (self._clock.now_ns() - began_ns) * 1e-9, 0.0))
+
+    def _listen(self) -> None:
+        """Record what the transducer gives, and let the machine know what it tells."""
+        if self._transducer is None:
+            return
+        block = self._going_on(self._transducer.read(self._settings.tick))
+        self._keep(block)
+        if self._watch is not None:
+            for event in self._watch.feed(block):
+                self._take(event)
+        if isinstance(self._state, Taring) and self._due("zero", self._settings.zero_patience):
+            self._show(Tell("the zero cannot be measured while something moves or touches; take hands off"))
+        self._report_losses()
+
+    def _going_on(self, block: ReadingBlock) -> ReadingBlock:
+        """Return readings so that their numbers and times follow those before a resumption."""
+        if self._resumed is None or not len(block):
+            return block
+        if self._seam is None:
+            self._seam = self._resumed.joins(self._resumed.last, block)
+            self._writer.event("readings_joined", data=asdict(self._seam), commit=False)
+        return self._seam.joined(block)
+
+    def _keep(self, block: ReadingBlock) -> None:
+        self._writer.readings(block)
+        self._readings += len(block)
+
+    def _take(self, event: Event) -> None:
+        """Let the machine decide about an event, write both down, then show what it asks for."""
+        before = self._state
+        self._state, commands = advance(before, event)
+        refusals = [command for command in commands if isinstance(command, Refuse)]
+        if refusals:
+            data = {"event": kind_of(event), "sentence": refusals[0].sentence, "given": data_of(event)}
+            self._writer.event("refused", trial_in_hand(before), data)
+            self._operator.show(refusals[0])
+            return
+        logged = self._writer.event(kind_of(event), trial_in_hand(before), data_of(event), commit=False)
+        self._begin_rest(commands, logged.time_ns)
+        if not isinstance(self._state, Taring | Ready | Stroking | Scoring | Settling):
+            self._watch = None
+        self._carry_out(commands)
+
+    def _begin_rest(self, commands: Sequence[Command], at_ns: int) -> None:
+        """Reckon a rest from the event it follows, whose instant a replay knows."""
+        for command in commands:
+            if isinstance(command, AskRest):
+                self._rested_ns = None if command.duration is None else at_ns + round(command.duration * 1e9)
+
+    def _rest_is_over(self) -> bool:
+        return self._rested_ns is not None and self._clock.now_ns() >= self._rested_ns
+
+    def _carry_out(self, commands: Sequence[Command]) -> None:
+        """Write commands down, make that safe, and only then let anybody see them."""
+        for command in commands:
+            if (line := line_of(command)) is not None:
+                self._writer.event(*line, commit=False)
+        self._writer.commit()
+        for command in commands:
+            if isinstance(command, MeasureZero):
+                self._begin_watch()
+            self._operator.show(command)
+        self._due_ns["status"] = self._clock.now_ns()
+
+    def _begin_watch(self) -> None:
+        transducer = self._transducer
+        if transducer is None:
+            raise AssertionError("a zero is measured only where there is a transducer")
+        settings = self._settings
+        self._watch = TakeWatch(
+            transducer.info,
+            self._plan.frame,
+            settings.zero_duration,
+            settings.detection,
+            self._detector,
+            settings.after_lift,
+        )
+        self._due_ns["zero"] = self._clock.now_ns() + round(settings.zero_patience * 1e9)
+
+    def _show(self, command: Tell) -> None:
+        self._writer.event("told", trial_in_hand(self._state), {"sentence": command.sentence})
+        self._operator.show(command)
+
+    def _report_losses(self, *, now: bool = False) -> None:
+        """Write down what the driver lost, repeated or found wrong since the last report."""
+        if self._transducer is None:
+            return
+        health = self._transducer.health
+        counts = {name: getattr(health, name) - getattr(self._reported, name) for name in LOSSES}
+        if any(counts.values()) and (now or self._due("losses", self._settings.losses_every)):
+            told = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+            data = {**counts, "rate_words": health.rate_words} if counts["off_rate"] else counts
+            sentence = f"readings: {told}" + (f" ({health.rate_words})" if counts["off_rate"] else "")
+            self._writer.event("losses", trial_in_hand(self._state), {**data, "sentence": sentence})
+            self._reported = health
+
+    def _due(self, what: str, every: float) -> bool:
+        """Say whether it is time for something, and when it is, set the next time."""
+        now_ns = self._clock.now_ns()
+        if now_ns < self._due_ns[what]:
+            return False
+        self._due_ns[what] = now_ns + round(every * 1e9)
+        return True
+
+    def _tell_status(self) -> None:
+        if not self._due("status", self._settings.status_every):
+            return
+        health = self._transducer.health if self._transducer is not None else Health()
+        self._progress(
+            Status(
+                type(self._state).__name__.lower(),
+                trial_in_hand(self._state),
+                len(self._plan.trials),
+                self._readings,
+                health.lost,
+                health.lag_ms,
+                self._writer.acknowledged,
+            )
+        )
+
+    def _end(self, cause: Cause, reason: str) -> SessionEnd:
+        """Stop the stream, keep its last readings, and write the end."""
+        health = self._last_readings()
+        if not isinstance(self._state, Ended):
+            self._state, commands = advance(self._state, Abort(reason))
+            for command in commands:
+                if (line := line_of(command)) is not None:
+                    self._writer.event(*line, commit=False)
+        complete = isinstance(self._state, Ended) and self._state.complete
+        self._report_losses(now=True)
+        end = SessionEnd(reason, cause, complete, self._readings, health)
+        self._writer.event("ended", data=asdict(end))
+        self._writer.close()
+        return end
+
+    def _last_readings(self) -> Health:
+        """Stop the transducer and take what had still arrived."""
+        if self._transducer is None:
+            return Health()
+        self._transducer.stop()
+        try:
+            while len(block := self._going_on(self._transducer.read(0.0))):
+                self._keep(block)
+        except (LinkLost, DeviceFault):
+            pass  # all that had arrived was handed over before it says so
+        return self._transducer.health
+
+
+def _with_origin(settings: RunnerSettings) -> dict[str, Any]:
+    """Return the settings as plain data, each marked as set or as the default."""
+    default, chosen = asdict(RunnerSettings()), asdict(settings)
+    return {
+        setting.name: {
+            "value": chosen[setting.name],
+            "origin": "default" if chosen[setting.name] == default[setting.name] else "set",
+        }
+        for setting in fields(settings)
+    }

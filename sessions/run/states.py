@@ -1,0 +1,155 @@
+"""Where a session is: the states of its course, and the place in the plan that each of them stands at."""
+
+from dataclasses import dataclass, replace
+
+from sessions.plan.plan import Block, SessionPlan, Trial
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far one trial is."""
+
+    takes: int = 0  # begun so far
+    kept: bool = False  # True when the last of them counts
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Which trial of the plan is in hand, and how far every trial is."""
+
+    plan: SessionPlan
+    index: int  # of the trial in hand
+    progress: tuple[Progress, ...]  # one for each trial of the plan
+
+    @property
+    def trial(self) -> Trial:
+        """Return the trial in hand."""
+        return self.plan.trials[self.index]
+
+    @property
+    def block(self) -> Block:
+        """Return the block of the trial in hand."""
+        return next(block for block in self.plan.blocks if self.trial in block.trials)
+
+    @property
+    def take(self) -> int:
+        """Return the number of the latest take of the trial in hand; 0 before the first."""
+        return self.progress[self.index].takes
+
+    @property
+    def last(self) -> bool:
+        """Say whether the trial in hand is the last."""
+        return self.index == len(self.progress) - 1
+
+    @property
+    def first_of_two(self) -> bool:
+        """Say whether the trial in hand is the first of two that are compared."""
+        return not self.last and self.plan.trials[self.index + 1].compared_with == self.trial.number
+
+    @property
+    def rest_due(self) -> bool:
+        """Say whether the plan asks for a rest before the trial in hand."""
+        rests, trial, block = self.plan.rests, self.trial, self.block
+        if self.index == 0 or trial.compared_with is not None:
+            return False
+        done = block.trials.index(trial)
+        if done == 0:
+            return rests.between_blocks and self.at(self.index - 1).block.phase != "practice"
+        # Two that are compared make one trial in the subject's eyes.
+        counted = sum(earlier.compared_with is None for earlier in block.trials[:done])
+        return rests.after_trials is not None and counted % rests.after_trials == 0
+
+    def at(self, index: int) -> "Place":
+        """Return the place with another trial in hand."""
+        return replace(self, index=index)
+
+    def with_progress(self, progress: Progress) -> "Place":
+        """Return the place with the trial in hand that far."""
+        return replace(self, progress=(*self.progress[: self.index], progress, *self.progress[self.index + 1 :]))
+
+
+@dataclass(frozen=True, slots=True)
+class Idle:
+    """All is set up; the session has not begun."""
+
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Mounting:
+    """The experimenter puts the trial's stimulus on; no take is open."""
+
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Taring:
+    """A take has begun; the zero is measured with nothing touching."""
+
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """The subject may stroke."""
+
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Stroking:
+    """The finger touches."""
+
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Scoring:
+    """The stroke is done and the subject judges."""
+
+    place: Place
+    touching: bool = False  # True during a further stroke
+    strokes: int = 1  # begun in this take
+    settled: bool = False  # the finger has been off long enough for the take to end
+
+
+@dataclass(frozen=True, slots=True)
+class Settling:
+    """All of the trial is done; the take runs on until the finger has been off for a moment."""
+
+    place: Place
+    touching: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Resting:
+    """A rest that the plan asks for, before the trial in hand; no take is open."""
+
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Paused:
+    """Nothing is asked of anybody. No take is open, but for one whose stroke is done and waits for its answer."""
+
+    place: Place
+    scoring: bool
+    strokes: int = 1  # begun in the take that waits
+
+
+@dataclass(frozen=True, slots=True)
+class Closing:
+    """Every trial is done; the last can still be repeated."""
+
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """The session is over."""
+
+    reason: str
+    complete: bool  # True when every trial was done or skipped
+
+
+State = Idle | Mounting | Taring | Ready | Stroking | Scoring | Settling | Resting | Paused | Closing | Ended

@@ -1,0 +1,1 @@
+"""Scores and predictions over subjects: means, mixed models, pooling."""

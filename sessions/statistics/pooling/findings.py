@@ -1,0 +1,144 @@
+"""What a study finds, as plain data, and the names of the effects it tells."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from sessions.prediction.multiverse import PathFinding
+from sessions.statistics.mixed_model import MixedModel
+from sessions.statistics.pooling.averages import Average, Estimates
+from sessions.statistics.pooling.exclusions import Exclusion
+from sessions.statistics.pooling.visit import Visit, VisitOptions
+from sessions.statistics.scores import MeanScore, Relation
+from sessions.statistics.variance_components import Spread
+from sessions.statistics.within_subjects import Agreement, Difference, RepeatedCorrelation, WithinMean
+
+SED = "SED [kPa]"
+INDEX = "index − 50"
+FRICTION = "µ"
+DRIFT = "trials before in the block"
+CARRY_OVER = "index stroked before − 50"
+LEVELS = "spread of subjects' levels"
+SLOPES = "spread of subjects' slopes on the index"
+NOISE = "noise of single scores"
+FINGERS = "spread of log µ between fingers and transducers"
+WITHIN = "r of score and SED within subjects"
+UNITS = {
+    INDEX: "points per index",
+    FRICTION: "points per unit of µ",
+    SED: "points per kPa",
+    DRIFT: "points per trial",
+    CARRY_OVER: "points per index",
+    LEVELS: "points",
+    SLOPES: "points per index",
+    NOISE: "points",
+    FINGERS: "1",
+    WITHIN: "1",
+}  # of effects on the score, and of the spreads
+
+
+@dataclass(frozen=True, slots=True)
+class Normalised:
+    """What is told of scores when each subject's use of the scale is taken away: own mean 0, own spread 1."""
+
+    means: Mapping[int, Average]  # by index
+    mean_relation: Relation | None
+    repeated: RepeatedCorrelation | None
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceMean:
+    """Means over subjects of one surface; None where there is no subject's number."""
+
+    index: int
+    subjects: int  # whose stroke gave an SED
+    mu: Average | None
+    sed: Average | None  # [MPa]
+    normal_force: Average | None  # measured [N]
+    model_normal_force: Average | None  # of the model, pressed to its depth [N]
+    matching_depth: Average | None  # at which the model would press as hard as the subject did [mm]
+
+
+@dataclass(frozen=True, slots=True)
+class DescriptorFindings:
+    """All that a study says of one descriptor."""
+
+    descriptor: str
+    indices: tuple[int, ...]
+    scores: tuple[MeanScore, ...]
+    within: tuple[WithinMean, ...]
+    agreement: Agreement | None
+    surfaces: tuple[SurfaceMean, ...]
+    answers: Mapping[str, tuple[float | None, ...]]  # subject -> score of each index
+    points: tuple[tuple[str, int, float, float], ...]  # subject, index, SED [MPa], score: all of its own strokes
+    mean_relation: Relation | None  # mean SED [MPa] against mean score
+    repeated: RepeatedCorrelation | None  # of a subject's scores with the SEDs of its own strokes
+    repeated_holm: float | None  # its p, allowing for as many descriptors as have one
+    without_subject: tuple[tuple[str, float], ...]  # subject left out, r within the others
+    normalised: Normalised
+    differences: tuple[Difference, ...]
+    estimates: Estimates | None
+    on_sed: MixedModel | str  # score on SED [kPa], drift and carry-over; or why there is no model
+    on_index: MixedModel | str  # score on the maker's index, drift and carry-over
+    on_friction: MixedModel | str  # score on the index and on the µ of each subject's own stroke, drift and carry-over
+    fingers: Spread | None  # how fingers differ: of the logarithm of mu between subjects, surfaces taken away [-]
+    paths: tuple[PathFinding, ...]  # () where they were not asked for
+
+
+@dataclass(frozen=True, slots=True)
+class Recovered:
+    """One planted effect beside what the study found."""
+
+    descriptor: str
+    effect: str
+    planted: float
+    found: float
+    low: float
+    high: float
+
+    @property
+    def covered(self) -> bool:
+        """Say whether the interval holds what was planted."""
+        return self.low <= self.planted <= self.high
+
+
+@dataclass(frozen=True, slots=True)
+class PlantedFriction:
+    """How friction of all strokes was recovered."""
+
+    strokes: int  # with a planted and a found mu
+    median_error: float  # of mu, relative [-]
+    worst_error: float
+    intervals: int  # of mu that are given
+    covered: int  # of them hold what was planted
+
+
+@dataclass(frozen=True, slots=True)
+class PlantedFlaw:
+    """What was spoilt in one session, and whether the study says so."""
+
+    session: str
+    expected: str  # for people
+    found: bool
+
+
+@dataclass(frozen=True, slots=True)
+class StudyFindings:
+    """The result of a study."""
+
+    simulated: str
+    options: VisitOptions
+    visits: tuple[Visit, ...]  # all that were read, those left out too
+    failed: tuple[tuple[str, str], ...]  # folder, why it could not be read
+    copies: tuple[tuple[str, str], ...]  # session that counts nothing, and the one whose recording it holds again
+    excluded: tuple[Exclusion, ...]
+    reversed: tuple[tuple[str, str, float], ...]  # subject, descriptor, r of score with index: still counted
+    descriptors: tuple[DescriptorFindings, ...]
+    effects: tuple[Recovered, ...]  # planted, where the study is synthetic
+    friction: PlantedFriction | None
+    flaws: tuple[PlantedFlaw, ...] = ()  # planted, where the study is synthetic
+    synthetic: int | None = None  # the seed, where it is
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {**({"simulated": self.simulated} if self.simulated else {}), **asdict(self)}

@@ -1,0 +1,216 @@
+"""What the visits of a study say together: means, agreement, and how predictions go with scores. Plain data."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from sessions.prediction.multiverse import PathTrial, path_findings
+from sessions.statistics.adjusted_means import surface_means
+from sessions.statistics.mixed_model import MixedModel, mixed_model
+from sessions.statistics.pooling.averages import Average, average, averages, by_subject, estimates
+from sessions.statistics.pooling.exclusions import Exclusion, decided
+from sessions.statistics.pooling.findings import (
+    CARRY_OVER,
+    DRIFT,
+    FRICTION,
+    INDEX,
+    SED,
+    DescriptorFindings,
+    Normalised,
+    StudyFindings,
+    SurfaceMean,
+)
+from sessions.statistics.pooling.ground_truth import found_flaws, found_friction, recovered
+from sessions.statistics.pooling.visit import TrialRow, Visit, VisitOptions, scores_of
+from sessions.statistics.scores import (
+    Relation,
+    ScoreTable,
+    mean_scores,
+    relation,
+    reversed_subjects,
+    score_matrix,
+)
+from sessions.statistics.variance_components import Spread, spreads
+from sessions.statistics.within_subjects import (
+    agreement,
+    differences,
+    holm,
+    repeated_correlation,
+    standardised,
+    within_means,
+)
+
+
+def pooled(
+    visits: Sequence[Visit],
+    failed: Sequence[tuple[str, str]] = (),
+    exclusions: tuple[Exclusion, ...] = (),
+    planted: Mapping[str, Any] | None = None,
+    options: VisitOptions | None = None,
+) -> StudyFindings:
+    """Return what the visits say together; they count in the order of their names, whoever read them first.
+
+    `options` is what was asked of each visit. `planted` is what a synthetic study tells of itself: handed in, used for
+    nothing but the comparison.
+    """
+    ordered = tuple(sorted(visits, key=lambda visit: visit.session))
+    copies = _copies(ordered)
+    counted = [visit for visit in ordered if visit.session not in copies]
+    kept = [(v, row) for v in counted for row in v.rows if decided(exclusions, v.subject, row.descriptor) is None]
+    tables = [scores_of(visit, [row for v, row in kept if v is visit]) for visit in counted]
+    asked = options or VisitOptions()
+    found = tuple(
+        _descriptor(name, asked, tables, [(v, row) for v, row in kept if row.descriptor == name])
+        for name in dict.fromkeys(row.descriptor for _, row in kept)
+    )
+    found = _with_holm(found)
+    return StudyFindings(
+        simulated=_simulated(ordered),
+        options=asked,
+        visits=ordered,
+        failed=tuple(sorted(failed)),
+        copies=tuple(copies.items()),
+        excluded=exclusions,
+        reversed=reversed_subjects(tables),
+        descriptors=found,
+        effects=() if planted is None else recovered(found, planted),
+        friction=None if planted is None else found_friction(ordered, planted["strokes"]),
+        flaws=() if planted is None else found_flaws(ordered, dict(failed), planted.get("spoilt", {})),
+        synthetic=None if planted is None else planted.get("seed"),
+    )
+
+
+def _copies(visits: Sequence[Visit]) -> dict[str, str]:
+    """Return the sessions that hold the recording of an earlier one once more, each with that one's name."""
+    first: dict[str, str] = {}
+    for visit in visits:
+        if visit.sha256:
+            first.setdefault(visit.sha256, visit.session)
+    return {v.session: first[v.sha256] for v in visits if v.sha256 and first[v.sha256] != v.session}
+
+
+def _with_holm(found: Sequence[DescriptorFindings]) -> tuple[DescriptorFindings, ...]:
+    ps = {one.descriptor: one.repeated.people_p for one in found if one.repeated is not None}
+    told = {descriptor: p for descriptor, p in ps.items() if p is not None}
+    adjusted = dict(zip(told, holm(list(told.values())), strict=True))
+    return tuple(replace(one, repeated_holm=adjusted.get(one.descriptor)) for one in found)
+
+
+def _simulated(visits: Sequence[Visit]) -> str:
+    made_up = sum(bool(visit.simulated) for visit in visits)
+    if not made_up:
+        return ""
+    return f"SIMULATED: {made_up} of the {len(visits)} sessions of this study are simulated"
+
+
+def _descriptor(
+    name: str, options: VisitOptions, tables: Sequence[ScoreTable], trials: Sequence[tuple[Visit, TrialRow]]
+) -> DescriptorFindings:
+    indices = tuple(sorted({row.index for _, row in trials}))
+    means = tuple(mean for mean in mean_scores(tables) if mean.descriptor == name)
+    matrix = score_matrix(tables, name)
+    surfaces = tuple(_surface(index, [(v, r) for v, r in trials if r.index == index]) for index in indices)
+    level = standardised(matrix)
+    points = [(v.subject, r, r.sed, r.score) for v, r in trials if r.sed is not None and r.score is not None]
+    scored = [(v.subject, r, r.score) for v, r in trials if r.score is not None]
+    return DescriptorFindings(
+        descriptor=name,
+        indices=indices,
+        scores=means,
+        within=within_means(matrix),
+        agreement=agreement(matrix),
+        surfaces=surfaces,
+        answers={subject: tuple(row.get(index) for index in indices) for subject, row in matrix.items()},
+        points=tuple((subject, row.index, sed, score) for subject, row, sed, score in points),
+        mean_relation=_related([(p[0], p[1].index, p[2], p[3]) for p in points]),
+        repeated=repeated_correlation([p[0] for p in points], [p[2] for p in points], [p[3] for p in points]),
+        repeated_holm=None,
+        without_subject=_without_subject([(p[0], p[2], p[3]) for p in points]),
+        normalised=_normalised(level, [(p[0], p[1].index, p[2]) for p in points]),
+        differences=differences(matrix),
+        estimates=estimates(trials),
+        on_sed=_model([(p[0], p[1], p[3]) for p in points], SED),
+        on_index=_model(scored, INDEX),
+        on_friction=_model([one for one in scored if one[1].mu is not None], INDEX, FRICTION),
+        fingers=_fingers([(v.subject, row.index, row.mu) for v, row in trials if row.mu is not None]),
+        paths=path_findings(
+            [PathTrial(v.subject, row.index, row.score, row.rule, row.paths) for v, row in trials],
+            options.prediction.kinematics,
+            options.area,
+            within=True,
+        ),
+    )
+
+
+def _model(trials: Sequence[tuple[str, TrialRow, float]], *what: str) -> MixedModel | str:
+    """Return the mixed model of scores on `what`, drift and carry-over, or why there is none.
+
+    Trials are subject, row and score. Subjects have slopes of their own on the first of `what`.
+    """
+    subjects, rows, scores = [one[0] for one in trials], [one[1] for one in trials], [one[2] for one in trials]
+    if len(set(subjects)) < 3:
+        own = "scores" if what == (INDEX,) else "scores and strokes of their own"
+        return f"it takes three subjects with {own}, and there {_are(len(set(subjects)))}"
+    columns = {
+        INDEX: [row.index - 50.0 for row in rows],
+        SED: [1e3 * (row.sed or 0.0) for row in rows],
+        FRICTION: [row.mu or 0.0 for row in rows],
+        DRIFT: [float(row.place) for row in rows],
+        CARRY_OVER: [0.0 if row.before is None else row.before - 50.0 for row in rows],
+    }
+    order = [name for name in (DRIFT, CARRY_OVER) if np.ptp(columns[name]) > 0.0]
+    return mixed_model(subjects, scores, {name: columns[name] for name in (*what, *order)}, slopes_differ=True)
+
+
+def _are(n: int) -> str:
+    return "is 1" if n == 1 else f"are {n or 'none'}"
+
+
+def _fingers(trials: Sequence[tuple[str, int, float]]) -> Spread | None:
+    """Return how far subjects' friction differs from one another, of trials' subject, index and mu."""
+    indices = sorted({index for _, index, _ in trials})
+    surfaces = [[float(index == one) for _, index, _ in trials] for one in indices[1:]]
+    found = spreads([subject for subject, _, _ in trials], [math.log(mu) for _, _, mu in trials], surfaces)
+    return None if found is None else found.level
+
+
+def _surface(index: int, trials: Sequence[tuple[Visit, TrialRow]]) -> SurfaceMean:
+    """Return means over subjects, each subject's own repeats averaged first."""
+
+    def over_subjects(name: str) -> Average | None:
+        return average(by_subject([(v.subject, getattr(row, name)) for v, row in trials]))
+
+    names = ("mu", "sed", "normal_force", "model_normal_force", "matching_depth")
+    mu, sed, normal, model, depth = map(over_subjects, names)
+    return SurfaceMean(index, 0 if sed is None else sed.n, mu, sed, normal, model, depth)
+
+
+def _related(points: Sequence[tuple[str, int, float, float]]) -> Relation | None:
+    """Return how mean scores go with mean SEDs, of points that have both: subject, index, SED and score."""
+    seds = surface_means([(subject, index, sed) for subject, index, sed, _ in points])
+    scores = surface_means([(subject, index, score) for subject, index, _, score in points])
+    if seds is None or scores is None:
+        return None
+    return relation(list(seds.values()), list(scores.values()), list(seds))
+
+
+def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[str, float], ...]:
+    """Return the correlation within subjects when each subject in turn is left out."""
+    told: list[tuple[str, float]] = []
+    for subject in dict.fromkeys(point[0] for point in points):
+        others = [point for point in points if point[0] != subject]
+        found = repeated_correlation(*zip(*others, strict=True)) if others else None
+        if found is not None:
+            told.append((subject, found.r))
+    return tuple(told)
+
+
+def _normalised(table: Mapping[str, Mapping[int, float]], points: Sequence[tuple[str, int, float]]) -> Normalised:
+    """Return what scores say that were standardised; `points` are subject, index and SED [MPa] of its own stroke."""
+    means = averages(table)
+    both = [(subject, i, sed, table[subject][i]) for subject, i, sed in points if i in table.get(subject, {})]
+    within = repeated_correlation([p[0] for p in both], [p[2] for p in both], [p[3] for p in both])
+    return Normalised(means, _related(both), within)

@@ -1,0 +1,234 @@
+"""One session's contribution to a study: a row a trial, with scores, friction and prediction side by side."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Literal
+
+import msgspec
+
+from sessions.plan.blinding import revealed
+from sessions.plan.plan import Block
+from sessions.plan.sealed_predictions import NUMBERS, sealed_sentence
+from sessions.prediction import PredictionOptions, SessionPrediction, predict
+from sessions.prediction.multiverse import Seds, trial_paths
+from sessions.prediction.uncertainty import with_intervals
+from sessions.recording import Recording
+from sessions.recording.calibration_uncertainty import gain_error_set
+from sessions.recording.log import TrialRecord
+from sessions.recording.manifest import file_sha256
+from sessions.recording.schema import LIVE_FILE
+from sessions.report.predictions import modelled
+from sessions.statistics.scores import Score, ScoreTable
+from sessions.strokes import Analysis, AnalysisSettings, analyse
+from sessions.strokes.bootstrap import drawn_from, stroke_intervals
+from sessions.strokes.contact_area import FIXED, AreaLaw
+
+FORM = 9  # raised when a row holds something else: what was stored before is then computed anew
+
+
+NO_INTERVAL = "intervals of the SED were not asked for"
+
+
+@dataclass(frozen=True, slots=True)
+class VisitOptions:
+    """What is asked of each session of a study."""
+
+    prediction: PredictionOptions = field(default_factory=lambda: PredictionOptions(course="steady", intervals=True))
+    area: AreaLaw = FIXED  # by which tau_max is told; the paths have areas of their own
+    paths: Literal["none", "small", "finite"] = (
+        "none"  # many paths too, and at which strain; see `sessions.prediction.multiverse`
+    )
+    gain_error: float | None = None  # of each axis of every transducer [-]; None: what was set for each session
+
+
+@dataclass(frozen=True, slots=True)
+class TrialRow:
+    """One trial. None where there is no number; `why` says why no SED."""
+
+    trial: int
+    block: str
+    descriptor: str
+    index: int
+    code: str
+    direction: int  # as planned
+    repetition: int
+    place: int  # trials of the block before this one
+    before: int | None  # index stroked just before, in the same block
+    outcome: str
+    score: float | None
+    estimate: float | None = None  # on a scale of the subject's own
+    choice: str | None = None  # of the two compared: first or second
+    rule: str = ""  # which mu the model got
+    mu: float | None = None
+    mu_low: float | None = None  # 95 % bootstrap interval of mu, as of all that was measured: `BootstrapSettings.kind`
+    mu_high: float | None = None
+    mu_dynamic: float | None = None
+    mu_static: float | None = None
+    tau_max: float | None = None  # [MPa]
+    tau_max_low: float | None = None
+    tau_max_high: float | None = None
+    speed: float | None = None  # [mm/s]
+    speed_low: float | None = None
+    speed_high: float | None = None
+    normal_force: float | None = None  # [N]
+    normal_force_low: float | None = None
+    normal_force_high: float | None = None
+    sed: float | None = None  # [MPa]
+    sed_low: float | None = None  # 95 % interval that friction alone makes, see `sessions.prediction.uncertainty`
+    sed_high: float | None = None
+    sed_interval: str = ""  # how it was found, or why there is none
+    error_estimate: float | None = None  # relative, of sed
+    model_normal_force: float | None = None  # [N]
+    model_normal_force_error: float | None = None  # relative, estimated by the solver
+    matching_depth: float | None = None  # [mm]
+    flaws: tuple[str, ...] = ()
+    why: str = ""
+    paths: Seds = ()  # SED along each of `sessions.prediction.multiverse.PATHS` [MPa], where they were asked for
+
+
+@dataclass(frozen=True, slots=True)
+class Visit:
+    """What one session brings."""
+
+    session: str  # its folder's name
+    subject: str
+    protocol: str
+    simulated: str  # the sentence that heads whatever is made of it; "" for a real one
+    forces: bool
+    complete: bool
+    rows: tuple[TrialRow, ...]
+    losses: tuple[str, ...]
+    made_by: Mapping[str, str]  # versions
+    sha256: str = ""  # of its `session.sqlite`
+    sealed: str = ""  # whether its predictions were sealed before its scores, "" where it predicts nothing
+    decisions: tuple[str, ...] = ()  # of people about its strokes, in force
+    calibration: str = ""  # the calibration's uncertainty that its intervals hold, set or assumed
+    model: tuple[tuple[str, str, str], ...] = ()  # what was modelled: name, value, remark
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return asdict(self)
+
+    @staticmethod
+    def from_dict(data: Mapping[str, Any]) -> "Visit":
+        """Return the visit that `to_dict` gave `data` for. Raises ValueError where it is none."""
+        return msgspec.convert(data, Visit)
+
+
+def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, str]) -> Visit:
+    """Return what a session brings to a study: analysed, and predicted where it has forces.
+
+    Raises Blinded while the stimuli's key is sealed, RecordingError where the session cannot be read.
+    """
+    known = revealed(recording)
+    gain_error = gain_error_set(known.folder) if options.gain_error is None else options.gain_error
+    analysis = analyse(known, AnalysisSettings(area=options.area, gain_error=gain_error))
+    prediction = None
+    if known.plan.forces:
+        prediction = with_intervals(analysis, predict(analysis, known.plan, options.prediction), both_ways=False)
+    along: Mapping[int, Seds] = {}
+    if options.paths != "none" and prediction is not None:
+        along = trial_paths(known, prediction, finite=options.paths == "finite")
+    records = {record.trial.number: record for record in known.trials}
+    rows = tuple(
+        replace(_row(block, place, records[trial.number], analysis, prediction), paths=along.get(trial.number, ()))
+        for block in known.plan.blocks
+        if block.phase == "main"
+        for place, trial in enumerate(block.trials)
+    )
+    end = known.end
+    return Visit(
+        session=known.folder.name,
+        subject=known.plan.subject,
+        protocol=known.plan.protocol,
+        simulated=known.simulated_sentence or "",
+        forces=known.plan.forces,
+        complete=end is not None and bool(end.get("complete")),
+        rows=rows,
+        losses=(*known.losses, *known.flaws),
+        made_by=dict(made_by),
+        sha256=file_sha256(known.folder / LIVE_FILE),
+        sealed="" if prediction is None else _sealed(known, prediction),
+        decisions=tuple(decision.sentence for decision in analysis.decisions),
+        calibration=drawn_from(analysis.settings).calibration,
+        model=tuple((fact.name, fact.value, fact.remark) for fact in modelled(prediction) if fact.name != "audits"),
+    )
+
+
+def scores_of(visit: Visit, rows: Sequence[TrialRow]) -> ScoreTable:
+    """Return the scores that some of a visit's rows hold."""
+    scores = tuple(Score(visit.subject, row.descriptor, row.index, row.score) for row in rows if row.score is not None)
+    return ScoreTable(visit.session, visit.subject, bool(visit.simulated), scores)
+
+
+def _sealed(recording: Recording, prediction: SessionPrediction) -> str:
+    return sealed_sentence(recording, [{name: getattr(row, name) for name in NUMBERS} for row in prediction.trials])
+
+
+def _row(
+    block: Block, place: int, record: TrialRecord, analysis: Analysis, prediction: SessionPrediction | None
+) -> TrialRow:
+    trial = record.trial
+    row = TrialRow(
+        trial=trial.number,
+        block=block.name,
+        descriptor=trial.stimulus.descriptor,
+        index=trial.stimulus.known_index,
+        code=trial.stimulus.code,
+        direction=trial.direction,
+        repetition=trial.repetition,
+        place=place,
+        before=block.trials[place - 1].stimulus.known_index if place else None,
+        outcome=record.outcome,
+        score=record.score,
+        estimate=record.number,
+        choice=record.choice,
+    )
+    told = {flaw.name: None for flaw in analysis.flaws if flaw.trial == trial.number and flaw.grade != "note"}
+    flaws = tuple(str(name) for name in told)
+    friction = next((one for one in analysis.friction if one.trial == trial.number), None)
+    answer = None if prediction is None else next((p for p in prediction.trials if p.trial == trial.number), None)
+    if friction is None:
+        missing = "The visit recorded no forces." if answer is None else answer.reasons.get("sed", "")
+        missing = "The trial was not done." if record.outcome == "open" else missing
+        return replace(row, flaws=flaws, why=missing)
+    stroke = analysis.strokes[friction.stroke]
+    intervals = stroke_intervals(stroke, friction.stroke, drawn_from(analysis.settings))
+    mu_low, mu_high = (intervals.mu_max if friction.rule == "maximum" else intervals.mu_dynamic) or (None, None)
+    tau_max_low, tau_max_high = intervals.tau_max or (None, None)
+    speed_low, speed_high = intervals.speed or (None, None)
+    normal_low, normal_high = intervals.normal_force or (None, None)
+    row = replace(
+        row,
+        rule=friction.rule,
+        mu=friction.mu,
+        mu_low=mu_low,
+        mu_high=mu_high,
+        mu_dynamic=stroke.mu_dynamic,
+        mu_static=stroke.mu_static,
+        tau_max=friction.tau_max,
+        tau_max_low=None if friction.tau_max is None else tau_max_low,
+        tau_max_high=None if friction.tau_max is None else tau_max_high,
+        speed=friction.speed,
+        speed_low=None if friction.speed is None else speed_low,
+        speed_high=None if friction.speed is None else speed_high,
+        normal_force=stroke.normal_force,
+        normal_force_low=normal_low,
+        normal_force_high=normal_high,
+        flaws=flaws,
+    )
+    if answer is None:
+        return row
+    interval = answer.interval
+    return replace(
+        row,
+        sed=answer.sed,
+        sed_low=None if interval is None else interval.low,
+        sed_high=None if interval is None else interval.high,
+        sed_interval=NO_INTERVAL if interval is None else interval.reason or f"by {interval.method}",
+        error_estimate=answer.error_estimate,
+        model_normal_force=answer.normal_force,
+        model_normal_force_error=answer.normal_force_error,
+        matching_depth=answer.matching_depth,
+        why=answer.reasons.get("sed", ""),
+    )

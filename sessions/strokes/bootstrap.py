@@ -1,0 +1,350 @@
+"""Intervals of a stroke's numbers from sensor noise, zero, calibration and choice of window: a seeded block bootstrap.
+
+Readings within a tenth of a second are alike, so blocks of them are drawn again, not readings (Künsch 1989, Ann.
+Statist. 17:1217). Every repeat also draws how wrong calibration and zero may be, and where the window may have begun
+and ended; the interval lies between two quantiles of what the repeats give.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.strokes.event_uncertainty import break_away_draws, onset_draws, slide_onset_draws
+from sessions.strokes.friction import Rule
+from sessions.strokes.onset import DetectorSettings
+from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.steady import strays
+from sessions.strokes.stroke import Interval, Stroke, StrokeCurve
+
+Array = NDArray[np.float64]
+
+_FEWEST_BLOCKS = 4
+_FEWEST_QUIET = 10  # readings before onset from which noise is told
+_BEFORE = 0.02  # from here on before the onset a reading may be the touch's already [s]
+NUMBERS = (  # of a stroke that have an interval
+    "mu_static",
+    "mu_dynamic",
+    "mu_max",
+    "tau_max",
+    "speed",
+    "normal_force",
+    "tangential_force",
+    "peak_normal",
+    "peak_tangential",
+    "heading",
+    "onset",
+    "break_away",
+    "slide_onset",
+)
+_RANGES = ("onset", "slide_onset")
+_TOP = 0.97  # of the peak: readings above this share of it may be the peak
+
+
+@dataclass(frozen=True, slots=True)
+class BootstrapSettings:
+    """What every repeat draws from; stored with the intervals."""
+
+    repeats: int = 1000
+    seed: int = 0
+    block: float = 0.1  # [s]
+    inwards: float = 0.2  # the steady window may begin or end so much of its length further inwards [-]
+    slide_share: tuple[float, float] = (0.1, 0.3)  # of the steady speed: at any between them the slide has begun [-]
+    gain_error: float = 0.01  # standard uncertainty of each axis' gain [-]
+    gain_error_origin: str = "assumed"  # nobody stated it for this transducer; "set" where somebody did
+    confidence: float = 0.95
+
+    @property
+    def kind(self) -> str:
+        """What an interval is, for people."""
+        return (
+            f"{100 * self.confidence:g} % percentile interval of {self.repeats} block-bootstrap repeats (blocks of "
+            f"{self.block:g} s, neighbours being alike allowed for, seed {self.seed}): sensor noise, zero and its "
+            f"drift, calibration ({self.calibration}), choice of window (ends up to {100 * self.inwards:g} % inwards)"
+        )
+
+    @property
+    def calibration(self) -> str:
+        """The calibration's uncertainty, for people: 0.3 % of each axis, set."""
+        return f"{100 * self.gain_error:g} % of each axis, {self.gain_error_origin}"
+
+    @property
+    def kinds(self) -> Mapping[str, str]:
+        """What the intervals hold of the numbers that are no plain means, for people."""
+        low, high = (100 * share for share in self.slide_share)
+        return {
+            "normal_force": "zero and its drift, calibration, choice of window; that the force changes along the "
+            "stroke is no uncertainty of its mean; of the tangential force likewise",
+            "heading": "noise, zero, choice of window, and gains of the axes that differ; not a transducer that is "
+            "turned; with it the share of repeats whose direction is the one told",
+            "onset": "the detector's rule repeated (a force that climbs as steeply crosses three standard deviations "
+            "of its noise between two readings, noise drawn anew), zero; a gain moves no instant; none where a person "
+            "decided it",
+            "break_away": "deviations from the fitted climb turned at random (wild bootstrap, the same blocks), zero, "
+            "and where the fit ends; a gain moves no instant; none where a person decided it",
+            "slide_onset": f"a range rather: any share of the steady speed may tell it, {low:g} to {high:g} %, with "
+            "noise and unevenness of the speed; where the finger slid as fast when its speed was first known, any "
+            "instant since the contact; none where a person decided it",
+        }
+
+
+def drawn_from(settings: AnalysisSettings) -> BootstrapSettings:
+    """Return what the intervals of an analysis are drawn from: the calibration's error that was set, or the assumed."""
+    if settings.gain_error is None:
+        return BootstrapSettings(seed=settings.bootstrap_seed)
+    return BootstrapSettings(seed=settings.bootstrap_seed, gain_error=settings.gain_error, gain_error_origin="set")
+
+
+@dataclass(frozen=True, slots=True)
+class StrokeIntervals:
+    """Intervals of one stroke's numbers, None for each number that is withheld or has too few readings."""
+
+    stroke: int  # position in `Analysis.strokes`
+    trial: int | None
+    mu_static: Interval | None  # [-]
+    mu_dynamic: Interval | None  # [-]
+    mu_max: Interval | None  # [-]
+    tau_max: Interval | None  # [MPa]; the contact area, or its law, is taken as given
+    speed: Interval | None  # [mm/s]
+    normal_force: Interval | None  # mean over the steady window [N]
+    tangential_force: Interval | None  # mean over the steady window [N]
+    peak_normal: Interval | None  # [N]
+    peak_tangential: Interval | None  # [N]
+    heading: Interval | None  # about the angle told: an end may lie beyond 180 [degrees]
+    direction_agrees: float | None  # share of repeats in which the direction is the one told [-]
+    onset: Interval | None  # [s, device time]
+    break_away: Interval | None  # [s, device time]
+    slide_onset: Interval | None  # [s, device time]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return asdict(self)
+
+
+def stroke_intervals(stroke: Stroke, number: int, settings: BootstrapSettings | None = None) -> StrokeIntervals:
+    """Return the intervals of the stroke at position `number`; the same stroke and seed give the same bits."""
+    chosen = settings or BootstrapSettings()
+    found: Mapping[str, Array] = {}
+    if stroke.curve is not None and len(stroke.curve.time) > 2:
+        found = _Repeats(stroke, stroke.curve, chosen, np.random.default_rng([chosen.seed, number])).all()
+
+    def interval(name: str) -> Interval | None:
+        if name not in found or getattr(stroke, name) is None:
+            return None
+        low, high = np.quantile(found[name], [(1 - chosen.confidence) / 2, (1 + chosen.confidence) / 2]).tolist()
+        told = getattr(stroke, name)
+        # An instant told at the end of the stretch in which it may lie, as by the first reading after it, is one too.
+        return (min(low, told), max(high, told)) if name in _RANGES else (low, high)
+
+    told = {name: interval(name) for name in NUMBERS}
+    return StrokeIntervals(number, stroke.trial, **told, direction_agrees=_agreeing(stroke, found))
+
+
+def _agreeing(stroke: Stroke, found: Mapping[str, Array]) -> float | None:
+    """Return the share of repeats whose heading lies within 60 degrees of the direction told, as the analysis asks."""
+    if stroke.direction is None or "heading" not in found:
+        return None
+    return float(np.mean(stroke.direction * np.cos(np.radians(found["heading"])) >= 0.5))
+
+
+def intervals_of(strokes: Sequence[Stroke], settings: BootstrapSettings | None = None) -> dict[str, Any]:
+    """Return the intervals of all strokes as plain data, with what they are and the settings they were drawn with."""
+    chosen = settings or BootstrapSettings()
+    found = [stroke_intervals(stroke, at, chosen).to_dict() for at, stroke in enumerate(strokes)]
+    return {"kind": chosen.kind, "kinds": dict(chosen.kinds), "settings": asdict(chosen), "strokes": found}
+
+
+class FrictionDraws(NamedTuple):
+    """What the friction of a stroke may have been: (repeats,) of each, together as they were drawn."""
+
+    mu: Array  # [-]
+    tau_max: Array  # [MPa]
+    normal_force: Array | None  # mean over the steady window [N]; None where there is none
+
+
+def friction_draws(
+    stroke: Stroke, number: int, rule: Rule, settings: BootstrapSettings | None = None
+) -> FrictionDraws | None:
+    """Return mu, tau_max and normal force of each repeat; None without mu or tau_max.
+
+    They are the draws that `stroke_intervals` takes its quantiles from; an error of calibration moves both alike.
+    """
+    chosen = settings or BootstrapSettings()
+    if stroke.curve is None or len(stroke.curve.time) < 3:
+        return None
+    found = _Repeats(stroke, stroke.curve, chosen, np.random.default_rng([chosen.seed, number])).all()
+    name = "mu_max" if rule == "maximum" else "mu_dynamic"
+    if name not in found or "tau_max" not in found:
+        return None
+    return FrictionDraws(found[name], found["tau_max"], found.get("normal_force"))
+
+
+class _Repeats:
+    """What all numbers of one stroke share in each of its repeats."""
+
+    def __init__(
+        self, stroke: Stroke, curve: StrokeCurve, settings: BootstrapSettings, draw: np.random.Generator
+    ) -> None:
+        self._stroke, self._curve, self._settings, self._draw = stroke, curve, settings, draw
+        n = settings.repeats
+        self._step = float(np.median(np.diff(curve.time)))
+        self._gain_t, self._gain_n, self._gain_torque = 1.0 + settings.gain_error * draw.standard_normal((3, n))
+        self._noise_t, self._noise_n = curve.noise
+        # The zero's drift was seen as one length of three axes; within it the zero may lie anywhere.
+        drift = (stroke.zero_drift or 0.0) / np.sqrt(3.0 * 12.0)
+        few = np.sqrt(max(1.0, curve.quiet / settings.block))
+        self._zero_t_sd = float(np.hypot(drift, self._noise_t / few))
+        self._zero_t = self._zero_t_sd * draw.standard_normal(n)
+        self._zero_n = np.hypot(drift, self._noise_n / few) * draw.standard_normal(n)
+
+    def all(self) -> dict[str, Array]:
+        """Return the numbers (repeats,) of each repeat, by name."""
+        found: dict[str, Array] = {}
+        if self._stroke.tau_max is not None and self._stroke.peak_tangential:
+            area = self._stroke.contact_area or self._stroke.peak_tangential / self._stroke.tau_max
+            moved = self._zero_t + self._top(self._curve.tangential, self._noise_t)
+            peak = self._stroke.tau_max * area * self._gain_t + moved
+            found["tau_max"] = peak / (area * self._gain_n**self._stroke.area_exponent)
+            found["peak_tangential"] = self._stroke.peak_tangential * self._gain_t + moved
+        for name in ("mu_static", "mu_max"):
+            value = getattr(self._stroke, name)
+            if value is not None:
+                found[name] = self._single(value)
+        window = self._window()
+        if window is not None:
+            found |= window
+        if self._stroke.peak_normal is not None:
+            top = self._top(self._curve.normal, self._noise_n)
+            found["peak_normal"] = self._stroke.peak_normal * self._gain_n + self._zero_n + top
+        return found | self._instants(found.get("speed")) | self._onset()
+
+    def _top(self, force: Array, noise: float) -> Array:
+        """Return how far the true greatest force may lie from the one told (repeats,) [N].
+
+        Noise has raised the one told about as far as noise drawn once more raises that on average.
+        """
+        high = force[force >= _TOP * np.nanmax(force)]
+        every = max(1, round(self._settings.block / 4 / self._step))  # filtered readings nearer than this are alike
+        high = high[::every]
+        tops = (high + noise * self._draw.standard_normal((self._settings.repeats, len(high)))).max(axis=1)
+        return tops - 2.0 * tops.mean() + high.max()
+
+    def _single(self, value: float) -> Array:
+        """Return a ratio that one short stretch gives (repeats,); the stretch is where T/N is nearest to it."""
+        ratio = self._curve.ratio
+        at = int(np.nanargmin(np.abs(ratio - value)))
+        normal = float(self._curve.normal[at])
+        noise = np.hypot(self._noise_t, value * self._noise_n) / normal
+        from_zero = (self._zero_t - value * self._zero_n) / normal
+        return value * self._gain_t / self._gain_n + from_zero + noise * self._draw.standard_normal(len(self._gain_t))
+
+    def _window(self) -> dict[str, Array] | None:
+        """Return dynamic friction and speed (repeats,) from blocks of the steady window drawn again."""
+        steady, settings = self._stroke.steady, self._settings
+        if steady is None or self._stroke.mu_dynamic is None:
+            return None
+        inside = (self._curve.time >= steady[0]) & (self._curve.time <= steady[1]) & np.isfinite(self._curve.ratio)
+        curve = self._curve
+        columns = np.column_stack(
+            [curve.ratio, 1.0 / curve.normal, curve.time, curve.position, curve.normal, curve.tangential, curve.force]
+        )
+        length = max(1, round(settings.block / self._step))
+        held = columns[inside]
+        count = len(held) // length
+        if count < _FEWEST_BLOCKS:
+            return None
+        blocks = held[: count * length].reshape(count, length, columns.shape[1]).mean(axis=1)
+        chosen, weight, kept = self._chosen(count)
+        drawn = blocks[chosen]  # (repeats, blocks, 9)
+        total = weight.sum(axis=1)
+        means = np.einsum("rbc,rb->rc", drawn, weight) / total[:, None]
+        # A mean of few blocks, or of blocks that are alike, strays further than drawing them shows.
+        further, free = strays(blocks[:, 0])
+        further *= np.sqrt(total / np.maximum(total - 1.0, 1.0) * free / self._draw.chisquare(free, len(total)))
+        lightness = float(blocks[:, 1].mean())
+        mu = self._stroke.mu_dynamic + (means[:, 0] - blocks[:, 0].mean()) * further
+        found = {
+            "mu_dynamic": mu * self._gain_t / self._gain_n
+            + (self._zero_t - self._stroke.mu_dynamic * self._zero_n) * lightness
+        }
+        if self._stroke.normal_force is not None and self._stroke.tangential_force is not None:
+            # A force may change along the stroke: its mean is that of a window, not of blocks drawn again. Windows are
+            # drawn inwards, where N may be greater, but might have been wider too: about their own mean.
+            other = kept @ blocks[:, 5:7] / total[:, None]
+            other -= other.mean(axis=0)
+            found["normal_force"] = (self._stroke.normal_force + other[:, 0]) * self._gain_n + self._zero_n
+            found["tangential_force"] = (self._stroke.tangential_force + other[:, 1]) * self._gain_t + self._zero_t
+        way = means[:, 7:] + self._zero_t_sd * self._draw.standard_normal((len(means), 2))
+        if self._stroke.speed is not None and np.isfinite(blocks[:, 3:5]).all():
+            way = self._slopes(drawn, weight) * self._gain_torque[:, None]
+            found["speed"] = np.hypot(way[:, 0], way[:, 1]) / self._gain_n
+        if self._stroke.heading is not None:
+            found["heading"] = self._headings(way, self._stroke.heading)
+        return found
+
+    def _headings(self, way: Array, told: float) -> Array:
+        """Return the angles (repeats,) [degrees] of ways (repeats, 2), as near the angle told as whole turns allow."""
+        uneven = 1.0 + self._settings.gain_error * np.sqrt(2.0) * self._draw.standard_normal(len(way))  # of two gains
+        angle = np.degrees(np.arctan2(way[:, 1] * uneven, way[:, 0]))
+        return told + (angle - told + 180.0) % 360.0 - 180.0
+
+    def _instants(self, speed: Array | None) -> dict[str, Array]:
+        """Return the instants (repeats,) that the analysis told and nobody decided."""
+        stroke, curve, found = self._stroke, self._curve, dict[str, Array]()
+        if stroke.steady is None:
+            return found
+        inside = (curve.time >= stroke.steady[0]) & (curve.time <= stroke.steady[1])
+        if stroke.break_away is not None and "stick" not in stroke.decided:
+            part = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[1])
+            columns = (curve.time[part], curve.ratio[part], curve.normal[part])
+            shortest = stroke.steady[1] - self._settings.inwards * (stroke.steady[1] - stroke.steady[0])
+            zero = (self._zero_t, self._zero_n)
+            peaked = stroke.mu_static is not None
+            draws = break_away_draws(columns, shortest, self._settings.block, zero, self._draw, peaked=peaked)
+            found |= {} if draws is None else {"break_away": draws}
+        if stroke.slide_onset is not None and speed is not None and "slide_onset" not in stroke.decided:
+            part = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[0])
+            noise = float(np.nanstd(curve.speed[inside])) * self._draw.standard_normal(len(speed))
+            told = self._draw.uniform(*self._settings.slide_share, len(speed)) * speed
+            draws = slide_onset_draws(curve.time[part], curve.speed[part], told, noise, self._draw)
+            found |= {} if draws is None else {"slide_onset": draws}
+        return found
+
+    def _onset(self) -> dict[str, Array]:
+        """Return the onset (repeats,), where the contact began there and nobody decided it."""
+        onset, curve = self._stroke.onset, self._curve
+        if onset is None or "onset" in self._stroke.decided:
+            return {}
+        quiet = curve.felt[curve.time < onset - _BEFORE]
+        quiet = quiet[np.isfinite(quiet)]
+        if len(quiet) < _FEWEST_QUIET:
+            return {}
+        noise = float(quiet.std())
+        # How large the noise is, and with it the threshold, is told from these readings too.
+        band = DetectorSettings().leave_noise * noise / np.sqrt(2.0 * len(quiet))
+        wrong = self._zero_n + band * self._draw.standard_normal(self._settings.repeats)
+        draws = onset_draws((curve.time, curve.felt), onset, noise, wrong, self._draw)
+        return {} if draws is None else {"onset": draws}
+
+    def _chosen(self, count: int) -> tuple[NDArray[np.int64], Array, Array]:
+        """Return blocks drawn for each repeat (repeats, count); 1 for those that fit into its window; 1 for its own."""
+        repeats = self._settings.repeats
+        trim = self._settings.inwards * count * self._draw.uniform(size=(2, repeats))
+        first, stop = np.floor(trim[0]), count - np.floor(trim[1])
+        stop = np.maximum(stop, first + min(count, 3))
+        first = np.minimum(first, stop - 3)
+        held = stop - first
+        chosen = first[:, None] + np.floor(self._draw.uniform(size=(repeats, count)) * held[:, None])
+        weight = (np.arange(count) < held[:, None]).astype(np.float64)
+        places = np.arange(count)
+        own = (places >= first[:, None]) & (places < stop[:, None])
+        return np.clip(chosen, 0, count - 1).astype(np.int64), weight, own.astype(np.float64)
+
+    def _slopes(self, drawn: Array, weight: Array) -> Array:
+        """Return the slope of position on time (repeats, 2) [mm/s] over the blocks drawn."""
+        total = weight.sum(axis=1)[:, None]
+        time, moved = drawn[:, :, 2], drawn[:, :, 3:5]
+        t = time - (time * weight).sum(axis=1)[:, None] / total
+        return ((t * weight)[:, :, None] * moved).sum(axis=1) / np.maximum((t**2 * weight).sum(axis=1), 1e-9)[:, None]

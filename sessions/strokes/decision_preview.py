@@ -1,0 +1,50 @@
+"""A decision before it is recorded: what stands in its place now, and what it would do."""
+
+from dataclasses import replace
+
+from sessions.recording import Recording
+from sessions.strokes.analysis import Analysis, analyse
+from sessions.strokes.decisions import Decision, DecisionError, Decisions, Value
+from sessions.strokes.flaws import FlawName
+from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.stroke import Stroke
+
+
+def with_old(analysis: Analysis, decision: Decision) -> Decision:
+    """Return a decision with what stands in its place now. Raises DecisionError where there is no such stroke."""
+    if decision.undoes is not None:
+        return decision
+    if decision.what == "tilt":
+        return replace(decision, old=analysis.settings.tilt)
+    found = [stroke for stroke in analysis.strokes if stroke.trial == decision.trial]
+    if decision.stroke is None:
+        given = next((one.stroke for one in analysis.friction if one.trial == decision.trial), None)
+        return replace(decision, old=None if given is None else analysis.strokes[given].number)
+    for stroke in found:
+        if stroke.number == decision.stroke:
+            return replace(decision, old=_stands(stroke, decision.what))
+    there = f"it has {len(found)}" if found else "none was found in it"
+    raise DecisionError(f"there is no {decision.of}: {there}")
+
+
+def tried(recording: Recording, decision: Decision, before: Decisions, now: Analysis) -> Analysis:
+    """Return the analysis as it would be with a decision more; `now` is that without it.
+
+    Raises DecisionError where the decision cannot be, or would change nothing.
+    """
+    found = analyse(
+        recording,
+        AnalysisSettings(area=now.settings.area, gain_error=now.settings.gain_error),
+        before.with_line(decision),
+    )
+    known = {flaw.sentence for flaw in now.flaws}
+    for flaw in found.flaws:
+        if flaw.name is FlawName.DECISION and flaw.sentence not in known and decision.undoes is None:
+            raise DecisionError(flaw.sentence)
+    return found
+
+
+def _stands(stroke: Stroke, what: str) -> Value:
+    if what == "stick":
+        return None if stroke.onset is None or stroke.break_away is None else (stroke.onset, stroke.break_away)
+    return getattr(stroke, what)

@@ -1,0 +1,115 @@
+"""How uncertain the instants of a stroke are: what its onset, its break-away and its slide's onset may have been.
+
+Of the onset the detector's own rule is repeated: a force that climbs as steeply crosses its threshold somewhere between
+two readings, and noise drawn anew moves the reading at which that is told. Of the break-away the readings' deviations
+from the fit are kept in place and turned by a random factor a block (a wild bootstrap: Wu 1986, Ann. Statist. 14:1261),
+since noise of T/N is greatest where N is least, and N climbs too. Of the slide's onset it is the share of the steady
+speed, at which it is told, that decides.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.strokes.break_away import climb, few, movable, settled
+from sessions.strokes.onset import DetectorSettings, onset_threshold
+
+Array = NDArray[np.float64]
+
+_DETECTOR = DetectorSettings()
+_ENDS = 5  # of the fit, from that of the steady window inwards
+_FEWEST = 3  # readings that tell how steeply the force climbs
+_MOST = 400  # readings about the crossing in which noise is drawn
+_LEAST_STEEP = 0.2  # of its mean steepness, to which a force that bends may be told to have climbed there
+_REACH = 4.0  # standard deviations of the noise within which it may move the crossing
+
+
+def onset_draws(
+    columns: tuple[Array, Array], onset: float, noise: float, zero: Array, draw: np.random.Generator
+) -> Array | None:
+    """Return where the force may have left its noise (repeats,) [s]; None where it had left it before the onset.
+
+    That is at three standard deviations of it (`DetectorSettings.leave_noise`). `columns` are time [s] and unfiltered
+    N [N] (n,) from before the contact on, `noise` that of N and `zero` how wrong its zero may be (repeats,) [N].
+    """
+    time, force = columns
+    at = int(np.searchsorted(time, onset))
+    if at == 0 or len(time) < at + _FEWEST or force[at - 1] > onset_threshold(noise, _DETECTOR):
+        return None
+    climbing = force[at:] < 2.0 * max(_DETECTOR.leave_noise * noise, float(force[at]))
+    held = slice(at - 1, at + max(_FEWEST, int(np.argmin(climbing)) + 1))
+    step = float(np.median(np.diff(time[held])))
+    # Skin stiffens as it is pressed: a force that bends upwards was less steep where it left the noise.
+    bend, slope, _ = np.polyfit(time[held] - (onset - step / 2.0), force[held], 2).tolist()
+    whole = float(np.polyfit(time[held], force[held], 1)[0])
+    slope = max(slope if bend > 0.0 else whole, _LEAST_STEEP * whole)
+    if slope <= 0.0:
+        return None
+    reach = min(_REACH * noise / slope, _MOST * step / 2.0)
+    places = np.arange(-reach, reach + step, step)
+    # Readings of each repeat, told from the crossing: the first lies anywhere within a step.
+    since = places + step * draw.uniform(size=(len(zero), 1))  # (repeats, k)
+    within = slope * since + noise * draw.standard_normal(since.shape) <= 0.0
+    last = np.where(within.any(axis=1), since.shape[1] - 1 - np.argmax(within[:, ::-1], axis=1), -1)
+    told = since[:, 0] + (last + 1) * step  # the reading after the last within the noise
+    return onset - told + zero / slope
+
+
+def break_away_draws(
+    columns: tuple[Array, Array, Array],
+    shortest: float,
+    block: float,
+    zero: tuple[Array, Array],
+    draw: np.random.Generator,
+    *,
+    peaked: bool,
+) -> Array | None:
+    """Return where T/N may have stopped climbing (repeats,) [s]; None where too few readings tell.
+
+    `columns` are time [s], T/N [-] and N [N] (n,) from the contact to the end of the steady window; the fit ends at one
+    of some instants from there back to `shortest` [s]. `zero` is how wrong the zero of T and of N may be (repeats,)
+    [N]; `block` [s] is how long neighbours are alike. `peaked` where a static peak was found. Each repeat moves the
+    break-away as its deviations move the fit, to first order.
+    """
+    last = float(columns[0][-1])
+    held = np.isfinite(columns[1])
+    time, ratio, normal = (column[held] for column in columns)
+    whole = climb(few(time), few(ratio), block, peaked=peaked)
+    if whole is None:
+        return None
+    bends = whole.bend != 1.0
+    found: list[Array] = []
+    parts = np.array_split(np.arange(len(zero[0])), _ENDS)
+    for number, part in enumerate(parts):
+        inside = time <= last + (shortest - last) * number / (_ENDS - 1)
+        t, y, n = few(time[inside]), few(ratio[inside]), few(normal[inside])
+        fit = settled(whole, t, y, bends=bends)
+        if fit.rise <= 0.0:
+            return None
+        edges = np.flatnonzero(np.diff(np.floor((t - t[0]) / block), prepend=-1.0))
+        climbing = float(np.searchsorted(t[edges], fit.meets) - np.searchsorted(t[edges], fit.begins))
+        # Two or three numbers were fitted to the climb's few blocks: what is left is less, and tells little of itself.
+        free = max(climbing - 2.0 - bends, 1.0)
+        wild = np.sqrt(max(climbing, 1.0) / draw.chisquare(free, len(part)))[:, None]
+        factors = wild * draw.standard_normal((len(part), len(edges)))
+        numbers = movable(fit, t, bends=bends)
+        moves = np.linalg.pinv(fit.slopes(t)[:, numbers])[numbers.index(1)]  # (n,) [s] by T/N
+        by_blocks = np.add.reduceat(moves * (y - fit.at(t)), edges)
+        wrong_t, wrong_n = (each[part] for each in zero)
+        found.append(fit.meets + factors @ by_blocks + wrong_t * (moves @ (1.0 / n)) - wrong_n * (moves @ (y / n)))
+    return np.concatenate(found)
+
+
+def slide_onset_draws(time: Array, speed: Array, told: Array, noise: Array, draw: np.random.Generator) -> Array | None:
+    """Return from when the centre of pressure may have slid (repeats,) [s]; None where its speed is not known.
+
+    `speed` (n,) [mm/s] at `time` (n,) [s], from the contact's onset on, reaches to the steady window; `told` is the
+    speed at which the slide has begun, `noise` how wrong that of the centre of pressure may be (repeats,) [mm/s]. Where
+    it was as fast as that when its speed was first known, it may have begun to slide at any instant before.
+    """
+    slow = np.flatnonzero(~np.isfinite(speed))
+    first = int(slow[-1]) + 1 if len(slow) else 0
+    if len(speed) - first < 2:
+        return None
+    kept = np.minimum.accumulate(speed[first:][::-1])[::-1]  # the least speed from each instant on
+    found = np.interp(told - noise, kept, time[first:])
+    return np.where(told - noise < kept[0], draw.uniform(time[0], time[first], len(told)), found)

@@ -1,0 +1,110 @@
+"""Forces at the stimulus's face: the wrench in the face frame, its zero-phase filter, ratio and centre of pressure."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.plan.plan import Frame
+from sessions.strokes.filters import low_passed
+
+Array = NDArray[np.float64]
+
+_AXES = {"x": 0, "y": 1, "z": 2}
+# -3 dB of a second-order Butterworth run forwards and backwards lies at its own -3 dB frequency divided by this.
+_TWO_PASSES = (np.sqrt(2.0) - 1.0) ** -0.25
+_SHORTEST_SEGMENT = 12  # readings; fewer have no filtered value
+
+
+@dataclass(frozen=True, slots=True)
+class Filter:
+    """A zero-phase low-pass Butterworth filter: second order, forwards and backwards."""
+
+    cut_off: float  # -3 dB of both passes together [Hz]
+
+    @property
+    def sentence(self) -> str:
+        """What was done, for people."""
+        return (
+            "zero-phase Butterworth low-pass, second order forwards and backwards, -3 dB of both passes together at "
+            f"{self.cut_off:g} Hz; forces were filtered before the ratio was formed, and never across a gap"
+        )
+
+    def applied(self, values: Array, rate: float, segments: list[slice]) -> Array:
+        """Return values (n, k) filtered within each segment [positions]; nan outside them and in the shortest ones."""
+        filtered = np.full_like(values, np.nan)
+        # The bilinear transform bends frequencies as the tangent does: the factor belongs to the bent ones.
+        design = rate / np.pi * np.arctan(_TWO_PASSES * np.tan(np.pi * self.cut_off / rate))
+        for segment in segments:
+            length = segment.stop - segment.start
+            if length >= _SHORTEST_SEGMENT:
+                padding = min(length - 1, int(np.ceil(3.0 * rate / self.cut_off)))
+                filtered[segment] = low_passed(values[segment], design, rate, padding)
+        return filtered
+
+    def fits(self, rate: float) -> bool:
+        """Say whether readings at `rate` [Hz] are dense enough for it to do anything."""
+        return rate >= 2.5 * self.cut_off * _TWO_PASSES
+
+
+def in_face_frame(wrench: Array, frame: Frame) -> Array:
+    """Return the wrench (n, 6) [N, N mm] turned so that +z points out of the face, pressing is Fz < 0.
+
+    "-z" leaves everything as it is; "-x" and "-y" rename the axes in their order (x y z -> y z x, z x y); a "+" normal
+    then turns by 180 degrees about the new x axis. All of these are rotations, so torques turn along.
+
+    >>> in_face_frame(np.array([[1.0, 2, 3, 4, 5, 6]]), Frame(normal="+z"))
+    array([[ 1., -2., -3.,  4., -5., -6.]])
+    """
+    axis = _AXES[frame.normal[1]]
+    order = [(axis + 1) % 3, (axis + 2) % 3, axis]
+    signs = np.array([1.0, 1.0, 1.0] if frame.normal[0] == "-" else [1.0, -1.0, -1.0])
+    return np.hstack([wrench[:, order] * signs, wrench[:, [3 + i for i in order]] * signs])
+
+
+def levelled(wrench: Array, lean: tuple[float, float]) -> Array:
+    """Return a wrench (n, 6) of the face frame turned so that +z is the normal of a face that leans [degrees].
+
+    A rotation by the shortest way, so torques turn along.
+
+    >>> (levelled(np.array([[-1.0, 0, 0, 0, 0, 0]]), (90.0, 0.0)).round(9) + 0.0).tolist()
+    [[0.0, 0.0, -1.0, 0.0, 0.0, 0.0]]
+    """
+    if lean == (0.0, 0.0):
+        return wrench
+    x, y = np.radians(lean)
+    angle = float(np.hypot(x, y))
+    axis = np.array([y, -x, 0.0]) / angle  # turns the normal back to z
+    skew = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    turn = np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew
+    return np.hstack([wrench[:, :3] @ turn.T, wrench[:, 3:] @ turn.T])
+
+
+def normal_force(wrench: Array, frame: Frame) -> Array:
+    """Return the normal force (n,) [N], positive when pressing, of a wrench (n, 6) as the transducer gives it."""
+    return wrench[:, _AXES[frame.normal[1]]] * (1.0 if frame.normal[0] == "+" else -1.0)
+
+
+def centre_of_pressure(wrench: Array, height: float) -> Array:
+    """Return where the resultant meets the face (n, 2) [mm]: x = (Ty - h Fx)/N, y = -(Tx + h Fy)/N.
+
+    `wrench` (n, 6) is zeroed and in the face frame, `height` [mm] that of the face above the transducer's origin.
+    nan where nothing presses.
+
+    >>> centre_of_pressure(np.array([[0.0, 0, -2, -6, 8, 0]]), 20.0)
+    array([[4., 3.]])
+    """
+    normal = -wrench[:, 2]
+    with np.errstate(invalid="ignore"):
+        pressing = np.where(normal > 0.0, normal, np.nan)
+    x = (wrench[:, 4] - height * wrench[:, 0]) / pressing
+    y = -(wrench[:, 3] + height * wrench[:, 1]) / pressing
+    return np.column_stack([x, y])
+
+
+def friction_ratio(wrench: Array, floor: float) -> Array:
+    """Return T/N (n,) [-] of a zeroed wrench (n, 6) in the face frame; nan where N is below `floor` [N]."""
+    normal = -wrench[:, 2]
+    with np.errstate(invalid="ignore"):
+        pressing = np.where(normal >= floor, normal, np.nan)
+    return np.hypot(wrench[:, 0], wrench[:, 1]) / pressing

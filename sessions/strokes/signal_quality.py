@@ -1,0 +1,269 @@
+"""Which readings of a block can be used: what was lost, froze, saturated, or came at uneven times."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.readings import ReadingBlock
+from drivers.transducer import TransducerInfo
+from sessions.strokes.clipping import Stuck, at_the_same_value, stuck_axes
+from sessions.strokes.flaws import FlawName, Grade
+from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.spikes import wild_readings
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_LONG = 1.8  # times the usual step: a reading is missing in between
+_COARSE = 3.0  # coarse: half an axis' changes are no more than so many of its least steps
+_JUMP = 2.0  # times the step that an axis' changes seldom exceed
+_OFF = 0.1  # share of an axis' range: so far from every rest before, a sensor that repeats itself to the end is frozen
+_AXIS_NAMES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Where readings are missing or cannot be used."""
+
+    start: float  # last sound reading before it [s, device time]
+    stop: float  # first one after it
+    cause: FlawName
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Soundness:
+    """What a block's readings are worth; n of them."""
+
+    rate: float  # readings a second, from the median time step [Hz]
+    even: bool  # the time steps are equal
+    good: Mask  # (n,) readings that can be used
+    saturated: Mask  # (n,)
+    gaps: tuple[Gap, ...]
+    segments: tuple[slice, ...]  # stretches of good readings without a gap
+    dead: tuple[str, ...]  # axes that never moved
+    flaws: tuple[tuple[FlawName, str, Grade], ...]
+
+    @property
+    def refused(self) -> bool:
+        """Say whether nothing of the block may be analysed."""
+        return any(grade == "refused" for _, _, grade in self.flaws)
+
+
+def soundness(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSettings) -> Soundness:
+    """Judge a block of at least two readings."""
+    steps = np.diff(block.time)
+    forward = steps[steps > 0.0]
+    step = float(np.median(forward)) if len(forward) else np.nan
+    beyond = _saturated(block, info)
+    wild_axes = wild_readings(block.raw, settings) & ~beyond[:, None]
+    wild: Mask = np.asarray(wild_axes.any(axis=1), np.bool_)
+    repeated = _frozen(block, settings)
+    stuck = stuck_axes(block.time, block.raw, wild | beyond, settings)
+    frozen = repeated | at_the_same_value(block.raw, stuck, clipped=False)
+    clipped = at_the_same_value(block.raw, stuck, clipped=True)
+    saturated = beyond | clipped
+    stalled = np.concatenate([[False], steps <= 0.0])
+    good = ~(frozen | saturated | wild | stalled)
+    long = (np.diff(block.sequence) == 1) & (steps > _LONG * step)
+    # A few long steps are readings that a stream without numbers lost; as many as this are another rate.
+    another = bool(long.mean() > settings.uneven)
+    widest = float(np.percentile(forward, 98)) if another else step
+    broken = (np.diff(block.sequence) != 1) | (steps > _LONG * widest) | (steps <= 0.0)
+    neighbours = steps[~broken]
+    spread = np.ptp(np.percentile(neighbours, [2, 98])) if len(neighbours) else np.inf
+    even = bool(not another and spread <= settings.uneven * step)
+    segments = _segments(good, broken)
+    dead = tuple(
+        name
+        for name, column in zip(_AXIS_NAMES, block.raw[good].T, strict=True)
+        if len(column) > settings.frozen_readings and np.ptp(column) == 0.0
+    )
+    missing = np.diff(block.sequence) - 1
+    lost = int(missing[missing > 0].sum())
+    flaws = [
+        *_loss_flaws(lost, len(block)),
+        *_frozen_flaws(repeated, frozen, block.time, settings),
+        *_saturation_flaws(beyond, block.time),
+        *_stuck_flaws(stuck, block.time),
+        *_wild_flaws(wild_axes, block.time),
+        *_dead_flaws(dead),
+        *_time_flaws(step, even, int(stalled.sum())),
+    ]
+    return Soundness(
+        1.0 / step if step > 0 else np.nan,
+        even,
+        good,
+        saturated,
+        tuple(_gap(a, b, block.time, frozen, saturated, wild) for a, b in pairwise(segments)),
+        segments,
+        dead,
+        tuple(flaws),
+    )
+
+
+def _frozen(block: ReadingBlock, settings: AnalysisSettings) -> Mask:
+    """Mark every repeat of the same six numbers in a run that neither noise nor a rest in coarse steps explains."""
+    jumps = _jumps_of_coarse(block.raw)
+    same = np.concatenate([[False], (np.diff(block.raw, axis=0) == 0.0).all(axis=1), [False]])
+    edges = np.flatnonzero(np.diff(same.astype(np.int8)))
+    frozen = np.zeros(len(block), np.bool_)
+    rests: list[int] = []
+    for start, last in edges.reshape(-1, 2).tolist():  # repeats of the reading at `start`
+        if last - start >= settings.frozen_readings and (
+            block.time[last] - block.time[start] >= settings.frozen_shortest
+        ):
+            jumped = not len(jumps) or bool(jumps[max(start - 1, 0) : start].any() or jumps[last : last + 1].any())
+            ends = last == len(block) - 1
+            frozen[start + 1 : last + 1] = jumped or (ends and _off_every_rest(block.raw, start, rests))
+            rests += [] if frozen[last] else [start]
+    return frozen
+
+
+def _off_every_rest(raw: Array, at: int, rests: list[int]) -> bool:
+    """Say whether some axis of a reading lies far from where it lay in each rest before: it is pressed, or was."""
+    off = np.abs(raw[rests] - raw[at]) > _OFF * np.ptp(raw, axis=0)
+    return bool(rests) and bool(off.any(axis=1).all())
+
+
+def _jumps_of_coarse(raw: Array) -> Mask:
+    """Mark the steps (n - 1,) that no axis in coarse steps makes by itself; empty where the steps are fine.
+
+    Steps are coarse where an axis that changes does so by its least step or little more: at rest such a sensor repeats
+    all six numbers, and leaves them step by step, where a frozen one that lives again jumps.
+    """
+    steps = np.abs(np.diff(raw, axis=0))
+    changes = [column[column > 0.0] for column in steps.T]
+    known = [each for each in changes if len(each)]
+    if not known or any(float(np.median(each)) > _COARSE * float(each.min()) for each in known):
+        return np.zeros(0, np.bool_)
+    large = np.array([_JUMP * float(np.percentile(each, 95)) if len(each) else np.inf for each in changes])
+    return np.asarray((steps > large).any(axis=1), np.bool_)
+
+
+def _saturated(block: ReadingBlock, info: TransducerInfo) -> Mask:
+    """Mark readings the device called invalid, and those outside the rated range, where one is stated."""
+    calibration = info.calibration
+    wrench = calibration.own(calibration.wrench(block.raw, np.zeros(6)))
+    with np.errstate(invalid="ignore"):
+        beyond = (np.abs(wrench) > calibration.rated).any(axis=1)
+    return info.doubtful(block.status) | beyond
+
+
+def _segments(good: Mask, broken: Mask) -> tuple[slice, ...]:
+    """Return the stretches of good readings between which `broken` (n - 1,) marks no step."""
+    starts = good & ~np.concatenate([[False], good[:-1] & ~broken])
+    stops = good & ~np.concatenate([good[1:] & ~broken, [False]])
+    return tuple(
+        slice(int(start), int(stop) + 1)
+        for start, stop in zip(np.flatnonzero(starts), np.flatnonzero(stops), strict=True)
+    )
+
+
+def _gap(before: slice, after: slice, time: Array, frozen: Mask, saturated: Mask, wild: Mask) -> Gap:
+    hole = slice(before.stop, after.start)
+    cause = FlawName.LOST_READINGS
+    if frozen[hole].any():
+        cause = FlawName.FROZEN
+    elif saturated[hole].any():
+        cause = FlawName.SATURATED
+    elif wild[hole].any():
+        cause = FlawName.WILD
+    return Gap(float(time[before.stop - 1]), float(time[after.start]), cause)
+
+
+_Found = list[tuple[FlawName, str, Grade]]
+
+
+def _loss_flaws(lost: int, arrived: int) -> _Found:
+    if not lost:
+        return []
+    share = 100 * lost / (lost + arrived)
+    sentence = f"{lost} readings were lost ({share:.2g} %); nothing was filled in and no filter reaches across a gap."
+    return [(FlawName.LOST_READINGS, sentence, "note")]
+
+
+def _frozen_flaws(repeated: Mask, frozen: Mask, time: Array, settings: AnalysisSettings) -> _Found:
+    """Name readings that repeat all six numbers; from a share of frozen ones on, of any axis, refuse the rest too."""
+    refused = float(frozen.mean()) >= settings.frozen_refused
+    found: _Found = []
+    if repeated.any():
+        sentence = (
+            f"{100 * float(repeated.mean()):.0f} % of the readings repeat the six numbers before them, first at "
+            f"{time[repeated][0]:.2f} s: the sensor was frozen"
+        )
+        rest = ", and nothing is analysed." if refused else " there, and these readings are left out."
+        found.append((FlawName.FROZEN, sentence + rest, "refused" if refused else "doubtful"))
+    elif refused:
+        share = 100 * float(frozen.mean())
+        sentence = f"One axis or another was frozen in {share:.0f} % of the readings: nothing is analysed."
+        found.append((FlawName.FROZEN, sentence, "refused"))
+    return found
+
+
+def _stuck_flaws(stuck: tuple[Stuck, ...], time: Array) -> _Found:
+    """Name each axis that was clipped or frozen by the first run that shows it."""
+    found: _Found = []
+    for axis, clipped in dict.fromkeys((one.axis, one.clipped) for one in stuck):
+        runs = [one for one in stuck if (one.axis, one.clipped) == (axis, clipped)]
+        lasting = sum(float(time[one.last] - time[one.first]) for one in runs)
+        sentence = (
+            f"{_AXIS_NAMES[axis]} keeps one value bit for bit while other axes move, for {lasting:.2g} s in all, first "
+            f"at {time[runs[0].first]:.2f} s, "
+        )
+        if clipped:
+            sentence += (
+                "and never goes beyond it: clipped. These readings are left out, and no peak that they hide is told."
+            )
+            found.append((FlawName.SATURATED, sentence, "doubtful"))
+        else:
+            sentence += "and moves before or after: frozen there. These readings are left out."
+            found.append((FlawName.FROZEN, sentence, "doubtful"))
+    return found
+
+
+def _wild_flaws(wild: Mask, time: Array) -> _Found:
+    """Name the readings (n, 6) that stand far beyond all around them."""
+    if not wild.any():
+        return []
+    at: Mask = np.asarray(wild.any(axis=1), np.bool_)
+    axes = ", ".join(name for name, marked in zip(_AXIS_NAMES, wild.T, strict=True) if marked.any())
+    count = int(at.sum())
+    sentence = (
+        f"{count} {'reading stands' if count == 1 else 'readings stand'} far beyond everything around on {axes}, first "
+        f"at {time[at][0]:.3f} s: wild, and left out before anything is filtered."
+    )
+    return [(FlawName.WILD, sentence, "doubtful")]
+
+
+def _saturation_flaws(saturated: Mask, time: Array) -> _Found:
+    if not saturated.any():
+        return []
+    sentence = (
+        f"{int(saturated.sum())} readings are saturated or marked invalid by the device, first at "
+        f"{time[saturated][0]:.2f} s; they are left out, and a peak that they may hide is not given."
+    )
+    return [(FlawName.SATURATED, sentence, "doubtful")]
+
+
+def _dead_flaws(dead: tuple[str, ...]) -> _Found:
+    if not dead:
+        return []
+    names = ", ".join(dead)
+    if any(name.startswith("F") for name in dead):
+        return [(FlawName.DEAD, f"{names} never changed: a dead sensor, and nothing is analysed.", "refused")]
+    return [(FlawName.DEAD, f"{names} never changed: no centre of pressure, hence no speed.", "doubtful")]
+
+
+def _time_flaws(step: float, even: bool, stalled: int) -> _Found:
+    if not step > 0.0:
+        return [(FlawName.UNKNOWN_RATE, "The device's time does not advance: nothing can be timed.", "refused")]
+    found: _Found = []
+    if stalled:
+        sentence = f"At {stalled} readings the device's time did not advance; they are left out."
+        found.append((FlawName.IRREGULAR_TIME, sentence, "doubtful"))
+    if not even:
+        sentence = f"The time steps are uneven about {1000 * step:.3g} ms: forces are not filtered."
+        found.append((FlawName.IRREGULAR_TIME, sentence, "doubtful"))
+    return found

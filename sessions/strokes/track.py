@@ -1,0 +1,84 @@
+"""The filtered readings of one contact: forces, ratio, centre of pressure and its speed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.strokes.contacts import Contact
+from sessions.strokes.forces import Filter, centre_of_pressure, friction_ratio
+from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.span import Span, ZeroInForce
+from sessions.strokes.stroke import StrokeCurve
+
+Array = NDArray[np.float64]
+
+_AROUND = (0.25, 0.15)  # shown before onset and after lift [s]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """The filtered readings of one contact; n of them. nan where a value means nothing."""
+
+    time: Array  # (n,) [s]
+    wrench: Array  # (n, 6) zeroed, face frame
+    normal: Array  # (n,) [N]
+    tangential: Array  # (n,) [N]
+    ratio: Array  # (n,) T/N [-], nan below the force floor
+    position: Array  # (n, 2) centre of pressure [mm], nan below the force floor
+    speed: Array  # (n,) of the centre of pressure [mm/s]
+    floor: float  # [N]
+    rate: float  # [Hz]
+
+
+def track_of(span: Span, contact: Contact, zero: ZeroInForce, height: float, settings: AnalysisSettings) -> Track:
+    """Return the readings of a contact, zeroed, with what follows from them."""
+    part = slice(contact.start, contact.stop)
+    wrench = span.smooth[part] - zero.level
+    normal = -wrench[:, 2]
+    peak = float(np.nanmax(normal, initial=0.0))
+    floor = max(settings.force_floor, settings.force_floor_share * peak)
+    tangential = np.hypot(wrench[:, 0], wrench[:, 1])
+    ratio = friction_ratio(wrench, floor)
+    position = np.where(np.isfinite(ratio)[:, None], centre_of_pressure(wrench, height), np.nan)
+    if any(name.startswith("T") for name in span.soundness.dead):
+        position = np.full_like(position, np.nan)
+    speed = _speed(span.time[part], position, span, settings)
+    return Track(span.time[part], wrench, normal, tangential, ratio, position, speed, floor, span.rate)
+
+
+def mean_vector(vectors: Array) -> Array:
+    """Return the mean (k,) of vectors (n, k), leaving out nan."""
+    return np.asarray(np.nanmean(vectors, axis=0), np.float64)
+
+
+def _speed(time: Array, position: Array, span: Span, settings: AnalysisSettings) -> Array:
+    """Return the speed (n,) [mm/s] of a position (n, 2) [mm], filtered within each unbroken stretch."""
+    speed = np.full(len(time), np.nan)
+    smoother = Filter(settings.speed_cut_off)
+    held = np.isfinite(position[:, 0]) & np.isfinite(position[:, 1])
+    joined = held[1:] & held[:-1] & (np.diff(time) < 1.8 / span.rate)
+    starts = np.flatnonzero(held & ~np.concatenate([[False], joined]))
+    stops = np.flatnonzero(held & ~np.concatenate([joined, [False]])) + 1
+    for start, stop in zip(starts, stops, strict=True):
+        if stop - start < 3:
+            continue
+        part = slice(int(start), int(stop))
+        path = position[part]
+        if span.soundness.even and smoother.fits(span.rate):
+            path = smoother.applied(path, span.rate, [slice(0, len(path))])
+        velocity = np.gradient(path, time[part], axis=0)
+        speed[part] = np.hypot(velocity[:, 0], velocity[:, 1])
+    return speed
+
+
+def curve_of(span: Span, contact: Contact, zero: ZeroInForce, height: float, settings: AnalysisSettings) -> StrokeCurve:
+    """Return the stroke's course with some time around it."""
+    first = int(np.searchsorted(span.time, float(span.time[contact.start]) - _AROUND[0]))
+    last = int(np.searchsorted(span.time, float(span.time[contact.stop - 1]) + _AROUND[1]))
+    shown = track_of(span, Contact(first, last, None, None), zero, height, settings)
+    force = shown.wrench[:, :2]
+    felt = zero.level[2] - span.wrench[first:last, 2]
+    columns = (shown.time, shown.normal, felt, shown.tangential, force, shown.ratio, shown.position, shown.speed)
+    sideways = float(np.sqrt((zero.filtered[:2] ** 2).mean()))
+    return StrokeCurve(*columns, noise=(sideways, float(zero.filtered[2])), quiet=zero.lasts)

@@ -1,0 +1,90 @@
+"""The transducer's zero: unloaded stretches, what they read, and how far they moved from before contact to after."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.strokes.onset import onset_threshold
+from sessions.strokes.settings import AnalysisSettings
+
+Array = NDArray[np.float64]
+
+_HOPS = 6  # windows start at every sixth of their length
+_FORCES = slice(0, 3)
+_WHOLE = 1.5  # a window that takes so many times its length holds a gap
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Zero:
+    """What the transducer reads with nothing touching."""
+
+    start: float  # of the stretch it was taken from [s, device time]
+    stop: float
+    level: Array  # (6,) face frame [N, N mm]
+    noise: Array  # (6,) standard deviations [N, N mm]
+    error: Array  # (6,) standard errors of `level` [N, N mm]
+
+    @property
+    def when(self) -> str:
+        """The stretch, for people."""
+        return f"{self.start:.3f} to {self.stop:.3f} s"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class QuietWindows:
+    """Windows in which no force moves more than its noise and the normal force is low; k of them, in order."""
+
+    time: Array  # (n,) of all readings [s]
+    wrench: Array  # (n, 6) of all readings, face frame, not zeroed [N, N mm]
+    bounds: NDArray[np.int64]  # (k, 2) first and past-last reading
+
+    def before(self, instant: float, longest: float) -> Zero | None:
+        """Return the zero of the last quiet windows that end by `instant` [s], over at most `longest` [s]."""
+        ended = self.bounds[self.time[self.bounds[:, 1] - 1] < instant]
+        return self._over(ended[::-1], longest) if len(ended) else None
+
+    def after(self, instant: float, longest: float) -> Zero | None:
+        """Return the zero of the first quiet windows that start after `instant` [s], over at most `longest` [s]."""
+        started = self.bounds[self.time[self.bounds[:, 0]] > instant]
+        return self._over(started, longest) if len(started) else None
+
+    def _over(self, windows: NDArray[np.int64], longest: float) -> Zero:
+        start, stop = windows[0]
+        for first, last in windows[1:]:
+            low, high = min(start, first), max(stop, last)
+            touching = first <= stop and last >= start
+            if not touching or self.time[high - 1] - self.time[low] > longest:
+                break
+            start, stop = low, high
+        stretch = self.wrench[start:stop]
+        noise = stretch.std(axis=0, ddof=1)
+        times = float(self.time[start]), float(self.time[stop - 1])
+        return Zero(*times, stretch.mean(axis=0), noise, noise / len(stretch) ** 0.5)
+
+
+def quiet_windows(time: Array, wrench: Array, rate: float, settings: AnalysisSettings) -> QuietWindows:
+    """Return where a wrench (n, 6) [N, N mm; face frame] at `time` (n,) [s] is unloaded."""
+    length = max(settings.detector.baseline_readings, round(settings.detector.baseline * rate))
+    bounds = _quiet(time, wrench, length, rate, settings)
+    return QuietWindows(time, wrench, bounds)
+
+
+def _quiet(time: Array, wrench: Array, length: int, rate: float, settings: AnalysisSettings) -> NDArray[np.int64]:
+    """Return the bounds (k, 2) of the quiet, unloaded windows of so many readings."""
+    if len(wrench) < length:
+        return np.empty((0, 2), np.int64)
+    starts = np.arange(0, len(wrench) - length + 1, max(1, length // _HOPS))
+    windows = np.lib.stride_tricks.sliding_window_view(wrench[:, _FORCES], length, axis=0)[starts]  # (k, 3, length)
+    spread = windows.std(axis=2, ddof=1)
+    # For white noise the standard deviation is 1.4826/sqrt(2) times the median step; slow movement hardly changes it.
+    noise = 1.4826 / np.sqrt(2.0) * np.median(np.abs(np.diff(windows, axis=2)), axis=2)
+    low, high = np.percentile(-wrench[:, 2], [0.5, 99.5])
+    floor = max(settings.detector.quiet_floor, settings.quiet_share * float(high - low))
+    quiet = (spread <= np.maximum(settings.detector.quiet_noise * noise, floor)).all(axis=1)
+    level = -windows[:, 2].mean(axis=1)
+    threshold = onset_threshold(float(np.median(noise[:, 2])), settings.detector)
+    unloaded = level - low <= max(settings.unloaded_share * (high - low), threshold)
+    whole = time[starts + length - 1] - time[starts] <= _WHOLE * length / rate
+    chosen = starts[quiet & unloaded & whole]
+    return np.column_stack([chosen, chosen + length]).astype(np.int64)
