@@ -107,7 +107,8 @@ def step_above(value: float) -> float:
 
 def top(frame: Frame) -> float:
     """Return the SED [kPa] at which the colours of a frame alone would end: few nodes lie above."""
-    return step_above(1000.0 * float(np.quantile(frame.sed, TOP)))
+    known = frame.sed[np.isfinite(frame.sed)]
+    return step_above(1000.0 * float(np.quantile(known, TOP)) if len(known) else 0.0)
 
 
 def seen(

@@ -20,6 +20,7 @@ FELL = 0.5  # a normal force that falls by this share along the steady window is
 WORDS = {
     FlawName.NO_STROKE: "no stroke was found",
     FlawName.NO_STEADY_SLIDING: "no steady window",
+    FlawName.ROLLED: "too short a way: the finger may only roll",
     FlawName.SECOND_STROKE: "second stroke",
     FlawName.WRONG_DIRECTION: "wrong direction",
     FlawName.TOO_LITTLE_FORCE: "pressed too lightly",

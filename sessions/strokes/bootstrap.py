@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sessions.strokes.event_uncertainty import break_away_draws, onset_draws, slide_onset_draws
 from sessions.strokes.friction import Rule
 from sessions.strokes.onset import DetectorSettings
-from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.settings import ASSUMED_GAIN_ERROR, AnalysisSettings
 from sessions.strokes.steady import strays
 from sessions.strokes.stroke import Interval, Stroke, StrokeCurve
 
@@ -52,7 +52,7 @@ class BootstrapSettings:
     block: float = 0.1  # [s]
     inwards: float = 0.2  # the steady window may begin or end so much of its length further inwards [-]
     slide_share: tuple[float, float] = (0.1, 0.3)  # of the steady speed: at any between them the slide has begun [-]
-    gain_error: float = 0.01  # standard uncertainty of each axis' gain [-]
+    gain_error: float = ASSUMED_GAIN_ERROR  # standard uncertainty of each axis' gain [-]
     gain_error_origin: str = "assumed"  # nobody stated it for this transducer; "set" where somebody did
     confidence: float = 0.95
 

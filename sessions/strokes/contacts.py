@@ -23,6 +23,7 @@ class Contact:
     lift: float | None  # [s, device time]; None where it ends in contact
     valleys: tuple[int, ...] = ()  # readings of least force that tell it from neighbours it was not lifted from
     turns: tuple[int, ...] = ()  # readings at which the finger turned, where that is its beginning or end
+    around: tuple[int, int] | None = None  # first reading and past the last of the contact that turns cut it out of
 
 
 def contacts(time: Array, normal: Array, baseline: Baseline, settings: AnalysisSettings) -> tuple[Contact, ...]:
@@ -44,9 +45,11 @@ def contacts(time: Array, normal: Array, baseline: Baseline, settings: AnalysisS
 def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: AnalysisSettings) -> tuple[Contact, ...]:
     """Return the strokes of a contact: two are told apart where the zeroed N between them falls far below both peaks.
 
-    `normal` (n,) [N] is zeroed and filtered, of all readings; nan counts as no force.
+    `normal` (n,) [N] is zeroed and filtered, of all readings. nan is
+    no force beside a gap that may hide a lift, and no valley elsewhere, as in stretches too short for the filter.
     """
-    force = np.maximum(np.nan_to_num(normal[contact.start : contact.stop]), 0.0)
+    inside = slice(contact.start, contact.stop)
+    force = np.maximum(_bridged(time[inside], normal[inside], settings.longest_gap), 0.0)
     padded = np.concatenate([[0.0], force, [0.0]])
     places, prominences = peaks(padded)
     standing = places[prominences >= (1.0 - settings.valley) * padded[places]] - 1
@@ -58,6 +61,18 @@ def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: Ana
         return (contact,)
     bounds = [contact.start, *valleys, contact.stop]
     return tuple(_piece(contact, bounds[i], bounds[i + 1], time, normal, settings) for i in range(len(bounds) - 1))
+
+
+def _bridged(time: Array, force: Array, longest: float) -> Array:
+    """Return forces (n,) [N] with straight lines in place of nan; 0 where a line would cross a gap of `longest` [s]."""
+    held = np.flatnonzero(np.isfinite(force))
+    if not len(held):
+        return np.zeros_like(force)
+    gaps = np.concatenate([[0], np.cumsum(np.diff(time) > longest)])  # before each reading
+    number = np.arange(len(force))
+    after = held[np.minimum(np.searchsorted(held, number), len(held) - 1)]
+    before = held[np.maximum(np.searchsorted(held, number, "right") - 1, 0)]
+    return np.where(gaps[after] == gaps[before], np.interp(number, held, force[held]), np.nan_to_num(force))
 
 
 def _piece(contact: Contact, start: int, stop: int, time: Array, normal: Array, settings: AnalysisSettings) -> Contact:

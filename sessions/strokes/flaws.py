@@ -37,6 +37,7 @@ class FlawName(StrEnum):
     RATIO_ABOVE_ONE_THROUGHOUT = "ratio_above_one"
     SIDE_LOAD = "side_load"
     NO_STEADY_SLIDING = "no_steady_sliding"
+    ROLLED = "may_only_roll"
     SPEED_NOT_MEASURABLE = "speed_not_measurable"
     HEIGHT_UNKNOWN = "height_unknown"
     DIRECTION_TURNS = "direction_turns"

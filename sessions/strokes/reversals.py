@@ -56,6 +56,7 @@ def split_at_turns(
             onset=contact.onset if start == contact.start else float(time[start]),
             lift=contact.lift if stop == contact.stop else float(time[stop]),
             turns=tuple(turn for turn in turns if turn in (start, stop)),
+            around=(contact.start, contact.stop),
         )
         for start, stop in pairwise(bounds)
     )

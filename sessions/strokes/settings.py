@@ -6,6 +6,8 @@ from typing import Literal
 from sessions.strokes.contact_area import FIXED, AreaLaw
 from sessions.strokes.onset import DetectorSettings
 
+ASSUMED_GAIN_ERROR = 0.01  # standard uncertainty of each axis' gain where nobody stated the transducer's own [-]
+
 WindowRule = Literal["widened", "least variance", "middle half", "whole slide"]
 
 
@@ -19,6 +21,9 @@ class AnalysisSettings:
     force_floor: float = 0.3  # T/N means nothing below this normal force [N] ...
     force_floor_share: float = 0.2  # ... nor below this share of the stroke's peak [-]
     quiet_share: float = 0.002  # a spread below this share of the range of N is quiet whatever the noise [-]
+    # ... and torques spread by less than this times the range of N: a standard deviation of 1 mm in 0.3 s is a centre
+    # of pressure that moves at 11.5 mm/s, slower than the slowest published stroke (13 mm/s) [mm]
+    quiet_moves: float = 1.0
     zero_stretch: float = 0.6  # most of the unloaded stretch that gives the zero [s]
     near: float = 1.0  # unloaded forces so near a stroke tell how far its zero can be trusted [s]
     unloaded_share: float = 0.3  # a quiet stretch higher than this share of the range of N is a steady press [-]
@@ -45,6 +50,9 @@ class AnalysisSettings:
     drift_doubted: float = 0.05  # doubtful: drift may have changed mu by this share [-]
     drift_refused: float = 0.10  # refused: by this one [-]
     shear: float = 3.0  # the centre of pressure may move so far while the skin only shears [mm]
+    # A finger that only rolls moves it no further than a quarter turn of a finger 15 mm wide (the width the model has):
+    # 7.5 mm * pi / 2. Further than that, something slid [mm]
+    roll: float = 11.8
     shear_steps: float = 2.0  # and so many steps of coarse torques are no movement [-]
     one_way: float = 0.9  # the tangential force keeps its direction: length of its mean unit vector [-]
     side_load: float = 0.3  # so much of the drag across the movement is a load from the side [-]
@@ -73,10 +81,16 @@ class AnalysisSettings:
     slow_onset: float = 0.5  # from onset to a fifth of the peak; a finger takes a tenth of it [s]
 
     @property
+    def gain_uncertainty(self) -> float:
+        """Standard uncertainty of each axis' gain [-]: the one that was set, or the one assumed."""
+        return ASSUMED_GAIN_ERROR if self.gain_error is None else self.gain_error
+
+    @property
     def interval_kind(self) -> str:
         """What an interval of mu is."""
         return (
             f"{100 * self.confidence:g} % t interval of the mean over the steady window from {self.block:g} s means, "
-            "neighbours being alike allowed for, widened by the zero's noise, and its drift where that was seen: not "
-            "by calibration or choice of window"
+            "neighbours being alike allowed for, widened by the zero's noise, its drift where that was seen, and the "
+            f"calibration ({100 * self.gain_uncertainty:g} % of each axis, "
+            f"{'assumed' if self.gain_error is None else 'set'}): not by choice of window"
         )

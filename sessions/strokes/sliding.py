@@ -6,7 +6,7 @@ from sessions.plan.plan import Frame
 from sessions.strokes.flaws import FlawName
 from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.span import Span
-from sessions.strokes.steady import FEWEST, Movement, displacement, movement, steady_window
+from sessions.strokes.steady import FEWEST, Movement, block_means, displacement, movement, steady_window
 from sessions.strokes.stroke_findings import COEFFICIENTS, DIRECTION, SPEED, Findings
 from sessions.strokes.track import Track, mean_vector
 
@@ -20,10 +20,12 @@ def slide(
     frame: Frame,
     settings: AnalysisSettings,
     decided: tuple[float, float] | None = None,
+    whole: Track | None = None,
 ) -> slice | None:
     """Find the steady window and the speed in it; None, with the reason, where nothing slides steadily.
 
-    A window that a person `decided` [s, device clock] is taken; what speaks against it is named.
+    A window that a person `decided` [s, device clock] is taken; what speaks against it is named. `whole` is the contact
+    that turns cut the stroke out of.
     """
     window = None
     if decided is not None:
@@ -37,7 +39,7 @@ def slide(
     if trouble is not None and decided is None:  # the centre of pressure does not tell when the finger slides
         window = steady_window(track.ratio, track.rate, len(track.time), settings)
         moved, trouble = _speed(span, track, window, frame, settings)
-    at_rest = _rest(span, track, window, settings)
+    at_rest = _rest(span, track, track if whole is None else whole, window, settings)
     if window is not None and at_rest is not None and decided is not None:
         found.flaw(at_rest[0], f"{at_rest[1]} The window was decided by a person: its numbers are given.", "doubtful")
         at_rest = None
@@ -69,7 +71,9 @@ def _asked(track: Track, decided: tuple[float, float]) -> slice | None:
     return slice(start, stop) if np.isfinite(track.ratio[start:stop]).sum() >= FEWEST else None
 
 
-def _rest(span: Span, track: Track, window: slice | None, settings: AnalysisSettings) -> tuple[FlawName, str] | None:
+def _rest(
+    span: Span, track: Track, whole: Track, window: slice | None, settings: AnalysisSettings
+) -> tuple[FlawName, str] | None:
     """Say why nothing shows that the contact slides over a window, or None where it does."""
     if window is None:
         return None
@@ -84,11 +88,29 @@ def _rest(span: Span, track: Track, window: slice | None, settings: AnalysisSett
                 "torques and the face's height; nothing shows that the contact slides, so no friction is given."
             )
         if way > max(settings.shear, settings.shear_steps * step):
-            return None
+            return _rolled(track, whole, float(np.nanmean(track.ratio[window])), settings)
     moves = f"moves by {way:.2g} mm" if np.isfinite(way) else "is not known"
     return FlawName.NO_STEADY_SLIDING, (
         f"T/N holds steady for a while, but the centre of pressure {moves} meanwhile: nothing shows that the contact "
         "slides, and a ratio at rest is no coefficient of friction; torques in a wrong unit would look so too."
+    )
+
+
+def _rolled(track: Track, whole: Track, level: float, settings: AnalysisSettings) -> tuple[FlawName, str] | None:
+    """Say that the centre of pressure moves no further than a finger rolls, or None where it does.
+
+    It counts over the `whole` contact, turns included, and only where T/N lies about its `level` in the steady window:
+    a contact slips nowhere below that.
+    """
+    with np.errstate(invalid="ignore"):
+        at_level = np.abs(whole.ratio - level) <= 2.0 * settings.steady_spread * level
+    places = block_means(np.where(at_level[:, None], whole.position, np.nan), track.rate, settings)
+    way = float(np.hypot(*np.ptp(places, axis=0))) if len(places) else 0.0
+    if way > settings.roll:
+        return None
+    return FlawName.ROLLED, (
+        f"The centre of pressure moves by {way:.2g} mm while T/N holds, and a finger that rolls without slip moves it "
+        f"by up to {settings.roll:g} mm: nothing shows a slide, so no friction is given; stroke further."
     )
 
 

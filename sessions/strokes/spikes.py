@@ -26,10 +26,13 @@ def wild_readings(raw: Array, settings: AnalysisSettings) -> Mask:
         if not len(moving):
             continue
         floor = max(settings.wild_noise * _NORMAL_STEP * float(np.median(steps)), _LEAST_STEPS * float(moving.min()))
-        for width in range(1, _WIDEST + 1):
-            for at in _candidates(np.diff(column), width, floor).tolist():
-                if not marked[at : at + width, axis].any() and _wild(column, steps, at, width, settings):
-                    marked[at : at + width, axis] = True
+        found = [(at, w) for w in range(1, _WIDEST + 1) for at in _candidates(np.diff(column), w, floor).tolist()]
+        alike = np.zeros(len(column), np.bool_)  # these may be wild: none of them says what is usual around another
+        for at, width in found:
+            alike[at : at + width] = True
+        for at, width in found:
+            if not marked[at : at + width, axis].any() and _wild(column, alike, at, width, settings):
+                marked[at : at + width, axis] = True
     return marked
 
 
@@ -40,12 +43,20 @@ def _candidates(steps: Array, width: int, floor: float) -> NDArray[np.int64]:
     return found[(found >= _BESIDE) & (found + width + _BESIDE <= len(steps) + 1)]
 
 
-def _wild(column: Array, steps: Array, at: int, width: int, settings: AnalysisSettings) -> bool:
-    """Say whether readings stand out by far more than any step around them, those to and from them left out."""
-    usual = np.concatenate([steps[max(0, at - 1 - _AROUND) : at - 1], steps[at + width : at + width + _AROUND]])
-    if len(usual) < _FEWEST:
+def _wild(column: Array, alike: Mask, at: int, width: int, settings: AnalysisSettings) -> bool:
+    """Say whether readings stand out by far more than any step around them between readings that are not `alike`."""
+    before = _sound(column, alike, range(at - 1, max(-1, at - 1 - _AROUND), -1))
+    after = _sound(column, alike, range(at + width, min(len(column), at + width + _AROUND)))
+    usual = np.abs(np.concatenate([np.diff(before), np.diff(after)]))
+    if len(usual) < _FEWEST or min(len(before), len(after)) < _BESIDE:
         return False
-    beside = np.concatenate([column[at - _BESIDE : at], column[at + width : at + width + _BESIDE]])
+    beside = np.concatenate([before[:_BESIDE], after[:_BESIDE]])
     inside = column[at : at + width]
     height = max(float(inside.min() - beside.max()), float(beside.min() - inside.max()))
     return height > settings.wild_steps * float(usual.max())
+
+
+def _sound(column: Array, alike: Mask, places: range) -> Array:
+    """Return the readings at places, in their order, without those that are `alike`."""
+    held = np.array(places, np.int64)
+    return column[held[~alike[held]]]

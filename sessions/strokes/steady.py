@@ -18,6 +18,7 @@ _QUARTERS = 4
 _FEWEST_BLOCKS = 4  # of which a standard error is told
 _ALIKE = 0.8  # most that neighbours may be alike: more cannot be told from so few
 _LEAST_FREE = 2.0  # degrees of freedom, likewise
+_MANY_FREE = 1e6  # Student's t is normal to seven digits from there on
 
 
 def steady_window(ratio: Array, rate: float, whole: int, settings: AnalysisSettings) -> slice | None:
@@ -115,7 +116,10 @@ def mean_of(values: Array, rate: float, common: float, settings: AnalysisSetting
 
         further, free = strays(blocks)
         error = further * float(blocks.std(ddof=1)) / len(blocks) ** 0.5
-        half = float(stdtrit(free, 0.5 + settings.confidence / 2) * np.hypot(error, common))
+        whole = float(np.hypot(error, common))
+        # Only the blocks' part has few degrees of freedom (Welch 1947 and Satterthwaite 1946, as in JCGM 100, G.4.1).
+        free *= (whole / error) ** 4 if error > 0.0 else np.inf
+        half = float(stdtrit(min(free, _MANY_FREE), 0.5 + settings.confidence / 2) * whole)
         interval = (mean - half, mean + half)
     return Mean(mean, float(held.std(ddof=1)), len(held), interval)
 

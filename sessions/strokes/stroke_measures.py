@@ -1,5 +1,7 @@
 """The numbers of one stroke, and what forbids some of them."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, Frame, Trial
@@ -46,7 +48,11 @@ def measured(
     if zero.flaw is not FlawName.NO_UNLOADED_STRETCH:
         _judge_gaps(found, span, contact, settings)
         _judge_loads(found, track, contact_area, settings)
-        window = slide(found, span, track, frame, settings, decided.span("steady"))
+        whole = None
+        if contact.around is not None:
+            first, last = contact.around
+            whole = track_of(span, replace(contact, start=first, stop=last), zero, frame.height, settings)
+        window = slide(found, span, track, frame, settings, decided.span("steady"), whole)
         _take_slide_onset(found, decided)
         if window is not None:
             _friction(found, track, window, zero, settings)
@@ -203,13 +209,14 @@ def _greatest_ratio(track: Track, floor: float, settings: AnalysisSettings) -> f
 
 
 def _friction(found: Findings, track: Track, window: slice, zero: ZeroInForce, settings: AnalysisSettings) -> None:
-    """Give the mean of T/N over the steady window; its interval allows for a wrong zero too."""
+    """Give the mean of T/N over the steady window; its interval allows for a wrong zero and wrong gains too."""
     drag = mean_vector(track.wrench[window, :2])
     sideways = float(np.linalg.norm(drag / np.linalg.norm(drag) * zero.error[:2]))
     ratio = float(np.nanmean(track.ratio[window]))
     lightness = float(np.nanmean(1.0 / track.normal[window]))
     from_zero = float(np.hypot(sideways, ratio * zero.error[2])) * lightness
-    mean = mean_of(track.ratio[window], track.rate, from_zero, settings)
+    from_gains = np.sqrt(2.0) * settings.gain_uncertainty * ratio  # of the drag's axis and of the normal one
+    mean = mean_of(track.ratio[window], track.rate, float(np.hypot(from_zero, from_gains)), settings)
     if mean.value > 1.0:
         sentence = (
             f"T/N is {mean.value:.2f} in the steady window: a surface that sticks can make it so, but so do a clipped "

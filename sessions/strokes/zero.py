@@ -12,6 +12,7 @@ Array = NDArray[np.float64]
 
 _HOPS = 6  # windows start at every sixth of their length
 _FORCES = slice(0, 3)
+_TORQUES = slice(3, 5)  # about x and y: those that tell the centre of pressure
 _WHOLE = 1.5  # a window that takes so many times its length holds a gap
 
 
@@ -75,16 +76,27 @@ def _quiet(time: Array, wrench: Array, length: int, rate: float, settings: Analy
     if len(wrench) < length:
         return np.empty((0, 2), np.int64)
     starts = np.arange(0, len(wrench) - length + 1, max(1, length // _HOPS))
-    windows = np.lib.stride_tricks.sliding_window_view(wrench[:, _FORCES], length, axis=0)[starts]  # (k, 3, length)
-    spread = windows.std(axis=2, ddof=1)
-    # For white noise the standard deviation is 1.4826/sqrt(2) times the median step; slow movement hardly changes it.
-    noise = 1.4826 / np.sqrt(2.0) * np.median(np.abs(np.diff(windows, axis=2)), axis=2)
+    spread, noise = _spread(wrench[:, _FORCES], starts, length)
     low, high = np.percentile(-wrench[:, 2], [0.5, 99.5])
     floor = max(settings.detector.quiet_floor, settings.quiet_share * float(high - low))
     quiet = (spread <= np.maximum(settings.detector.quiet_noise * noise, floor)).all(axis=1)
-    level = -windows[:, 2].mean(axis=1)
+    # A finger that slides with a steady force moves the centre of pressure, and with it the torques alone.
+    turned, shaking = _spread(wrench[:, _TORQUES], starts, length)
+    still = settings.quiet_moves * float(high - low)
+    quiet &= (turned <= np.maximum(settings.detector.quiet_noise * shaking, still)).all(axis=1)
+    level = np.lib.stride_tricks.sliding_window_view(-wrench[:, 2], length)[starts].mean(axis=1)
     threshold = onset_threshold(float(np.median(noise[:, 2])), settings.detector)
     unloaded = level - low <= max(settings.unloaded_share * (high - low), threshold)
     whole = time[starts + length - 1] - time[starts] <= _WHOLE * length / rate
     chosen = starts[quiet & unloaded & whole]
     return np.column_stack([chosen, chosen + length]).astype(np.int64)
+
+
+def _spread(axes: Array, starts: NDArray[np.int64], length: int) -> tuple[Array, Array]:
+    """Return the standard deviations (k, m) of axes (n, m) in windows from `starts` (k,), and their noise (k, m).
+
+    For white noise the standard deviation is 1.4826/sqrt(2) times the median step; slow movement hardly changes it.
+    """
+    windows = np.lib.stride_tricks.sliding_window_view(axes, length, axis=0)[starts]  # (k, m, length)
+    noise = 1.4826 / np.sqrt(2.0) * np.median(np.abs(np.diff(windows, axis=2)), axis=2)
+    return windows.std(axis=2, ddof=1), noise

@@ -17,6 +17,7 @@ from solver.scene import Scene
 # Eight triangles of each element, in its nine nodes
 _AROUND = [0, 4, 1, 5, 2, 6, 3, 7]  # the nodes along the sides of an element
 _SPLIT = np.array([[8, 0, 4], [8, 4, 1], [8, 1, 5], [8, 5, 2], [8, 2, 6], [8, 6, 3], [8, 3, 7], [8, 7, 0]])
+_INSIDE = float(Q2P1.points.max())  # outermost point of quadrature, as a share of the way to the node [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,8 +105,19 @@ def _energies(prediction: Prediction, sketch: Sketch) -> Array:
 
     body = FiniteBody.of(prediction.mesh, finite_laws(scene.materials), checked=True)
     count = len(sketch.probes.element)
-    places = Endings(sketch.probes, np.ones(count), np.arange(count), count)
-    return FiniteProbes.of(body, places).energy(body, prediction.displacement)
+
+    def energies(probes: Probes) -> Array:
+        places = Endings(probes, np.ones(count), np.arange(count), count)
+        return FiniteProbes.of(body, places).energy(body, prediction.displacement)
+
+    found = energies(sketch.probes)
+    if np.isfinite(found).all():
+        return found
+    # In a sharp corner, as where bone ends at the skin, an element's own shape functions may turn its node inside out,
+    # although no point over which the element is integrated is. The nearest such point then stands for the node.
+    points = np.tile(_INSIDE * Q2P1.positions, (len(sketch.mesh.elements), 1))
+    inside = energies(Probes.at(sketch.mesh, sketch.elastic, sketch.probes.element, points))
+    return np.where(np.isfinite(found), found, inside)
 
 
 def _patch(outline: Outline, scene: Scene) -> Array:

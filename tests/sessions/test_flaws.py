@@ -158,8 +158,11 @@ CASES = {
     "speed_not_measurable": Case(
         block(T, felt(made(T, N, HALF, ALONG + 10.0 * np.sin(2 * np.pi * 1.5 * T)))), ("speed", "speed_error")
     ),
+    "may_only_roll": Case(
+        block(T, felt(made(T, N, 0.1 + 0 * T, 3.0 * (T - 2.0)))), (*FRICTION, "speed", "direction"), ()
+    ),
     "height_unknown": Case(
-        block(T, felt(made(T, N, 0.5 + 0.03 * (T - 2.0), 2.0 * (T - 2.0)))),
+        block(T, felt(made(T, N, 0.5 + 0.04 * (T - 2.0), 7.0 * (T - 2.0)))),
         ("speed",),
         extra={"frame": Frame("-z", "default", HEIGHT, "default")},
     ),

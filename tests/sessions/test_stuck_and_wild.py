@@ -162,3 +162,27 @@ def test_the_same_sensor_frozen_under_the_finger_until_the_recording_ends_is_nam
 def test_a_sensor_that_never_reads_below_zero_is_not_clipped_where_nothing_presses():
     found = of(with_axis(FZ, lambda column: np.minimum(np.round(column, 2), 0.0)))
     assert not names(found) & {"saturated", "frozen_sensor"}
+
+
+@pytest.mark.parametrize("spike", [-80.0, 80.0])
+@pytest.mark.parametrize("seed", range(8))
+def test_twelve_spikes_of_eighty_newtons_hide_no_good_stroke(seed, spike):
+    raw = CLEAN.copy()
+    at = np.random.default_rng(seed).choice(np.flatnonzero((T > 0.5) & (T < 9.5)), 12, replace=False)
+    raw[at, FZ] += spike
+    found = of(raw)
+    assert names(found, "refused") == set()
+    assert "wild_reading" in names(found)
+    assert [one.mu_dynamic for one in found.strokes] == pytest.approx([MU] * 3, rel=0.01)
+
+
+@pytest.mark.parametrize("first", [250, 300, 400, 440])
+@pytest.mark.parametrize("apart", [4, 5, 8])
+def test_twelve_spikes_close_together_are_told_apart_from_the_stroke_they_lie_in(first, apart):
+    raw = CLEAN.copy()
+    raw[first : first + 12 * apart : apart, FZ] -= 80.0
+    marked = wild_readings(raw, SETTINGS)
+    assert np.flatnonzero(marked[:, FZ]).tolist() == list(range(first, first + 12 * apart, apart))
+    found = of(raw)
+    assert len(found.strokes) == 3
+    assert found.strokes[0].mu_dynamic == pytest.approx(MU, rel=0.01)

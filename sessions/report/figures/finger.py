@@ -68,10 +68,14 @@ def finger_panels(field: Field, levels: tuple[float, ...], *, simulated: bool) -
 def common_levels(fields: Sequence[Field]) -> tuple[float, ...]:
     """Return the borders of the colours for all fields together [kPa]: few nodes, at bone and contact, lie above.
 
-    They rise from 0 in steps of 1, 2 or 5 times a power of ten.
+    They rise from 0 in steps of 1, 2 or 5 times a power of ten. Nodes without an SED (nan) count for nothing; where no
+    node has one above 0, the colours end at 1 kPa.
     """
     values = np.concatenate([np.asarray(field.sed) for field in fields]) * 1e3
-    high = float(np.quantile(values, 0.97))
+    values = values[np.isfinite(values)]
+    high = float(np.quantile(values, 0.97)) if len(values) else 0.0
+    if high <= 0.0:
+        high = 1.0
     step = _nice(high / 8)
     return tuple(round(step * n, 9) for n in range(int(np.ceil(high / step)) + 1))
 
@@ -79,10 +83,12 @@ def common_levels(fields: Sequence[Field]) -> tuple[float, ...]:
 def _tissue(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSet:
     """Fill the finger by its SED, outline layers, bone and ending, and draw the surface it rests on."""
     nodes = np.asarray(field.nodes)
-    mesh = Triangulation(nodes[:, 0], nodes[:, 1], np.asarray(field.triangles))
+    sed = np.asarray(field.sed) * 1e3
+    corners = np.asarray(field.triangles)
+    mesh = Triangulation(nodes[:, 0], nodes[:, 1], corners, mask=~np.isfinite(sed[corners]).all(axis=1))
     filled = axes.tricontourf(
         mesh,
-        np.asarray(field.sed) * 1e3,
+        np.nan_to_num(sed),  # a node without an SED lies in no triangle that is drawn
         levels=levels,
         cmap=COLOURS,
         extend="max",

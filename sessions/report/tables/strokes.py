@@ -60,7 +60,7 @@ def stroke_table(report: Report) -> Table | None:
     groups = grouped(report, report.strokes, lambda s: s.experiment, row)
     kind = f" Under each number: {report.interval_kind}." if report.interval_kind else ""
     caption = (
-        "Strokes. µ dynamic: mean over the steady window (± half its 95 % t interval, noise and zero alone); µ static: "
+        "Strokes. µ dynamic: mean over the steady window (± half its 95 % interval: noise, zero, gains); µ static: "
         "height of the static peak; µ maximum: greatest above the force floor; τ max: greatest tangential force over "
         "the contact area, which is taken as given; speed: slope of the centre of pressure (± its standard error)."
         f"{kind}"
