@@ -23,13 +23,6 @@ from daq_app.window.messages import Message
 from daq_app.window.view_course import Button, CourseView, PlanRow
 from sessions import steps
 
-QUESTIONS = {
-    "redo": "Why is it done again?",
-    "skip": "Why is it left out?",
-    "note": "Note, kept with its time:",
-    "end": "Why does the session end now?",
-}
-
 
 class CoursePanel(QFrame):
     """The left of the experimenter's window while a session is in hand."""
@@ -42,6 +35,7 @@ class CoursePanel(QFrame):
         self._send = send
         self._view: CourseView | None = None
         self._asking = ""
+        self._asked_for = ""  # the question that stands over the line
         self._plan = QListWidget()
         self._plan.setAccessibleName("plan: trials done, in hand and coming")
         self._plan.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -105,8 +99,9 @@ class CoursePanel(QFrame):
             self._send(shown.sends)
             return
         self._asking = what
-        say(self._question, QUESTIONS[what])
-        self.line.setAccessibleName(QUESTIONS[what])
+        self._asked_for = shown.question
+        say(self._question, shown.question)
+        self.line.setAccessibleName(shown.question)
         self.line.clear()
         self._bottom.setCurrentIndex(1)
         self.line.setFocus()
@@ -120,7 +115,7 @@ class CoursePanel(QFrame):
     def _given(self) -> None:
         text = self.line.text().strip()
         if not text:
-            say(self._question, f"{QUESTIONS[self._asking]} A word is enough; Esc leaves it.")
+            say(self._question, f"{self._asked_for} A word is enough; Esc leaves it.")
             return
         made: dict[str, Callable[[str], Message]] = {
             "redo": steps.Redo,
@@ -210,5 +205,5 @@ def _buttons(view: CourseView) -> tuple[Button, ...]:
 
 
 def _show_button(made: QPushButton, shown: Button) -> None:
-    made.setText(f"{shown.label} {shown.key}")
+    made.setText(f"{shown.label} {shown.key}".strip())
     made.setEnabled(shown.enabled)

@@ -112,6 +112,7 @@ class MainWindow(QMainWindow):
             self.stroke.setToolTip(course.stroke.details)
             regrade(self.stroke, {"refused": "wrong", "doubtful": "look"}.get(course.stroke.grade, ""))
             self.redo.setEnabled(course.redo.enabled)
+            self.redo.setText(f"{course.redo.label}  {course.redo.key}")
         self._show_subject_view(view)
 
     def set_tokens(self, tokens: Tokens) -> None:
