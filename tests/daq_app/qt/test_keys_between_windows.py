@@ -104,7 +104,7 @@ def test_a_number_that_reaches_the_experimenters_window_is_typed_whole_and_its_0
     assert driver.session.trials[0].answer == "number 20"
 
 
-def test_the_key_that_gave_the_answer_pressed_twice_does_not_go_on_with_the_course(driver):
+def test_the_key_that_gave_the_answer_pressed_twice_does_not_go_on_with_the_course(driver, monkeypatch):
     window = driver.window
     window.page.scores_only.setChecked(True)
     begin(driver)
@@ -118,11 +118,14 @@ def test_the_key_that_gave_the_answer_pressed_twice_does_not_go_on_with_the_cour
         QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
         QTest.keyClick(window.subject.line, ENTER)
         moved_on(driver, 1)
-        for place in (window.subject, window):
-            QTest.keyClick(place, ENTER)
-        assert driver.view.course.primary.label == "Mounted"
-        QTest.keyClick(window.subject, SPACE)
-        driver.phase("ready")
+        sent = []
+        with monkeypatch.context() as patch:
+            patch.setattr(window.bridge, "send", sent.append)
+            for place in (window.subject, window):
+                QTest.keyClick(place, ENTER)
+            assert sent == []
+            QTest.keyClick(window.subject, SPACE)
+            assert sent == [driver.view.course.primary.sends]
     finally:
         QApplication.setDoubleClickInterval(interval)
 
