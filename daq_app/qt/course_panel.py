@@ -43,7 +43,7 @@ class CoursePanel(QFrame):
         self.note = button("Note N", "write a note", lambda: self.ask("note"), "small")
         self.no_answer = button("No answer 0", "the subject gives no answer", lambda: self.ask("no answer"), "small")
         self.end = button("End Ctrl+E", "end the session, with a reason", self._end, "small")
-        self._all = (self.redo, self.skip, self.pause, self.note, self.no_answer, self.end)
+        self._all = (self.skip, self.redo, self.pause, self.note, self.no_answer, self.end)
         self.line = EntryLine(self._given, self.leave)
         self.line.setAccessibleName("reason or note")
         self._question = label("", wrap=True)

@@ -110,7 +110,7 @@ def _redo(again: tuple[TrialState, ...], sends: steps.Redo | None) -> Button:
     """Return the button that names what it discards."""
     if not again:
         return Button("Redo", "R", enabled=False)
-    numbers = " and ".join(str(trial.trial.number) for trial in again)
+    numbers = "–".join(str(trial.trial.number) for trial in again)
     named = " and ".join(f"{trial.trial.number} ({trial.trial.stimulus.code})" for trial in again)
     trials = f"trial {named}" if len(again) == 1 else f"trials {named}"
     return Button(

@@ -156,7 +156,7 @@ def test_redo_names_both_of_two_that_are_compared():
     begun = m.SessionBegun("recordings/P07", PAIRS, "people", None, 0, 1.0)
     state = after(begun, steps.AskMount(second), steps.StartTake(2, 1), steps.AskChoice(first, second, "Which?"))
     redo = derive_view(state).course.redo
-    assert redo.label == "Redo 1 and 2"
+    assert redo.label == "Redo 1–2"
     assert first.stimulus.code in redo.question
     assert second.stimulus.code in redo.question
 
