@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QElapsedTimer, QEvent, QObject, Signal
+from PySide6.QtCore import QElapsedTimer, QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
 
@@ -15,7 +15,7 @@ from daq_app.window.key_owner import owner
 class Keyboard(QObject):
     """The keys of the experimenter's and the subject's window."""
 
-    typed = Signal()  # a text of the experimenter's window is no longer typed in
+    free = Signal()  # it is no longer a text's, or another program's
 
     def __init__(self, window: QMainWindow, plan: QWidget, subject: SubjectWindow, act: Callable[[str], None]) -> None:
         """Watch the subject's window and the experimenter's plan; `act` does what a key of the course stands for."""
@@ -31,6 +31,7 @@ class Keyboard(QObject):
         application = QApplication.instance()
         assert isinstance(application, QApplication)
         application.focusChanged.connect(self._focus_changed)
+        application.applicationStateChanged.connect(self._state_changed)
 
     def typed_in(self) -> QWidget | None:
         """Return the text that the experimenter types in; None where there is none."""
@@ -75,4 +76,8 @@ class Keyboard(QObject):
 
     def _focus_changed(self, old: QWidget | None, new: QWidget | None) -> None:
         if new is not None and new.window() is self._window and is_text_field(old) and self.typed_in() is None:
-            self.typed.emit()
+            self.free.emit()
+
+    def _state_changed(self, state: Qt.ApplicationState) -> None:
+        if state == Qt.ApplicationState.ApplicationActive and self.typed_in() is None:
+            self.free.emit()

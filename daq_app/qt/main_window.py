@@ -75,7 +75,7 @@ class MainWindow(QMainWindow):
         self.subject.answered.connect(self._answered)
         self.subject.screen_changed.connect(self._line_changed)
         self.keyboard = Keyboard(self, self.course.plan, self.subject, self.act)
-        self.keyboard.typed.connect(self._bring_subject)
+        self.keyboard.free.connect(self._bring_subject)
         self._left = QStackedWidget()
         self._left.addWidget(self.page)
         self._left.addWidget(self.course)
@@ -139,8 +139,8 @@ class MainWindow(QMainWindow):
         self.subject.setAttribute(Qt.WidgetAttribute.WA_ShowWithoutActivating, not activating)
         if others and not self.subject.isVisible():
             self.subject.setGeometry(others[0].availableGeometry())
-            self.subject.showFullScreen()
-        elif others or activating:
+            self.subject.setWindowState(Qt.WindowState.WindowFullScreen)  # not showFullScreen: that takes the keyboard
+        if others or activating:
             self.subject.show()
 
     def act(self, act: str) -> None:  # noqa: C901  a table of cases

@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+import sys
 import time
 from contextlib import contextmanager
 
@@ -38,6 +39,17 @@ def desk_of(screens):
         finally:
             manager.terminate()
             manager.wait()
+
+
+OTHER = """
+from PySide6.QtWidgets import QApplication, QLineEdit
+application = QApplication([])
+line = QLineEdit()
+line.setWindowTitle("another program")
+line.textChanged.connect(lambda text: print(text, flush=True))
+line.show()
+application.exec()
+"""
 
 
 def count(folder, kind, number):
@@ -112,3 +124,37 @@ def test_keys_of_the_course_work_on_the_subjects_window_and_a_click_there_takes_
         assert [event.data["text"] for event in events(folder) if event.kind == "note"] == ["a10b"]
         assert "scored" not in kinds(folder)
         answer_by_keys(desk, folder, 1)
+
+
+@pytest.mark.parametrize("screens", [(1600,), (DESK, TABLET)])
+def test_no_key_typed_into_another_program_answers_and_the_subjects_window_comes_when_the_keyboard_is_back(
+    tmp_path, screens
+):
+    folder = tmp_path / "recordings"
+    with desk_of(screens) as desk, desk.program(tmp_path):
+        begin(desk, folder)
+        window = desk.window("^daq-app$")
+        command = [sys.executable, "-c", OTHER]
+        other = subprocess.Popen(command, env=desk.environment, stdout=subprocess.PIPE, text=True)
+        try:
+            until(lambda: desk.active() == "another program", "another program")
+            desk.do("windowactivate", "--sync", window)
+            desk.press("space")
+            count(folder, "take_started", 1)
+            desk.do("windowactivate", "--sync", desk.window("another program"))
+            desk.do("type", "1")
+            count(folder, "score_asked", 1)
+            time.sleep(1.0)
+            desk.do("type", "2")
+            assert desk.active() == "another program"
+            desk.do("windowactivate", "--sync", window)
+            until(lambda: desk.active() == SUBJECT, "the subject's window")
+            desk.do("windowactivate", "--sync", window)  # now because the experimenter wants it
+            time.sleep(1.0)
+            assert desk.active() == WINDOW
+            desk.press("Right", "Return")  # whichever window has the keyboard
+            count(folder, "scored", 1)
+        finally:
+            other.terminate()
+            typed, _ = other.communicate()
+        assert typed.split() == ["1", "12"]
