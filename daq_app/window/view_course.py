@@ -70,7 +70,7 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
     """Return what is shown of a session."""
     headline, primary = _to_do(session, bench)
     over = session.over
-    again = redone(session)
+    again = redo_targets(session)
     stroke = _stroke(session, again)
     trial = session.of(session.trial)
     return CourseView(
@@ -91,7 +91,7 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
     )
 
 
-def redone(session: SessionState) -> tuple[TrialState, ...]:
+def redo_targets(session: SessionState) -> tuple[TrialState, ...]:
     """Return the trials that a redo would discard now: one, two that are compared, or none."""
     if session.phase in IN_A_TRIAL - {"mounting"}:
         trial = session.of(session.trial)
