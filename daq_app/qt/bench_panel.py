@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
+    QComboBox,
     QFrame,
     QGridLayout,
     QHBoxLayout,
@@ -13,7 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from daq_app.qt.indicators import Lamp, LoadBar
-from daq_app.qt.parts import Shortened, button, choice, label, regrade, say, scrolled
+from daq_app.qt.parts import EntryLine, Shortened, button, choice, label, regrade, say, scrolled
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.window.bench_load import AXES
@@ -46,6 +47,9 @@ class BenchPanel(QFrame):
         self._bars = {name: LoadBar(tokens, name, scale) for name in (*AXES, "combined")}
         self._choice = choice("transducer to connect: choose one, or type its address")
         self._choice.setEditable(True)
+        self._choice.setLineEdit(EntryLine(self._typed, self._leave))
+        self._choice.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)  # an address is no device until it answers
+        self._choice.setCompleter(None)  # pyright: ignore[reportArgumentType]  what is typed stays what it is
         self.search = button("Search", "search for transducers", search)
         self.connect_button = button("Connect", "connect the chosen transducer", self._connect)
         self.tare = button("Zero T", "measure the zero of the bench", lambda: send(Tare()))
@@ -106,6 +110,13 @@ class BenchPanel(QFrame):
         elif uri := self._chosen():
             self._send(Connect(uri))
 
+    def _typed(self) -> None:
+        self._connect()
+        self._leave()
+
+    def _leave(self) -> None:
+        self.window().setFocus()
+
     def _chosen(self) -> str:
         """Return the address chosen or typed."""
         text = self._choice.currentText().strip()
@@ -117,8 +128,11 @@ class BenchPanel(QFrame):
         self._choice.clear()
         for device in view.devices:
             self._choice.addItem(f"{device.name} · {device.detail}", device.uri)
-        at = self._choice.findData(view.uri or typed or "sim:")
-        self._choice.setCurrentIndex(max(at, 0))
+        wanted = view.uri or typed or "sim:"
+        at = self._choice.findData(wanted)
+        self._choice.setCurrentIndex(at)
+        if at < 0:
+            self._choice.setEditText(wanted)
         if (typed_in := self._choice.lineEdit()) is not None:
             typed_in.setCursorPosition(0)
 

@@ -24,6 +24,7 @@ from sessions.plan.plan import Frame
 
 FRAME = 16  # between two looks at the recorder [ms]: 60 a second
 AFTER_OPENING = 1500  # what is not needed at once waits until the window stands [ms]
+BEGINNING = (m.Connect, m.StartSession, m.ResumeSession)  # requests for which another recorder is started
 TICK = 0.1  # between two looks at the clock, for what tells an age, and at the load [s]
 
 
@@ -111,7 +112,7 @@ class Bridge(QObject):
     def send(self, message: Message) -> None:
         """Do what somebody asked for: fold it, and tell the recorder where it is for it."""
         self._fold(message)
-        if isinstance(message, REQUESTS):
+        if isinstance(message, REQUESTS) and (self.state.gone is None or isinstance(message, BEGINNING)):
             if self.state.gone is not None:
                 self._begin_again()
             self._client.send(message)  # pyright: ignore[reportArgumentType]  it is one of REQUESTS

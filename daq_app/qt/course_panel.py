@@ -3,12 +3,10 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QFrame,
     QGridLayout,
     QHBoxLayout,
-    QLineEdit,
     QListWidget,
     QListWidgetItem,
     QPushButton,
@@ -17,18 +15,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.qt.parts import button, label, say
+from daq_app.qt.parts import EntryLine, button, label, say
 from daq_app.qt.tokens import GRID, TARGET, Tokens
 from daq_app.window.messages import Message
 from daq_app.window.view_course import Button, CourseView, PlanRow
 from sessions.run import steps
-
-QUESTIONS = {
-    "redo": "Why is it done again?",
-    "skip": "Why is it left out?",
-    "note": "Note, kept with its time:",
-    "end": "Why does the session end now?",
-}
 
 
 class CoursePanel(QFrame):
@@ -42,17 +33,19 @@ class CoursePanel(QFrame):
         self._send = send
         self._view: CourseView | None = None
         self._asking = ""
-        self._plan = QListWidget()
-        self._plan.setAccessibleName("plan: trials done, in hand and coming")
-        self._plan.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._asked_for = ""  # the question that stands over the line
+        self.plan = QListWidget()
+        self.plan.setAccessibleName("plan: trials done, in hand and coming")
+        self.plan.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.redo = button("Redo R", "redo the trial, with a reason", lambda: self.ask("redo"), "small")
         self.skip = button("Skip S", "skip the trial, with a reason", lambda: self.ask("skip"), "small")
         self.pause = button("Pause P", "pause", self._pause, "small")
         self.note = button("Note N", "write a note", lambda: self.ask("note"), "small")
         self.no_answer = button("No answer 0", "the subject gives no answer", lambda: self.ask("no answer"), "small")
         self.end = button("End Ctrl+E", "end the session, with a reason", self._end, "small")
-        self._all = (self.redo, self.skip, self.pause, self.note, self.no_answer, self.end)
-        self.line = ReasonLine(self._given, self.leave)
+        self._all = (self.skip, self.redo, self.pause, self.note, self.no_answer, self.end)
+        self.line = EntryLine(self._given, self.leave)
+        self.line.setAccessibleName("reason or note")
         self._question = label("", wrap=True)
         self._bottom = QStackedWidget()
         self._bottom.addWidget(self._actions())
@@ -66,7 +59,7 @@ class CoursePanel(QFrame):
         layout.setContentsMargins(int(1.5 * GRID), GRID, int(1.5 * GRID), GRID)
         layout.setSpacing(GRID)
         layout.addLayout(head)
-        layout.addWidget(self._plan, 1)
+        layout.addWidget(self.plan, 1)
         layout.addWidget(self._bottom)
 
     @property
@@ -105,8 +98,9 @@ class CoursePanel(QFrame):
             self._send(shown.sends)
             return
         self._asking = what
-        say(self._question, QUESTIONS[what])
-        self.line.setAccessibleName(QUESTIONS[what])
+        self._asked_for = shown.question
+        say(self._question, shown.question)
+        self.line.setAccessibleName(shown.question)
         self.line.clear()
         self._bottom.setCurrentIndex(1)
         self.line.setFocus()
@@ -114,13 +108,13 @@ class CoursePanel(QFrame):
     def leave(self) -> None:
         """Ask for nothing any more."""
         if self.asking:
-            self._bottom.setCurrentIndex(0)
             self.window().setFocus()
+            self._bottom.setCurrentIndex(0)
 
     def _given(self) -> None:
         text = self.line.text().strip()
         if not text:
-            say(self._question, f"{QUESTIONS[self._asking]} A word is enough; Esc leaves it.")
+            say(self._question, f"{self._asked_for} A word is enough; Esc leaves it.")
             return
         made: dict[str, Callable[[str], Message]] = {
             "redo": steps.Redo,
@@ -145,7 +139,7 @@ class CoursePanel(QFrame):
         grid.setSpacing(GRID)
         for at, made in enumerate(self._all):
             grid.addWidget(made, at // 3, at % 3)
-        self._plan.setMinimumHeight(3 * TARGET // 2)
+        self.plan.setMinimumHeight(3 * TARGET // 2)
         return page
 
     def _asked(self, scale: float) -> QWidget:
@@ -164,45 +158,25 @@ class CoursePanel(QFrame):
         return page
 
     def _show_rows(self, rows: tuple[PlanRow, ...]) -> None:
-        while self._plan.count() > len(rows):
-            self._plan.takeItem(self._plan.count() - 1)
+        while self.plan.count() > len(rows):
+            self.plan.takeItem(self.plan.count() - 1)
         for at, row in enumerate(rows):
-            item = self._plan.item(at)
+            item = self.plan.item(at)
             if item is None:  # pyright: ignore[reportUnnecessaryComparison]  Qt returns None beyond the last
                 item = QListWidgetItem()
-                self._plan.addItem(item)
+                self.plan.addItem(item)
             text = f"{row.name}   {row.found}" if row.kind == "block" else f"{row.mark}  {row.name}   {row.found}"
             if item.text() != text:
                 item.setText(text)
             item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{row.kind}: {row.name} {row.found}")
-            made = self._plan.font()
+            made = self.plan.font()
             made.setBold(row.kind in ("block", "current"))
             item.setFont(made)
             if row.kind == "current":
-                self._plan.scrollToItem(item, QListWidget.ScrollHint.EnsureVisible)
+                self.plan.scrollToItem(item, QListWidget.ScrollHint.EnsureVisible)
 
     def set_tokens(self, tokens: Tokens) -> None:
         """Follow another theme: the style sheet does it all."""
-
-
-class ReasonLine(QLineEdit):
-    """A line that keeps Enter and Esc to itself: Enter there is not the window's primary button."""
-
-    def __init__(self, given: Callable[[], None], left: Callable[[], None]) -> None:
-        """Call `given` at Enter and `left` at Esc."""
-        super().__init__()
-        self.setAccessibleName("reason or note")
-        self._given = given
-        self._left = left
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
-        """Take the two keys; type the others."""
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            self._given()
-        elif event.key() == Qt.Key.Key_Escape:
-            self._left()
-        else:
-            super().keyPressEvent(event)
 
 
 def _buttons(view: CourseView) -> tuple[Button, ...]:
@@ -210,5 +184,5 @@ def _buttons(view: CourseView) -> tuple[Button, ...]:
 
 
 def _show_button(made: QPushButton, shown: Button) -> None:
-    made.setText(f"{shown.label} {shown.key}")
+    made.setText(f"{shown.label} {shown.key}".strip())
     made.setEnabled(shown.enabled)

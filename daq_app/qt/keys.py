@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from daq_app.qt.parts import button, label, panel
@@ -23,11 +23,15 @@ class Key:
 
 KEYS = (
     Key("Space", "primary", "do what the sentence says (Enter too)"),
-    Key("R", "redo", "redo the trial; the reason is asked for, or taken from what was found of the stroke"),
+    Key(
+        "R",
+        "redo",
+        "redo the trial that the button names; the reason is asked for, or taken from what was found of the stroke",
+    ),
     Key("S", "skip", "skip the trial, with a reason"),
     Key("P", "pause", "pause, and go on"),
     Key("N", "note", "write a note, kept with its time"),
-    Key("0", "no answer", "the subject gives no answer to this trial"),
+    Key("0", "no answer", "the subject gives no answer to this trial; where a number is due, use the button"),
     Key("Ctrl+E", "end", "end the session before its last trial, with a reason"),
     Key("Ctrl+N", "new", "new session, after one has ended"),
     Key("T", "tare", "measure the zero of the bench, outside a session"),
@@ -84,6 +88,13 @@ def act_of(event: QKeyEvent) -> str | None:
     elif held != Qt.KeyboardModifier.NoModifier:
         return None
     return next((known.act for known in KEYS if known.key == name), None)
+
+
+def name_of(event: QKeyEvent) -> str:
+    """Return the name of a key that is pressed without Ctrl, Alt or the like; empty where it is held with one."""
+    if event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier):
+        return ""
+    return "Enter" if event.key() == Qt.Key.Key_Return else QKeySequence(event.key()).toString()
 
 
 class KeysPage(QWidget):

@@ -5,7 +5,7 @@ import threading
 from datetime import datetime
 from pathlib import Path
 
-from PySide6.QtCore import QEvent, QObject, QSize, Qt, QTimer
+from PySide6.QtCore import QSize, Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -22,7 +22,8 @@ from daq_app.qt.bench_panel import BenchPanel, BenchStrip
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.course_panel import CoursePanel
 from daq_app.qt.header import Header, Notice, ToDo
-from daq_app.qt.keys import KeysPage, act_of
+from daq_app.qt.keyboard import Keyboard
+from daq_app.qt.keys import KeysPage
 from daq_app.qt.live_panel import LivePanel
 from daq_app.qt.new_session_page import NewSessionPage
 from daq_app.qt.parts import button, label, regrade, say
@@ -73,6 +74,8 @@ class MainWindow(QMainWindow):
         self.subject = SubjectWindow(tokens, scale, bridge.session_now)
         self.subject.answered.connect(self._answered)
         self.subject.screen_changed.connect(self._line_changed)
+        self.keyboard = Keyboard(self, self.course.plan, self.subject, self.act)
+        self.keyboard.free.connect(self._bring_subject)
         self._left = QStackedWidget()
         self._left.addWidget(self.page)
         self._left.addWidget(self.course)
@@ -112,6 +115,7 @@ class MainWindow(QMainWindow):
             self.stroke.setToolTip(course.stroke.details)
             regrade(self.stroke, {"refused": "wrong", "doubtful": "look"}.get(course.stroke.grade, ""))
             self.redo.setEnabled(course.redo.enabled)
+            self.redo.setText(f"{course.redo.label}  {course.redo.key}")
         self._show_subject_view(view)
 
     def set_tokens(self, tokens: Tokens) -> None:
@@ -121,16 +125,23 @@ class MainWindow(QMainWindow):
             part.set_tokens(tokens)
 
     def show_subject(self) -> None:
-        """Show the subject's window: on a second screen where there is one, and let keys go to it."""
-        here = self.screen()
-        others = [screen for screen in QGuiApplication.screens() if screen is not here]
-        if others and not self.subject.isVisible():
-            self.subject.setGeometry(others[0].availableGeometry())
-            self.subject.showFullScreen()
-        else:
-            self.subject.show()
+        """Show the subject's window, and let the keyboard go to it from whatever is being typed."""
+        if self.keyboard.typed_in() is not None:
+            self.setFocus()
+        self._place_subject(activating=True)
         self.subject.raise_()
         self.subject.activateWindow()
+
+    def _place_subject(self, *, activating: bool) -> None:
+        """Show the subject's window: on a second screen where there is one."""
+        here = self.screen()
+        others = [screen for screen in QGuiApplication.screens() if screen is not here]
+        self.subject.setAttribute(Qt.WidgetAttribute.WA_ShowWithoutActivating, not activating)
+        if others and not self.subject.isVisible():
+            self.subject.setGeometry(others[0].availableGeometry())
+            self.subject.setWindowState(Qt.WindowState.WindowFullScreen)  # not showFullScreen: that takes the keyboard
+        if others or activating:
+            self.subject.show()
 
     def act(self, act: str) -> None:  # noqa: C901  a table of cases
         """Do what a key stands for."""
@@ -139,6 +150,8 @@ class MainWindow(QMainWindow):
                 self._primary()
             case "redo" | "skip" | "note" | "no answer" | "end" if self.course.isVisible():
                 self.course.ask(act)
+                if self.course.asking:
+                    self._come_back()
             case "pause" if self.course.isVisible():
                 self.course.pause.click()
             case "new" if self._view_over():
@@ -173,18 +186,8 @@ class MainWindow(QMainWindow):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Obey the keys; those of a field that is typed in never come here."""
-        act = act_of(event)
-        if act is None or event.isAutoRepeat():
+        if not self.keyboard.press(event):
             super().keyPressEvent(event)
-        else:
-            self.act(act)
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802  Qt's name
-        """Give letters typed on the plan to the window: a list would search for them."""
-        if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent) and act_of(event) is not None:
-            self.keyPressEvent(event)
-            return True
-        return super().eventFilter(watched, event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Fold what there is no room for."""
@@ -252,6 +255,10 @@ class MainWindow(QMainWindow):
         if page != self._left.currentIndex():
             self._left.setCurrentIndex(page)
             (self.page.subject if page == 0 else self).setFocus()
+            self.subject.given_with = None  # an answer of another session
+            if page == 0:
+                self.page.subject.clear()  # the next session is not begun by whoever was there last
+                self._look_for_unfinished()
 
     def _bench(self) -> Bench:
         bench = self.bridge.state.bench
@@ -263,18 +270,34 @@ class MainWindow(QMainWindow):
         hand = None if session is None else session.plan.answering_hand
         was_scoring = self.subject.scoring
         self.subject.show_view(view.subject, hand)
-        people = session is not None and session.people != "simulated people"
-        if self.subject.scoring and not was_scoring and people:
+        if not was_scoring:
+            self._bring_subject()
+
+    def _bring_subject(self) -> None:
+        """Bring the subject's window for an answer that is due, and the keyboard unless somebody is typing."""
+        session = self.bridge.state.session
+        if not self.subject.scoring or session is None or session.people == "simulated people":
+            return
+        active = QGuiApplication.applicationState() == Qt.ApplicationState.ApplicationActive
+        if active and self.keyboard.typed_in() is None:
             self.show_subject()
+        else:
+            self._place_subject(activating=False)
+
+    def _come_back(self) -> None:
+        """Let the keyboard come back to this window, which comes to the front where it shares a screen."""
+        if len(QGuiApplication.screens()) == 1:
+            self.raise_()
+        self.activateWindow()
 
     def _line_changed(self) -> None:
         self.page.show_line(millimetres(self.subject.screen()))
 
     def _answered(self, event: Message) -> None:
         self.bridge.send(event)
-        if len(QGuiApplication.screens()) == 1:
-            self.raise_()
-            self.activateWindow()
+        field = self.keyboard.typed_in()
+        if field is None or field.window() is self:
+            self._come_back()
 
     def _draw(self) -> None:
         session = self.bridge.state.session

@@ -3,8 +3,21 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QComboBox, QFrame, QLabel, QPushButton, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtGui import QKeyEvent, QResizeEvent
+from PySide6.QtWidgets import (
+    QAbstractSpinBox,
+    QComboBox,
+    QFrame,
+    QLabel,
+    QLineEdit,
+    QPlainTextEdit,
+    QPushButton,
+    QScrollArea,
+    QSizePolicy,
+    QTextEdit,
+    QVBoxLayout,
+    QWidget,
+)
 
 from daq_app.qt.tokens import GRID, TARGET
 
@@ -100,6 +113,32 @@ def choice(name: str) -> QComboBox:
     made.setMinimumHeight(TARGET)
     made.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
     return made
+
+
+class EntryLine(QLineEdit):
+    """A line that keeps Enter and Esc to itself: Enter there is not the window's primary button."""
+
+    def __init__(self, given: Callable[[], None], left: Callable[[], None]) -> None:
+        """Call `given` at Enter and `left` at Esc."""
+        super().__init__()
+        self._given = given
+        self._left = left
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
+        """Take the two keys; type the others."""
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self._given()
+        elif event.key() == Qt.Key.Key_Escape:
+            self._left()
+        else:
+            super().keyPressEvent(event)
+
+
+def is_text_field(widget: QWidget | None) -> bool:
+    """Say whether keys pressed on a widget are text that is typed."""
+    if isinstance(widget, QComboBox):
+        return widget.isEditable()
+    return isinstance(widget, QLineEdit | QAbstractSpinBox | QTextEdit | QPlainTextEdit) and not widget.isReadOnly()
 
 
 def scrolled(inside: QWidget) -> QScrollArea:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QHBoxLayout, QLabel, QStackedWidget, QVBoxLayout, QWidget
 
 from daq_app.qt.free_answers import ChoiceOfTwo, NumberField
 from daq_app.qt.parts import button, label, say
@@ -13,11 +13,12 @@ from daq_app.qt.ruler_check import RulerCheck
 from daq_app.qt.score_line import ScoreLine
 from daq_app.qt.screens import Millimetres, millimetres
 from daq_app.qt.tokens import GRID, Tokens, font
-from daq_app.window.view_subject import SubjectView
+from daq_app.window.view_subject import Kind, SubjectView
 from sessions.plan.plan import Hand
 
 LARGE, LARGER = 24, 36  # type that is read from where a hand rests on a transducer
 WIDEST = 1100  # row of the button
+GIVING = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space)
 TEXT_WIDTH = 900  # of a text that is still easily read
 
 
@@ -35,6 +36,7 @@ class SubjectWindow(QWidget):
         self.setWindowTitle("daq-app · subject")
         self.setAccessibleName("subject's window")
         self._view: SubjectView | None = None
+        self.given_with: int | None = None  # key by which the last answer was given; None: by a click or a touch
         self._stated_hand: Hand | None = None
         self._title = _large(label(role="title", wrap=True), LARGER, scale, bold=True)
         self._text = _large(label(wrap=True), LARGE, scale)
@@ -72,10 +74,19 @@ class SubjectWindow(QWidget):
         return self._view is not None and self._view.asks
 
     @property
+    def asks(self) -> Kind:
+        """Return what the subject is asked for."""
+        return "read" if self._view is None else self._view.kind
+
+    @property
+    def measuring(self) -> bool:
+        """Say whether the line is held against a ruler now."""
+        return self._pages.currentWidget() is self.ruler
+
+    @property
     def _way(self) -> ScoreLine | NumberField | ChoiceOfTwo:
         """Return what the answer is given with."""
-        kind = None if self._view is None else self._view.kind
-        return self.number if kind == "number" else self.choice if kind == "choice" else self.line
+        return self.number if self.asks == "number" else self.choice if self.asks == "choice" else self.line
 
     def show_view(self, view: SubjectView, hand: Hand | None) -> None:
         """Show what is to be done now; `hand` is the answering one, where somebody stated it."""
@@ -93,7 +104,7 @@ class SubjectWindow(QWidget):
         else:
             say(self._title, view.title)
             say(self._text, view.text)
-        if self._pages.currentWidget() is not self.ruler:
+        if not self.measuring:
             self._turn()
 
     def _begin(self, view: SubjectView) -> None:
@@ -129,12 +140,19 @@ class SubjectWindow(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Let Enter be Next, and every other key of the line go to the line."""
-        if self.scoring and event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space):
-            self._give()
+        if self.scoring and not self.measuring and event.key() in GIVING:
+            self.take_key(event)
         elif event.key() == Qt.Key.Key_F11:
             self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
         else:
             super().keyPressEvent(event)
+
+    def take_key(self, event: QKeyEvent) -> None:
+        """Take a key of the answer, in whichever window it was pressed."""
+        if event.key() in GIVING:
+            self._give(event.key())
+        else:
+            QApplication.sendEvent(self._way.focusProxy() or self._way, event)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802  Qt's name
         """Follow the window to screens of another size from now on."""
@@ -223,9 +241,10 @@ class SubjectWindow(QWidget):
     def _answer_changed(self) -> None:
         self.next.setVisible(self._way.answered)
 
-    def _give(self) -> None:
+    def _give(self, key: int | None = None) -> None:
         if not self.scoring or not self._way.answered:
             return
+        self.given_with = key
         given = self._way.given(self._stated_hand)
         self.next.hide()  # nobody gives an answer twice
         self._view = None

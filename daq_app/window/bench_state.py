@@ -55,6 +55,8 @@ def bench_after(bench: BenchState, message: Message) -> BenchState:
     match message:
         case m.Connect() | m.Device() | m.NoDevice() | m.LinkDown() | m.LinkBack() | m.Failed():
             return _linked(bench, message)
+        case m.SessionEnded() | m.Gone():
+            return _left(bench, message)
         case m.Tare() | m.Tared() | LoggedEvent(kind="zeroed"):
             return _tared(bench, message)
         case m.HealthReport():
@@ -92,6 +94,17 @@ def _linked(
             return replace(bench, link="open" if same else "lost", problem=problem)
         case m.Failed():
             return _not_done(bench, message)
+
+
+def _left(bench: BenchState, message: m.SessionEnded | m.Gone) -> BenchState:
+    """Return the bench after a session or the recorder has let go of it."""
+    match message:
+        case m.SessionEnded(end=end) if end.cause == "device":
+            return replace(bench, link="lost", problem=end.reason)
+        case m.Gone(asked=False):
+            return BenchState(found=bench.found)  # the recorder's process held the transducer
+        case _:
+            return bench
 
 
 def _tared(bench: BenchState, message: m.Tare | m.Tared | LoggedEvent) -> BenchState:

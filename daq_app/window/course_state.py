@@ -71,14 +71,14 @@ class SessionState:
     told: str | None = None  # the last sentence that needs no answer, or that refuses one
     judged: int | None = None  # number of the trial whose stroke was looked at last
     time_offset: float = 0.0  # of the times in the log to those of the stream that is shown, after a resumption [s]
-    marks: tuple[Mark, ...] = ()  # the last ones, in the time of the stream that is shown
+    marks: tuple[Mark, ...] = ()  # the last ones, in the time of the session's stream; none once it is over
     notes: tuple[str, ...] = ()
     status: Status | None = None
     saved_ns: int = 0  # instant of the last thing that is safe [ns, session clock]
     saved: float | None = None  # when the window heard of it [s]
     end: SessionEnd | None = None
     resumable: bool = False
-    broken: str | None = None  # why nothing is recorded any more, where no end could be written
+    broken: str | None = None  # why nothing is recorded any more, where no end was written
     sealing: Literal["no", "running", "sealed"] = "no"
 
     @property
@@ -109,7 +109,7 @@ def session_begun(begun: m.SessionBegun, now: float) -> SessionState:
     )
     for event in begun.events:
         session = _logged(session, event)
-    return session
+    return replace(session, marks=())  # theirs is the clock of a stream that has ended
 
 
 def session_after(session: SessionState, message: Message, now: float) -> SessionState:
@@ -129,20 +129,38 @@ def _after(session: SessionState, message: Message, now: float) -> SessionState:
             return replace(session, status=message, saved_ns=message.safe.time_ns, saved=saved, phase=phase)
         case Judged(trial, take, quality):
             return _judged(session, trial, take, quality)
-        case m.SessionEnded(_, end, resumable):
-            return replace(session, end=end, phase="ended", asked=None, resumable=resumable)
-        case m.ResumeSession():
-            return replace(session, phase="resuming", asked=None)
-        case m.Failed("ResumeSession") if session.over:
-            return replace(session, phase="ended")
-        case m.Failed(request, sentence) if request in ("StartSession", "ResumeSession") and not session.over:
-            return replace(session, broken=sentence, phase="ended", asked=None)
+        case m.SessionEnded() | m.Gone() | m.Failed() | m.ResumeSession():
+            return _ended(session, message)
         case m.Sealing():
             return replace(session, sealing="running")
         case m.Sealed():
             return replace(session, sealing="sealed")
         case _:
             return _shown(session, message)
+
+
+def _ended(session: SessionState, message: m.SessionEnded | m.Gone | m.Failed | m.ResumeSession) -> SessionState:
+    """Return the session after something that ends it, or takes it up again."""
+    match message:
+        case m.SessionEnded(_, end, resumable):
+            return replace(_over(session), end=end, resumable=resumable)
+        case m.Gone(asked, sentence) if not asked and not session.over:
+            return replace(_over(session), broken=sentence, resumable=True)
+        case m.Gone(False) | m.Failed("ResumeSession") if session.phase == "resuming":
+            return replace(session, phase="ended")
+        case m.ResumeSession():
+            return replace(session, phase="resuming", asked=None)
+        case m.Failed(kind=""):
+            return session  # a request that has to wait for the end of this session
+        case m.Failed(request, sentence) if request in ("StartSession", "ResumeSession") and not session.over:
+            return replace(_over(session), broken=sentence)
+        case _:
+            return session
+
+
+def _over(session: SessionState) -> SessionState:
+    """Return the session once nothing is recorded any more; its marks go with the clock of its stream."""
+    return replace(session, phase="ended", asked=None, marks=())
 
 
 def _shown(session: SessionState, message: Message) -> SessionState:
@@ -239,7 +257,7 @@ def _judged(session: SessionState, trial: int, take: int, quality: Quality) -> S
     if of is None or of.takes != take:
         return session
     session = replace(session.with_trial(trial, quality=quality), judged=trial)
-    if quality.steady is None:
+    if quality.steady is None or session.over:
         return session
     return _marked(session, Mark("steady", *quality.steady))
 

@@ -60,9 +60,7 @@ def derive_view(state: AppState) -> View:
         simulated=simulated,
         lamp=_lamp(state),
         banner=_banner(state),
-        course=None
-        if session is None
-        else view_course.course_view(session, state.bench, state.now, alone=state.gone is not None),
+        course=None if session is None else view_course.course_view(session, state.bench, state.now),
         bench=view_bench.bench_view(state.bench, recording=session is not None and not session.over),
         subject=view_subject.subject_view(session),
     )
@@ -95,17 +93,11 @@ def _banner(state: AppState) -> Banner | None:
     """Return the worst that is to be said; one at a time."""
     session, bench = state.session, state.bench
     running = session is not None and not session.over
-    if state.gone is not None:
-        kept = f" What was saved until then is in {session.folder}." if session else ""
-        again = m.ResumeSession(session.folder) if running and session is not None else None
-        return Banner("wrong", f"{sentence(state.gone)}{kept}", "Resume session" if again else "", again)
-    if session is not None and session.broken is not None:
-        words = f"The recording has stopped: {session.broken}. What was saved until then is in {session.folder}."
-        return Banner("wrong", words)
-    if session is not None and session.end is not None and session.end.cause not in ("finished", "aborted", "stopped"):
+    if session is not None and (words := _cut_short(state, session)):
         again = m.ResumeSession(session.folder) if session.resumable else None
-        words = f"The session was cut short: {session.end.reason}. Everything until then is kept."
         return Banner("wrong", words, "Resume session" if again else "", again)
+    if state.gone is not None:
+        return Banner("wrong", sentence(state.gone))
     if bench.link == "lost":
         lost = "" if not running else " Readings are being lost; what came before is kept."
         return Banner("wrong", f"The transducer does not answer: {bench.problem}.{lost}")
@@ -123,6 +115,23 @@ def _banner(state: AppState) -> Banner | None:
     if bench.link == "none" and bench.problem is not None:
         return Banner("look", f"No transducer: {bench.problem}")
     return None
+
+
+def _cut_short(state: AppState, session: SessionState) -> str:
+    """Return why a session ended before its time; empty where it ended as somebody wished, or is being taken up."""
+    end, bench, kept = session.end, state.bench, f"What was saved until then is in {session.folder}."
+    if session.phase == "resuming":
+        return ""
+    if session.resumable and state.failed is not None and state.failed.request == "ResumeSession":
+        return f"The session was not taken up again: {state.failed.sentence.rstrip('.')}. {kept}"
+    if session.broken is not None:
+        return f"The recording has stopped: {session.broken.rstrip('.')}. {kept}"
+    if end is None or end.cause in ("finished", "aborted", "stopped"):
+        return ""
+    why = end.reason
+    if end.cause == "device":
+        why = "the transducer fell silent; it answers again" if bench.link == "open" else bench.problem or why
+    return f"The session was cut short: {why}. Everything until then is kept."
 
 
 def duration(seconds: float) -> str:

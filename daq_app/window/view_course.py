@@ -13,7 +13,6 @@ from sessions.run import steps
 
 WAYS = {1: "away from the subject", -1: "towards the subject"}
 IN_A_TRIAL = frozenset({"mounting", "taring", "ready", "stroking", "scoring", "settling"})
-TO_BE_REDONE = IN_A_TRIAL | {"closing"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +23,7 @@ class Button:
     key: str
     enabled: bool = True
     sends: Message | None = None  # None: it opens something in the window, such as the line for a reason
+    question: str = ""  # asked beside the line for a reason
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,14 +66,13 @@ class CourseView:
     forces_shown: bool  # False where the protocol keeps them from the experimenter
 
 
-def course_view(session: SessionState, bench: BenchState, now: float, *, alone: bool = False) -> CourseView:
-    """Return what is shown of a session; `alone` where its recorder is gone."""
-    headline, primary = _alone(session) if alone and not session.over else _to_do(session, bench)
+def course_view(session: SessionState, bench: BenchState, now: float) -> CourseView:
+    """Return what is shown of a session."""
+    headline, primary = _to_do(session, bench)
     over = session.over
-    stroke = _stroke(session)
+    again = redo_targets(session)
+    stroke = _stroke(session, again)
     trial = session.of(session.trial)
-    takes_before = trial is not None and trial.takes > 0
-    redo = session.phase in TO_BE_REDONE and (session.trial != 1 or takes_before)
     return CourseView(
         headline=headline,
         primary=primary,
@@ -82,14 +81,47 @@ def course_view(session: SessionState, bench: BenchState, now: float, *, alone: 
         told=f"It is kept in {session.folder}" if over else session.told or "",
         rows=_rows(session),
         stroke=stroke,
-        redo=Button("Redo", "R", redo, stroke.redo if redo else None),
-        skip=Button("Skip", "S", session.phase in IN_A_TRIAL),
+        redo=_redo(again, stroke.redo),
+        skip=Button("Skip", "S", session.phase in IN_A_TRIAL, question="Why is it left out?"),
         pause=_pause(session),
-        note=Button("Note", "N", not over),
-        no_answer=Button("No answer", "0", session.phase == "scoring", _no_answer(session.asked)),
-        end=Button("New", "Ctrl+N", sends=NewSession()) if over else Button("End", "Ctrl+E"),
+        note=Button("Note", "N", not over, question="Note, kept with its time:"),
+        no_answer=_no_answer_button(session),
+        end=_end(over=over),
         forces_shown="forces" in session.plan.shown.experimenter,
     )
+
+
+def redo_targets(session: SessionState) -> tuple[TrialState, ...]:
+    """Return the trials that a redo would discard now: one, two that are compared, or none."""
+    if session.phase in IN_A_TRIAL - {"mounting"}:
+        trial = session.of(session.trial)
+    elif session.phase == "closing":
+        trial = session.trials[-1]
+    else:  # before the first take of a trial it is the one before
+        mounted = session.of(session.trial) if session.phase == "mounting" else None
+        trial = session.of(mounted.trial.number - 1) if mounted is not None and not mounted.takes else None
+    if trial is None:
+        return ()
+    first = session.of(trial.trial.compared_with)
+    return (trial,) if first is None else (first, trial)
+
+
+def _redo(again: tuple[TrialState, ...], sends: steps.Redo | None) -> Button:
+    """Return the button that names what it discards."""
+    if not again:
+        return Button("Redo", "R", enabled=False)
+    numbers = "–".join(str(trial.trial.number) for trial in again)
+    named = " and ".join(f"{trial.trial.number} ({trial.trial.stimulus.code})" for trial in again)
+    trials = f"trial {named}" if len(again) == 1 else f"trials {named}"
+    return Button(
+        f"Redo {numbers}", "R", sends=sends, question=f"Why redo {trials}? What was recorded of it no longer counts."
+    )
+
+
+def _end(*, over: bool) -> Button:
+    if over:
+        return Button("New", "Ctrl+N", sends=NewSession())
+    return Button("End", "Ctrl+E", question="Why does the session end now?")
 
 
 def _to_do(session: SessionState, bench: BenchState) -> tuple[str, Button | None]:
@@ -147,6 +179,12 @@ def _answer_sentence(session: SessionState, code: str) -> str:
             return f"The subject scores sample {code}."
 
 
+def _no_answer_button(session: SessionState) -> Button:
+    """Return the button for a subject who cannot say; while a number is due, 0 is a digit of it."""
+    key = "" if isinstance(session.asked, steps.AskNumber) else "0"
+    return Button("No answer", key, session.phase == "scoring", _no_answer(session.asked))
+
+
 def _no_answer(asked: steps.Command | None) -> steps.Event | None:
     """Return the event of a subject who cannot say."""
     match asked:
@@ -164,11 +202,6 @@ def _rest(session: SessionState) -> tuple[str, Button]:
     duration = session.asked.duration if isinstance(session.asked, steps.AskRest) else None
     by_itself = "" if duration is None else f" It goes on by itself after {duration:g} s."
     return f"The subject rests.{by_itself}", Button("Go on", "Space", sends=steps.Resume())
-
-
-def _alone(session: SessionState) -> tuple[str, Button | None]:
-    resume = Button("Resume session", "Space", sends=m.ResumeSession(session.folder))
-    return "The recorder has stopped. Press Space to go on at the same trial.", resume
 
 
 def _stroke_sentence(session: SessionState, trial: Trial) -> str:
@@ -243,7 +276,7 @@ def _mu(quality: Quality) -> str:
     return f"µ {low:.2f}–{high:.2f}" if f"{low:.2f}" != f"{high:.2f}" else f"µ {quality.mu:.2f}"
 
 
-def _stroke(session: SessionState) -> StrokeView:
+def _stroke(session: SessionState, again: tuple[TrialState, ...]) -> StrokeView:
     judged = session.of(session.judged)
     if judged is None or judged.quality is None:
         return StrokeView("none", "No stroke yet.")
@@ -258,8 +291,7 @@ def _stroke(session: SessionState) -> StrokeView:
     if quality.fell is not None:
         parts.append(f"N {'fell' if quality.fell >= 0 else 'rose'} {100 * abs(quality.fell):.0f} %")
     parts.append("good" if quality.grade == "good" else "; ".join(quality.words))
-    still_mounted = judged.trial.number == session.trial or session.phase in ("mounting", "closing")
-    redo = steps.Redo(quality.words[0]) if quality.words and still_mounted else None
+    redo = steps.Redo(quality.words[0]) if quality.words and judged in again else None
     return StrokeView(quality.grade, " · ".join(parts), " ".join(quality.sentences), redo)
 
 

@@ -30,6 +30,9 @@ class SubjectView:
 
 
 WAITING = ("Welcome", "The experimenter will begin in a moment.")
+HANDS_OFF = "Keep your fingers off the surface."  # what to do on it is told when it is time to do it
+THANKS = ("Thank you", "You can rest your hand now.")
+PAUSE = ("Pause", "The experimenter will go on in a moment.")
 
 
 def subject_view(session: SessionState | None) -> SubjectView:
@@ -41,10 +44,10 @@ def subject_view(session: SessionState | None) -> SubjectView:
         case "idle":
             return SubjectView("read", *WAITING, hand=hand)
         case "mounting" | "taring":
-            return SubjectView("read", "Please wait", _told(session), hand=hand)
+            return SubjectView("read", "Please wait", _told(session, HANDS_OFF), hand=hand)
         case "ready" | "stroking":
             force = session.plan.forces and "forces" in session.plan.shown.subject
-            return SubjectView("read", _stroke(session), _told(session), hand=hand, force=force)
+            return SubjectView("read", _stroke(session), _told(session, _instruction(session)), hand=hand, force=force)
         case "scoring":
             return _question(session, hand)
         case "settling":
@@ -52,9 +55,9 @@ def subject_view(session: SessionState | None) -> SubjectView:
         case "resting":
             return SubjectView("read", "Rest", "Rest your hand. The experimenter will go on with you.", hand=hand)
         case "paused" | "resuming":
-            return SubjectView("read", "Pause", "The experimenter will go on in a moment.", hand=hand)
+            return SubjectView("read", *PAUSE, hand=hand)
         case "closing" | "ended":
-            return SubjectView("read", "Thank you", "You can rest your hand now.", hand=hand)
+            return SubjectView("read", *(PAUSE if session.resumable else THANKS), hand=hand)
 
 
 def _stroke(session: SessionState) -> str:
@@ -63,14 +66,17 @@ def _stroke(session: SessionState) -> str:
     return "Stroke the surface once" if allowed == 1 else f"Stroke the surface up to {allowed} times"
 
 
-def _told(session: SessionState) -> str:
-    """Return what the protocol lets the subject know beside what to do."""
+def _instruction(session: SessionState) -> str:
+    return session.block.instruction if session.block and "instruction" in session.plan.shown.subject else ""
+
+
+def _told(session: SessionState, to_do: str) -> str:
+    """Return what to do with the finger, and what the protocol lets the subject know beside it."""
     shown, trial = session.plan.shown.subject, session.of(session.trial)
     parts: list[str] = []
     if session.block is not None and session.block.phase != "main":
         parts.append("This one is for practice." if session.block.phase == "practice" else "")
-    if "instruction" in shown and session.block is not None:
-        parts.append(session.block.instruction)
+    parts.append(to_do)
     if trial is not None and "trial count" in shown:
         parts.append(f"Surface {trial.trial.number} of {len(session.trials)}.")
     if trial is not None and "code" in shown:

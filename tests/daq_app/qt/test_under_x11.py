@@ -2,15 +2,14 @@
 
 import os
 import shutil
-import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
+from x11_desk import ROOT, Desk, kinds, server, until
 
-from sessions.recording import Recording, RecordingError
+from sessions.recording import Recording
 
 pytestmark = [
     pytest.mark.qt,
@@ -20,70 +19,11 @@ pytestmark = [
     ),
 ]
 
-ROOT = Path(__file__).parents[3]
-PATIENCE = 120.0  # far beyond what anything takes [s]
 SIZE = (1600, 1000)
 
 
-def until(condition, what):
-    end = time.monotonic() + PATIENCE
-    while not (found := condition()):
-        assert time.monotonic() < end, f"{what} did not come"
-        time.sleep(0.1)
-    return found
-
-
-@pytest.fixture
-def display():
-    reading, writing = os.pipe()
-    screen = f"{SIZE[0]}x{SIZE[1]}x24"
-    server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writing), "-screen", "0", screen, "-nolisten", "tcp"],
-        pass_fds=[writing],
-        stderr=subprocess.DEVNULL,
-    )
-    os.close(writing)
-    with os.fdopen(reading) as told:
-        number = told.readline().strip()
-    yield f":{number}"
-    server.terminate()
-    server.wait()
-
-
-class Desk:
-    """Keys and mouse of an X server."""
-
-    def __init__(self, display):
-        self.environment = {**os.environ, "DISPLAY": display}
-        self.environment.pop("QT_QPA_PLATFORM", None)
-
-    def do(self, *words):
-        done = subprocess.run(["xdotool", *map(str, words)], env=self.environment, capture_output=True, text=True)
-        return done.stdout.strip()
-
-    def window(self, name):
-        found = until(lambda: self.do("search", "--onlyvisible", "--name", name), name)
-        return found.splitlines()[0]
-
-    def keys(self, window, *keys):
-        self.do("windowfocus", "--sync", window)
-        for key in keys:
-            self.do("key", "--clearmodifiers", key)
-
-
-def kinds(folder):
-    try:
-        [session] = folder.glob("*/")
-        return [event.kind for event in Recording.open(session).events]
-    except (ValueError, RecordingError, OSError):
-        return []
-
-
-def test_one_trial_and_an_early_end_with_real_keys_and_a_real_mouse(display, tmp_path):
-    desk = Desk(display)
-    environment = {**desk.environment, "PYTHONPATH": str(ROOT), "HOME": str(tmp_path)}
-    program = subprocess.Popen([sys.executable, "-m", "daq_app"], cwd=tmp_path, env=environment)
-    try:
+def test_one_trial_and_an_early_end_with_real_keys_and_a_real_mouse(tmp_path):
+    with server(*SIZE) as display, (desk := Desk(display)).program(tmp_path):
         window = desk.window("^daq-app$")
         folder = tmp_path / "recordings"
         time.sleep(1.0)
@@ -102,8 +42,7 @@ def test_one_trial_and_an_early_end_with_real_keys_and_a_real_mouse(display, tmp
         until(lambda: "score_asked" in kinds(folder), "the stroke")
         subject = desk.window("subject$")
         # A click in the middle of the line, which lies in the middle of the subject's window.
-        geometry = dict(line.split("=") for line in desk.do("getwindowgeometry", "--shell", subject).splitlines())
-        width, height = int(geometry["WIDTH"]), int(geometry["HEIGHT"])
+        _, _, width, height = desk.box(subject)
         for share in range(20, 80, 2):  # down the window: the line's height is its own affair
             desk.do("mousemove", "--window", subject, width // 2, height * share // 100, "click", 1)
         desk.keys(subject, "Return")
@@ -121,9 +60,6 @@ def test_one_trial_and_an_early_end_with_real_keys_and_a_real_mouse(display, tmp
         assert recording.end["reason"] == "enough"
         assert "SIMULATED" in recording.simulated_sentence
         desk.keys(window, "alt+F4")
-    finally:
-        program.send_signal(signal.SIGTERM)
-        program.wait(PATIENCE)
 
 
 def test_without_a_screen_one_sentence_says_what_to_do(tmp_path):

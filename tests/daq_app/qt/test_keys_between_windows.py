@@ -1,0 +1,186 @@
+"""Keys that reach one window and are meant for the other, and what the window is left with when something ends."""
+
+import os
+import signal
+from dataclasses import replace
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from daq_app.qt.start import SIMULATED_BENCH
+from daq_app.recorder.messages import Connect, Disconnect
+from sessions.run import steps
+
+pytestmark = pytest.mark.qt
+
+ENTER, SPACE, ESCAPE = Qt.Key.Key_Return, Qt.Key.Key_Space, Qt.Key.Key_Escape
+
+
+def begin(driver, subject="P07"):
+    page = driver.window.page
+    QTest.keyClicks(page.subject, subject)
+    QTest.keyClick(page.subject, ENTER)
+    driver.phase("idle")
+    QTest.keyClick(driver.window, SPACE)
+    driver.phase("mounting")
+
+
+def until_scoring(driver):
+    QTest.keyClick(driver.window, SPACE)
+    driver.phase("scoring")
+
+
+def moved_on(driver, number):
+    driver.until(lambda: driver.session.trial != number, "the next trial")
+
+
+def test_an_answer_to_a_recorder_that_is_gone_takes_nothing_away_and_space_resumes(driver):
+    begin(driver)
+    until_scoring(driver)
+    subject = driver.window.subject
+    QTest.keyClick(subject.line, Qt.Key.Key_Right)
+    os.kill(driver.window.bridge._client.pid, signal.SIGKILL)
+    driver.until(lambda: driver.view.banner is not None, "the banner")
+    assert not subject.scoring
+    QTest.keyClick(subject, Qt.Key.Key_A)  # no request goes to a recorder that is not there
+    driver.window.bridge.send(steps.Scored(50.0))
+    assert driver.view.banner.action == "Resume session"
+    QTest.keyClick(subject, SPACE)  # from whichever window
+    driver.phase("mounting")
+    assert driver.session.trial == 1
+    until_scoring(driver)
+
+
+def test_an_answer_can_be_given_with_keys_that_reach_the_experimenters_window(driver):
+    window = driver.window
+    begin(driver)
+    until_scoring(driver)
+    window.setFocus()
+    for key in (Qt.Key.Key_Right, Qt.Key.Key_PageUp):
+        QTest.keyClick(window, key)
+    assert window.subject.line.answer.score == 60.0
+    QTest.keyClick(window, ENTER)
+    moved_on(driver, 1)
+    assert driver.session.trials[0].answer == "score 60"
+
+
+def test_while_a_note_is_typed_every_key_is_the_notes_and_none_an_answer(driver):
+    window = driver.window
+    begin(driver)
+    until_scoring(driver)
+    QTest.keyClick(window.subject, Qt.Key.Key_N)
+    assert window.course.asking
+    QTest.keyClicks(window.course.line, "1")
+    QTest.keyClicks(window.subject.line, "0 rs")  # after a click on the subject's window, say
+    for key in (Qt.Key.Key_PageUp, Qt.Key.Key_Up):
+        QTest.keyClick(window.course.line, key)
+        QTest.keyClick(window.subject.line, key)
+    assert window.course.line.text() == "10 rs"
+    assert not window.subject.line.answered
+    assert driver.session.phase == "scoring"
+    QTest.keyClick(window.subject, ESCAPE)
+    assert not window.course.asking
+    QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
+    assert window.subject.line.answered
+
+
+def test_a_number_that_reaches_the_experimenters_window_is_typed_whole_and_its_0_is_no_refusal(driver):
+    window = driver.window
+    window.page.protocol.setCurrentText("magnitude-estimation")
+    window.page.scores_only.setChecked(True)
+    begin(driver)
+    QTest.keyClick(window, SPACE)
+    driver.phase("ready")
+    QTest.keyClick(window, SPACE)
+    driver.phase("scoring")
+    window.setFocus()
+    QTest.keyClicks(window, "20")
+    assert driver.session.phase == "scoring"
+    assert window.subject.number.field.text() == "20"
+    QTest.keyClick(window, ENTER)
+    moved_on(driver, 1)
+    assert driver.session.trials[0].answer == "number 20"
+
+
+def test_the_key_that_gave_the_answer_pressed_twice_does_not_go_on_with_the_course(driver, monkeypatch):
+    window = driver.window
+    window.page.scores_only.setChecked(True)
+    begin(driver)
+    QTest.keyClick(window, SPACE)
+    driver.phase("ready")
+    QTest.keyClick(window, SPACE)
+    driver.phase("scoring")
+    interval = QApplication.doubleClickInterval()
+    QApplication.setDoubleClickInterval(60_000)  # however slow this machine is
+    try:
+        QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
+        QTest.keyClick(window.subject.line, ENTER)
+        moved_on(driver, 1)
+        sent = []
+        with monkeypatch.context() as patch:
+            patch.setattr(window.bridge, "send", sent.append)
+            for place in (window.subject, window):
+                QTest.keyClick(place, ENTER)
+            assert sent == []
+            QTest.keyClick(window.subject, SPACE)
+            assert sent == [driver.view.course.primary.sends]
+    finally:
+        QApplication.setDoubleClickInterval(interval)
+
+
+def test_redo_names_its_trial_on_both_buttons_and_in_its_question(driver):
+    window = driver.window
+    window.page.scores_only.setChecked(True)
+    begin(driver)
+    QTest.keyClick(window, SPACE)
+    driver.phase("ready")
+    code = driver.session.trials[0].trial.stimulus.code
+    assert (window.redo.text(), window.course.redo.text()) == ("Redo 1  R", "Redo 1 R")
+    QTest.keyClick(window.subject, Qt.Key.Key_R)
+    assert f"trial 1 ({code})" in window.course._question.text()
+    QTest.keyClick(window.course.line, ESCAPE)
+
+
+def test_the_page_of_the_next_session_has_no_code_and_enter_begins_none(driver):
+    begin(driver)
+    driver.window.bridge.send(steps.Abort("enough"))
+    driver.until(lambda: driver.session.sealing == "sealed", "the end")
+    QTest.keyClick(driver.window, ENTER)
+    assert driver.session is None
+    assert driver.window.page.subject.text() == ""
+    QTest.keyClick(driver.window.page.subject, ENTER)
+    assert "never a name" in driver.window.page._wrong["subject"].text()
+    assert driver.session is None
+
+
+def test_enter_in_the_address_connects_what_was_typed_and_a_wrong_one_is_named_and_can_be_mended(driver):
+    window, chosen = driver.window, driver.window.bench._choice
+    window.bridge.send(Disconnect())
+    driver.until(lambda: driver.state.bench.link == "none", "the end of the link")
+    try:
+        for address, words in (("simm:", "simm"), ("sim:?rate=100", "")):
+            chosen.setFocus()
+            chosen.lineEdit().selectAll()
+            QTest.keyClicks(chosen, address)
+            QTest.keyClick(chosen, ENTER)
+            driver.until(lambda: driver.state.bench.link in ("none", "open"), "an answer")
+            told = "" if driver.view.banner is None else driver.view.banner.sentence
+            assert words in told
+            assert "None" not in told
+        assert driver.state.bench.link == "open"
+        assert driver.state.bench.info.rate == 100.0
+        assert driver.session is None
+    finally:
+        window.bridge.send(Connect(SIMULATED_BENCH))
+        driver.until(lambda: driver.state.bench.link == "open", "the simulated bench")
+
+
+def test_an_address_that_is_being_typed_stays_when_other_devices_are_found(driver):
+    panel, view = driver.window.bench, driver.view.bench
+    panel._choice.setEditText("net-ft://10.0.0.9")
+    panel._show_devices(replace(view, uri=""))
+    assert panel._choice.currentText() == "net-ft://10.0.0.9"
+    assert panel._chosen() == "net-ft://10.0.0.9"
+    panel._show_devices(view)

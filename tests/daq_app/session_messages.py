@@ -1,0 +1,52 @@
+"""What a recorder tells in the course of a session, for tests of what the window makes of it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from daq_app.recorder import messages as m
+from daq_app.window.state import AppState, fold
+from daq_app.window.stroke_quality import Quality
+from drivers.calibration import Calibration
+from drivers.transducer import Health, TransducerInfo
+from sessions.plan.protocols import plan, protocol
+from sessions.recording import Acknowledged, LoggedEvent
+from sessions.run import steps
+from sessions.run.runner import SessionEnd, Status
+
+CALIBRATION = Calibration(
+    "FT1", "counts", np.diag([1e-6] * 3 + [1e-3] * 3), np.array([36.0] * 3 + [500.0] * 3), "typed"
+)
+INFO = TransducerInfo("net-ft://192.168.1.1", "net-ft", "Net F/T", "FT1", False, 7000.0, 7000.0, CALIBRATION)
+PLAN = plan(protocol("sensotact-friction"), "P07", 7)
+FIRST, SECOND = PLAN.trials[:2]
+GOOD = Quality("good", (), (), (2.0, 3.5), 0.44, (0.438, 0.444), 21.0, 0.08)
+BAD = replace(GOOD, grade="refused", words=("no steady window",), steady=None, mu=None)
+
+
+def after(*messages, state=None):
+    state = AppState() if state is None else state
+    for message in messages:
+        state = fold(state, message)
+    return state
+
+
+def logged(kind, trial=None, **data):
+    return LoggedEvent(1, 0, kind, trial, 0, data)
+
+
+def status(safe_ns, state="mounting"):
+    return Status(state, 1, 10, 100, 0, 2.0, Acknowledged(100, 3, safe_ns))
+
+
+BEGUN = (m.Device(INFO, None), m.SessionBegun("recordings/P07", PLAN, "people", None, 0, 1.0), steps.AskBegin())
+MOUNT = (*BEGUN, steps.ShowInstruction(PLAN.blocks[0]), steps.AskMount(FIRST))
+TARE = (*MOUNT, steps.StartTake(1, 1), steps.MeasureZero())
+READY = (*TARE, steps.AskStroke(FIRST))
+TOUCH = (*READY, logged("contact_onset", 1, time=1.5, noticed=1.51))
+SCORE = (*TOUCH, logged("finger_lifted", 1, time=3.6, noticed=3.7), steps.AskScore(FIRST, ("low end", "high end")))
+PAUSED = (*MOUNT, logged("pause", 1))
+CLOSING = (*BEGUN, steps.AskFinish())
+END = SessionEnd("every trial is done", "finished", True, 100, Health())
+LOST = SessionEnd("the cable was pulled", "device", False, 100, Health(lost=3))
+CODE = FIRST.stimulus.code
