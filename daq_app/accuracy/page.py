@@ -33,7 +33,7 @@ def page(found: Measured, figures: Mapping[str, Plate] | None = None) -> str:
     """Return the page: no script, nothing asked of any network; `figures` where they are drawn already."""
     figures, listed = plates(found) if figures is None else figures, tables(found)
     environment = Environment(
-        loader=ChoiceLoader([PackageLoader("daq_app.accuracy", "."), PackageLoader("sessions.exchange", ".")]),
+        loader=ChoiceLoader([PackageLoader("daq_app.accuracy", "."), PackageLoader("sessions.report", ".")]),
         autoescape=select_autoescape(default=True, default_for_string=True),
         trim_blocks=True,
         lstrip_blocks=True,

@@ -19,8 +19,9 @@ import numpy as np
 
 from drivers.readings import ReadingBlock
 from sessions.exchange import ExportSource, Progress
+from sessions.exchange.csv_text import write_rows
 from sessions.exchange.exported import ExportedSession, head_of
-from sessions.exchange.readings_text import MISSING, columns, read_rows, rows, write_rows
+from sessions.exchange.readings_text import MISSING, columns, read_rows, rows
 from sessions.exchange.session_tables import Column, Table, tables
 from sessions.recording import LoggedEvent, Recording
 from sessions.recording.atomic_file import write_json

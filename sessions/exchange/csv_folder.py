@@ -8,8 +8,9 @@ from typing import Any, TextIO
 
 from drivers.readings import ReadingBlock
 from sessions.exchange import ExportSource, Progress
+from sessions.exchange.csv_text import plain, write_rows
 from sessions.exchange.exported import ExportedSession, head_of
-from sessions.exchange.readings_text import columns, read_rows, rows, write_rows
+from sessions.exchange.readings_text import columns, read_rows, rows
 from sessions.exchange.session_tables import Column, Table, tables
 from sessions.recording import LoggedEvent, Recording
 from sessions.recording.atomic_file import write_json
@@ -92,8 +93,8 @@ def _opened(path: Path) -> TextIO:
 
 def _write_rows(file: TextIO, mark: Sequence[Column], header: list[list[str]], rows: Iterable[Sequence[Any]]) -> None:
     """Write a header and rows; where they are marked, a column that says so comes first."""
-    write_rows(file, [[*(column.heading for column in mark), *names] for names in header], ",")
-    write_rows(file, ([*("yes" for _ in mark), *row] for row in rows), ",")
+    write_rows(file, [[*(column.heading for column in mark), *names] for names in header])
+    write_rows(file, ([*("yes" for _ in mark), *row] for row in rows))
 
 
 def _write_readings(recording: Recording, mark: Sequence[Column], path: Path, progress: Progress) -> None:
@@ -119,7 +120,7 @@ def _read_readings(path: Path) -> Iterator[ReadingBlock]:
 
 def _rows_of(path: Path) -> list[dict[str, str]]:
     with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+        return [{name: plain(text) for name, text in row.items()} for row in csv.DictReader(file)]
 
 
 def _readme(recording: Recording, told: Sequence[tuple[str, str, Sequence[Column]]]) -> str:

@@ -1,9 +1,8 @@
 """Readings as rows of text and back: every number survives to the last bit."""
 
-import csv
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 
@@ -42,11 +41,6 @@ def rows(block: ReadingBlock, calibration: Calibration) -> Iterator[tuple[Any, .
         wrench = calibration.wrench(block.raw, np.zeros(6))
     singles = (block.sequence, block.counter, block.status, block.time, block.received_ns)
     return zip(*(single.tolist() for single in singles), *block.raw.T.tolist(), *wrench.T.tolist(), strict=True)
-
-
-def write_rows(file: TextIO, found: Iterable[Sequence[Any]], delimiter: str) -> None:
-    """Write rows; None is an empty cell."""
-    csv.writer(file, delimiter=delimiter, lineterminator="\n").writerows(found)
 
 
 def read_rows(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Iterator[ReadingBlock]:

@@ -1,10 +1,10 @@
 """A study as CSV files that R's read.csv and pandas' read_csv open as they are: its trials, its many paths."""
 
-import csv
 import io
 from collections.abc import Mapping
 from dataclasses import fields
 
+from sessions.exchange.csv_text import write_rows
 from sessions.prediction.multiverse import Path
 from sessions.statistics.pooling.exclusions import decided
 from sessions.statistics.pooling.findings import StudyFindings
@@ -69,12 +69,10 @@ def _heading(name: str) -> str:
 def columns_csv(study: StudyFindings) -> str:
     """Return a row for each column of `trials_csv`: its name, its unit and its meaning."""
     out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["column", "unit", "meaning"])
     first = [name for name in _OWN if name != "excluded" and (study.simulated or name != SIMULATED)]
-    writer.writerows([name, "", _OWN[name]] for name in first)
-    writer.writerows([_heading(name), *_MEANING[name]] for name in _MEANING)
-    writer.writerow(["excluded", "", _OWN["excluded"]])
+    rows = [["column", "unit", "meaning"], *([name, "", _OWN[name]] for name in first)]
+    rows += [[_heading(name), *_MEANING[name]] for name in _MEANING]
+    write_rows(out, [*rows, ["excluded", "", _OWN["excluded"]]])
     return out.getvalue()
 
 
@@ -83,14 +81,14 @@ def paths_csv(study: StudyFindings) -> str:
     mark = [SIMULATED] if study.simulated else []
     names = [field.name for field in fields(Path)]
     out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
     heads = ("usual", "surfaces", "trials", "r_of_means", "r_within_subjects", "low", "high")
-    writer.writerow([*mark, "descriptor", *names, *heads])
+    rows: list[list[object]] = [[*mark, "descriptor", *names, *heads]]
     for one in study.descriptors:
         for found in one.paths:
             numbers = (found.surfaces, found.trials, found.r, found.within, found.low, found.high)
             told = [*(["yes"] if mark else []), one.descriptor, *(getattr(found.path, name) for name in names)]
-            writer.writerow([*told, "yes" if found.usual else "no", *(_plain(number) for number in numbers)])
+            rows.append([*told, "yes" if found.usual else "no", *(_plain(number) for number in numbers)])
+    write_rows(out, rows)
     return out.getvalue()
 
 
@@ -103,8 +101,7 @@ def trials_csv(study: StudyFindings) -> str:
     heads = [_heading(name) for name in names]
     mark = [SIMULATED] if study.simulated else []
     out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*mark, "session", "subject", *heads, "excluded"])
+    rows: list[list[object]] = [[*mark, "session", "subject", *heads, "excluded"]]
     copies = dict(study.copies)
     for visit in study.visits:
         for row in visit.rows:
@@ -112,7 +109,8 @@ def trials_csv(study: StudyFindings) -> str:
             why = "" if decision is None else decision.why
             why = f"the same recording as {copies[visit.session]}" if visit.session in copies else why
             told = ["yes" if visit.simulated else "no"] if mark else []
-            writer.writerow([*told, visit.session, visit.subject, *(_plain(getattr(row, n)) for n in names), why])
+            rows.append([*told, visit.session, visit.subject, *(_plain(getattr(row, n)) for n in names), why])
+    write_rows(out, rows)
     return out.getvalue()
 
 

@@ -1,7 +1,6 @@
 """The report as one self-contained page, and its figures as files with their numbers."""
 
 import base64
-import csv
 import io
 import os
 from collections.abc import Sequence
@@ -11,6 +10,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from sessions.exchange.csv_text import write_rows
 from sessions.report import Report
 from sessions.report import tables as report_tables
 from sessions.report.figures import Panel, Plate, plates
@@ -122,9 +122,7 @@ def panel_csv(panel: Panel, head: str) -> str:
     out = io.StringIO()
     if head:
         out.write(f"# {head}\n")
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(panel.header)
-    writer.writerows(["" if value is None else value for value in row] for row in panel.rows)
+    write_rows(out, [panel.header, *panel.rows])
     return out.getvalue()
 
 

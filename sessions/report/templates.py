@@ -6,7 +6,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select
 def template(name: str) -> Template:
     """Return the template in a file of this folder."""
     environment = Environment(
-        loader=PackageLoader("sessions.exchange", "."),
+        loader=PackageLoader("sessions.report", "."),
         autoescape=select_autoescape(default=True, default_for_string=True),
         trim_blocks=True,
         lstrip_blocks=True,

@@ -1,6 +1,7 @@
 """Numbers and names as people read them."""
 
 import math
+import re
 from collections.abc import Callable
 
 NONE = "–"
@@ -117,3 +118,12 @@ def plural(n: int, noun: str) -> str:
     ('1 subject', '10 subjects')
     """
     return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+
+
+def identifier(name: str) -> str:
+    """Return a different XML identifier for each name: what an identifier may not hold stands as its code point.
+
+    >>> identifier('relation a"b')
+    'relation_20_a_22_b'
+    """
+    return re.sub(r"[^A-Za-z0-9-]", lambda found: f"_{ord(found[0]):x}_", name)

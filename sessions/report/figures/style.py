@@ -17,6 +17,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 
+from sessions.report.wording import identifier
+
 SKY = "#56B4E9"  # normal force
 VERMILLION = "#D55E00"  # tangential force
 PURPLE = "#CC79A7"  # mu
@@ -35,6 +37,7 @@ _LOOK: dict[Any, Any] = {
     # is wider than the ones a reader without it sees instead: labels may come out shorter, never cut.
     "font.sans-serif": ["DejaVu Sans"],
     "svg.fonttype": "none",
+    "text.parse_math": False,  # a name may hold dollar signs
     "text.hinting": "no_hinting",  # a reader's letters are no narrower for a coarse screen, as those laid out would be
     "font.size": TEXT,
     "axes.titlesize": TEXT,
@@ -60,6 +63,7 @@ _LOOK: dict[Any, Any] = {
     "path.simplify": True,
     "path.simplify_threshold": 0.3,
 }
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # characters that XML forbids
 _FONTS = "'DejaVu Sans', Verdana, 'Liberation Sans', Arial, Helvetica, sans-serif"
 
 Cell = str | float | int | None
@@ -168,6 +172,7 @@ def svg(drawn: Sheet, name: str, title: str, *, simulated: bool) -> str:
 def _finished(text: str, name: str, title: str, hover: Mapping[str, str], *, simulated: bool) -> str:
     """Return the SVG with titles for hovering, fonts to fall back on, and ids nobody else on a page has."""
     text = text[text.index("<svg") :]
+    name = identifier(name)
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
     for gid, words in hover.items():
         text = text.replace(f'<g id="{gid}">', f'<g id="{gid}"><title>{escape(words)}</title>', 1)
@@ -179,4 +184,4 @@ def _finished(text: str, name: str, title: str, hover: Mapping[str, str], *, sim
     head = '<?xml version="1.0" encoding="utf-8"?>\n'
     if simulated:
         head += "<!-- SIMULATED: this picture shows no measurement of a real device or person -->\n"
-    return head + text
+    return head + _NOT_XML.sub("\ufffd", text)

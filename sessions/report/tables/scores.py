@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from sessions.report import Report
 from sessions.report.tables.cells import Cell, Column, Group, Notes, Table
-from sessions.report.wording import NONE, correlation, digits, places, significant
+from sessions.report.wording import NONE, correlation, digits, identifier, places, significant
 from sessions.statistics.scores import MeanScore, Relation, sd_interval, slope_interval
 
 
@@ -69,7 +69,9 @@ def answer_tables(report: Report) -> tuple[Table, ...]:
             )
             columns = (Column("subject"), *(Column(f"index {index}") for index in e.indices))
             caption = f"Every score of {e.descriptor} [0–100]; repeats of one subject averaged."
-            tables.append(Table(f"table-answers-{e.name}", caption, columns, (Group("", rows),), notes.listed()))
+            tables.append(
+                Table(f"table-answers-{identifier(e.name)}", caption, columns, (Group("", rows),), notes.listed())
+            )
     return tuple(tables)
 
 
