@@ -148,7 +148,7 @@ def _saturated(block: ReadingBlock, info: TransducerInfo) -> Mask:
     wrench = calibration.own(calibration.wrench(block.raw, np.zeros(6)))
     with np.errstate(invalid="ignore"):
         beyond = (np.abs(wrench) > calibration.rated).any(axis=1)
-    return info.doubtful(block.status) | beyond
+    return info.status.doubtful(block.status) | beyond
 
 
 def _segments(good: Mask, broken: Mask) -> tuple[slice, ...]:

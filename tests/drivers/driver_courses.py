@@ -11,10 +11,11 @@ import pytest
 
 from daq_app import wiring
 from daq_app.wiring import connected
-from drivers import rate, streaming
+from drivers import deadline, rate, streaming
 from drivers.address import parse_address
 from drivers.catalog import DRIVERS
 from drivers.clock import PacedClock
+from drivers.deadline import Deadline
 from drivers.digital_ft import device as digital_ft
 from drivers.net_ft import device as net_ft
 from drivers.readings import ReadingBlock
@@ -88,7 +89,7 @@ def handles(device, before=0):
 
 def quickened(monkeypatch):
     """Let what a driver waits for be no longer than a test needs; a first reading comes, however busy the machine."""
-    monkeypatch.setattr(net_ft, "_PATIENCE", 120.0)
+    monkeypatch.setattr(deadline, "CONNECTING", 120.0)
     monkeypatch.setattr(serial_ft, "_MEASURED", 0.25)
     monkeypatch.setattr(digital_ft, "_MEASURED", 0.15)
     monkeypatch.setattr(streaming, "_SILENCE", 0.8)
@@ -136,7 +137,7 @@ def identified(name, uri):
         return None
     for _ in range(20):  # a device may be deaf for a moment after its stream was ended
         try:
-            return IDENTIFY[name](parse_address(uri), 2.0)
+            return IDENTIFY[name](parse_address(uri), Deadline(2.0))
         except SetupError as error:
             return str(error)
         except LinkLost as error:

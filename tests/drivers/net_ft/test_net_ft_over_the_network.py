@@ -11,6 +11,7 @@ import pytest
 
 from drivers.catalog import open_transducer, reachable
 from drivers.clock import PacedClock, RealClock
+from drivers.deadline import Deadline
 from drivers.links import http_get
 from drivers.readings import ReadingBlock
 from drivers.transducer import LinkLost, SetupError
@@ -92,7 +93,7 @@ def test_a_rate_that_somebody_changes_on_the_web_page_is_told_in_words_and_times
     while transducer.health.received < 50:
         time.sleep(0.001)
     before = transducer.read(0.0)
-    assert http_get("127.0.0.1", port(one.uri, "http"), "/comm.cgi?comrdtrate=100", 3.0).status == 302
+    assert http_get("127.0.0.1", port(one.uri, "http"), "/comm.cgi?comrdtrate=100", Deadline(3.0)).status == 302
     block = read_until(transducer, lambda: transducer.health.off_rate)
     transducer.close()
     block = ReadingBlock.joined([before, block])
