@@ -9,7 +9,7 @@ from drivers.transducer import LinkLost
 # All in real seconds.
 CONNECTING = 4.5  # from asking for a device to its first reading, so that with closing all ends within 5 s
 FIRST_READING = 1.5  # of these are kept for beginning the stream: a device of 1 Hz needs one
-ENDING = 0.5  # for bringing a stream to an end
+ENDING = 0.2  # for bringing a stream to an end
 TICK = 0.03  # longest single wait, and so for a stop
 
 

@@ -64,12 +64,11 @@ class ThreadedTransducer(ABC):
         self._reset()
         patience, self._spent = deadline.CONNECTING - self._spent, 0.0
         waiting, self._begin_by = Deadline(patience), Deadline(patience, self._stopping)
-        self._thread = threading.Thread(
-            target=self._run, name=f"{self._info.driver} {self._info.serial}".strip(), daemon=True
-        )
-        self._thread.start()
+        name = f"{self._info.driver} {self._info.serial}".strip()
+        thread = self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        thread.start()
         try:
-            while not self._has_come() and self._ended is None and self._thread.is_alive():
+            while not self._has_come() and self._ended is None and thread.is_alive():
                 if waiting.left <= 0.0:
                     self._ended = LinkLost(self._never_came(waiting.spent))
                 self._arrived.wait(deadline.TICK)

@@ -216,7 +216,7 @@ class Bench:
         try:
             with _breakable(self._uri):
                 self._open(self._uri, self._clock)
-        except (LinkLost, DeviceFault, SetupError):
+        except (LinkLost, DeviceFault, SetupError, NotNow):
             return
         assert self._connected is not None
         info = self._connected.transducer.info

@@ -16,7 +16,7 @@ from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems
 from sessions.recording.provenance import software_versions
 from sessions.toml_file import SettingsError
-from sessions.verification import differences, told, why
+from sessions.verification import differences, doubtful_readings, told, why
 
 EXAMPLE = "daq-app verify recordings/P07"
 
@@ -31,6 +31,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     folder: Path = options.session
     found = list(problems(folder))
     recording = Recording.open(folder)
+    found += doubtful_readings(recording)
     checked = ["files"]
     decided = read(folder)
     found += decided.problems

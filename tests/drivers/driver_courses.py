@@ -20,7 +20,7 @@ from drivers.digital_ft import device as digital_ft
 from drivers.net_ft import device as net_ft
 from drivers.readings import ReadingBlock
 from drivers.serial_ft import device as serial_ft
-from drivers.transducer import LinkLost, SetupError
+from drivers.transducer import Health, LinkLost, SetupError
 from simulators.bench import Bench
 from simulators.boxes import SIMULATORS, Simulated
 from simulators.faults import Fault, Faults
@@ -247,6 +247,38 @@ def disturbed_course(name, folder):
         set(threading.enumerate()) - threads,
         left,
     )
+
+
+def planted_statuses_course(name, folder):
+    """Plant each status that the maker lists, one after the other; return who it is, and what health said of each."""
+    clock, faults, said = PacedClock(1.0), Faults(), {}
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        quickened(monkeypatch)
+        device = started(name, faults, clock, folder, monkeypatch)
+        try:
+            with connected(device.uri, clock) as opened:
+                transducer, now = opened.transducer, opened.bench_now or device.now
+                transducer.start()
+                for status in simulator(name).statuses:
+                    if simulator(name).at_start:
+                        transducer.stop()
+                    before = transducer.health
+                    faults.put(Fault("status", now(), now() + 1e6, status=status))
+                    if simulator(name).at_start:
+                        transducer.start()
+                        before = Health()
+                    since = time.monotonic()
+                    while transducer.health.flagged == before.flagged and time.monotonic() - since < PATIENCE:
+                        transducer.read(0.02)
+                    said[status] = before, transducer.health, time.monotonic() - since
+                    faults.put()
+                    while (block := transducer.read(0.1)) is not None and len(block) and block.status[-1]:
+                        pass
+                transducer.stop()
+        finally:
+            device.close()
+            device.forget()
+    return opened.transducer.info, said
 
 
 def counted(kind, told):

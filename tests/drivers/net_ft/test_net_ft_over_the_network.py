@@ -102,6 +102,31 @@ def test_a_rate_that_somebody_changes_on_the_web_page_is_told_in_words_and_times
     assert set(np.round(np.diff(block.time), 9)) <= {0.005, 0.01, 0.015}
 
 
+def test_units_that_somebody_changes_while_it_streams_are_found_within_a_second(box):
+    faults = Faults()
+    one = box(clock=RealClock(), faults=faults)
+    transducer = open_transducer(one.uri, RealClock())
+    transducer.start()
+    transducer.read(1.0)
+    faults.put(Fault("units", one.now(), 1e6, share=1e-6))  # counts per force from 1 000 000 to 1
+    began = time.monotonic()
+    with pytest.raises(LinkLost, match="counts in other units than before: 1 counts a N"):
+        while True:
+            transducer.read(0.1)
+    took = time.monotonic() - began
+    transducer.close()
+    assert took < 1.0
+    assert 0 < transducer.health.off_units < 400, "readings that came since the page was last as before"
+
+
+def test_a_box_that_goes_on_in_the_same_units_is_not_disturbed_by_looking_at_its_page(box):
+    transducer = open_transducer(box(clock=RealClock()).uri, RealClock())
+    transducer.start()
+    time.sleep(1.5)  # the page is read again in this time
+    transducer.close()
+    assert transducer.health.off_units == transducer.health.lost == transducer.health.restarted == 0
+
+
 def test_without_a_rate_the_box_is_left_as_it_is(box):
     assert open_transducer(box(rate=1000).uri, PacedClock(10.0)).info.rate == 1000.0
 
