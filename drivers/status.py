@@ -28,7 +28,11 @@ def bit(number: int, words: str, verdict: Verdict) -> StatusBit:
 
 @dataclass(frozen=True, slots=True)
 class StatusTable:
-    """A maker's table of status bits, the gravest first. A bit that is in no entry is doubtful."""
+    """A maker's table of status bits, the gravest first. A bit that is in no entry is doubtful.
+
+    Where nothing but notes is listed, as in early recordings, a fault cannot be told from values out of range: then
+    such a bit makes the values invalid, whichever it is.
+    """
 
     bits: tuple[StatusBit, ...] = ()
     summary: int = 0  # bit that is set beside any other, and says nothing beside another
@@ -40,9 +44,10 @@ class StatusTable:
         for entry in entries:
             rest &= ~entry.mask
         unknown = [number for number in range(63, -1, -1) if rest >> number & 1]
-        entries += [bit(number, f"unknown bit {number}", "doubtful") for number in unknown]
+        verdict: Verdict = "doubtful" if any(entry.verdict != "note" for entry in self.bits) else "saturated"
+        entries += [bit(number, f"unknown bit {number}", verdict) for number in unknown]
         if not entries and status & self.summary:
-            entries.append(StatusBit(self.summary, self.summary, "unnamed error", "doubtful"))
+            entries.append(StatusBit(self.summary, self.summary, "unnamed error", verdict))
         return tuple(entries)
 
     def words(self, status: int) -> tuple[str, ...]:

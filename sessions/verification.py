@@ -28,7 +28,7 @@ def doubtful_readings(recording: Recording) -> Iterator[str]:
         yield f"{FlawName.SATURATED}: {saturated} readings are invalid, as the device told: {said}"
     if unsure := sum(event.data.get("off_units", 0) for event in recording.events if event.kind == "losses"):
         yield (
-            f"{FlawName.UNITS_CHANGED}: the last {unsure} readings of a stream are doubtful, the device was found to "
+            f"{FlawName.RECORDING}: the last {unsure} readings of a stream are doubtful, the device was found to "
             "count in other units; leave them out"
         )
 

@@ -13,7 +13,6 @@ class FlawName(StrEnum):
     LOST_READINGS = "lost_readings"
     SATURATED = "saturated"
     DEVICE_FAULT = "device_fault"  # the device tells of a fault of its own
-    UNITS_CHANGED = "units_changed"
     FROZEN = "frozen_sensor"
     DEAD = "dead_sensor"
     WILD = "wild_reading"
