@@ -1,10 +1,16 @@
 """What a session says of readings that came while the device told of a fault, or counted otherwise: on a real run."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
+import time
 from functools import partial
 
 import numpy as np
 import pytest
+from hostile_devices import net_ft
 
 from daq_app import wiring
 from daq_app.cli import run
@@ -88,3 +94,24 @@ def test_the_window_names_a_fault_of_the_device():
     assert view.lamp == "wrong"
     assert "gauge excitation current too low" in view.lamp_words
     assert ("doubtful", "200") in view.counters
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals reach a process otherwise on this system")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_run_within_a_second_while_its_transducer_sends_no_reading(number, tmp_path):
+    device = net_ft(bytes(35))
+    command = ["run", "sensotact-friction", "--device", device.uri, "--subject", "P01", "--headless", "--any-folder"]
+    command += ["--out", str(tmp_path / "session")]
+    ran = subprocess.Popen([sys.executable, "-m", "daq_app", *command], stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+    try:
+        while not device.asked.wait(0.1):
+            assert ran.poll() is None, ran.stderr.read()
+        began = time.monotonic()
+        ran.send_signal(number)
+        ran.communicate(timeout=20)
+        took = time.monotonic() - began
+    finally:
+        ran.kill()
+        device.close()
+    assert took < 1.0
+    assert ran.returncode == 130

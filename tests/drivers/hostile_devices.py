@@ -33,6 +33,7 @@ class Hostile:
 
     def __init__(self):
         self.uri = ""
+        self.asked = threading.Event()  # for a stream
         self._over = threading.Event()
         self._threads = []
         self._ends = []
@@ -96,6 +97,7 @@ def net_ft(datagram, *, page_drip=0.0):
         rdt.settimeout(0.001)
         with contextlib.suppress(TimeoutError, ConnectionError):
             asker[:] = [rdt.recvfrom(100)[1]]
+            hostile.asked.set()
         if asker:
             with contextlib.suppress(ConnectionError):
                 rdt.sendto(os.urandom(36) if datagram is None else datagram, asker[0])
