@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from drivers.address import Address, AddressError, parse_address
 from drivers.clock import Clock
+from drivers.deadline import Deadline
 from drivers.digital_ft.device import identify_digital_ft, open_digital_ft
 from drivers.labjack_u6.device import identify_labjack_u6, open_labjack_u6
 from drivers.net_ft.handshake import identify_net_ft, open_net_ft
@@ -19,8 +20,8 @@ class Driver:
     """One way to reach a transducer."""
 
     name: str  # the scheme of its addresses
-    open: Callable[[Address, Clock], Transducer]
-    identify: Callable[[Address, float], TransducerInfo]  # who answers within so many real seconds; changes nothing
+    open: Callable[[Address, Clock, Deadline], Transducer]
+    identify: Callable[[Address, Deadline], TransducerInfo]  # who answers; changes nothing
     usual: tuple[str, ...]  # addresses where such a device stands unless somebody moved it
 
 
@@ -48,7 +49,7 @@ def open_transducer(uri: str, clock: Clock) -> Transducer:
     Raises SetupError when the address or a setting cannot be met, LinkLost when nothing answers.
     """
     address, tool = without_tool(parse_address(uri))
-    transducer = _driver(address).open(address, clock)
+    transducer = _driver(address).open(address, clock, Deadline.for_opening())
     return TransducerWithTool(transducer, tool) if tool else transducer
 
 
@@ -64,7 +65,7 @@ def reachable(named: Iterable[str] = (), patience: float = 0.5) -> tuple[Found, 
 def _found(uri: str, patience: float) -> Found:
     try:
         address, tool = without_tool(parse_address(uri))
-        return Found(uri, with_tool(_driver(address).identify(address, patience), tool), None)
+        return Found(uri, with_tool(_driver(address).identify(address, Deadline(patience)), tool), None)
     except (SetupError, LinkLost, DeviceFault) as error:
         return Found(uri, None, str(error))
 

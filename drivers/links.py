@@ -1,11 +1,11 @@
-"""What a link to a device is, and those over the network. Only this, `serial_link` and `usb_link` open ports."""
+"""Links over the network. Only this, `serial_link` and `usb_link` open ports."""
 
 import contextlib
 import socket
-import time
+import threading
 from dataclasses import dataclass
-from typing import Protocol
 
+from drivers.deadline import TICK, Deadline
 from drivers.transducer import LinkLost, SetupError
 
 RECEIVE_BUFFER = 4 * 2**20  # asked of the system for UDP [bytes]; it may grant less
@@ -13,37 +13,19 @@ MOST_BODY = 64 * 1024  # a page longer than this is refused [bytes]
 MOST_HEAD = 8 * 1024
 
 
-class Link(Protocol):
-    """A way to one device."""
-
-    def send(self, data: bytes) -> None:
-        """Send `data`. Raises LinkLost when the link is gone for good."""
-        ...
-
-    def receive(self, timeout: float) -> bytes | None:
-        """Return what arrived next, or None when nothing came within `timeout` real seconds."""
-        ...
-
-    def close(self) -> None:
-        """Give the port back. Harmless when repeated."""
-        ...
-
-
 class UdpLink:
     """Datagrams to and from one host and port; those of others are not seen."""
 
-    def __init__(self, host: str, port: int) -> None:
+    def __init__(self, host: str, port: int, deadline: Deadline) -> None:
         """Bind a free local port. Raises SetupError when the host cannot be found, LinkLost when no way leads there."""
+        address = _resolved(host, deadline)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
-            self._socket.connect((_resolved(host), port))
+            self._socket.connect((address, port))
         except OSError as error:
             self._socket.close()
             raise LinkLost(f"no way leads to {host}: {_reason(error)}; check the network cable and settings") from None
-        except SetupError:
-            self._socket.close()
-            raise
         self._where = f"{host}, UDP port {port}"
         self._timeout = 0.0
         self._socket.settimeout(0.0)
@@ -75,23 +57,62 @@ class UdpLink:
         self._socket.close()
 
 
-def tcp_answer(host: str, port: int, request: bytes, size: int, patience: float) -> bytes:
-    """Return the `size` bytes that answer a request, or as many as came, within `patience` real seconds.
+def tcp_answer(host: str, port: int, request: bytes, size: int, deadline: Deadline) -> bytes:
+    """Return the `size` bytes that answer a request, or as many as came before the connection ended.
 
-    Raises SetupError when the host cannot be found, LinkLost when nothing answers there.
+    Raises SetupError when the host cannot be found, LinkLost when nothing answers there or not all by the deadline.
     """
     where = f"{host}, TCP port {port}"
     answer = b""
     try:
-        with socket.create_connection((_resolved(host), port), timeout=patience) as connection:
-            connection.sendall(request)
-            while len(answer) < size and (more := connection.recv(size - len(answer))):
+        with _Call(host, port, deadline) as call:
+            call.send(request)
+            while len(answer) < size and (more := call.receive(size - len(answer))):
                 answer += more
     except TimeoutError:
-        raise LinkLost(f"{where} gave no answer within {patience:g} s; check the address and the tcp port") from None
+        raise LinkLost(
+            f"{where} gave no whole answer within {deadline.spent:.2g} s; check the address and the tcp port"
+        ) from None
     except OSError as error:
         raise LinkLost(f"nothing answers at {where}: {_reason(error)}; check the address and the tcp port") from None
     return answer
+
+
+class _Call:
+    """A connection to a port of a host, whose every wait ends by a deadline."""
+
+    def __init__(self, host: str, port: int, deadline: Deadline) -> None:
+        """Connect. Raises SetupError when the host cannot be found, OSError."""
+        self._deadline = deadline
+        address = _resolved(host, deadline)
+        self._socket = socket.create_connection((address, port), timeout=self._left())
+
+    def __enter__(self) -> "_Call":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._socket.close()
+
+    def send(self, data: bytes) -> None:
+        """Send all of `data`. Raises OSError."""
+        self._socket.settimeout(self._left())
+        self._socket.sendall(data)
+
+    def receive(self, most: int) -> bytes:
+        """Return what comes next, at most so many bytes; none at the end of the connection. Raises OSError."""
+        while True:
+            self._socket.settimeout(min(self._left(), TICK))
+            try:
+                return self._socket.recv(most)
+            except TimeoutError:
+                continue  # a stop may be wanted, and the deadline may be over
+
+    def _left(self) -> float:
+        """Return how long may be waited [real s]. Raises TimeoutError, Stopped."""
+        left = self._deadline.left
+        if left <= 0.0:
+            raise TimeoutError
+        return left
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,35 +123,31 @@ class HttpAnswer:
     body: bytes
 
 
-def http_get(host: str, port: int, path: str, patience: float) -> HttpAnswer:
-    """Return the answer to one GET; the whole exchange ends within `patience` real seconds.
+def http_get(host: str, port: int, path: str, deadline: Deadline) -> HttpAnswer:
+    """Return the answer to one GET; the whole exchange ends by the deadline.
 
     Redirects are not followed. Raises SetupError when the host cannot be found, LinkLost when nothing answers in time
     or what answers is not HTTP or is longer than MOST_BODY.
     """
     where = f"http://{host}:{port}{path}"
-    deadline = time.monotonic() + patience
-    address = _resolved(host)
     try:
-        with socket.create_connection((address, port), timeout=patience) as connection:
-            connection.sendall(f"GET {path} HTTP/1.0\r\nHost: {host}\r\nConnection: close\r\n\r\n".encode("ascii"))
-            return _answer(connection, deadline, where)
+        with _Call(host, port, deadline) as call:
+            call.send(f"GET {path} HTTP/1.0\r\nHost: {host}\r\nConnection: close\r\n\r\n".encode("ascii"))
+            return _answer(call, where)
     except TimeoutError:
-        raise LinkLost(f"{where} gave no answer within {patience:g} s; check power, cable and address") from None
+        raise LinkLost(
+            f"{where} gave no answer within {deadline.spent:.2g} s; check power, cable and address"
+        ) from None
     except OSError as error:
         raise LinkLost(f"nothing answers at {where}: {_reason(error)}; check power, cable and address") from None
 
 
-def _answer(connection: socket.socket, deadline: float, where: str) -> HttpAnswer:
+def _answer(call: _Call, where: str) -> HttpAnswer:
     """Read one HTTP/1.0 answer: to its stated length, or else to the end of the connection."""
     received = bytearray()
     head, body_at, length = b"", -1, None
     while length is None or len(received) < body_at + length:
-        remaining = deadline - time.monotonic()
-        if remaining <= 0.0:
-            raise TimeoutError
-        connection.settimeout(remaining)
-        chunk = connection.recv(16384)
+        chunk = call.receive(16384)
         if not chunk:
             break
         received += chunk
@@ -161,12 +178,21 @@ def _stated_length(head: bytes) -> int | None:
     return None
 
 
-def _resolved(host: str) -> str:
-    """Return the IPv4 address of a host's name. Raises SetupError when it has none."""
-    try:
-        return socket.gethostbyname(host)
-    except (OSError, UnicodeError):
-        raise SetupError(f"the host {host!r} cannot be found; give its IP address, for example 192.168.1.1") from None
+def _resolved(host: str, deadline: Deadline) -> str:
+    """Return the IPv4 address of a host's name. Raises SetupError when it has none, or none is found in time."""
+    found: list[str] = []
+
+    def look() -> None:
+        with contextlib.suppress(OSError, UnicodeError):
+            found.append(socket.gethostbyname(host))
+
+    looking = threading.Thread(target=look, name=f"looking for {host}", daemon=True)  # the system's search has no limit
+    looking.start()
+    while looking.is_alive() and (left := deadline.left) > 0.0:
+        looking.join(min(left, TICK))
+    if not found:
+        raise SetupError(f"the host {host!r} cannot be found; give its IP address, for example 192.168.1.1")
+    return found[0]
 
 
 def _reason(error: OSError) -> str:

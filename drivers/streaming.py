@@ -1,7 +1,6 @@
 """A transducer that streams records without full numbers: thread, times, loss and return. Its wire is told to it."""
 
 import math
-import threading
 import time
 from collections import deque
 from collections.abc import Callable
@@ -12,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock
-from drivers.links import Link
+from drivers.deadline import CONNECTING, ENDING, TICK, Deadline, Stopped
+from drivers.link import Link
 from drivers.pacing import Paced
 from drivers.rate import RateWatch, rate_of_least_late, rate_words
 from drivers.readings import ReadingBlock
@@ -21,7 +21,6 @@ from drivers.threaded import ThreadedTransducer
 from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, TransducerInfo
 
 # All in real seconds.
-_TICK = 0.03  # longest wait for bytes, and so for a stop
 _GATHER = 0.002  # at fast rates bytes are let gather for so long before they are taken,
 _LUMP = 2048  # but where so many came at one go: there the computer was busy, and more may be waiting
 _FIRST = 3.0  # until a device that never sent a record is given up, beyond what bringing it to stream takes
@@ -61,11 +60,6 @@ class Numbering(Protocol):
 class Conversation(Protocol):
     """What is said over one kind of line around a stream."""
 
-    @property
-    def saturated(self) -> int:
-        """Bits of a record's status that make its six values invalid."""
-        ...
-
     def begin(self, link: Link) -> bytes:
         """Bring the device to stream, whatever it was doing; return what it streamed already.
 
@@ -87,67 +81,38 @@ class Conversation(Protocol):
 
 
 def measured_rate(
-    link: Link, conversation: Conversation, clock: Clock, seconds: float, stated: float = math.nan
+    link: Link, conversation: Conversation, clock: Clock, seconds: float, deadline: Deadline, stated: float = math.nan
 ) -> float:
     """Return how many records a second of the session's clock come [Hz], from `seconds` of streaming [real s].
 
     Good to a few per cent. Where it is neither the rate `stated` nor what the stream up to half a time before said, the
-    computer may have been busy, and the stream is watched for longer. Raises LinkLost when hardly any records come, and
-    what `conversation.begin` raises.
+    computer may have been busy, and the stream is watched for longer, up to the deadline. Raises LinkLost when hardly
+    any records come, and what `conversation.begin` raises.
     """
     decoder = conversation.decoder()
-    data: bytes | None = conversation.begin(link)
     came: list[tuple[int, int]] = []  # how many records so far, and when the last of them came [ns]
     found, count = math.nan, 0
-    for look in range(_LOOKS):
-        until = time.monotonic() + seconds / 2.0
-        while True:
-            more = len(decoder.feed(data).status) if data else 0
-            if more:
-                count += more
-                came.append((count, clock.now_ns()))
-            data = link.receive(_TICK)
-            if time.monotonic() >= until:
+    try:
+        data: bytes | None = conversation.begin(deadline.bound(link))
+        for look in range(_LOOKS):
+            part = deadline.within(seconds / 2.0)
+            while True:
+                more = len(decoder.feed(data).status) if data else 0
+                if more:
+                    count += more
+                    came.append((count, clock.now_ns()))
+                data = link.receive(TICK)
+                if part.left <= 0.0:
+                    break
+            before, found = found, rate_of_least_late(came)
+            alike = look and (abs(found / stated - 1.0) < _ALIKE or abs(found / before - 1.0) < _ALIKE)
+            if alike or deadline.left <= 0.0:
                 break
-        before, found = found, rate_of_least_late(came)
-        if look and (abs(found / stated - 1.0) < _ALIKE or abs(found / before - 1.0) < _ALIKE):
-            break
-    conversation.end(link)
+    finally:
+        conversation.end(Deadline(ENDING).bound(link))
     if math.isnan(found):
         raise LinkLost("it sends no readings when asked to stream; switch it off and on, and check the cable")
     return found
-
-
-class _Stopped(Exception):
-    """The user stopped the stream while the device was being brought to stream."""
-
-
-class _StoppableLink:
-    """A link whose use ends as soon as the stream is to be stopped."""
-
-    def __init__(self, link: Link, stopping: threading.Event) -> None:
-        self._link = link
-        self._stopping = stopping
-
-    def send(self, data: bytes) -> None:
-        self._refuse()
-        self._link.send(data)
-
-    def receive(self, timeout: float) -> bytes | None:
-        deadline = time.monotonic() + timeout
-        while True:
-            self._refuse()
-            remaining = deadline - time.monotonic()
-            data = self._link.receive(max(min(remaining, _TICK), 0.0))
-            if data is not None or remaining <= _TICK:
-                return data
-
-    def close(self) -> None:
-        self._link.close()
-
-    def _refuse(self) -> None:
-        if self._stopping.is_set():
-            raise _Stopped
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,22 +130,23 @@ class StreamingTransducer(ThreadedTransducer):
     missing numbers; so is the time in which the line was pulled or the device was off.
     """
 
-    _tick = _TICK
+    _tick = TICK
 
     def __init__(
         self,
         info: TransducerInfo,
-        connect: Callable[[], Link],
+        connect: Callable[[Deadline], Link],
         conversation: Conversation,
         clock: Clock,
         *,
+        opening: Deadline | None = None,
         gathers: bool = True,
     ) -> None:
-        """Take an identified device whose `info.rate` [Hz] is known within a few per cent.
+        """Take an identified device whose `info.rate` [Hz] is known within a few per cent, opened by `opening`.
 
         `gathers`: the link hands over all that has arrived at one go, as lines do, and not a datagram at a time.
         """
-        super().__init__(info, clock)
+        super().__init__(info, clock, opening)
         self._connect = connect
         self._conversation = conversation
         self._period = 1.0 / info.rate / clock.factor  # between two records [real s]
@@ -194,29 +160,23 @@ class StreamingTransducer(ThreadedTransducer):
         with self._lock:
             self._digest()
             watch = self._pacing.watch
-            return Health(
-                received=self._received,
+            return self._health(
                 lost=self._pacing.lost,
                 malformed=self._malformed_before + self._decoder.malformed,
                 restarted=self._restarted,
-                saturated=self._saturated,
                 off_rate=watch.found,
                 rate_words=rate_words("readings come", watch.rate, watch.asked) if watch.found else "",
-                lag_ms=self._lag_ms,
             )
 
-    def start(self) -> None:
-        """Bring the device to stream. Raises LinkLost, SetupError or DeviceFault when no record comes."""
-        self._reset()
-        self._thread = threading.Thread(target=self._run, name=f"{self._info.driver} {self._info.serial}".strip())
-        self._thread.start()
-        while not self._ever and self._thread.is_alive():
-            self._arrived.wait(_TICK)
-            self._arrived.clear()
-        if self._ended is not None:
-            ended = self._ended
-            self.stop()
-            raise ended
+    def _has_come(self) -> bool:
+        """Tell whether a reading has come."""
+        return self._ever
+
+    def _never_came(self, seconds: float) -> str:
+        """Return why no reading came within `seconds`, in a sentence."""
+        broken = self.health.malformed
+        what = f"{broken} broken records and no reading" if broken else "no reading"
+        return f"{self._info.uri} sent {what} within {seconds:.1f} s; check its power, the cable and the address"
 
     def _reset(self) -> None:
         """Forget what an earlier stream left."""
@@ -224,7 +184,7 @@ class StreamingTransducer(ThreadedTransducer):
         self._pending.clear()
         self._pacing = self._conversation.numbering(self._info.rate, self._clock.factor)
         self._unpaced: list[_Arrived] = []  # arrivals that pacing keeps back
-        self._received = self._restarted = self._saturated = 0
+        self._restarted = 0
         self._malformed_before = 0  # by decoders that have had their day
         self._decoder = self._conversation.decoder()
         self._ever = False  # a record has come
@@ -236,7 +196,7 @@ class StreamingTransducer(ThreadedTransducer):
         while not self._stopping.is_set():
             try:
                 self._stream()
-            except _Stopped:
+            except Stopped:
                 break
             except (LinkLost, SetupError, DeviceFault) as error:
                 silent = time.monotonic() - self._heard
@@ -252,9 +212,10 @@ class StreamingTransducer(ThreadedTransducer):
 
     def _stream(self) -> None:
         """Stream over one opening of the line until told to stop. Raises LinkLost when no records come any more."""
-        link = self._connect()
+        limit = Deadline(CONNECTING, self._stopping) if self._ever else self._begin_by
+        link = self._connect(limit)
         try:
-            first = self._conversation.begin(_StoppableLink(link, self._stopping))
+            first = self._conversation.begin(limit.bound(link))
             if self._ever:
                 self._pending.append(_Arrived(None, self._clock.now_ns()))
             with self._lock:
@@ -263,7 +224,7 @@ class StreamingTransducer(ThreadedTransducer):
             try:
                 self._listen(link, self._decoder, first)
             finally:
-                self._conversation.end(link)
+                self._conversation.end(Deadline(ENDING).bound(link))
         finally:
             link.close()
 
@@ -289,7 +250,7 @@ class StreamingTransducer(ThreadedTransducer):
                 )
             if self._gather and data and len(data) < _LUMP:
                 time.sleep(self._gather)
-            data = link.receive(_TICK)
+            data = link.receive(TICK)
 
     def _digest(self, *, end: bool = False) -> None:
         """Turn pending records into readings. The lock is held."""
@@ -312,9 +273,7 @@ class StreamingTransducer(ThreadedTransducer):
         arrivals, self._unpaced = self._unpaced, []
         parts = [(a.records, a.received_ns) for a in arrivals if a.records is not None]
         status = np.concatenate([records.status for records, _ in parts])
-        self._received += len(status)
-        self._saturated += int(np.count_nonzero(status & self._conversation.saturated))
-        self._ready.append(
+        self._hand_over(
             ReadingBlock(
                 sequence=paced.sequence,
                 counter=paced.sequence,

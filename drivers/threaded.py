@@ -1,12 +1,18 @@
-"""What all drivers share whose readings a thread of their own takes: handing over, stopping, closing."""
+"""What all drivers share whose readings a thread of their own takes: beginning, handing over, stopping, closing."""
 
 import threading
 import time
 from abc import ABC, abstractmethod
+from typing import Any
 
+from drivers import deadline
 from drivers.clock import Clock
+from drivers.deadline import Deadline
 from drivers.readings import ReadingBlock
-from drivers.transducer import LinkLost, SetupError, TransducerInfo
+from drivers.status import StatusCount
+from drivers.transducer import Health, LinkLost, SetupError, TransducerInfo
+
+_LEAVING = 0.9  # for the thread to end, until it is left alone with a device that holds it [real s]
 
 
 class ThreadedTransducer(ABC):
@@ -14,8 +20,9 @@ class ThreadedTransducer(ABC):
 
     _tick = 0.05  # longest wait, and so for a stop [real s]
 
-    def __init__(self, info: TransducerInfo, clock: Clock) -> None:
-        """Take an identified device."""
+    def __init__(self, info: TransducerInfo, clock: Clock, opening: Deadline | None = None) -> None:
+        """Take an identified device. What its opening took is taken off the time for its first start."""
+        self._spent = 0.0 if opening is None else opening.spent
         self._info = info
         self._clock = clock
         self._lock = threading.Lock()  # over all that _digest touches
@@ -24,12 +31,57 @@ class ThreadedTransducer(ABC):
         self._thread: threading.Thread | None = None
         self._ended: Exception | None = None  # why the stream ended, when nobody had stopped it
         self._ready: list[ReadingBlock] = []
+        self._received = 0
+        self._statuses = StatusCount(info.status)
         self._lag_ms = 0.0
+
+    def _health(self, **counts: Any) -> Health:  # noqa: ANN401 - fields of Health
+        """Return totals: those that all drivers count, and `counts`. The lock is held."""
+        statuses = self._statuses
+        return Health(
+            received=self._received,
+            saturated=statuses.verdicts["saturated"],
+            doubtful=statuses.verdicts["doubtful"],
+            noted=statuses.verdicts["note"],
+            flagged=dict(statuses.flagged),
+            lag_ms=self._lag_ms,
+            **counts,
+        )
+
+    def _hand_over(self, block: ReadingBlock) -> None:
+        """Let these readings be read. The lock is held."""
+        self._received += len(block)
+        self._statuses.take(block.status)
+        self._ready.append(block)
 
     @property
     def info(self) -> TransducerInfo:
         """Identity, calibration and settings, as found at opening."""
         return self._info
+
+    def start(self) -> None:
+        """Bring the device to stream. Raises LinkLost, SetupError or DeviceFault when no reading comes in time."""
+        self._reset()
+        patience, self._spent = deadline.CONNECTING - self._spent, 0.0
+        waiting, self._begin_by = Deadline(patience), Deadline(patience, self._stopping)
+        name = f"{self._info.driver} {self._info.serial}".strip()
+        thread = self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        thread.start()
+        try:
+            while not self._has_come() and self._ended is None and thread.is_alive():
+                if waiting.left <= 0.0:
+                    self._ended = LinkLost(self._never_came(waiting.spent))
+                self._arrived.wait(deadline.TICK)
+                self._arrived.clear()
+            self._check_first()
+        except BaseException:
+            self.stop()
+            raise
+
+    def _check_first(self) -> None:
+        """Raise why the stream cannot be used, where it cannot."""
+        if self._ended is not None:
+            raise self._ended
 
     def read(self, timeout: float) -> ReadingBlock:
         """Return all readings not yet handed over, waiting up to `timeout` session seconds for the first."""
@@ -59,18 +111,32 @@ class ThreadedTransducer(ABC):
         self._stopping.clear()
         self._ended = None
         self._ready = []
+        self._received = 0
+        self._statuses = StatusCount(self._info.status)
         self._lag_ms = 0.0
 
     def stop(self) -> None:
         """End streaming; what had arrived can still be read. Harmless when repeated."""
         self._stopping.set()
         if self._thread is not None:
-            self._thread.join()
+            self._thread.join(_LEAVING)
             self._thread = None
 
     def close(self) -> None:
         """Stop; port and thread are given back. Harmless when repeated."""
         self.stop()
+
+    @abstractmethod
+    def _run(self) -> None:
+        """Be the thread: bring the device to stream by `_begin_by`, and put down in `_ended` why the stream ended."""
+
+    @abstractmethod
+    def _has_come(self) -> bool:
+        """Tell whether a reading has come."""
+
+    @abstractmethod
+    def _never_came(self, seconds: float) -> str:
+        """Return why no reading came within `seconds`, in a sentence."""
 
     @abstractmethod
     def _digest(self, *, end: bool = False) -> None:

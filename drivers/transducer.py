@@ -4,11 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
+from drivers.status import StatusTable
 
 
 class SetupError(Exception):
@@ -36,14 +34,7 @@ class TransducerInfo:
     counter_rate: float  # ticks a second of the device's own counter [Hz]; nan where it has none
     calibration: Calibration
     settings: Mapping[str, str] = field(default_factory=dict[str, str])  # each setting as read back: filter, bias
-    harmless: int = 0  # bits of a reading's status that say nothing against its six values
-    summary: int = 0  # bit of the status that is set beside any other, and says nothing beside a harmless one
-
-    def doubtful(self, status: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Tell of each status (n,) whether it speaks against the reading's six values."""
-        rest = status & ~np.int64(self.harmless)
-        told = (status & np.int64(self.harmless)) != 0
-        return np.where(told, rest & ~np.int64(self.summary), rest) != 0
+    status: StatusTable = field(default_factory=StatusTable)  # what the bits of a reading's status mean
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +48,11 @@ class Health:
     malformed: int = 0
     stalled: int = 0  # records whose device counter did not move (they are kept, and counted here too)
     restarted: int = 0  # times the device began to count anew
-    saturated: int = 0  # records whose status says the six values are invalid
+    saturated: int = 0  # readings whose status says the six values are invalid, as when out of range
+    doubtful: int = 0  # other readings whose status speaks against their values: the device has a fault
+    noted: int = 0  # other readings whose status says something, and nothing against their values
+    flagged: Mapping[str, int] = field(default_factory=dict[str, int])  # readings by what their status says, in words
+    off_units: int = 0  # readings since the units were last confirmed, when they were found to be others
     off_rate: int = 0  # times the rate was found to be another than the one set, or than before
     rate_words: str = ""  # what was found of it last
     lag_ms: float = 0.0  # age of the newest reading when it was handed over [ms of the session's clock]

@@ -16,7 +16,7 @@ BACKEND: Any = None  # of pyusb: None takes the system's; a simulated bus is put
 _PACKETS = 64  # taken at one go while they come without a pause
 _PAUSE_MS = 2
 _LARGEST = 64  # bytes in a packet of a full-speed bulk endpoint
-_WRITE_MS = 1000
+_WRITE_MS = 300
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,13 +57,14 @@ class UsbLink:
 
     def receive(self, timeout: float) -> bytes | None:
         """Return the answer to the request before, or what the stream brings; None when nothing came in `timeout` s."""
-        asked, self._asked = self._asked, False
+        asked = self._asked
         endpoint = self._endpoints.answers if asked else self._endpoints.stream
         parts: list[bytes] = []
         wait_ms = max(round(timeout * 1000), 1)
         while len(parts) < (1 if asked else _PACKETS):
             try:
                 parts.append(bytes(self._device.read(endpoint, _LARGEST, wait_ms)))
+                self._asked = False  # only now: who waits in short turns must still find the answer
             except _core.USBTimeoutError:
                 break
             except _core.USBError as error:

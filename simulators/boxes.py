@@ -43,6 +43,8 @@ class Simulator:
     factor: float  # times as fast as real it can run on a computer that has much else to do
     tells: tuple[Kind, ...]  # faults that can happen on this wire and that a driver can tell
     hides: tuple[Kind, ...] = ()  # faults that can happen and that no driver can tell: nothing on the wire shows them
+    statuses: tuple[int, ...] = ()  # that its maker's manual lists, to be planted one after the other
+    at_start: bool = False  # a status can only be told in full where it is set when a stream begins
 
 
 _LINE: tuple[Kind, ...] = ("lose", "corrupt", "shorten", "saturate", "unplug", "reboot", "slow")
@@ -93,10 +95,17 @@ def _nidaq(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> Simulate
     return Simulated(uri, bench, library.now, pull, lambda: library.open, library.remove)
 
 
+_ERROR = 1 << 31  # the networked box sets it beside any other
+_BITS = (*range(1, 15), *range(16, 31))
+_DIGITAL = (*range(6), 7, *range(8, 14))
+_CODES = (54, 55, 63)  # in a stream of a converter
+
 SIMULATORS: Mapping[str, Simulator] = {
-    "net-ft": Simulator(_net_ft, 10.0, (*_NETWORK, *_LINE)),
-    "serial-ft": Simulator(_serial_ft, 2.0, _LINE, hides=("stall",)),
-    "digital-ft": Simulator(_digital_ft, 0.4, _LINE, hides=("stall",)),
-    "labjack-u6": Simulator(_labjack_u6, 2.0, _LINE, hides=("stall",)),
+    "net-ft": Simulator(_net_ft, 10.0, (*_NETWORK, *_LINE), statuses=tuple(_ERROR | 1 << n for n in _BITS)),
+    "serial-ft": Simulator(_serial_ft, 2.0, _LINE, hides=("stall",), statuses=tuple(range(1, 10))),
+    "digital-ft": Simulator(
+        _digital_ft, 0.4, _LINE, hides=("stall",), statuses=(sum(1 << n for n in _DIGITAL),), at_start=True
+    ),
+    "labjack-u6": Simulator(_labjack_u6, 2.0, _LINE, hides=("stall",), statuses=_CODES),
     "nidaq": Simulator(_nidaq, 1.0, ("lose", "saturate", "unplug", "reboot", "slow"), hides=("stall",)),
 }

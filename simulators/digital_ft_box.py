@@ -22,6 +22,7 @@ RATE = 7000  # packets a second
 COUNTS_PER_VOLT = 3000.0  # of a gauge
 _COUNTS = 1_000_000  # in one N and in one N m, of what the stored matrix gives
 _SIZE = 3_400  # registers
+_STATUS = 0x001D
 _CALIBRATION = 0x00E3  # the first register of calibration 1
 _GAINS_AND_OFFSETS = (*range(1000, 1006), *range(32_000, 32_006))  # as calibration 1 wants them
 _JAM = 14  # bytes heard while streaming that end the stream
@@ -125,8 +126,8 @@ class DigitalFtBox(LineBox):
         packets: list[bytes] = []
         for time, six, above in zip(times.tolist(), gauges, over.tolist(), strict=True):
             if not self._faults.active("stall", time):
-                body = six.tobytes()
-                self._last = body + bytes([sum(body) & 0x7F | (0x80 if above else 0)])
+                body, fault = six.tobytes(), above or self._faults.status(time) != 0
+                self._last = body + bytes([sum(body) & 0x7F | (0x80 if fault else 0)])
             packets.append(self._last)
         return packets
 
@@ -161,6 +162,7 @@ class DigitalFtBox(LineBox):
         place = slice(2 * first, 2 * (first + count))
         if not (1 <= count <= 64 and first + count <= _SIZE):
             return bytes([function | 0x80, 2])
+        self._registers[2 * _STATUS : 2 * _STATUS + 2] = struct.pack(">H", self._faults.status(self.now()) & 0xFFFF)
         if function == 0x03:
             return bytes([3, 2 * count]) + bytes(self._registers[place])
         if not self._unlocked or len(data) != 5 + 2 * count:

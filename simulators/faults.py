@@ -19,6 +19,8 @@ Kind = Literal[
     "delay",
     "stall",
     "saturate",
+    "status",
+    "units",
     "drift",
     "miscalibrate",
     "slow",
@@ -37,11 +39,12 @@ class Fault:
 
     On the way, for a share of the datagrams: `lose`, `repeat` (sent twice), `reorder` (swapped with the next),
     `corrupt` (other bytes, same length), `shorten` (fewer bytes), `delay` (sent later). In the box: `stall` (the same
-    reading again and again), `saturate` (status says the values are invalid), `drift` (the zero of every axis walks off
-    by `share` of its range, and stays there), `miscalibrate` (it feels the wrench `1 + share` times as large as its
-    calibration says), `slow` (its own clock runs only `1 - share` as fast), `steal` (another client takes the stream
-    each time it is asked for; networked box only), `reboot` (switched off, then on), `unplug` (nothing comes through,
-    and the box does not notice).
+    reading again and again), `saturate` (status says the values are invalid), `status` (it sets the bits of `status`,
+    as its manual numbers them), `units` (it is set to count `share` times as much to a unit; networked box only),
+    `drift` (the zero of every axis walks off by `share` of its range, and stays there), `miscalibrate` (it feels the
+    wrench `1 + share` times as large as its calibration says), `slow` (its own clock runs only `1 - share` as fast),
+    `steal` (another client takes the stream each time it is asked for; networked box only), `reboot` (switched off,
+    then on), `unplug` (nothing comes through, and the box does not notice).
     """
 
     kind: Kind
@@ -49,6 +52,7 @@ class Fault:
     stop: float  # [s]
     share: float = 1.0  # of the datagrams in the stretch [-]
     delay: float = 0.05  # of a datagram that is delayed [s]
+    status: int = 0  # bits that are set
 
     def __post_init__(self) -> None:
         """Refuse what cannot be carried out."""
@@ -56,6 +60,8 @@ class Fault:
             raise ValueError(f"fault kind {self.kind!r} is unknown; there are {', '.join(KINDS)}")
         if not (0.0 <= self.start < self.stop and 0.0 < self.share <= 1.0 and self.delay > 0.0):
             raise ValueError(f"fault {self.kind!r} needs 0 <= start < stop, 0 < share <= 1 and a delay above 0")
+        if (self.kind == "status") != (0 < self.status < 2**32):
+            raise ValueError("fault 'status' needs status, the bits to be set, from 1 to 4294967295; no other has it")
         if self.kind == "slow" and self.share > 0.9:
             raise ValueError("fault 'slow' needs share <= 0.9; a clock that stands still is a 'stall'")
 
@@ -85,6 +91,16 @@ class Faults:
     def active(self, kind: Kind, time: float) -> bool:
         """Tell whether a fault of the box itself is on at `time` [s]."""
         return self._at(kind, time) is not None
+
+    def status(self, time: float) -> int:
+        """Return the status bits the box sets at `time` [s] beyond its own."""
+        fault = self._at("status", time)
+        return 0 if fault is None else fault.status
+
+    def counting(self, time: float) -> float:
+        """Return how many times as much as at first the box counts to a unit at `time` [s]."""
+        fault = self._at("units", time)
+        return 1.0 if fault is None else fault.share
 
     def aged(self, times: Array) -> Array:
         """Return how far the device's own clock has come (n,) [s] at `times` (n,) [s]."""

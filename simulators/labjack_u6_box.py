@@ -179,6 +179,7 @@ class LabJackU6Box:
             at, missing = self._report
             self._report = (at - samples, missing) if at >= samples else None
             told, error = (0, 59) if at >= samples else (missing, 60)
+        error = error or self._faults.status(self.now()) & 0xFF
         data = told.to_bytes(4, "little") + bytes([self._sent % 256, error])
         data += b"".join(code.to_bytes(2, "little") for code in codes) + bytes([min(len(self._buffer) // 4, 255), 0])
         self._sent += 1

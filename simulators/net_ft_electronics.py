@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from simulators.bench import Bench
 from simulators.faults import Faults
-from simulators.net_ft_pages import COUNTS, NET_FT, Pages, Product
+from simulators.net_ft_pages import NET_FT, Pages, Product
 
 Array = NDArray[np.float64]
 
@@ -79,6 +79,7 @@ class Electronics:
 
     def tcp_reply(self, request: bytes, now: float) -> bytes:
         """Return the reply to the 20 bytes of a TCP request; none to a command that is not simulated."""
+        self.pages.counting = self._faults.counting(now)
         if request[0] == 0:  # READFT: counts in 16 bits, and system commands in the last two bytes
             if request[19] & 1:
                 self.set_bias(now)
@@ -87,7 +88,7 @@ class Electronics:
             return struct.pack(">HH6h", 0x1234, status[0] >> 16, *small)
         if request[0] == 1:  # READCALINFO
             units = (self.pages.force_code, self.pages.torque_code)
-            return struct.pack(">HBBII6H", 0x1234, *units, COUNTS, COUNTS, *self.pages.scales)
+            return struct.pack(">HBBII6H", 0x1234, *units, self.pages.counts, self.pages.counts, *self.pages.scales)
         return b""
 
     def http_reply(self, request: bytes, now: float) -> bytes:
@@ -96,6 +97,7 @@ class Electronics:
         target = words[1] if len(words) == 3 and words[0] == "GET" else "/"
         if target.startswith("/rundata.cgi") and "cmd=bias" in target:
             self.set_bias(now)
+        self.pages.counting = self._faults.counting(now)
         status, counts = self._felt(np.array([now]))
         code, page = self.pages.answer(target, status[0], counts[0].tolist())
         body = page.encode()
@@ -109,5 +111,8 @@ class Electronics:
         wrench[forced] = self._rated  # what a clipped converter shows
         over = forced | np.any(np.abs(wrench) > self._rated, axis=1)
         counts = (np.clip(wrench, -self._rated, self._rated) - self._bias) * self.pages.counts_per_wrench
+        counts *= np.array([self._faults.counting(time) for time in times.tolist()])[:, None]
         whole = np.clip(np.rint(counts), -(2**31), 2**31 - 1).astype(np.int64)
-        return [self.pages.product.saturated if above else 0 for above in over.tolist()], whole
+        saturated = self.pages.product.saturated
+        told = zip(over.tolist(), times.tolist(), strict=True)
+        return [(saturated if above else 0) | self._faults.status(time) for above, time in told], whole

@@ -58,6 +58,7 @@ class Pages:
         self._rated = rated  # (6,) [N, N mm]
         self._kept = {"setuserfilter": "0", "setpke": "0", "cfgnam": "Nano43 SI-36-0.5", "cfgid": "default"}
         self._bias = [0] * 6
+        self.counting = 1.0  # times as many counts to a unit as usual
         self.force_code = 2
         self.torque_code = 3
         self.buffered = 10  # records in a datagram of buffered streaming
@@ -67,13 +68,18 @@ class Pages:
 
     @property
     def counts_per_wrench(self) -> Array:
-        """Counts in one N or N mm of each axis, shape (6,)."""
+        """Counts in one N or N mm of each axis, shape (6,), by the units; `counting` is beyond it."""
         return COUNTS / np.repeat([_FORCES[self.force_code][1], _TORQUES[self.torque_code][1]], 3)
 
     @property
     def scales(self) -> list[int]:
         """What one of the six 16-bit counts of the TCP port stands for, in full counts."""
         return [int(np.ceil(rated / 32767)) for rated in self._rated * self.counts_per_wrench]
+
+    @property
+    def counts(self) -> int:
+        """Counts in one unit."""
+        return max(round(COUNTS * self.counting), 1)
 
     def answer(self, target: str, status: int, counts: list[int]) -> tuple[int, str]:
         """Return (HTTP status, page) for a GET of `target`, with the box's status and counts of this instant."""
@@ -82,7 +88,7 @@ class Pages:
         if parts.path == "/netftapi2.xml":
             return 200, self._configuration(status, counts)
         if parts.path == "/netftcalapi.xml":
-            return 200, _page("netftCalibration", {"calsn": self._serial, "calcpf": COUNTS, "calcpt": COUNTS})
+            return 200, _page("netftCalibration", {"calsn": self._serial, "calcpf": self.counts, "calcpt": self.counts})
         if parts.path in _SETTABLE:
             for name in _SETTABLE[parts.path] & query.keys():
                 self._set(name, query[name])
@@ -112,8 +118,8 @@ class Pages:
             "scfgfu": force[0],
             "cfgtu": self.torque_code,
             "scfgtu": torque[0],
-            "cfgcpf": COUNTS,
-            "cfgcpt": COUNTS,
+            "cfgcpf": self.counts,
+            "cfgcpt": self.counts,
             "cfgmr": _listed([f"{r:.9g}" for r in rated]),
             "cfgtdu": 3,
             "scfgtdu": "mm",

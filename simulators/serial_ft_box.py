@@ -176,7 +176,7 @@ class SerialFtBox(LineBox):
         counts = np.clip(counts, -32768, 32767).astype(int)
         for time, above, six in zip(times.tolist(), over.tolist(), counts.tolist(), strict=True):
             if not self._faults.active("stall", time):
-                self._last = (int(above or self._faults.active("saturate", time)), six)
+                self._last = (self._faults.status(time) or int(above or self._faults.active("saturate", time)), six)
             error, values = self._last
             if self._binary:
                 packed.append(struct.pack(">B6h", error, *values))

@@ -90,7 +90,7 @@ def load_timetable(path: Path) -> Timetable:
     try:
         script = msgspec.convert(table, _Script)
         strokes = sorted(((entry.at, _surface(entry)) for entry in script.stroke), key=lambda stroke: stroke[0])
-        faults = tuple(Fault(f.kind, f.start, f.stop, f.share, f.delay) for f in script.fault)
+        faults = tuple(Fault(f.kind, f.start, f.stop, f.share, f.delay, f.status) for f in script.fault)
         return Timetable(tuple(strokes), faults, script.repeat)
     except (msgspec.ValidationError, ValueError) as error:
         raise TimetableError(f"{path}: {error}") from None
@@ -117,6 +117,7 @@ class _FaultEntry(msgspec.Struct, forbid_unknown_fields=True):
     stop: _Time = msgspec.field(name="to")
     share: float = 1.0
     delay: float = 0.05
+    status: int = 0
 
 
 class _Script(msgspec.Struct, forbid_unknown_fields=True):

@@ -11,6 +11,7 @@ from daq_app.recorder.messages import (
     Device,
     Failed,
     Gone,
+    LinkDown,
     Report,
     ResumeSession,
     Sealed,
@@ -128,6 +129,10 @@ class _Attendance:
             case Sealed():
                 assert self._end is not None
                 return Attended(self._end, sealed=True)
+            case LinkDown(sentence) if self._begun is None:
+                raise LinkLost(sentence)  # it was opened, and does not stream
+            case Failed() if self._stopping and self._begun is None:
+                raise KeyboardInterrupt  # as wanted, before anything was recorded
             case Failed() | Gone():
                 _raise_failure(report)
             case _ if isinstance(report, Command) and self._terminal is not None:

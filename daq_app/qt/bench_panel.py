@@ -22,7 +22,7 @@ from daq_app.window.messages import Message
 from daq_app.window.view_bench import BenchView
 from daq_app.window.view_life import NAMES
 
-SHOWN_COUNTERS = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated", "lag")
+SHOWN_COUNTERS = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated", "doubtful", "lag")
 
 
 class BenchPanel(QFrame):

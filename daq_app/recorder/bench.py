@@ -1,8 +1,8 @@
 """The transducer as the recorder holds it: opened, streaming while no session runs, lost, and back again."""
 
 import time
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Generator
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,16 @@ GLANCE = 0.01  # between two looks while no session runs [real s]
 
 class NotNow(Exception):
     """What was asked for is not possible now; the message says why and what to do."""
+
+
+@contextmanager
+def _breakable(uri: str) -> Generator[None]:
+    """Let a stop break off what waits for a device, which may take its time. Raises NotNow when one did."""
+    try:
+        with interruptions() as interrupted, interrupted.raised():
+            yield
+    except KeyboardInterrupt:
+        raise NotNow(f"{uri} was not connected: stopped by the user") from None
 
 
 class Tap:
@@ -102,11 +112,8 @@ class Bench:
         Raises what opening raises, NotNow when a stop broke it off; then none is open.
         """
         self.disconnect()
-        try:
-            with interruptions() as interrupted, interrupted.raised():  # a device that does not answer takes its time
-                self._open(uri, clock or self._clock)
-        except KeyboardInterrupt:
-            raise NotNow(f"{uri} was not connected: stopped by the user") from None
+        with _breakable(uri):
+            self._open(uri, clock or self._clock)
         assert self._connected is not None
         self._send(Device(self._connected.transducer.info, self._connected.frame))
 
@@ -133,14 +140,18 @@ class Bench:
             self._send(Failed("Tare", "the zero was not measured: stopped by the user", "NotNow"))
 
     def stream(self) -> None:
-        """Begin to show what is measured, unless it is shown already."""
+        """Begin to show what is measured, unless it is shown already. Raises NotNow when a stop broke it off."""
         if self._connected is not None and not self._streaming:
             self._display.stream_began()
             self._streaming = True
             try:
-                self._connected.transducer.start()
+                with _breakable(self._connected.transducer.info.uri):
+                    self._connected.transducer.start()
             except (LinkLost, DeviceFault) as error:
                 self._lost(str(error))
+            except NotNow:
+                self.disconnect()
+                raise
 
     def lent(self) -> Tap | None:
         """Return the transducer for a session, not streaming; None where there is none."""
@@ -203,8 +214,9 @@ class Bench:
             return
         self._again = time.monotonic() + TRY_AGAIN
         try:
-            self._open(self._uri, self._clock)
-        except (LinkLost, DeviceFault, SetupError):
+            with _breakable(self._uri):
+                self._open(self._uri, self._clock)
+        except (LinkLost, DeviceFault, SetupError, NotNow):
             return
         assert self._connected is not None
         info = self._connected.transducer.info

@@ -102,7 +102,7 @@ class Display:
                 block.time,
                 block.received_ns,
                 felt - calibration.wrench(np.array([self._zero]), np.zeros(6)),
-                np.where(info.doubtful(block.status), block.status, 0),
+                np.where(info.status.doubtful(block.status), block.status, 0),
                 self._zero,
             )
         )
@@ -113,7 +113,7 @@ class Display:
         span = now - self._arrived[0][0] if self._arrived else 0.0
         # The first readings of the span came before it began.
         count = sum(readings for _, readings in self._arrived) - (self._arrived[0][1] if self._arrived else 0)
-        self._saturated_now = health.saturated
+        self._saturated_now = health.saturated + health.doubtful
         rated = np.full(6, np.nan) if self._info is None else self._info.calibration.rated
         unknown = np.isnan(np.append(rated, rated.sum()))
         load, peak = np.where(unknown, np.nan, self._load), np.where(unknown, np.nan, self._peak)

@@ -30,6 +30,7 @@ WORDS = {
     FlawName.NOT_LIFTED: "the finger was not lifted between strokes",
     FlawName.DIRECTION_TURNS: "the direction turned",
     FlawName.SATURATED: "the transducer was overloaded",
+    FlawName.DEVICE_FAULT: "the transducer told of a fault",
     FlawName.LOST_READINGS: "readings were lost",
     FlawName.DRIFT: "the zero drifted",
     FlawName.FROZEN: "the transducer stood still",

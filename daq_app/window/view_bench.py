@@ -11,7 +11,18 @@ from daq_app.window.messages import Message
 from daq_app.window.view_life import life_rows
 
 UNITS = ("N", "N", "N", "N mm", "N mm", "N mm")
-COUNTED = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated")
+COUNTED = (
+    "lost",
+    "repeated",
+    "late",
+    "malformed",
+    "stalled",
+    "restarted",
+    "saturated",
+    "doubtful",
+    "noted",
+    "off_units",
+)
 LAGGING = 100.0  # a reading handed over later than this is worth a look [ms]
 
 
@@ -98,11 +109,13 @@ def _lamp(bench: BenchState) -> tuple[Literal["off", "well", "look", "wrong"], s
     if bench.peak.over:
         return "wrong", "overloaded"
     if bench.saturated:
-        return "wrong", "invalid readings"
+        said = ", ".join(bench.health.flagged)
+        return "wrong", f"invalid readings: {said}" if said else "invalid readings"
     if near := bench.peak.near:
         return "look", f"near the rated load: {', '.join(near)}"
     counts = asdict(bench.health)
     troubles = [f"{counts[name]} {name}" for name in COUNTED if counts[name]]
+    troubles += list(bench.health.flagged)
     troubles += [bench.health.rate_words] if bench.health.off_rate else []
     if troubles:
         return "look", ", ".join(troubles)

@@ -9,8 +9,9 @@ from functools import partial
 
 from drivers.address import Address, check_options
 from drivers.clock import Clock
+from drivers.deadline import Deadline
 from drivers.digital_ft import wire
-from drivers.links import Link
+from drivers.link import Link
 from drivers.pacing import GAP, Pacing
 from drivers.records import RecordDecoder
 from drivers.serial_link import Parity, SerialLink, port_of
@@ -40,30 +41,31 @@ class _Where:
     number: int  # of the calibration, 1 to 16
 
 
-def open_digital_ft(address: Address, clock: Clock) -> StreamingTransducer:
+def open_digital_ft(address: Address, clock: Clock, deadline: Deadline) -> StreamingTransducer:
     """Return the transducer at `address`, its calibration in force, not streaming.
 
     Raises SetupError, LinkLost or DeviceFault with the reason.
     """
     place = _where(address)
-    connect = partial(SerialLink, place.port, place.baud, place.parity)
-    link = connect()
+    link = _line(place, deadline)
     try:
-        hold(link)
-        stored, word = _stored(place, link), status_word(link)
+        bound = deadline.bound(link)
+        word = hold(bound)
+        stored = _stored(place, bound)
         conversation = DigitalConversation(place.number, stored)
-        rate = measured_rate(link, conversation, clock, _MEASURED, wire.STREAM_RATE)
+        rate = measured_rate(link, conversation, clock, _MEASURED, deadline, wire.STREAM_RATE)
     except (LinkLost, DeviceFault) as error:
         raise type(error)(f"{address.uri}: {error}") from None
     finally:
         link.close()
-    return StreamingTransducer(_info(place, stored, word, rate), connect, conversation, clock)
+    info = _info(place, stored, word, rate)
+    return StreamingTransducer(info, partial(_line, place), conversation, clock, opening=deadline)
 
 
-def identify_digital_ft(address: Address, _patience: float) -> TransducerInfo:
+def identify_digital_ft(address: Address, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing nothing: a stream left over from before goes on. An answer takes 0.2 s at most."""
     place = _where(address)
-    link = SerialLink(place.port, place.baud, place.parity)
+    link = deadline.bound(_line(place, deadline))
     try:
         word = status_word(link)
         if word is None:
@@ -76,7 +78,12 @@ def identify_digital_ft(address: Address, _patience: float) -> TransducerInfo:
         link.close()
 
 
-def _stored(place: _Where, link: SerialLink) -> wire.StoredCalibration:
+def _line(place: _Where, _deadline: Deadline) -> SerialLink:
+    """Return the line, open."""
+    return SerialLink(place.port, place.baud, place.parity)
+
+
+def _stored(place: _Where, link: Link) -> wire.StoredCalibration:
     registers = read(link, wire.calibration_address(place.number), wire.CALIBRATION_SIZE)
     try:
         return wire.parse_calibration(registers)
@@ -111,6 +118,7 @@ def _info(place: _Where, stored: wire.StoredCalibration, status: int | None, mea
         counter_rate=math.nan,
         calibration=stored.calibration,
         settings=settings,
+        status=wire.STATUS_BITS,
     )
 
 
@@ -132,16 +140,15 @@ def _where(address: Address) -> _Where:
 class DigitalConversation:
     """Requests, answers and streams of one transducer with one of its calibrations."""
 
-    saturated = wire.STATUS_FLAG | wire.GAUGE_AT_END
-
     def __init__(self, number: int, stored: wire.StoredCalibration) -> None:
         """Take a transducer whose calibration `number`, 1 to 16, was read as `stored`."""
         self._number = number
         self._stored = stored
+        self._word = 0  # the status word, which can only be read while nothing streams
 
     def decoder(self) -> RecordDecoder:
         """Return a decoder for a stream about to begin."""
-        return wire.StreamDecoder()
+        return wire.StreamDecoder(self._word)
 
     def numbering(self, rate: float, factor: float) -> Pacing:
         """Return what numbers the stream: its records carry neither number nor time."""
@@ -152,7 +159,7 @@ class DigitalConversation:
 
         Raises LinkLost when it does not answer, DeviceFault when another transducer does or it refuses.
         """
-        hold(link)
+        self._word = hold(link)
         first = wire.calibration_address(self._number)
         stored = read(link, first, wire.CALIBRATION_SIZE)
         serial = stored[:8].split(b"\0")[0].decode("ascii", "replace").strip()
@@ -182,11 +189,11 @@ class DigitalConversation:
                 pass
 
 
-def hold(link: Link) -> None:
-    """Bring the transducer to answer, ending a stream left over from before. Raises LinkLost when it does not."""
+def hold(link: Link) -> int:
+    """Return the status word, after ending a stream left over from before. Raises LinkLost when nobody answers."""
     for _ in range(_TRIES):
-        if status_word(link) is not None:
-            return
+        if (word := status_word(link)) is not None:
+            return word
         if link.receive(_SILENT) is not None:
             link.send(wire.JAM)
         link.receive(_REST)

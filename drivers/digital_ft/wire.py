@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from drivers.calibration import Calibration
 from drivers.records import Records
+from drivers.status import StatusTable, bit
 from drivers.transducer import SetupError
 
 ADDRESS = 10
@@ -35,7 +36,7 @@ GAUGE_AT_END = 0x100  # put into the status here: a gauge is at the end of its r
 
 _EXCEPTION = 0x80
 _REASONS = {1: "illegal function", 2: "illegal address", 3: "illegal value", 4: "device failure"}
-_MEANING = {
+_MEANING = {  # of the status word
     0: "watchdog reset",
     1: "excitation too high",
     2: "excitation too low",
@@ -50,6 +51,14 @@ _MEANING = {
     12: "thermistor too low",
     13: "converter reading out of range",
 }
+_WORD_AT = 16  # a reading with the flag holds the status word from this bit on, as it was when the stream began
+STATUS_BITS = StatusTable(
+    (
+        bit(8, "a gauge at the end of its range", "saturated"),
+        *(bit(_WORD_AT + number, words, "doubtful") for number, words in _MEANING.items()),
+        bit(7, "error flag: the status word is not 0", "doubtful"),
+    )
+)
 _FORCE = {1: 4.4482216152605, 2: 1.0, 3: 4448.2216152605, 4: 1000.0, 5: 9.80665, 6: 0.00980665}  # newtons in one
 _TORQUE = {1: 112.9848290276, 2: 1355.8179483314, 3: 1000.0, 4: 1.0, 5: 98.0665, 6: 1e6}  # newton millimetres in one
 _ORDER = (0, 3, 1, 4, 2, 5)  # of the gauges: where G0 to G5 stand in a packet
@@ -158,7 +167,7 @@ def status_words(status: int) -> tuple[str, ...]:
     >>> status_words(0b100010)
     ('excitation too high', 'supply too low')
     """
-    return tuple(_MEANING.get(bit, f"unknown bit {bit}") for bit in range(16) if status >> bit & 1)
+    return tuple(_MEANING.get(number, f"unknown bit {number}") for number in range(16) if status >> number & 1)
 
 
 class StreamDecoder:
@@ -168,9 +177,10 @@ class StreamDecoder:
     packets in a row are sound, and from then on a packet is a reading only when the next one is sound too.
     """
 
-    def __init__(self) -> None:
-        """Start with nothing received, searching."""
+    def __init__(self, word: int = 0) -> None:
+        """Start with nothing received, searching. `word` is the status word as read last, before the stream."""
         self.malformed = 0
+        self._flagged = STATUS_FLAG | word << _WORD_AT
         self._buffer = b""
         self._in_step = False
         self._skipped = 0  # bytes since the last sound packet
@@ -196,7 +206,7 @@ class StreamDecoder:
             damaged.append(np.concatenate([[broken], np.zeros(good - 2 - first, np.int64)]))
             self._buffer = self._buffer[(good - 1) * PACKET_SIZE :]
             self._in_step = True
-        return _records(found, damaged)
+        return _records(found, damaged, self._flagged)
 
     def _skip(self) -> None:
         """Drop bytes up to the next place where the packets in the buffer may be sound."""
@@ -213,15 +223,15 @@ def _sound(packets: NDArray[np.uint8]) -> NDArray[np.bool_]:
     return packets[:, :12].sum(axis=1, dtype=np.uint32) & 0x7F == packets[:, 12] & 0x7F
 
 
-def _records(found: list[NDArray[np.uint8]], damaged: list[NDArray[np.int64]]) -> Records:
-    """Return sound packets as records: gauges in the order G0 to G5, the flag as status."""
+def _records(found: list[NDArray[np.uint8]], damaged: list[NDArray[np.int64]], flagged: int) -> Records:
+    """Return sound packets as records: gauges in the order G0 to G5, `flagged` as status where the flag is set."""
     if not found:
         return Records.of([], [], [])
     packets = np.concatenate(found)
     gauges = np.ascontiguousarray(packets[:, :12]).view(">i2")[:, _ORDER].astype(np.float64)
     at_end = np.any(np.abs(gauges + 0.5) >= 32767.0, axis=1)
-    status = (packets[:, 12] & STATUS_FLAG).astype(np.int64) + np.where(at_end, GAUGE_AT_END, 0)
-    return Records(gauges, status, np.concatenate(damaged))
+    status = np.where(packets[:, 12] & STATUS_FLAG, flagged, 0) + np.where(at_end, GAUGE_AT_END, 0)
+    return Records(gauges, status.astype(np.int64), np.concatenate(damaged))
 
 
 def _framed(frame: bytes) -> bytes:

@@ -9,8 +9,9 @@ from typing import Any
 from drivers.address import Address, AddressError, check_options
 from drivers.calibration_file import CalibrationFile, read_calibration_file
 from drivers.clock import Clock
+from drivers.deadline import Deadline
 from drivers.labjack_u6 import wire
-from drivers.links import Link
+from drivers.link import Link
 from drivers.records import RecordDecoder
 from drivers.scan_count import ScanCount
 from drivers.streaming import StreamingTransducer
@@ -34,14 +35,14 @@ class _Where:
     calibration: CalibrationFile | None
 
 
-def open_labjack_u6(address: Address, clock: Clock) -> StreamingTransducer:
+def open_labjack_u6(address: Address, clock: Clock, deadline: Deadline) -> StreamingTransducer:
     """Return the transducer at `address`, identified, not streaming. Raises SetupError, LinkLost, DeviceFault."""
     place = _where(address)
     if place.calibration is None:
         raise AddressError(f"{place.uri} names no calibration; add cal=FILE, the transducer's own .cal file")
-    link, identity = _linked(place)
+    link, identity = _linked(place, deadline)
     try:
-        constants = _constants(link)
+        constants = _constants(deadline.bound(link))
     except (LinkLost, DeviceFault) as error:
         raise type(error)(f"{place.uri}: {error}") from None
     finally:
@@ -49,19 +50,19 @@ def open_labjack_u6(address: Address, clock: Clock) -> StreamingTransducer:
     scans = wire.scan_clock(place.rate)
     conversation = GaugeConversation(identity.serial, constants, scans)
     info = _info(place, place.calibration, identity, constants, scans)
-    return StreamingTransducer(info, partial(_again, place, identity.serial), conversation, clock)
+    return StreamingTransducer(info, partial(_again, place, identity.serial), conversation, clock, opening=deadline)
 
 
-def identify_labjack_u6(address: Address, _patience: float) -> TransducerInfo:
+def identify_labjack_u6(address: Address, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing nothing. Raises SetupError where another program has it or nothing is plugged in."""
     place = _where(address)
-    link, identity = _linked(place)
+    link, identity = _linked(place, deadline)
     try:
         if place.calibration is None:
             raise SetupError(
                 f"{place.uri}: LabJack U6 {identity.serial} is there; add cal=FILE, the transducer's own .cal file"
             )
-        constants = _constants(link)
+        constants = _constants(deadline.bound(link))
     except (LinkLost, DeviceFault) as error:
         raise type(error)(f"{place.uri}: {error}") from None
     finally:
@@ -69,7 +70,7 @@ def identify_labjack_u6(address: Address, _patience: float) -> TransducerInfo:
     return _info(place, place.calibration, identity, constants, wire.scan_clock(place.rate))
 
 
-def _linked(place: _Where) -> tuple[UsbLink, wire.Identity]:
+def _linked(place: _Where, deadline: Deadline) -> tuple[UsbLink, wire.Identity]:
     """Return the one converter that is meant, open, and who it is."""
     fitting: dict[int, Any] = {}
     refused: list[SetupError] = []
@@ -80,7 +81,7 @@ def _linked(place: _Where) -> tuple[UsbLink, wire.Identity]:
             refused.append(error)
             continue
         try:
-            serial = _identity(link).serial
+            serial = _identity(deadline.bound(link)).serial
         except (LinkLost, DeviceFault) as error:
             refused.append(SetupError(f"{place.uri}: {error}"))
             continue
@@ -97,12 +98,16 @@ def _linked(place: _Where) -> tuple[UsbLink, wire.Identity]:
         raise LinkLost(f"{place.uri}: no {which} is plugged in; check its USB cable")
     (one,) = fitting.values()
     link = UsbLink(one, _ENDPOINTS, place.uri)
-    return link, _identity(link)
+    try:
+        return link, _identity(deadline.bound(link))
+    except BaseException:
+        link.close()
+        raise
 
 
-def _again(place: _Where, serial: int) -> UsbLink:
+def _again(place: _Where, serial: int, deadline: Deadline) -> UsbLink:
     """Open the same converter anew, wherever it is plugged in now."""
-    return _linked(_Where(place.uri, serial, place.rate, place.calibration))[0]
+    return _linked(_Where(place.uri, serial, place.rate, place.calibration), deadline)[0]
 
 
 def _info(
@@ -121,6 +126,7 @@ def _info(
         rate=scans.rate,
         counter_rate=scans.rate,
         calibration=file.calibration,
+        status=wire.STATUS_BITS,
         settings={
             "converter": f"serial number {identity.serial}, firmware {identity.firmware}",
             "calibration": f"{file.calibration.source}, SHA-256 {file.sha256}",
@@ -150,8 +156,6 @@ def _where(address: Address) -> _Where:
 
 class GaugeConversation:
     """Requests and streams of one converter. Each request is answered before anything else comes."""
-
-    saturated = wire.SATURATED
 
     def __init__(self, serial: int, constants: wire.Constants, clock: wire.ScanClock) -> None:
         """Take the converter of that serial number, whose constants were read, to scan by `clock`."""

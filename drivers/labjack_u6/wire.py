@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.records import Records
+from drivers.status import StatusBit, StatusTable, bit
 from drivers.transducer import DeviceFault
 
 Array = NDArray[np.float64]
@@ -21,7 +22,6 @@ STREAM_PACKET = 14 + 2 * GAUGES * SCANS  # bytes
 HIGHEST_RATE = 8000  # scans a second; the converter makes 50 000 readings a second at its lowest resolution
 LIMIT = 10.0  # of a gauge's voltage [V]: beyond, and at the ends of the converter, it is saturated
 
-SATURATED = 0x3F00  # status: bit 8 + i says that gauge i is at its limit; bits 0 to 7 are an error of its packet
 STREAM_IS_OFF = 52  # answer to a stop when nothing streams
 _DRAINING = 59  # error code of packets while an overflow is being recovered from: their scans are sound
 _RECOVERED = 60  # error code of the packet that tells how many scans an overflow cost
@@ -46,6 +46,13 @@ _ERRORS = {
     60: "recovered from an overflow",
     63: "recovery overflowed",
 }
+
+
+# Bit 8 + i of a status says that gauge i is at its limit; bits 0 to 7 are the error code of its packet.
+STATUS_BITS = StatusTable(
+    tuple(bit(8 + gauge, f"gauge {gauge} at its limit", "saturated") for gauge in range(GAUGES))
+    + tuple(StatusBit(0xFF, code, f"error {code}: {words}", "doubtful") for code, words in _ERRORS.items())
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -239,4 +239,4 @@ def _transform(found: Mapping[str, list[str]]) -> str:
 def _status(text: str, family: Family) -> str:
     if not re.fullmatch(r"0x[0-9a-fA-F]{1,8}", text):
         return text
-    return "; ".join(family.words(int(text, 16))) or "healthy"
+    return "; ".join(family.status.words(int(text, 16))) or "healthy"

@@ -1,6 +1,6 @@
 """The networked force/torque box as a transducer: streaming, accounting, loss and return."""
 
-import threading
+import contextlib
 import time
 from collections import deque
 from collections.abc import Callable
@@ -9,18 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock
-from drivers.links import Link
-from drivers.net_ft.wire import AXIA, NET_FT, START, STOP, decode
+from drivers.deadline import ENDING, Deadline, Stopped
+from drivers.link import Link
+from drivers.net_ft.settings_watch import SettingsWatch
+from drivers.net_ft.wire import START, STOP, decode
 from drivers.rate import RateWatch, rate_words
 from drivers.readings import ReadingBlock
 from drivers.sequence import SequenceAccount
 from drivers.threaded import ThreadedTransducer
-from drivers.transducer import DeviceFault, Health, LinkLost, TransducerInfo
+from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, TransducerInfo
 
 # All in real seconds, since networks know no other.
 _TICK = 0.05  # longest wait for a datagram, and so for a stop
 _ASK_EVERY = 0.1  # between two start requests while nothing comes
-_PATIENCE = 3.0  # until a box that never sent anything is given up: the computer may be busy just then
 _SILENCE = 3.0  # until a box that has fallen silent is given up
 _QUIET = 0.3  # silence after which the box is asked to start again
 _THEFTS = 3  # so many returns within _THEFT_SPAN mean that somebody else keeps taking the stream
@@ -39,18 +40,19 @@ class NetFtTransducer(ThreadedTransducer):
     def __init__(
         self,
         info: TransducerInfo,
-        connect: Callable[[], Link],
+        connect: Callable[[Deadline], Link],
         who: Callable[[], TransducerInfo | None],
         clock: Clock,
         request: bytes = START,
+        *,
+        opening: Deadline | None = None,
     ) -> None:
-        """Take an identified box. `who` tells who answers there now, soon, None when nobody does: asked in a silence.
+        """Take an identified box, opened by `opening`. `request` asks for the stream.
 
-        `request` asks for the stream.
+        `who` returns who answers there now, soon, None when nobody does; it is asked again and again.
         """
+        super().__init__(info, clock, opening)
         self._request = request
-        self._invalid = (AXIA if "axia" in info.model.lower() else NET_FT).invalid
-        super().__init__(info, clock)
         self._connect = connect
         self._who = who
         self._step = round(info.counter_rate / info.rate) if info.rate > 0.0 else None  # nan: learn it
@@ -68,36 +70,26 @@ class NetFtTransducer(ThreadedTransducer):
             found += (
                 [rate_words("its clock runs", self._watch.rate, self._info.counter_rate)] if self._watch.found else []
             )
-            return Health(
-                received=self._received,
+            return self._health(
                 lost=account.lost,
                 repeated=account.repeated,
                 late=account.late,
                 malformed=self._wrong_length + account.garbage,
                 stalled=account.frozen,
                 restarted=account.restarted,
-                saturated=self._saturated,
                 off_rate=account.changed + self._watch.found,
                 rate_words="; ".join(found),
-                lag_ms=self._lag_ms,
+                off_units=0 if self._settings.fault is None else sum(count for _, count in self._unconfirmed),
             )
 
-    def start(self) -> None:
-        """Ask for the stream until it comes. Raises LinkLost when it does not, DeviceFault when its rate is wrong."""
-        self._reset()
-        link = self._connect()
-        self._thread = threading.Thread(target=self._drain, args=(link,), name=f"net-ft {self._info.serial}")
-        self._thread.start()
-        patience = _PATIENCE + 4.0 * self._period
-        waited = 0.0
-        while self.health.received == 0:
-            waited += 0.0 if self._arrived.wait(_TICK) else _TICK
-            self._arrived.clear()
-            if self._ended is not None or waited > patience:
-                self.stop()
-                raise self._ended or LinkLost(self._never_came(patience))
+    def _has_come(self) -> bool:
+        """Tell whether a reading has come."""
+        return self.health.received > 0
+
+    def _check_first(self) -> None:
+        """Raise why the stream cannot be used, where it cannot; DeviceFault when its rate is wrong."""
+        super()._check_first()
         if self._step is not None and self._account.step not in (None, self._step):
-            self.stop()
             raise DeviceFault(
                 f"{self._info.uri} is set to {self._info.rate:g} Hz but sends "
                 f"{self._info.counter_rate / (self._account.step or 1):g} Hz; switch it off and on, then open it again"
@@ -109,27 +101,38 @@ class NetFtTransducer(ThreadedTransducer):
         self._pending.clear()
         self._account = SequenceAccount(self._step, self._info.counter_rate)
         self._watch = RateWatch(self._info.counter_rate, self._clock.factor, _SILENT_TICKS * self._clock.factor)
-        self._breaks = 0  # in the device's counter, so far
+        self._breaks = self._changes = 0  # in the device's counter, and of it or the rate, so far
         self._held: list[tuple[bytes, int]] = []
         self._zero: int | None = None  # counter of the first reading
-        self._received = self._wrong_length = self._saturated = 0
+        self._wrong_length = 0
+        self._settings = SettingsWatch(self._info, self._who, self._clock)
+        self._unconfirmed: deque[tuple[int, int]] = deque()  # when the last of so many readings came, units unsure [ns]
 
-    def _drain(self, link: Link) -> None:
+    def _run(self) -> None:
         """Be the receiving thread: ask for the stream, take what comes, ask again when it falls silent, and end it."""
         try:
-            self._listen(link)
-        except (LinkLost, DeviceFault) as error:
-            self._ended = error
-        finally:
+            link = self._connect(self._begin_by)
             try:
-                link.send(STOP)
-                link.send(STOP)  # it is not acknowledged and may be lost; a second one does no harm
-                while (datagram := link.receive(0.0)) is not None:
-                    self._pending.append((datagram, self._clock.now_ns()))
-            except LinkLost:
-                pass
-            link.close()
+                self._settings.start()
+                self._listen(link)
+            finally:
+                self._take_leave(Deadline(ENDING).bound(link))
+                self._settings.end()
+        except (LinkLost, SetupError, DeviceFault) as error:
+            self._ended = error
+        except Stopped:
+            pass
+        finally:
             self._arrived.set()
+
+    def _take_leave(self, link: Link) -> None:
+        """Bring the stream to an end, and take what had been sent."""
+        with contextlib.suppress(LinkLost):
+            link.send(STOP)
+            link.send(STOP)  # it is not acknowledged and may be lost; a second one does no harm
+            while (datagram := link.receive(0.0)) is not None:
+                self._pending.append((datagram, self._clock.now_ns()))
+        link.close()
 
     def _listen(self, link: Link) -> None:
         """Take datagrams until told to stop, or until the box has been silent for too long."""
@@ -140,6 +143,8 @@ class NetFtTransducer(ThreadedTransducer):
         streaming = ever = False
         returns: deque[float] = deque(maxlen=_THEFTS)
         while not self._stopping.is_set():
+            if self._settings.fault is not None:
+                raise self._settings.fault
             datagram = receive(_TICK)
             if datagram is not None:
                 keep((datagram, now_ns()))
@@ -159,25 +164,9 @@ class NetFtTransducer(ThreadedTransducer):
                         f"{self._info.uri} stopped sending {_THEFTS} times within {_THEFT_SPAN:g} s; "
                         "another program on the network probably takes its stream: end that program"
                     )
-            if not ever or self._is_the_same():
+            if not ever or self._settings.is_the_same():
                 link.send(self._request)
             asked, streaming = silence, False
-
-    def _is_the_same(self) -> bool:
-        """Tell whether the box answers again. Raises DeviceFault when another one does, or when it is set anew."""
-        found = self._who()
-        if found is None:
-            return False
-        if found.serial != self._info.serial:
-            raise DeviceFault(
-                f"{self._info.uri}: transducer {found.serial} answers where {self._info.serial} was; "
-                "connect that one again, or open it anew"
-            )
-        if not np.array_equal(found.calibration.matrix, self._info.calibration.matrix):
-            raise DeviceFault(
-                f"{self._info.uri}: transducer {found.serial} counts in other units than before; open it anew"
-            )
-        return True
 
     def _digest(self, *, end: bool = False) -> None:
         """Turn pending datagrams into accounted readings. The lock is held."""
@@ -200,11 +189,10 @@ class NetFtTransducer(ThreadedTransducer):
             self._zero = int(verdict.counter[0])
         kept = records[verdict.kept]
         status = kept["status"].astype(np.int64)
-        self._received += len(kept)
         arrived_ns = np.array(received_ns, np.int64)[verdict.kept]
         self._compare_clocks(verdict.counter, arrived_ns)
-        self._saturated += int(np.count_nonzero(status & self._invalid))
-        self._ready.append(
+        self._compare_settings(int(arrived_ns[-1]), len(kept))
+        self._hand_over(
             ReadingBlock(
                 sequence=verdict.sequence,
                 counter=verdict.counter,
@@ -226,22 +214,45 @@ class NetFtTransducer(ThreadedTransducer):
         for i in range((len(counter) - 1) % apart, len(counter), apart):
             self._watch.take(int(counter[i]), int(received_ns[i]))
 
+    def _compare_settings(self, received_ns: int, count: int) -> None:
+        """Keep count of readings whose units are not confirmed, and look at once where rate or counter has changed."""
+        changes = self._account.changed + self._account.restarted + self._watch.found
+        if changes != self._changes:
+            self._changes = changes
+            self._settings.look_now()
+        while self._unconfirmed and self._unconfirmed[0][0] < self._settings.confirmed_ns:
+            self._unconfirmed.popleft()
+        self._unconfirmed.append((received_ns, count))
+
     def _rate_found(self) -> str:
         """Return at which rate the box sends now."""
         return rate_words("it sends", self._info.counter_rate / (self._account.step or 1), self._info.rate)
 
-    def _never_came(self, patience: float) -> str:
+    def _never_came(self, seconds: float) -> str:
         """Return why a start failed."""
-        if self._who() is not None:
+        health = self.health
+        if senseless := health.malformed + health.repeated + health.late + len(self._held):
             return (
-                f"{self._info.uri} answers on its web page but sent no reading within {patience:.1f} s; "
+                f"{self._info.uri} sent {senseless} records within {seconds:.1f} s of which none is a reading: of a "
+                "wrong length, or numbers that stand still; switch the box off and on, and check the rdt port"
+            )
+        if self._answers():
+            return (
+                f"{self._info.uri} answers on its web page but sent no reading within {seconds:.1f} s; "
                 "check that no firewall holds back its UDP datagrams"
             )
-        return f"{self._info.uri} sent no reading within {patience:.1f} s; check its power and network cable"
+        return f"{self._info.uri} sent no reading within {seconds:.1f} s; check its power and network cable"
+
+    def _answers(self) -> bool:
+        """Tell whether somebody answers on the web page."""
+        try:
+            return self._who() is not None
+        except SetupError:
+            return True
 
     def _fell_silent(self, seconds: float) -> str:
         """Return why a running stream was given up."""
-        if self._who() is not None:
+        if self._answers():
             return (
                 f"{self._info.uri} has sent nothing for {seconds:.1f} s though its web page still answers; "
                 "end any other program that reads it, and check for a firewall"

@@ -8,6 +8,7 @@ import numpy as np
 
 from drivers.address import Address, AddressError, check_options
 from drivers.clock import Clock
+from drivers.deadline import Deadline
 from drivers.links import UdpLink, http_get, tcp_answer
 from drivers.net_ft import wire
 from drivers.net_ft.configuration import Configuration, parse_configuration, true_rate
@@ -15,7 +16,6 @@ from drivers.net_ft.device import NetFtTransducer
 from drivers.net_ft.wire import COUNTER_RATE
 from drivers.transducer import LinkLost, SetupError, TransducerInfo
 
-PATIENCE = 3.0  # for one web page [real s]; a healthy box answers within 0.1 s
 _AT_ONCE = 0.18  # for one web page while a stream is silent, and so for a stop [real s]
 _SETTLING = 0.05  # after a bias was asked for [real s]
 _OPTIONS = frozenset({"rdt", "tcp", "http", "rate", "mode", "bias", "latch"})
@@ -36,21 +36,22 @@ class Where:
     reset_latch: bool = False  # of the monitor condition
 
 
-def open_net_ft(address: Address, clock: Clock) -> NetFtTransducer:
+def open_net_ft(address: Address, clock: Clock, deadline: Deadline) -> NetFtTransducer:
     """Return the box at `address`, set as it asks, not streaming. Raises SetupError or LinkLost with the reason."""
     place = where(address)
     return NetFtTransducer(
-        prepare(place),
-        connect=lambda: UdpLink(address.host, place.rdt_port),
+        prepare(place, deadline),
+        connect=lambda limit: UdpLink(address.host, place.rdt_port, limit),
         who=lambda: who(place),
         clock=clock,
+        opening=deadline,
         request=start_request(place),
     )
 
 
-def identify_net_ft(address: Address, patience: float) -> TransducerInfo:
+def identify_net_ft(address: Address, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing nothing. Raises SetupError or LinkLost with the reason."""
-    return identify(where(address), patience)
+    return identify(where(address), deadline)
 
 
 def where(address: Address) -> Where:
@@ -74,26 +75,26 @@ def where(address: Address) -> Where:
     )
 
 
-def identify(place: Where, patience: float = PATIENCE) -> TransducerInfo:
+def identify(place: Where, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing nothing. Raises SetupError or LinkLost with the reason."""
-    return _info(place, _configuration(place, patience))
+    return _info(place, _configuration(place, deadline))
 
 
-def prepare(place: Where) -> TransducerInfo:
+def prepare(place: Where, deadline: Deadline) -> TransducerInfo:
     """Set what the address asks for, and return who answers, as read back afterwards."""
-    found = _configuration(place, PATIENCE)
+    found = _configuration(place, deadline)
     if not found.streams:
         raise SetupError(f"{place.address.uri}: the box's RDT output is disabled; enable it on its Communications page")
     if place.rate is not None and not _is_rate(found, place.rate):
         path = f"/comm.cgi?comrdtrate={place.rate}"
-        answer = http_get(place.address.host, place.http_port, path, PATIENCE)
-        if answer.status not in (200, 302) or not _is_rate(found := _configuration(place, PATIENCE), place.rate):
+        answer = http_get(place.address.host, place.http_port, path, deadline)
+        if answer.status not in (200, 302) or not _is_rate(found := _configuration(place, deadline), place.rate):
             shown = "shows no rate at all" if math.isnan(found.rate) else f"stays at {found.rate:g} Hz"
             raise SetupError(
                 f"{place.address.uri}: the box was asked for {place.rate} Hz but {shown}; "
                 "set the rate on its Communications page"
             )
-    done = _commanded(place, found) if place.set_bias or place.reset_latch else {}
+    done = _commanded(place, found, deadline) if place.set_bias or place.reset_latch else {}
     if place.buffered:
         done["streaming"] = "buffered"
     info = _info(place, found)
@@ -105,9 +106,9 @@ def start_request(place: Where) -> bytes:
     return wire.START_BUFFERED if place.buffered else wire.START
 
 
-def _commanded(place: Where, found: Configuration) -> dict[str, str]:
+def _commanded(place: Where, found: Configuration, deadline: Deadline) -> dict[str, str]:
     """Carry out over the command port what the address asks for; return what came of it, for the record."""
-    units = wire.parse_units(_tcp(place, wire.READ_UNITS, 24))
+    units = wire.parse_units(_tcp(place, wire.READ_UNITS, 24, deadline))
     if units is None or (units.counts_per_force, units.counts_per_torque) != (
         found.counts_per_force,
         found.counts_per_torque,
@@ -117,14 +118,14 @@ def _commanded(place: Where, found: Configuration) -> dict[str, str]:
         )
     done: dict[str, str] = {}
     if place.reset_latch:
-        _wrench(place, wire.RESET_LATCH)
-        still = wire.is_latched(_tcp(place, wire.READ_WRENCH, 16))
+        _wrench(place, wire.RESET_LATCH, deadline)
+        still = wire.is_latched(_tcp(place, wire.READ_WRENCH, 16, deadline))
         read_back = "and latched again: its condition holds" if still else "and read back as not latched"
         done["monitor condition latch"] = f"reset at opening, as the address asks, {read_back}"
     if place.set_bias:
-        _wrench(place, wire.SET_BIAS)
+        _wrench(place, wire.SET_BIAS, deadline)
         time.sleep(_SETTLING)
-        counts = np.array(_wrench(place, wire.READ_WRENCH)) * np.array(units.scales)
+        counts = np.array(_wrench(place, wire.READ_WRENCH, deadline)) * np.array(units.scales)
         left = np.abs(found.calibration().matrix @ counts)
         done["software bias"] = (
             f"set at opening, as the address asks; at most {left[:3].max():.3g} N and {left[3:].max():.3g} N mm left"
@@ -132,22 +133,22 @@ def _commanded(place: Where, found: Configuration) -> dict[str, str]:
     return done
 
 
-def _wrench(place: Where, command: bytes) -> tuple[int, ...]:
-    counts = wire.parse_wrench(_tcp(place, command, 16))
+def _wrench(place: Where, command: bytes, deadline: Deadline) -> tuple[int, ...]:
+    counts = wire.parse_wrench(_tcp(place, command, 16, deadline))
     if counts is None:
         raise SetupError(f"{place.address.uri}: its command port gives no answer that can be read; check the tcp port")
     return counts
 
 
-def _tcp(place: Where, command: bytes, size: int) -> bytes:
-    return tcp_answer(place.address.host, place.tcp_port, command, size, PATIENCE)
+def _tcp(place: Where, command: bytes, size: int, deadline: Deadline) -> bytes:
+    return tcp_answer(place.address.host, place.tcp_port, command, size, deadline)
 
 
 def who(place: Where) -> TransducerInfo | None:
-    """Return who answers at once, None when nobody does."""
+    """Return who answers at once, None when nobody does. Raises SetupError when its page makes no sense."""
     try:
-        return identify(place, _AT_ONCE)
-    except (LinkLost, SetupError):
+        return identify(place, Deadline(_AT_ONCE))
+    except LinkLost:
         return None
 
 
@@ -162,8 +163,7 @@ def _info(place: Where, found: Configuration) -> TransducerInfo:
         counter_rate=found.ticks,
         calibration=found.calibration(),
         settings=found.settings,
-        harmless=found.family.harmless,
-        summary=wire.SUMMARY,
+        status=found.family.status,
     )
 
 
@@ -171,8 +171,8 @@ def _is_rate(found: Configuration, asked: int) -> bool:
     return math.isclose(found.rate, true_rate(asked, found.ticks))
 
 
-def _configuration(place: Where, patience: float) -> Configuration:
-    answer = http_get(place.address.host, place.http_port, "/netftapi2.xml", patience)
+def _configuration(place: Where, deadline: Deadline) -> Configuration:
+    answer = http_get(place.address.host, place.http_port, "/netftapi2.xml", deadline)
     if answer.status != 200:
         raise SetupError(
             f"{place.address.uri}: its web page answers {answer.status} instead of a configuration; "

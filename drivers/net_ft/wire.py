@@ -4,11 +4,13 @@ Layouts: maker's manuals 9620-05-NET FT (chapters 10 and 11, section 15.2) and 9
 """
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from drivers.status import StatusTable, bit
 
 _REQUEST = struct.Struct(">HHI")  # header, command, number of records (0: until stopped)
 _HEADER = 0x1234
@@ -36,52 +38,52 @@ COUNTER_RATE = 7000.0  # ticks a second, good to 0.5 % [Hz]
 
 SUMMARY = 1 << 31  # some bit is an error
 
-_NET_FT = {
-    30: "processor or memory fault",
-    29: "digital board fault",
-    28: "analogue board fault",
-    27: "serial link communication error",
-    26: "program memory verification error",
-    25: "halted by configuration errors",
-    24: "settings failed validation",
-    23: "configuration does not fit the calibration",
-    22: "network communication error",
-    21: "CAN error",
-    20: "RDT communication error",
-    19: "EtherNet/IP error",
-    18: "DeviceNet error",
-    17: "transducer saturated or converter error",
-    16: "monitor condition latched",  # a threshold the user set was crossed: no fault by itself
-    14: "watchdog timeout",
-    13: "stack check failed",
-    12: "serial EEPROM error",
-    11: "serial flash error",
-    10: "analogue board watchdog timeout",
-    9: "gauge excitation current too high",
-    8: "gauge excitation current too low",
-    7: "artificial analogue ground out of range",
-    6: "analogue supply too high",
-    5: "analogue supply too low",
-    4: "serial link data unavailable",
-    3: "reference voltage error",
-    2: "internal temperature error",
-    1: "HTTP error",
-}
-
-
-_AXIA = {
-    30: "force or torque out of range",
-    29: "calibration checksum error",
-    28: "simulated error",
-    27: "gauge out of range",
-    16: "monitor condition latched",
-    7: "calibration not accessible",
-    5: "other error",
-    3: "busy",
-    2: "broken gauge",
-    1: "supply outside 12 to 32 V",
-    0: "temperature outside -5 to 70 °C",
-}
+# A monitor condition is latched where a threshold that the user set was crossed. Whether the summary bit comes with it
+# is not agreed on: both forms are a note. All else is doubtful, as in the most careful published client.
+_NET_FT = (
+    bit(30, "processor or memory fault", "doubtful"),
+    bit(29, "digital board fault", "doubtful"),
+    bit(28, "analogue board fault", "doubtful"),
+    bit(27, "serial link communication error", "doubtful"),
+    bit(26, "program memory verification error", "doubtful"),
+    bit(25, "halted by configuration errors", "doubtful"),
+    bit(24, "settings failed validation", "doubtful"),
+    bit(23, "configuration does not fit the calibration", "doubtful"),
+    bit(22, "network communication error", "doubtful"),
+    bit(21, "CAN error", "doubtful"),
+    bit(20, "RDT communication error", "doubtful"),
+    bit(19, "EtherNet/IP error", "doubtful"),
+    bit(18, "DeviceNet error", "doubtful"),
+    bit(17, "transducer saturated or converter error", "saturated"),
+    bit(16, "monitor condition latched", "note"),
+    bit(14, "watchdog timeout", "doubtful"),
+    bit(13, "stack check failed", "doubtful"),
+    bit(12, "serial EEPROM error", "doubtful"),
+    bit(11, "serial flash error", "doubtful"),
+    bit(10, "analogue board watchdog timeout", "doubtful"),
+    bit(9, "gauge excitation current too high", "doubtful"),
+    bit(8, "gauge excitation current too low", "doubtful"),
+    bit(7, "artificial analogue ground out of range", "doubtful"),
+    bit(6, "analogue supply too high", "doubtful"),
+    bit(5, "analogue supply too low", "doubtful"),
+    bit(4, "serial link data unavailable", "doubtful"),
+    bit(3, "reference voltage error", "doubtful"),
+    bit(2, "internal temperature error", "doubtful"),
+    bit(1, "HTTP error", "doubtful"),
+)
+_AXIA = (
+    bit(30, "force or torque out of range", "saturated"),
+    bit(29, "calibration checksum error", "doubtful"),
+    bit(28, "simulated error", "note"),
+    bit(27, "gauge out of range", "saturated"),
+    bit(16, "monitor condition latched", "note"),
+    bit(7, "calibration not accessible", "doubtful"),
+    bit(5, "other error", "doubtful"),
+    bit(3, "busy", "note"),
+    bit(2, "broken gauge", "doubtful"),
+    bit(1, "supply outside 12 to 32 V", "doubtful"),
+    bit(0, "temperature outside -5 to 70 °C", "doubtful"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,24 +91,11 @@ class Family:
     """What differs between the boxes that speak this wire."""
 
     name: str
-    invalid: int  # status bits that make the six values of a record invalid
-    harmless: int  # status bits that say nothing against the six values
-    meaning: Mapping[int, str]  # of each status bit
-
-    def words(self, status: int) -> tuple[str, ...]:
-        """Return what the set bits of a status word mean, the gravest first; nothing when the box is healthy.
-
-        >>> NET_FT.words(0x80020000)
-        ('transducer saturated or converter error',)
-        """
-        bits = [bit for bit in range(30, -1, -1) if status >> bit & 1]
-        words = tuple(self.meaning.get(bit, f"unknown bit {bit}") for bit in bits)
-        return words or (("unnamed error",) if status & SUMMARY else ())
+    status: StatusTable
 
 
-# Whether the summary bit comes with a latched condition is not agreed on: both forms are taken to mean no harm.
-NET_FT = Family("Net F/T", 1 << 17, 1 << 16, _NET_FT)
-AXIA = Family("Ethernet Axia", 1 << 30 | 1 << 27 | 1 << 2, 1 << 28 | 1 << 16 | 1 << 3, _AXIA)
+NET_FT = Family("Net F/T", StatusTable(_NET_FT, SUMMARY))
+AXIA = Family("Ethernet Axia", StatusTable(_AXIA, SUMMARY))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,7 +7,6 @@ device's clock and numbers nothing; when its buffer overflows it ends the acquis
 import importlib
 import time
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,16 +15,19 @@ import numpy as np
 from drivers.address import Address, AddressError, check_options
 from drivers.calibration_file import read_calibration_file
 from drivers.clock import Clock
-from drivers.links import Link
+from drivers.deadline import Deadline
+from drivers.link import Link
 from drivers.records import RecordDecoder, Records
 from drivers.scan_count import ScanCount
+from drivers.status import StatusTable, bit
 from drivers.streaming import StreamingTransducer
 from drivers.transducer import LinkLost, SetupError, TransducerInfo
 
 GAUGES = 6
 RANGE = 10.0  # [V]
 LIMIT = 9.9  # of a gauge's voltage [V]; a converter of 16 bits clips slightly outside of 10 V
-SATURATED = 0x3F00  # status: bit 8 + i says that gauge i is at its limit
+# Bit 8 + i of a status says that gauge i is at its limit.
+STATUS_BITS = StatusTable(tuple(bit(8 + gauge, f"gauge {gauge} at its limit", "saturated") for gauge in range(GAUGES)))
 _BUFFER = 10.0  # readings that the library keeps for a computer that is late [s]
 _NAP = 0.005  # between two looks for readings [real s]
 _OPTIONS = frozenset({"cal", "rate"})
@@ -44,7 +46,7 @@ def library() -> Any:  # noqa: ANN401 - it is not always there
         ) from None
 
 
-def open_nidaq(address: Address, clock: Clock) -> StreamingTransducer:
+def open_nidaq(address: Address, clock: Clock, deadline: Deadline) -> StreamingTransducer:
     """Return the transducer at `address`, not streaming. Raises SetupError with the reason."""
     check_options(address, _OPTIONS)
     api = library()
@@ -54,13 +56,14 @@ def open_nidaq(address: Address, clock: Clock) -> StreamingTransducer:
     link.close()
     return StreamingTransducer(
         replace(info, rate=link.rate, counter_rate=link.rate, settings={**info.settings, "gauges": link.gauges}),
-        partial(TaskLink, api, device, rate),
+        lambda _: TaskLink(api, device, rate),
         TaskConversation(),
         clock,
+        opening=deadline,
     )
 
 
-def identify_nidaq(address: Address, _patience: float) -> TransducerInfo:
+def identify_nidaq(address: Address, _deadline: Deadline) -> TransducerInfo:
     """Return who is there; nothing is acquired. Raises SetupError with the reason."""
     check_options(address, _OPTIONS)
     return _found(library(), address)[1]
@@ -90,6 +93,7 @@ def _found(api: Any, address: Address) -> tuple[str, TransducerInfo]:  # noqa: A
         rate=float("nan"),
         counter_rate=float("nan"),
         calibration=calibration.calibration,
+        status=STATUS_BITS,
         settings={
             "converter": f"{device.product_type}, serial number {device.serial_num:X}",
             "calibration": f"{calibration.calibration.source}, SHA-256 {calibration.sha256}",
@@ -180,8 +184,6 @@ class VoltsDecoder:
 
 class TaskConversation:
     """Begins and ends acquisitions."""
-
-    saturated = SATURATED
 
     def decoder(self) -> RecordDecoder:
         """Return a decoder for a stream about to begin."""

@@ -4,14 +4,14 @@ import contextlib
 import math
 import time
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from drivers.address import Address, check_options
 from drivers.calibration import Calibration
 from drivers.clock import Clock
-from drivers.links import Link
+from drivers.deadline import Deadline
+from drivers.link import Link
 from drivers.pacing import GAP, Pacing
 from drivers.records import RecordDecoder
 from drivers.serial_ft import wire
@@ -43,7 +43,7 @@ class _Where:
     calibration: Calibration
 
 
-def open_serial_ft(address: Address, clock: Clock) -> StreamingTransducer:
+def open_serial_ft(address: Address, clock: Clock, deadline: Deadline) -> StreamingTransducer:
     """Return the controller at `address`, set and watched for its rate, not streaming.
 
     Raises SetupError, LinkLost or DeviceFault with the reason.
@@ -51,45 +51,50 @@ def open_serial_ft(address: Address, clock: Clock) -> StreamingTransducer:
     place = _where(address)
     conversation = ControllerConversation(binary=place.binary)
     try:
-        link, baud = _answering(place, math.inf)
+        link, baud = _answering(place, deadline)
         try:
-            said = banner(link)
-            rate = measured_rate(link, conversation, clock, _MEASURED)
+            said = banner(deadline.bound(link))
+            rate = measured_rate(link, conversation, clock, _MEASURED, deadline)
         finally:
             link.close()
     except (LinkLost, DeviceFault) as error:
         raise type(error)(f"{address.uri}: {error}") from None
     info = _info(place, baud, said, rate)
-    return StreamingTransducer(info, partial(SerialLink, place.port, baud), conversation, clock)
+    return StreamingTransducer(info, lambda _: SerialLink(place.port, baud), conversation, clock, opening=deadline)
 
 
-def identify_serial_ft(address: Address, patience: float) -> TransducerInfo:
-    """Return who answers within `patience` real seconds, changing no setting (a stream nobody reads is ended)."""
+def identify_serial_ft(address: Address, deadline: Deadline) -> TransducerInfo:
+    """Return who answers, changing no setting (a stream nobody reads is ended)."""
     place = _where(address)
     try:
-        link, baud = _answering(place, patience)
+        link, baud = _answering(place, deadline)
         link.close()
     except LinkLost as error:
         raise LinkLost(f"{address.uri}: {error}") from None
     return _info(place, baud, "", math.nan)
 
 
-def _answering(place: _Where, patience: float) -> tuple[SerialLink, int]:
+def _answering(place: _Where, deadline: Deadline) -> tuple[SerialLink, int]:
     """Return an open line on which a controller answers, and its baud rate."""
-    deadline = time.monotonic() + patience
+    tried: list[int] = []
     for baud in place.bauds:
-        if time.monotonic() > deadline:
+        if deadline.left <= 0.0:
             break
+        tried.append(baud)
         link = SerialLink(place.port, baud)
         try:
-            if prompted(link, tries=2):
+            if prompted(deadline.bound(link), tries=2):
                 return link, baud
+        except LinkLost:
+            if deadline.left > 0.0:
+                link.close()
+                raise
         except BaseException:
             link.close()
             raise
         link.close()
-    tried = ", ".join(str(baud) for baud in place.bauds)
-    raise LinkLost(f"no controller answers (tried {tried} baud); check its power and the cable")
+    rates = ", ".join(map(str, tried))
+    raise LinkLost(f"no controller answers (tried {rates} baud); check its power, the cable and the baud rate")
 
 
 def _info(place: _Where, baud: int, said: str, rate: float) -> TransducerInfo:
@@ -115,6 +120,7 @@ def _info(place: _Where, baud: int, said: str, rate: float) -> TransducerInfo:
         counter_rate=math.nan,
         calibration=place.calibration,
         settings=settings,
+        status=wire.STATUS_BITS,
     )
 
 
@@ -163,8 +169,6 @@ def _above_zero(address: Address, option: str) -> float:
 
 class ControllerConversation:
     """Prompts, settings and streams of one controller."""
-
-    saturated = 0xFF  # any error digit means saturation or a sensor error: the values are invalid
 
     def __init__(self, *, binary: bool) -> None:
         """Take records as bytes, or as text."""
@@ -223,7 +227,7 @@ class ControllerConversation:
         raise LinkLost("the controller does not begin to stream; switch it off and on")
 
 
-def prompted(link: Link, tries: int = _TRIES, patience: float = 0.25) -> bool:
+def prompted(link: Link, tries: int = _TRIES, patience: float = 0.2) -> bool:
     """Tell whether a controller answers with its prompt; a stream it was sending ends by this."""
     return any(_said(link, wire.RETURN, patience).rstrip().endswith(wire.PROMPT) for _ in range(tries))
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from drivers.records import Records
+from drivers.status import StatusBit, StatusTable
 
 WARM_START = b"\x17"  # ^W
 ASCII_OUTPUT = b"CD A"
@@ -34,6 +35,9 @@ _BINARY = np.dtype([("error", "u1"), ("values", ">i2", 6)])
 _WIDTH = 6  # characters of an integer in text
 _ASCII_RECORD = re.compile(rb"([0-9])" + rb",( *-?[0-9]+)" * 6)
 _MOST_ERROR = 9  # of an error byte: it stands for one digit
+STATUS_BITS = StatusTable(
+    tuple(StatusBit(0xFF, n, f"error digit {n}: saturated or sensor error", "saturated") for n in range(1, 10))
+)
 _ACKNOWLEDGED = b"\x06\r\n>"  # after the record of an answer to QR in binary
 _NEAR = 4  # records that are looked at together where all is steady
 _STEADY = 160  # summed change of their values below which no further proof is asked [counts]

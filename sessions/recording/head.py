@@ -4,12 +4,14 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import msgspec
 import numpy as np
 
 from drivers.calibration import Calibration
+from drivers.status import StatusBit, StatusTable, bit
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan
 
@@ -56,8 +58,9 @@ def info_to_dict(info: TransducerInfo) -> dict[str, Any]:
         "rate": _known(info.rate),
         "counter_rate": _known(info.counter_rate),
         "settings": dict(info.settings),
-        "harmless": info.harmless,
-        "summary": info.summary,
+        "harmless": info.status.harmless,
+        "summary": info.status.summary,
+        "status_bits": [asdict(entry) for entry in info.status.bits],
         "calibration": {
             "serial": calibration.serial,
             "raw_unit": calibration.raw_unit,
@@ -96,9 +99,19 @@ def info_from_dict(data: Mapping[str, Any]) -> TransducerInfo:
         counter_rate=_number(data["counter_rate"]),
         calibration=calibration,
         settings=dict(data["settings"]),
-        harmless=data.get("harmless", 0),
-        summary=data.get("summary", 0),
+        status=_status_table(data),
     )
+
+
+def _status_table(data: Mapping[str, Any]) -> StatusTable:
+    """Return what the bits of a status mean; early recordings only tell which are harmless."""
+    told = data.get("status_bits")
+    if told is None:
+        harmless = int(data.get("harmless", 0))
+        bits = tuple(bit(n, f"bit {n}", "note") for n in range(harmless.bit_length()) if harmless >> n & 1)
+    else:
+        bits = tuple(msgspec.convert(entry, StatusBit) for entry in told)
+    return StatusTable(bits, int(data.get("summary", 0)))
 
 
 def calibration_hash(calibration: Calibration) -> str:

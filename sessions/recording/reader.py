@@ -4,6 +4,7 @@ import json
 import shutil
 import sqlite3
 import tempfile
+from collections import Counter
 from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, fields
@@ -15,6 +16,7 @@ import msgspec
 import numpy as np
 
 from drivers.readings import ReadingBlock
+from drivers.status import flagged_words
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan
 from sessions.recording.errors import RecordingError
@@ -42,6 +44,9 @@ LOSS_SENTENCES = {
     "stalled": "{} readings came while the device's counter stood still",
     "restarted": "how often the device began to count anew: {}",
     "saturated": "the device called {} readings invalid, as when it is saturated",
+    "doubtful": "the device told of a fault with {} readings: they are doubtful",
+    "noted": "the status of {} readings says something, though nothing against their values",
+    "off_units": "{} readings came when the device may have counted in other units already: they are doubtful",
     "off_rate": "how often the device's rate was found to be another than set, or than before: {}",
 }
 
@@ -110,10 +115,14 @@ class Recording:
     def flaws(self) -> tuple[str, ...]:
         """Name what went wrong while recording, as the event log tells it, a sentence each."""
         trouble: list[str] = []
+        losses = [event.data for event in self.events if event.kind == "losses"]
         for name, sentence in LOSS_SENTENCES.items():
-            count = sum(event.data.get(name, 0) for event in self.events if event.kind == "losses")
-            if count:
+            if count := sum(data.get(name, 0) for data in losses):
                 trouble.append(sentence.format(count))
+        flagged: Counter[str] = Counter()
+        for data in losses:
+            flagged.update(data.get("flagged", {}))
+        trouble += [f"what their status said: {flagged_words(flagged)}"] if flagged else []
         found = [event.data["rate_words"] for event in self.events if "rate_words" in event.data]
         trouble += [f"the rate that was found: {words}" for words in dict.fromkeys(found)]
         for record in self.trials:

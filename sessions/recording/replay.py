@@ -1,5 +1,6 @@
 """A transducer that speaks from a recording: sequence, device counter, status and raw numbers as they were recorded."""
 
+from collections import Counter
 from collections.abc import Generator, Iterable
 from dataclasses import fields, replace
 
@@ -12,7 +13,7 @@ from sessions.recording.log import LoggedEvent
 from sessions.recording.reader import Recording
 
 # What a "losses" event may count.
-COUNTED = frozenset(field.name for field in fields(Health)) - {"received", "lag_ms", "rate_words"}
+COUNTED = frozenset(field.name for field in fields(Health)) - {"received", "lag_ms", "rate_words", "flagged"}
 
 
 class RecordedReadings:
@@ -144,4 +145,7 @@ def health_of(told: Iterable[LoggedEvent]) -> Health:
     events = list(told)
     counts = {name: sum(int(event.data.get(name, 0)) for event in events) for name in COUNTED}
     words = [str(event.data["rate_words"]) for event in events if "rate_words" in event.data]
-    return Health(**counts, rate_words=words[-1] if words else "")
+    flagged: Counter[str] = Counter()
+    for event in events:
+        flagged.update(event.data.get("flagged", {}))
+    return Health(**counts, rate_words=words[-1] if words else "", flagged=dict(flagged))

@@ -6,6 +6,7 @@ from typing import Any, Literal, Protocol
 
 from drivers.clock import Clock
 from drivers.readings import ReadingBlock
+from drivers.status import flagged_words
 from drivers.transducer import DeviceFault, Health, LinkLost, Transducer
 from sessions.plan.plan import SessionPlan
 from sessions.recording import Acknowledged, RecordingError, SessionWriter
@@ -21,7 +22,10 @@ from sessions.strokes.onset import ContactDetector, DetectorSettings
 Cause = Literal["finished", "aborted", "stopped", "device", "client", "disk", "program"]
 STOPPED = "stopped by the user"
 Ending = tuple[Cause, str]  # why a session ends, for programs and for people
-LOSSES = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated", "off_rate")  # counts of Health
+LOSSES = (  # counts of Health
+    *("lost", "repeated", "late", "malformed", "stalled", "restarted"),
+    *("saturated", "doubtful", "noted", "off_rate", "off_units"),
+)
 
 
 class Operator(Protocol):
@@ -289,8 +293,13 @@ class _Run:
         counts = {name: getattr(health, name) - getattr(self._reported, name) for name in LOSSES}
         if any(counts.values()) and (now or self._due("losses", self._settings.losses_every)):
             told = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-            data = {**counts, "rate_words": health.rate_words} if counts["off_rate"] else counts
-            sentence = f"readings: {told}" + (f" ({health.rate_words})" if counts["off_rate"] else "")
+            flagged = {words: count - self._reported.flagged.get(words, 0) for words, count in health.flagged.items()}
+            flagged = {words: count for words, count in flagged.items() if count}
+            causes = [health.rate_words] if counts["off_rate"] else []
+            causes += [f"status: {flagged_words(flagged)}"] if flagged else []
+            sentence = f"readings: {told}" + (f" ({'; '.join(causes)})" if causes else "")
+            data: dict[str, Any] = {**counts, "rate_words": health.rate_words} if counts["off_rate"] else {**counts}
+            data |= {"flagged": flagged} if flagged else {}
             self._writer.event("losses", trial_in_hand(self._state), {**data, "sentence": sentence})
             self._reported = health
 

@@ -12,6 +12,7 @@ class FlawName(StrEnum):
 
     LOST_READINGS = "lost_readings"
     SATURATED = "saturated"
+    DEVICE_FAULT = "device_fault"  # the device tells of a fault of its own
     FROZEN = "frozen_sensor"
     DEAD = "dead_sensor"
     WILD = "wild_reading"

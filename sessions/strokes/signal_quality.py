@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.readings import ReadingBlock
+from drivers.status import StatusCount, StatusTable, flagged_words
 from drivers.transducer import TransducerInfo
 from sessions.strokes.clipping import Stuck, at_the_same_value, stuck_axes
 from sessions.strokes.flaws import FlawName, Grade
@@ -85,7 +86,8 @@ def soundness(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSetti
     flaws = [
         *_loss_flaws(lost, len(block)),
         *_frozen_flaws(repeated, frozen, block.time, settings),
-        *_saturation_flaws(beyond, block.time),
+        *_fault_flaws(block, info.status),
+        *_saturation_flaws(beyond & ~info.status.faulty(block.status), block.time),
         *_stuck_flaws(stuck, block.time),
         *_wild_flaws(wild_axes, block.time),
         *_dead_flaws(dead),
@@ -148,7 +150,7 @@ def _saturated(block: ReadingBlock, info: TransducerInfo) -> Mask:
     wrench = calibration.own(calibration.wrench(block.raw, np.zeros(6)))
     with np.errstate(invalid="ignore"):
         beyond = (np.abs(wrench) > calibration.rated).any(axis=1)
-    return info.doubtful(block.status) | beyond
+    return info.status.doubtful(block.status) | beyond
 
 
 def _segments(good: Mask, broken: Mask) -> tuple[slice, ...]:
@@ -235,6 +237,20 @@ def _wild_flaws(wild: Mask, time: Array) -> _Found:
         f"at {time[at][0]:.3f} s: wild, and left out before anything is filtered."
     )
     return [(FlawName.WILD, sentence, "doubtful")]
+
+
+def _fault_flaws(block: ReadingBlock, table: StatusTable) -> _Found:
+    """Name the faults that the device told of."""
+    faulty = table.faulty(block.status)
+    if not faulty.any():
+        return []
+    told = StatusCount(table)
+    told.take(block.status[faulty])
+    sentence = (
+        f"{int(faulty.sum())} readings came while the device told of a fault, first at {block.time[faulty][0]:.2f} s: "
+        f"{flagged_words(told.flagged)}; they are doubtful and left out."
+    )
+    return [(FlawName.DEVICE_FAULT, sentence, "doubtful")]
 
 
 def _saturation_flaws(saturated: Mask, time: Array) -> _Found:

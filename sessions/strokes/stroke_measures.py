@@ -128,7 +128,7 @@ def _judge_gaps(found: Findings, span: Span, contact: Contact, settings: Analysi
     """Withhold peaks that missing readings may hide."""
     first, last = span.time[contact.start], span.time[contact.stop - 1]
     if ((span.saturated_at >= first) & (span.saturated_at <= last)).any():
-        sentence = "Readings of this stroke are saturated: its peaks are not known."
+        sentence = "Readings of this stroke are saturated or come with a fault of the device: its peaks are not known."
         found.flaw(FlawName.SATURATED, sentence, "doubtful", PEAKS)
     inside = [gap for gap in span.soundness.gaps if first <= gap.start and gap.stop <= last]
     widest = max(inside, key=lambda gap: gap.stop - gap.start, default=None)

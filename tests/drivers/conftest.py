@@ -4,8 +4,8 @@ import threading
 
 import pytest
 
+from drivers import deadline
 from drivers.clock import PacedClock
-from drivers.net_ft import device
 from simulators.bench import Bench
 from simulators.net_ft_box import NetFtBox
 
@@ -16,7 +16,7 @@ def box(monkeypatch):
 
     However busy this machine is, its first reading is waited for.
     """
-    monkeypatch.setattr(device, "_PATIENCE", 120.0)
+    monkeypatch.setattr(deadline, "CONNECTING", 120.0)
     boxes, before = [], set(threading.enumerate())
 
     def started(bench=None, *, clock=None, **settings):

@@ -11,15 +11,16 @@ import pytest
 
 from daq_app.simulation import wiring
 from daq_app.simulation.wiring import connected
-from drivers import rate, streaming
+from drivers import deadline, rate, streaming
 from drivers.address import parse_address
 from drivers.catalog import DRIVERS
 from drivers.clock import PacedClock
+from drivers.deadline import Deadline
 from drivers.digital_ft import device as digital_ft
 from drivers.net_ft import device as net_ft
 from drivers.readings import ReadingBlock
 from drivers.serial_ft import device as serial_ft
-from drivers.transducer import LinkLost, SetupError
+from drivers.transducer import Health, LinkLost, SetupError
 from simulators.bench import Bench
 from simulators.boxes import SIMULATORS, Simulated
 from simulators.faults import Fault, Faults
@@ -88,7 +89,7 @@ def handles(device, before=0):
 
 def quickened(monkeypatch):
     """Let what a driver waits for be no longer than a test needs; a first reading comes, however busy the machine."""
-    monkeypatch.setattr(net_ft, "_PATIENCE", 120.0)
+    monkeypatch.setattr(deadline, "CONNECTING", 120.0)
     monkeypatch.setattr(serial_ft, "_MEASURED", 0.25)
     monkeypatch.setattr(digital_ft, "_MEASURED", 0.15)
     monkeypatch.setattr(streaming, "_SILENCE", 0.8)
@@ -136,7 +137,7 @@ def identified(name, uri):
         return None
     for _ in range(20):  # a device may be deaf for a moment after its stream was ended
         try:
-            return IDENTIFY[name](parse_address(uri), 2.0)
+            return IDENTIFY[name](parse_address(uri), Deadline(2.0))
         except SetupError as error:
             return str(error)
         except LinkLost as error:
@@ -246,6 +247,38 @@ def disturbed_course(name, folder):
         set(threading.enumerate()) - threads,
         left,
     )
+
+
+def planted_statuses_course(name, folder):
+    """Plant each status that the maker lists, one after the other; return who it is, and what health said of each."""
+    clock, faults, said = PacedClock(1.0), Faults(), {}
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        quickened(monkeypatch)
+        device = started(name, faults, clock, folder, monkeypatch)
+        try:
+            with connected(device.uri, clock) as opened:
+                transducer, now = opened.transducer, opened.bench_now or device.now
+                transducer.start()
+                for status in simulator(name).statuses:
+                    if simulator(name).at_start:
+                        transducer.stop()
+                    before = transducer.health
+                    faults.put(Fault("status", now(), now() + 1e6, status=status))
+                    if simulator(name).at_start:
+                        transducer.start()
+                        before = Health()
+                    since = time.monotonic()
+                    while transducer.health.flagged == before.flagged and time.monotonic() - since < PATIENCE:
+                        transducer.read(0.02)
+                    said[status] = before, transducer.health, time.monotonic() - since
+                    faults.put()
+                    while (block := transducer.read(0.1)) is not None and len(block) and block.status[-1]:
+                        pass
+                transducer.stop()
+        finally:
+            device.close()
+            device.forget()
+    return opened.transducer.info, said
 
 
 def counted(kind, told):

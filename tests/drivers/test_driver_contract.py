@@ -18,6 +18,7 @@ from driver_courses import (
     STOPS_WITHIN,
     counted,
     disturbed_course,
+    planted_statuses_course,
     simulator,
     undisturbed_course,
 )
@@ -26,6 +27,7 @@ from daq_app.simulation.wiring import connected
 from drivers.catalog import DRIVERS, reachable
 from drivers.clock import PacedClock
 from drivers.transducer import SetupError
+from sessions.recording.head import info_from_dict, info_to_dict
 from simulators.boxes import SIMULATORS
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="there are no pseudo-terminals on this system")
@@ -205,6 +207,28 @@ def test_nothing_is_left_behind_by_a_device_that_went_away(disturbed, name):
     course = disturbed(name)
     assert course.threads_left == set()
     assert course.handles_left <= 0  # a simulated port goes with its device
+
+
+# ---- what the status says
+
+
+STATUSES = [name for name in LIVE if simulator(name).statuses]
+
+
+@pytest.mark.parametrize("name", STATUSES)
+def test_every_status_that_the_maker_lists_is_named_and_judged_within_a_second(name, tmp_path):
+    info, said = planted_statuses_course(name, tmp_path)
+    assert said.keys() == set(simulator(name).statuses)
+    for before, after, took in said.values():
+        new = [words for words, count in after.flagged.items() if count > before.flagged.get(words, 0)]
+        assert new, "nothing is named"
+        assert not [words for words in new if "unknown" in words or "unnamed" in words]
+        judged = (after.saturated - before.saturated, after.doubtful - before.doubtful, after.noted - before.noted)
+        assert sum(count > 0 for count in judged) == 1, judged
+        assert took < 1.0
+    named = {words for _, after, _ in said.values() for words in after.flagged}
+    assert len(named) >= len(simulator(name).statuses)
+    assert info_from_dict(info_to_dict(info)).status == info.status, "a recording holds the table"
 
 
 # ---- addresses

@@ -5,6 +5,7 @@ import threading
 
 import pytest
 
+from drivers.deadline import Deadline
 from drivers.links import MOST_BODY, HttpAnswer, UdpLink, http_get
 from drivers.transducer import LinkLost, SetupError
 
@@ -42,7 +43,7 @@ def serve():
 
 
 def get(port, patience=5.0):
-    return http_get("127.0.0.1", port, "/netftapi2.xml", patience)
+    return http_get("127.0.0.1", port, "/netftapi2.xml", Deadline(patience))
 
 
 @pytest.mark.parametrize(
@@ -109,7 +110,7 @@ def far_end():
 
 
 def test_datagrams_go_both_ways_one_by_one(far_end):
-    link = UdpLink("127.0.0.1", far_end.getsockname()[1])
+    link = UdpLink("127.0.0.1", far_end.getsockname()[1], Deadline(5.0))
     link.send(b"start")
     request, asker = far_end.recvfrom(100)
     for answer in (b"one", b"", b"three"):
@@ -123,7 +124,7 @@ def test_datagrams_go_both_ways_one_by_one(far_end):
 
 
 def test_datagrams_of_strangers_are_not_seen(far_end):
-    link = UdpLink("127.0.0.1", far_end.getsockname()[1])
+    link = UdpLink("127.0.0.1", far_end.getsockname()[1], Deadline(5.0))
     link.send(b"start")
     _, asker = far_end.recvfrom(100)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
@@ -136,7 +137,7 @@ def test_datagrams_of_strangers_are_not_seen(far_end):
 
 def test_a_refused_datagram_is_no_reason_to_give_up(far_end):
     port = far_end.getsockname()[1]
-    link = UdpLink("127.0.0.1", port)
+    link = UdpLink("127.0.0.1", port, Deadline(5.0))
     far_end.close()
     for _ in range(3):
         link.send(b"start")
@@ -145,7 +146,7 @@ def test_a_refused_datagram_is_no_reason_to_give_up(far_end):
 
 
 def test_a_link_that_was_closed_is_lost(far_end):
-    link = UdpLink("127.0.0.1", far_end.getsockname()[1])
+    link = UdpLink("127.0.0.1", far_end.getsockname()[1], Deadline(5.0))
     link.close()
     with pytest.raises(LinkLost):
         link.send(b"start")
@@ -155,4 +156,4 @@ def test_a_link_that_was_closed_is_lost(far_end):
 
 def test_an_unknown_host_is_refused():
     with pytest.raises(SetupError, match="cannot be found"):
-        UdpLink("no.such.host.invalid", 1)
+        UdpLink("no.such.host.invalid", 1, Deadline(5.0))

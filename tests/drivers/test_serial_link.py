@@ -9,6 +9,7 @@ import serial
 from drivers import serial_link
 from drivers.address import parse_address
 from drivers.clock import RealClock
+from drivers.deadline import Deadline
 from drivers.digital_ft import device as digital_ft
 from drivers.digital_ft import wire
 from drivers.digital_ft.device import open_digital_ft
@@ -58,7 +59,7 @@ def stand_in(monkeypatch):
 
 def test_the_rs485_transducer_is_opened_with_its_own_line_settings(stand_in):
     with pytest.raises(LinkLost, match="does not answer"):
-        open_digital_ft(parse_address("digital-ft:///dev/ttyUSB7"), RealClock())
+        open_digital_ft(parse_address("digital-ft:///dev/ttyUSB7"), RealClock(), Deadline.for_opening())
     ((port, baud), settings) = stand_in[0]
     assert (port, baud) == ("/dev/ttyUSB7", 1_250_000)
     assert settings["parity"] == serial.PARITY_EVEN
@@ -70,7 +71,11 @@ def test_the_rs485_transducer_is_opened_with_its_own_line_settings(stand_in):
 
 def test_the_controller_is_opened_without_parity_at_each_rate_it_might_have(stand_in):
     with pytest.raises(LinkLost, match="no controller answers"):
-        open_serial_ft(parse_address("serial-ft:///dev/ttyUSB0?counts_per_N=20&counts_per_Nm=333.33"), RealClock())
+        open_serial_ft(
+            parse_address("serial-ft:///dev/ttyUSB0?counts_per_N=20&counts_per_Nm=333.33"),
+            RealClock(),
+            Deadline.for_opening(),
+        )
     assert [arguments[1] for arguments, _ in stand_in][:3] == [38400, 9600, 115200]
     assert {settings["parity"] for _, settings in stand_in} == {serial.PARITY_NONE}
 

@@ -11,6 +11,7 @@ import pytest
 
 from drivers.address import parse_address
 from drivers.clock import Clock, PacedClock
+from drivers.deadline import Deadline
 from drivers.digital_ft import device as digital_ft_device
 from drivers.digital_ft.device import identify_digital_ft, open_digital_ft
 from drivers.readings import ReadingBlock
@@ -41,14 +42,14 @@ class Simulated:
     box: Any
 
     def open(self, more=""):
-        return self.opens(parse_address(self.uri + more), self.clock)
+        return self.opens(parse_address(self.uri + more), self.clock, Deadline.for_opening())
 
     def heard(self, block):
         """When the last reading arrived, on the bench's clock."""
         return (block.received_ns[-1] - self.box._origin_ns) * 1e-9 if len(block) else 0.0
 
     def identify(self):
-        return self.identifies(parse_address(self.uri), 1.0)
+        return self.identifies(parse_address(self.uri), Deadline(1.0))
 
 
 def serial_ft(form="binary"):
@@ -162,11 +163,11 @@ def test_the_baud_rate_of_a_controller_is_found_by_trying():
     box.start()
     try:
         uri = box.uri.replace("baud=19200&", "")
-        transducer = open_serial_ft(parse_address(uri), clock)
+        transducer = open_serial_ft(parse_address(uri), clock, Deadline.for_opening())
         assert transducer.info.settings["baud"] == "19200, found by trying"
         assert transducer.info.rate == pytest.approx(19200 / 130, rel=0.05)
         with pytest.raises(LinkLost, match="tried 9600 baud"):
-            open_serial_ft(parse_address(uri + "&baud=9600"), clock)
+            open_serial_ft(parse_address(uri + "&baud=9600"), clock, Deadline.for_opening())
     finally:
         box.close()
 
@@ -184,7 +185,7 @@ def test_the_baud_rate_of_a_controller_is_found_by_trying():
 )
 def test_a_controllers_address_without_sense_is_refused(options, complaint):
     with pytest.raises(SetupError, match=complaint):
-        open_serial_ft(parse_address(f"serial-ft:///dev/ttyUSB0{options}"), PacedClock(1.0))
+        open_serial_ft(parse_address(f"serial-ft:///dev/ttyUSB0{options}"), PacedClock(1.0), Deadline.for_opening())
 
 
 def test_a_transducer_left_streaming_is_stopped_when_it_is_opened_and_left_alone_when_it_is_looked_for():

@@ -22,6 +22,7 @@ from made_strokes import (
 from made_strokes import wrench as made
 
 from drivers.readings import ReadingBlock
+from drivers.status import StatusTable, bit
 from sessions.plan.plan import Frame
 from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.decisions import Decision, Decisions
@@ -103,6 +104,12 @@ CASES = {
     "lost_readings": Case(without(400, 430), ("tau_max", "mu_max")),
     "saturated": Case(
         block(T, felt(PLAIN), status=np.where((T > 1.9) & (T < 2.0), 1 << 17, 0)), ("tau_max", "peak_normal")
+    ),
+    "device_fault": Case(
+        block(T, felt(PLAIN), status=np.where((T > 1.9) & (T < 2.0), 0x80000100, 0)),
+        ("tau_max", "peak_normal"),
+        also=frozenset({"saturated"}),
+        extra={"info": replace(INFO, status=StatusTable((bit(8, "gauge excitation", "doubtful"),), 1 << 31))},
     ),
     "frozen_sensor": Case(changed(slice(420, 460), 419), ("tau_max",)),
     "dead_sensor": Case(moved(ty=lambda t: 0 * t), ("speed", *FRICTION), (), frozenset({"no_steady_sliding"})),

@@ -18,10 +18,12 @@ from drivers.catalog import Found, reachable
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock
 from drivers.serial_link import serial_ports
+from drivers.status import flagged_words
 from drivers.transducer import Transducer
 
 EXAMPLE = "daq-app devices probe sim:"
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+FLAWS = ("lost", "malformed", "stalled", "saturated", "doubtful", "off_rate", "off_units")  # counts of Health
 PROBED = 3.0  # how long a probe listens [s]
 
 
@@ -118,8 +120,10 @@ def _probe(uri: str, console: Console) -> int:
     console.say(f"{info.model}, serial {info.serial}, {number(info.rate, 4)} Hz set")
     console.say(f"calibration: {info.calibration.source}")
     console.say(f"measured {number(_measured_rate(readings), 5)} Hz on the session's clock")
-    counts = {name: value for name, value in asdict(health).items() if name not in ("lag_ms", "rate_words")}
+    counts = {name: value for name, value in asdict(health).items() if name not in ("lag_ms", "rate_words", "flagged")}
     console.say(", ".join(f"{name} {value}" for name, value in counts.items()) + f", lag {health.lag_ms:.1f} ms")
+    if health.flagged:
+        console.say(f"the status of readings said: {flagged_words(health.flagged)}")
     if health.rate_words:
         console.say(health.rate_words)
     if mean is not None and noise is not None:
@@ -127,9 +131,7 @@ def _probe(uri: str, console: Console) -> int:
             [a, number(float(m)), number(float(s), 2), u] for a, m, s, u in zip(AXES, mean, noise, units, strict=True)
         ]
         console.say(table(rows, head=["axis", "mean", "noise (sd)", "unit"]))
-    flawed = (
-        health.lost or health.malformed or health.stalled or health.saturated or health.off_rate or not len(readings)
-    )
+    flawed = any(counts[name] for name in FLAWS) or not len(readings)
     return 3 if flawed else 0
 
 

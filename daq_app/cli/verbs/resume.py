@@ -55,4 +55,4 @@ def run(options: argparse.Namespace, console: Console) -> int:
     gap = next(event.data["gap"] for event in reversed(Recording.open(folder).events) if event.kind == "resumed")
     console.result({"session": str(folder), "end": asdict(end), "sealed": outcome.sealed, "gap": gap})
     console.say(f"{folder}: {end.reason}; {end.readings} readings in all, {end.health.lost} lost since it was resumed")
-    return DONE if end.complete and not end.health.lost else FLAWED
+    return DONE if end.complete and not (end.health.lost or end.health.doubtful or end.health.off_units) else FLAWED

@@ -16,6 +16,7 @@ from daq_app.cli.console import Console
 from daq_app.cli.main import DONE, FLAWED, WrongValue
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import People, StartSession
+from drivers.status import flagged_words
 from sessions.plan.plan import Frame, Phase
 from sessions.plan.protocols import Body, Protocol, StudyPlace, plan, protocol
 from sessions.plan.study_file import open_study, study_key
@@ -89,11 +90,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
     end = outcome.end
     console.result({"session": str(folder), "end": asdict(end), "sealed": outcome.sealed, "seed": seed})
     console.say(f"{folder}: {end.reason}; {end.readings} readings, {end.health.lost} lost")
+    if end.health.flagged:
+        console.say(f"the status of readings said: {flagged_words(end.health.flagged)}")
     if end.cause in RESUMABLE:
         console.note(
             f"it is not sealed yet: 'daq-app resume {folder}' goes on at the same trial, with --end it is ended"
         )
-    return DONE if end.complete and not end.health.lost else FLAWED
+    return DONE if end.complete and not (end.health.lost or end.health.doubtful or end.health.off_units) else FLAWED
 
 
 def _decided(options: argparse.Namespace) -> tuple[Protocol, int, Body, StudyPlace | None]:

@@ -13,7 +13,7 @@ from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems
 from sessions.recording.calibration_uncertainty import GAIN_ERROR, gain_error_set
 from sessions.recording.provenance import software_versions
-from sessions.recording.verification import differences, told, why
+from sessions.recording.verification import differences, doubtful_readings, told, why
 from sessions.strokes import analyse
 from sessions.strokes.decisions import DECISIONS, read
 from sessions.toml_file import SettingsError
@@ -31,6 +31,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     folder: Path = options.session
     found = list(problems(folder))
     recording = Recording.open(folder)
+    found += doubtful_readings(recording)
     checked = ["files"]
     decided = read(folder)
     found += decided.problems

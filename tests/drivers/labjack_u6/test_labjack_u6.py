@@ -11,6 +11,7 @@ from drivers import usb_link
 from drivers.address import parse_address
 from drivers.catalog import open_transducer
 from drivers.clock import PacedClock, RealClock
+from drivers.deadline import Deadline
 from drivers.labjack_u6 import wire
 from drivers.labjack_u6.device import identify_labjack_u6
 from drivers.readings import ReadingBlock
@@ -175,7 +176,7 @@ def test_it_says_who_it_is_and_what_it_rests_on(plugged, cal):
     assert info.rate == 1000.0
     assert str(device.serial) in info.settings["converter"]
     assert "3.1572e-04" in f"{float(info.settings['constants'].split()[0]):.4e}"
-    assert identify_labjack_u6(parse_address(uri), 1.0).model == info.model
+    assert identify_labjack_u6(parse_address(uri), Deadline(1.0)).model == info.model
 
 
 def test_an_undisturbed_stream_is_whole_evenly_timed_and_feels_what_the_bench_exerts(plugged, cal):
@@ -253,7 +254,7 @@ def test_a_missing_calibration_is_asked_for_in_one_sentence(plugged):
     with pytest.raises(SetupError, match="add cal=FILE"):
         open_transducer("labjack-u6://", RealClock())
     with pytest.raises(SetupError, match="360000001 is there; add cal=FILE"):
-        identify_labjack_u6(parse_address("labjack-u6://"), 1.0)
+        identify_labjack_u6(parse_address("labjack-u6://"), Deadline(1.0))
 
 
 @pytest.mark.filterwarnings("ignore")

@@ -11,10 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drivers import deadline
 from drivers.calibration import Calibration
 from drivers.clock import PacedClock, RealClock
 from drivers.net_ft import device
 from drivers.net_ft.device import NetFtTransducer
+from drivers.net_ft.wire import NET_FT
 from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo
 from simulators.bench import Bench
 from simulators.faults import Fault, Faults
@@ -43,9 +45,9 @@ class MemoryLink:
         self._coming = deque()
 
     def send(self, data):
-        self.sent.append(data)
         if data == START and self._answers:
             self._coming.extend(self._answers.popleft())
+        self.sent.append(data)
 
     def receive(self, timeout):
         if not self._coming:
@@ -66,9 +68,15 @@ class MemoryLink:
 
 def opened(link, *, rate=200.0, clock=None, there=True, serial="FT1"):
     calibration = Calibration("FT1", "counts", np.diag([1e-6] * 3 + [1e-3] * 3), np.full(6, np.nan), "a test")
-    info = TransducerInfo("net-ft://box", "net-ft", "Net F/T", "FT1", False, rate, 7000.0, calibration)
-    answering = replace(info, serial=serial) if there else None
-    return NetFtTransducer(info, lambda: link, lambda: answering, clock or RealClock())
+    info = TransducerInfo(
+        "net-ft://box", "net-ft", "Net F/T", "FT1", False, rate, 7000.0, calibration, status=NET_FT.status
+    )
+
+    def who():
+        """Return who answers: the box that was opened, and once all has come that it sent, the one of `serial`."""
+        return replace(info, serial=serial if link.sent and link.empty else "FT1") if there else None
+
+    return NetFtTransducer(info, lambda _: link, who, clock or RealClock())
 
 
 def all_readings(transducer, link):
@@ -95,7 +103,8 @@ def readings_until_lost(transducer, reason):
 @pytest.fixture
 def hasty(monkeypatch):
     """Give up in a tenth of the time."""
-    for name in ("_TICK", "_ASK_EVERY", "_PATIENCE", "_SILENCE", "_QUIET"):
+    monkeypatch.setattr(deadline, "CONNECTING", deadline.CONNECTING / 10)
+    for name in ("_TICK", "_ASK_EVERY", "_SILENCE", "_QUIET"):
         monkeypatch.setattr(device, name, getattr(device, name) / 10)
 
 
@@ -220,7 +229,7 @@ def test_a_box_that_stays_silent_is_given_up_after_all_it_sent_was_read():
 
 @pytest.mark.usefixtures("hasty")
 def test_another_transducer_that_answers_after_a_silence_is_named_and_not_read():
-    link = MemoryLink(line(0, 10), line(0, 5, counter=50))
+    link = MemoryLink(line(0, 10))
     transducer = opened(link, serial="FT2")
     transducer.start()
     assert readings_until_lost(transducer, "transducer FT2 answers where FT1 was") == 10

@@ -11,6 +11,7 @@ import pytest
 
 from drivers.catalog import open_transducer, reachable
 from drivers.clock import PacedClock, RealClock
+from drivers.deadline import Deadline
 from drivers.links import http_get
 from drivers.readings import ReadingBlock
 from drivers.transducer import LinkLost, SetupError
@@ -92,13 +93,37 @@ def test_a_rate_that_somebody_changes_on_the_web_page_is_told_in_words_and_times
     while transducer.health.received < 50:
         time.sleep(0.001)
     before = transducer.read(0.0)
-    assert http_get("127.0.0.1", port(one.uri, "http"), "/comm.cgi?comrdtrate=100", 3.0).status == 302
+    assert http_get("127.0.0.1", port(one.uri, "http"), "/comm.cgi?comrdtrate=100", Deadline(3.0)).status == 302
     block = read_until(transducer, lambda: transducer.health.off_rate)
     transducer.close()
     block = ReadingBlock.joined([before, block])
     assert transducer.health.rate_words == "it sends at 100 Hz, not at 200 Hz"
     assert (transducer.health.lost, transducer.health.received) == (0, len(block))
     assert set(np.round(np.diff(block.time), 9)) <= {0.005, 0.01, 0.015}
+
+
+def test_units_that_somebody_changes_while_it_streams_are_found_within_a_second(box):
+    faults = Faults()
+    one = box(clock=RealClock(), faults=faults)
+    transducer = open_transducer(one.uri, RealClock())
+    transducer.start()
+    transducer.read(1.0)
+    faults.put(Fault("units", one.now(), 1e6, share=1e-6))  # counts per force from 1 000 000 to 1
+    began = time.monotonic()
+    with pytest.raises(LinkLost, match="counts in other units than before: 1 counts a N"):
+        read_until(transducer, lambda: False)
+    took = time.monotonic() - began
+    transducer.close()
+    assert took < 1.0
+    assert 0 < transducer.health.off_units < 400, "readings that came since the page was last as before"
+
+
+def test_a_box_that_goes_on_in_the_same_units_is_not_disturbed_by_looking_at_its_page(box):
+    transducer = open_transducer(box(clock=RealClock()).uri, RealClock())
+    transducer.start()
+    time.sleep(1.5)  # the page is read again in this time
+    transducer.close()
+    assert transducer.health.off_units == transducer.health.lost == transducer.health.restarted == 0
 
 
 def test_without_a_rate_the_box_is_left_as_it_is(box):

@@ -8,6 +8,7 @@ import pytest
 
 from drivers.address import parse_address
 from drivers.clock import RealClock
+from drivers.deadline import Deadline
 from drivers.nidaq.device import identify_nidaq, open_nidaq
 from drivers.readings import ReadingBlock
 from drivers.transducer import SetupError
@@ -42,24 +43,24 @@ def readings(transducer, count):
 
 
 def test_it_says_who_it_is_and_at_which_rate_it_was_set(library, address):
-    info = open_nidaq(address, RealClock()).info
+    info = open_nidaq(address, RealClock(), Deadline.for_opening()).info
     assert info.simulated
     assert info.serial == "SIM00003"
     assert info.rate == pytest.approx(1000.5)
     assert "1A2B3C" in info.settings["converter"]
     assert library.asked == [("Dev1/ai0:5", "diff", -10.0, 10.0)]
     assert info.settings["gauges"] == "six differential pairs from ai0 on, -10 to 10 V, as read back"
-    assert identify_nidaq(address, 1.0).model == info.model
+    assert identify_nidaq(address, Deadline(1.0)).model == info.model
 
 
 def test_a_device_that_takes_another_range_than_asked_is_refused(library, address):
     library.range = (-5.0, 5.0)
     with pytest.raises(SetupError, match="-10 to 10 V was asked of Dev1 and it took -5 to 5 V"):
-        open_nidaq(address, RealClock())
+        open_nidaq(address, RealClock(), Deadline.for_opening())
 
 
 def test_its_readings_are_the_planted_wrench_at_the_rate_read_back(library, address):
-    transducer = open_nidaq(address, RealClock())
+    transducer = open_nidaq(address, RealClock(), Deadline.for_opening())
     transducer.start()
     block = readings(transducer, 300)
     transducer.close()
@@ -71,7 +72,7 @@ def test_its_readings_are_the_planted_wrench_at_the_rate_read_back(library, addr
 
 
 def test_an_overflow_in_the_library_is_a_gap_and_the_stream_goes_on(library, address):
-    transducer = open_nidaq(address, RealClock())
+    transducer = open_nidaq(address, RealClock(), Deadline.for_opening())
     library.faults.put(Fault("lose", library.now() + 0.1, library.now() + 0.15))
     transducer.start()
     block = readings(transducer, 400)
@@ -85,10 +86,10 @@ def test_an_overflow_in_the_library_is_a_gap_and_the_stream_goes_on(library, add
 
 def test_an_unknown_device_and_a_missing_library_are_told_in_one_sentence(library, address, monkeypatch):
     with pytest.raises(SetupError, match="there is no device dev7; NI-DAQmx knows Dev1"):
-        open_nidaq(parse_address(address.uri.replace("Dev1", "Dev7")), RealClock())
+        open_nidaq(parse_address(address.uri.replace("Dev1", "Dev7")), RealClock(), Deadline.for_opening())
     with pytest.raises(SetupError, match="write nidaq://Dev1"):
-        open_nidaq(parse_address("nidaq://Dev1"), RealClock())
+        open_nidaq(parse_address("nidaq://Dev1"), RealClock(), Deadline.for_opening())
     library.remove()
     monkeypatch.setitem(sys.modules, "nidaqmx.constants", None)
     with pytest.raises(SetupError, match="pip install"):
-        open_nidaq(address, RealClock())
+        open_nidaq(address, RealClock(), Deadline.for_opening())

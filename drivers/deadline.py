@@ -1,0 +1,85 @@
+"""The one limit on connecting: however a device behaves, every wait for it ends by a deadline or at a stop."""
+
+import threading
+import time
+
+from drivers.link import Link
+from drivers.transducer import LinkLost
+
+# All in real seconds.
+CONNECTING = 4.5  # from asking for a device to its first reading, so that with closing all ends within 5 s
+FIRST_READING = 1.5  # of these are kept for beginning the stream: a device of 1 Hz needs one
+ENDING = 0.2  # for bringing a stream to an end
+TICK = 0.03  # longest single wait, and so for a stop
+
+
+class Stopped(Exception):
+    """Somebody wants the wait to end."""
+
+
+class Deadline:
+    """A limit on all that is waited for, which nothing that arrives can put off."""
+
+    def __init__(self, seconds: float, stopping: threading.Event | None = None) -> None:
+        """End in so many real seconds, or as soon as `stopping` is set."""
+        self._began = time.monotonic()
+        self._seconds = seconds
+        self._stopping = stopping
+
+    @staticmethod
+    def for_opening() -> "Deadline":
+        """Return the limit on opening a device."""
+        return Deadline(CONNECTING - FIRST_READING)
+
+    @property
+    def spent(self) -> float:
+        """Real seconds since it was set."""
+        return time.monotonic() - self._began
+
+    @property
+    def left(self) -> float:
+        """Real seconds that are left, not below 0. Raises Stopped."""
+        if self._stopping is not None and self._stopping.is_set():
+            raise Stopped
+        return max(self._seconds - self.spent, 0.0)
+
+    def within(self, seconds: float) -> "Deadline":
+        """Return a limit on a part of the wait: in `seconds`, and not later than this one."""
+        return Deadline(min(seconds, self.left), self._stopping)
+
+    def check(self) -> None:
+        """Raise LinkLost when the time is over, Stopped when it shall end."""
+        if self.left <= 0.0:
+            raise LinkLost(f"it was not ready within {self._seconds:.2g} s; check its power, the cable and the address")
+
+    def bound(self, link: Link) -> "BoundLink":
+        """Return the link, whose use ends by this deadline."""
+        return BoundLink(link, self)
+
+
+class BoundLink:
+    """A link that raises LinkLost once a deadline is over, and Stopped at a stop."""
+
+    def __init__(self, link: Link, deadline: Deadline) -> None:
+        """Limit the use of `link`."""
+        self._link = link
+        self._deadline = deadline
+
+    def send(self, data: bytes) -> None:
+        """Send `data`."""
+        self._deadline.check()
+        self._link.send(data)
+
+    def receive(self, timeout: float) -> bytes | None:
+        """Return what arrived next, or None when nothing came within `timeout` real seconds."""
+        until = time.monotonic() + timeout
+        while True:
+            self._deadline.check()
+            remaining = until - time.monotonic()
+            data = self._link.receive(max(min(remaining, TICK, self._deadline.left), 0.0))
+            if data is not None or remaining <= TICK:
+                return data
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._link.close()

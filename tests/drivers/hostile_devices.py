@@ -1,0 +1,153 @@
+"""Devices that talk without end and never as their maker says, on real ports of this computer."""
+
+import contextlib
+import os
+import socket
+import struct
+import threading
+import time
+
+from drivers import usb_link
+from drivers.clock import RealClock
+from simulators.bench import Bench
+from simulators.gauges import calibration_file
+from simulators.labjack_u6_box import LabJackU6Box
+from simulators.pseudo_terminal import PseudoTerminal
+from simulators.usb_backend import SimulatedBus
+
+PAGE = (
+    b"HTTP/1.0 200 OK\r\n\r\n<netft><prodname>Net F/T</prodname><cfgcpf>1000000</cfgcpf><cfgcpt>1000000</cfgcpt>"
+    b"<scfgfu>N</scfgfu><scfgtu>Nm</scfgtu><comrdtrate>200</comrdtrate></netft>"
+)
+STUCK = struct.pack(">III6i", 7, 35, 0, *range(6))
+UDP = {
+    "datagrams of 35 bytes": bytes(35),
+    "one number again and again": STUCK,
+    "empty datagrams": b"",
+    "datagrams of 36 random bytes": None,
+}
+
+
+class Hostile:
+    """Threads that serve until it is closed, and the address at which they do."""
+
+    def __init__(self):
+        self.uri = ""
+        self.asked = threading.Event()  # for a stream
+        self._over = threading.Event()
+        self._threads = []
+        self._ends = []
+
+    def serve(self, work):
+        self._threads.append(threading.Thread(target=self._again, args=(work,), daemon=True))
+        self._threads[-1].start()
+
+    def _again(self, work):
+        with contextlib.suppress(OSError, ValueError):
+            while not self._over.is_set():
+                work()
+
+    def at_close(self, end):
+        self._ends.append(end)
+
+    def close(self):
+        self._over.set()
+        for thread in self._threads:
+            thread.join(2.0)
+        for end in self._ends:
+            end()
+
+
+def _port(hostile, kind=socket.SOCK_STREAM):
+    bound = socket.socket(socket.AF_INET, kind)
+    bound.bind(("127.0.0.1", 0))
+    bound.settimeout(0.1)
+    hostile.at_close(bound.close)
+    if kind == socket.SOCK_STREAM:
+        bound.listen()
+    return bound
+
+
+def _served(hostile, listener, answer, *, drip=0.0):
+    """Answer each call with these bytes, all at once, or a byte every `drip` seconds."""
+
+    def one():
+        try:
+            caller, _ = listener.accept()
+        except TimeoutError:
+            return
+        with caller:
+            caller.recv(4096)
+            for piece in [answer] if not drip else [answer[i : i + 1] for i in range(len(answer))]:
+                caller.sendall(piece)
+                time.sleep(drip)
+
+    hostile.serve(one)
+
+
+def net_ft(datagram, *, page_drip=0.0):
+    """Return a box whose page is in order, and whose stream is this datagram, every millisecond."""
+    hostile = Hostile()
+    http, tcp, rdt = _port(hostile), _port(hostile), _port(hostile, socket.SOCK_DGRAM)
+    _served(hostile, http, PAGE, drip=page_drip)
+    _served(hostile, tcp, bytes(24), drip=2.0)
+    asker = []
+
+    def stream():
+        rdt.settimeout(0.001)
+        with contextlib.suppress(TimeoutError, ConnectionError):
+            asker[:] = [rdt.recvfrom(100)[1]]
+            hostile.asked.set()
+        if asker:
+            with contextlib.suppress(ConnectionError):
+                rdt.sendto(os.urandom(36) if datagram is None else datagram, asker[0])
+
+    hostile.serve(stream)
+    http_port, tcp_port, rdt_port = (bound.getsockname()[1] for bound in (http, tcp, rdt))
+    hostile.uri = f"net-ft://127.0.0.1?http={http_port}&tcp={tcp_port}&rdt={rdt_port}"
+    return hostile
+
+
+def line(scheme, options, data):
+    """Return a serial line on which these bytes come without end."""
+    hostile, port = Hostile(), PseudoTerminal("ttyHostile")
+
+    def talk():
+        port.heard(0.002)
+        port.say(data() if callable(data) else data)
+
+    hostile.serve(talk)
+    hostile.at_close(port.close)
+    hostile.uri = f"{scheme}://{port.path}?{options}"
+    return hostile
+
+
+class _Endless(LabJackU6Box):
+    """A converter whose stream cannot be stopped, and holds no scan."""
+
+    def streamed(self, patience):
+        """Return bytes at once, however long may be waited."""
+        time.sleep(min(patience, 0.001))
+        return bytes(62)
+
+
+def labjack_u6(folder):
+    """Return a converter that answers as it should, and streams bytes without end that are no scans."""
+    hostile = Hostile()
+    usb_link.BACKEND = SimulatedBus([_Endless(Bench(3), RealClock())])
+    hostile.at_close(lambda: setattr(usb_link, "BACKEND", None))
+    hostile.uri = f"labjack-u6://?rate=300&cal={calibration_file(folder, 'SIM00003')}"
+    return hostile
+
+
+SERIAL = "baud=38400&counts_per_N=20&counts_per_Nm=333.33"
+HOSTILE = {
+    **{f"net-ft, {name}": (lambda _, d=datagram: net_ft(d)) for name, datagram in UDP.items()},
+    "net-ft, a page that drips": lambda _: net_ft(STUCK, page_drip=0.5),
+    "serial-ft, zeros": lambda _: line("serial-ft", SERIAL, bytes(50)),
+    "serial-ft, prompts": lambda _: line("serial-ft", SERIAL, b">"),
+    "serial-ft, at any baud rate": lambda _: line("serial-ft", SERIAL.partition("&")[2], b"\xff" * 9),
+    "digital-ft, zeros": lambda _: line("digital-ft", "parity=none", b"\x55" * 26),
+    "digital-ft, random bytes": lambda _: line("digital-ft", "parity=none", lambda: os.urandom(30)),
+    "labjack-u6, zeros": labjack_u6,
+}

@@ -1,0 +1,92 @@
+"""Connecting ends, and so does a stop, whatever a device sends."""
+
+import os
+import threading
+import time
+
+import pytest
+from hostile_devices import HOSTILE, STUCK, net_ft
+
+from drivers.catalog import DRIVERS, open_transducer
+from drivers.clock import RealClock
+from drivers.transducer import DeviceFault, LinkLost, SetupError
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="there are no pseudo-terminals on this system")
+
+CONNECTS_WITHIN = 5.0  # [real s]
+STOPS_WITHIN = 1.0
+BY_LIBRARY = {"nidaq"}  # its maker's library speaks to the device
+
+
+def connect(uri, opened):
+    """Open and start, and return the sentence that says why it could not be done."""
+    try:
+        opened.append(open_transducer(uri, RealClock()))
+        opened[-1].start()
+    except (LinkLost, DeviceFault, SetupError) as error:
+        return str(error)
+    return ""
+
+
+def test_every_driver_with_bytes_of_its_own_has_a_hostile_device():
+    assert {name.partition(",")[0] for name in HOSTILE} == {driver.name for driver in DRIVERS} - BY_LIBRARY
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_connecting_ends_within_5_s_in_one_sentence_whatever_arrives(name, tmp_path):
+    threads = set(threading.enumerate())
+    device, opened = HOSTILE[name](tmp_path), []
+    try:
+        began = time.monotonic()
+        sentence = connect(device.uri, opened)
+        took = time.monotonic() - began
+    finally:
+        for transducer in opened:
+            transducer.close()
+        device.close()
+    assert took < CONNECTS_WITHIN
+    assert device.uri.partition("?")[0].split("://")[0] in sentence or "http" in sentence or "tty" in sentence
+    assert "\n" not in sentence
+    assert set(threading.enumerate()) <= threads
+
+
+@pytest.mark.parametrize("name", [name for name in HOSTILE if "drips" not in name and "any baud" not in name])
+def test_a_stop_ends_connecting_within_1_s_whatever_arrives(name, tmp_path):
+    device, opened, sentences = HOSTILE[name](tmp_path), [], []
+    connecting = threading.Thread(target=lambda: sentences.append(connect(device.uri, opened)))
+    try:
+        connecting.start()
+        while connecting.is_alive() and not opened:
+            time.sleep(0.01)
+        time.sleep(0.3)
+        began = time.monotonic()
+        for transducer in opened:
+            transducer.stop()
+        took = time.monotonic() - began
+        connecting.join(CONNECTS_WITHIN)
+    finally:
+        device.close()
+    assert took < STOPS_WITHIN
+    assert not connecting.is_alive()
+
+
+def test_setting_a_bias_ends_within_5_s_on_a_command_port_that_drips():
+    device = net_ft(STUCK)
+    try:
+        began = time.monotonic()
+        sentence = connect(f"{device.uri}&bias=set", [])
+        took = time.monotonic() - began
+    finally:
+        device.close()
+    assert took < CONNECTS_WITHIN
+    assert "TCP port" in sentence
+
+
+def test_datagrams_that_are_no_readings_are_named():
+    device, opened = net_ft(bytes(35)), []
+    try:
+        sentence = connect(device.uri, opened)
+    finally:
+        device.close()
+    assert "of which none is a reading" in sentence
+    assert opened[0].health.malformed > 0
