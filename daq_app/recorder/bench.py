@@ -106,14 +106,21 @@ class Bench:
         """Return the transducer's totals; none where there is none."""
         return Health() if self._connected is None else self._connected.transducer.health
 
-    def connect(self, uri: str, clock: Clock | None = None) -> None:
-        """Open the transducer at `uri` in place of any other.
+    def connect(self, uri: str, clock: Clock | None = None, *, streaming: bool = True) -> None:
+        """Open the transducer at `uri` in place of any other, and begin to show what it measures where `streaming`.
 
-        Raises what opening raises, NotNow when a stop broke it off; then none is open.
+        Raises what opening and starting raise, NotNow when a stop broke it off; then none is open.
         """
         self.disconnect()
-        with _breakable(uri):
-            self._open(uri, clock or self._clock)
+        try:
+            with _breakable(uri):
+                self._open(uri, clock or self._clock)
+                if streaming:
+                    self._start()
+        except BaseException:
+            self._close()
+            self._uri = None
+            raise
         assert self._connected is not None
         self._send(Device(self._connected.transducer.info, self._connected.frame))
 
@@ -142,11 +149,9 @@ class Bench:
     def stream(self) -> None:
         """Begin to show what is measured, unless it is shown already. Raises NotNow when a stop broke it off."""
         if self._connected is not None and not self._streaming:
-            self._display.stream_began()
-            self._streaming = True
             try:
                 with _breakable(self._connected.transducer.info.uri):
-                    self._connected.transducer.start()
+                    self._start()
             except (LinkLost, DeviceFault) as error:
                 self._lost(str(error))
             except NotNow:
@@ -182,6 +187,13 @@ class Bench:
             self._display.zeroed(told.mean)
             remember_zero(self._connected.transducer.info, told.mean, told.spread)
             self._send(told)
+
+    def _start(self) -> None:
+        """Let the open transducer stream for the display."""
+        assert self._connected is not None
+        self._display.stream_began()
+        self._streaming = True
+        self._connected.transducer.start()
 
     def _open(self, uri: str, clock: Clock) -> None:
         with ExitStack() as stack:

@@ -75,7 +75,6 @@ class Recorder:
         match request:
             case Connect(uri):
                 self._bench.connect(uri)
-                self._bench.stream()
             case Disconnect():
                 self._bench.disconnect()
             case Tare(duration):

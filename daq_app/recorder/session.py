@@ -310,7 +310,7 @@ def _opened_again(
         if request.uri is not None:
             raise NotNow("the session began without a transducer, and goes on without one")
         return None
-    bench.connect(request.uri or recorded_device(recording) or recording.info.uri, clock)
+    bench.connect(request.uri or recorded_device(recording) or recording.info.uri, clock, streaming=False)
     info = _told_of(bench)
     check_same_transducer(recording.info, info)
     return info

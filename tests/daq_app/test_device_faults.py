@@ -112,6 +112,7 @@ def test_a_signal_ends_a_run_within_a_second_while_its_transducer_sends_no_readi
         took = time.monotonic() - began
     finally:
         ran.kill()
+        ran.communicate()
         device.close()
     assert took < 1.0
     assert ran.returncode == 130
