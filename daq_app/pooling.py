@@ -13,6 +13,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from daq_app.child_process import fresh_processes
 from daq_app.cluster import by_cluster
 from daq_app.computing import Answer, computed, content_of
 from daq_app.console import Console
@@ -136,8 +137,7 @@ def _local(folders: Sequence[Path], options: VisitOptions, workers: int | None) 
 def _in_pool(folders: Sequence[Path], options: VisitOptions, workers: int) -> Iterator[Answer]:
     # Threads of the linear algebra would change the last bits, and cost more than they bring at these sizes.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    fresh = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=fresh, initializer=attend)
+    pool = ProcessPoolExecutor(workers, mp_context=fresh_processes(), initializer=attend)
     try:
         waiting: set[Future[Answer]] = {pool.submit(computed, folder, options) for folder in folders}
         while waiting:
