@@ -129,8 +129,8 @@ def _after(session: SessionState, message: Message, now: float) -> SessionState:
             return replace(session, status=message, saved_ns=message.safe.time_ns, saved=saved, phase=phase)
         case Judged(trial, take, quality):
             return _judged(session, trial, take, quality)
-        case m.SessionEnded(_, end, resumable):
-            return replace(session, end=end, phase="ended", asked=None, resumable=resumable)
+        case m.SessionEnded(folder, end, resumable):
+            return replace(session, folder=folder, end=end, phase="ended", asked=None, resumable=resumable)
         case m.ResumeSession():
             return replace(session, phase="resuming", asked=None)
         case m.Failed("ResumeSession") if session.over:
