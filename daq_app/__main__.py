@@ -3,16 +3,18 @@
 import gc
 import os
 import sys
-from typing import NoReturn
 
-from daq_app.cli.main import STOPPED, run
+from daq_app.child_process import keep_current_folder_out
 
 
 def main() -> None:
     """Run the command line, or without one open the window, and leave with the exit code."""
+    keep_current_folder_out()
     # The solver's matrices are small: threads of the linear algebra only wait for each other (2 to 10 times slower).
     # Read when numpy is imported, which no module has done by now.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from daq_app.cli.main import run
+
     if len(sys.argv) == 1:
         from daq_app.qt.start import main as open_window  # the command line runs where Qt is not installed
 
@@ -24,8 +26,10 @@ def main() -> None:
     _leave(run(sys.argv[1:]))
 
 
-def _leave(code: int) -> NoReturn:
+def _leave(code: int) -> None:
     """Leave with an exit code; at once where the user asked to stop and nothing is left to be ended."""
+    from daq_app.cli.main import STOPPED
+
     if code == STOPPED and not _children():
         sys.stdout.flush()
         sys.stderr.flush()

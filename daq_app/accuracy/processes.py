@@ -3,7 +3,6 @@
 import json
 import os
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from time import perf_counter
 
 from daq_app.accuracy.asked import Asked, Found, LeftOut
 from daq_app.accuracy.methods import Kinematics
+from daq_app.child_process import interpreter
 
 SCENE = """[friction]
 mu = 0.24
@@ -89,16 +89,15 @@ def measure(asked: Asked, found: Found) -> Iterator[Cold | Memory | LeftOut]:
 
 
 def _commands(folder: Path) -> list[tuple[str, list[str]]]:
-    python = sys.executable
     out: list[tuple[str, list[str]]] = [
-        ("Python alone", [python, "-c", "pass"]),
-        ("Python and its arrays", [python, "-c", "import numpy, scipy.linalg"]),
+        ("Python alone", interpreter("-c", "pass")),
+        ("Python and its arrays", interpreter("-c", "import numpy, scipy.linalg")),
     ]
     for kinematics, loaded in (("small", "solver.response.solution"), ("finite", "solver.response.finite_solution")):
-        out.append((f"the solver loaded, {kinematics} strain", [python, "-c", f"import {loaded}"]))
+        out.append((f"the solver loaded, {kinematics} strain", interpreter("-c", f"import {loaded}")))
         scene = folder / f"{kinematics}.toml"
         scene.write_text(SCENE.format(kinematics=kinematics), encoding="utf-8")
-        out.append((f"daq-app solve, {kinematics} strain", [python, "-m", "daq_app", "solve", str(scene), "--json"]))
+        out.append((f"daq-app solve, {kinematics} strain", interpreter("-m", "daq_app", "solve", str(scene), "--json")))
     return out
 
 
@@ -119,7 +118,7 @@ def _of_children() -> float:
 def _memory(kinematics: Kinematics) -> Memory | LeftOut:
     code = MEMORY.format(kinematics=kinematics, tolerance=TOLERANCE)
     try:
-        done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=LONGEST)
+        done = subprocess.run(interpreter("-c", code), check=True, capture_output=True, text=True, timeout=LONGEST)
     except (subprocess.SubprocessError, OSError) as bad:
         return LeftOut(f"Memory of a solve at {kinematics} strain could not be measured here: {bad}.")
     idle, solving, dofs, estimate = json.loads(done.stdout)

@@ -6,12 +6,12 @@ import sys
 import time
 from collections import deque
 from contextlib import suppress
-from multiprocessing import get_context
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
 from daq_app.analyst import messages as m
+from daq_app.child_process import fresh_processes
 
 Connection = Any  # one end of a pipe; its type is another one on each system
 PATIENCE = 0.15  # work that has not stopped by itself after so long is ended [s]
@@ -143,7 +143,7 @@ class Analyst:
         self._gone()
 
     def _start(self) -> None:
-        context = get_context("spawn")
+        context = fresh_processes()
         ours, theirs = context.Pipe()
         self._process = context.Process(target=run, args=(theirs, str(self._folder)), daemon=True, name="analyst")
         self._process.start()

@@ -16,6 +16,7 @@ from typing import Any
 from daq_app.batch.cluster import by_cluster
 from daq_app.batch.session_numbers import Answer, computed, content_of
 from daq_app.batch.workers import attend
+from daq_app.child_process import fresh_processes
 from daq_app.cli.console import Console
 from sessions.recording import RecordingError
 from sessions.recording.atomic_file import write_whole
@@ -136,8 +137,7 @@ def _local(folders: Sequence[Path], options: VisitOptions, workers: int | None) 
 def _in_pool(folders: Sequence[Path], options: VisitOptions, workers: int) -> Iterator[Answer]:
     # Threads of the linear algebra would change the last bits, and cost more than they bring at these sizes.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    fresh = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=fresh, initializer=attend)
+    pool = ProcessPoolExecutor(workers, mp_context=fresh_processes(), initializer=attend)
     try:
         waiting: set[Future[Answer]] = {pool.submit(computed, folder, options) for folder in folders}
         while waiting:

@@ -36,6 +36,7 @@ _WRONG = frozenset({"AddressError", "NotNow"})  # failures that come of the comm
 class Attended:
     """How a session came out."""
 
+    folder: str  # where it lies: another folder than asked for where that was taken away meanwhile
     end: SessionEnd
     sealed: bool
 
@@ -74,6 +75,7 @@ class _Attendance:
         self._interrupted = interrupted
         self._terminal: Terminal | None = None
         self._begun: SessionBegun | None = None
+        self._folder = ""
         self._end: SessionEnd | None = None
         self._stopping = False
         self._silent = False
@@ -87,7 +89,7 @@ class _Attendance:
                 self._interrupted.heard = False
                 if self._end is not None:
                     self._console.note("the recorder goes on sealing the session by itself")
-                    return Attended(self._end, sealed=False)
+                    return Attended(self._folder, self._end, sealed=False)
                 if self._stopping:
                     raise KeyboardInterrupt
                 self._stopping = True
@@ -120,15 +122,15 @@ class _Attendance:
                 self._begin(report)
             case Status():
                 self._tell(report)
-            case SessionEnded(_, end, resumable):
-                self._end = end
+            case SessionEnded(folder, end, resumable):
+                self._folder, self._end = folder, end
                 self._terminal = None
-                return Attended(end, sealed=False) if resumable else None
+                return Attended(folder, end, sealed=False) if resumable else None
             case Sealing(folder):
                 self._console.note(f"sealing {folder}")
             case Sealed():
                 assert self._end is not None
-                return Attended(self._end, sealed=True)
+                return Attended(self._folder, self._end, sealed=True)
             case LinkDown(sentence) if self._begun is None:
                 raise LinkLost(sentence)  # it was opened, and does not stream
             case Failed() if self._stopping and self._begun is None:

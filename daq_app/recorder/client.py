@@ -28,7 +28,6 @@ is `Gone`, all that was reported as safe is on the disk, and the same `ResumeSes
 
 import os
 import subprocess
-import sys
 import threading
 import time
 from collections import deque
@@ -37,6 +36,7 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
+from daq_app.child_process import interpreter
 from daq_app.recorder.messages import REPORTS, REQUESTS, Gone, Report, Request, Shutdown
 from daq_app.recorder.wire import BrokenMessage, Codec, Splitter
 
@@ -70,7 +70,7 @@ class Recorder:
         With `debug` its errors go to our stderr. Raises OSError where no process can be made.
         """
         process = subprocess.Popen(
-            [sys.executable, "-m", "daq_app.recorder", repr(pace)],
+            interpreter("-m", "daq_app.recorder", repr(pace)),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=None if debug else subprocess.DEVNULL,

@@ -282,7 +282,7 @@ def _filled(folder: Path) -> Quota:
     writer.limit(QUOTA)
     took: list[float] = []
     position = 0
-    while writer.full is None:
+    while writer.must_end is None:
         if position > 100 * RATE:
             raise SelfTestFailed("a session that had no more room went on without a word")
         writer.readings(_made_up(position, clock.now_ns()))
@@ -291,7 +291,7 @@ def _filled(folder: Path) -> Quota:
         writer.commit()
         took.append(time.monotonic() - began)
     safe = writer.acknowledged.readings
-    writer.event("ended", data={"reason": writer.full, "cause": "disk", "complete": False, "readings": safe})
+    writer.event("ended", data={"reason": writer.must_end, "cause": "disk", "complete": False, "readings": safe})
     writer.close()
     recording = Recording.open(folder)
     block = recording.readings()

@@ -135,9 +135,12 @@ def run(prepared: Prepared, bench: Bench, display: Display, inbox: Inbox, send: 
     course = _Course(prepared, bench, display, inbox, send)
     writer.safe = course.told
     simulated = simulated_sentence(prepared.info, prepared.people.kind != "people")
-    folder = str(writer.folder)
     kind, offset_ns = prepared.people.kind, prepared.clock_offset_ns
-    send(SessionBegun(folder, prepared.plan, kind, simulated, offset_ns, prepared.clock.factor, prepared.before))
+    send(
+        SessionBegun(
+            str(writer.folder), prepared.plan, kind, simulated, offset_ns, prepared.clock.factor, prepared.before
+        )
+    )
     with awake():
         end = run_session(
             prepared.plan,
@@ -150,7 +153,7 @@ def run(prepared: Prepared, bench: Bench, display: Display, inbox: Inbox, send: 
             progress=course.progress,
         )
     resumable = end.cause in RESUMABLE
-    send(SessionEnded(folder, end, resumable))
+    send(SessionEnded(str(writer.folder), end, resumable))  # which is another one where the first was taken away
     if end.cause == "device":
         bench.lost(end.reason)
     if not resumable:

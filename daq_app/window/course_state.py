@@ -142,8 +142,8 @@ def _after(session: SessionState, message: Message, now: float) -> SessionState:
 def _ended(session: SessionState, message: m.SessionEnded | m.Gone | m.Failed | m.ResumeSession) -> SessionState:
     """Return the session after something that ends it, or takes it up again."""
     match message:
-        case m.SessionEnded(_, end, resumable):
-            return replace(_over(session), end=end, resumable=resumable)
+        case m.SessionEnded(folder, end, resumable):
+            return replace(_over(session), folder=folder, end=end, resumable=resumable)
         case m.Gone(asked, sentence) if not asked and not session.over:
             return replace(_over(session), broken=sentence, resumable=True)
         case m.Gone(False) | m.Failed("ResumeSession") if session.phase == "resuming":

@@ -7,10 +7,10 @@ import signal
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from multiprocessing import get_context
 from multiprocessing.process import BaseProcess
 from typing import Any
 
+from daq_app.child_process import fresh_processes
 from daq_app.recorder.messages import Live
 from daq_app.window.live_model import Forces, Kinematics, Provisional, Ready, Settle, Settled, Use, forces_of, joined
 from daq_app.window.priority import give_way
@@ -81,7 +81,7 @@ class LiveModel:
         """Start the process; it follows the published finger until a plan tells of another."""
         if self._process is not None:
             return
-        context = get_context("spawn")
+        context = fresh_processes()
         ours, theirs = context.Pipe()
         self._process = context.Process(target=run, args=(theirs,), daemon=True, name="live model")
         self._process.start()

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
 from importlib import import_module
-from multiprocessing import get_context
 
 from daq_app.batch.workers import attend
+from daq_app.child_process import fresh_processes
 from daq_app.recorder import messages as m
 from daq_app.window.live_feed import LiveFeed
 from daq_app.window.messages import DrawingFailed, Judged
@@ -32,7 +32,7 @@ class Judge:
     def prepare(self) -> None:
         """Start the process, so that the first stroke need not wait for it."""
         if self._worker is None:
-            self._worker = ProcessPoolExecutor(1, get_context("spawn"), initializer=attend)
+            self._worker = ProcessPoolExecutor(1, fresh_processes(), initializer=attend)
             self._worker.submit(_warm)
 
     def close(self) -> None:

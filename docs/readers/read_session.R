@@ -5,7 +5,8 @@
 #
 # session$readings, $events, $trials, $answers, $strokes, $friction, $flaws and, where stored, $predictions are data frames;
 # units stand at the end of a column's name, README.md of the export tells each of them. The file session.h5 of a session can
-# be read too where Bioconductor's rhdf5 is installed: rhdf5::h5read("session.h5", "readings/raw").
+# be read too where Bioconductor's rhdf5 is installed: rhdf5::h5read("session.h5", "readings/raw"). The JSON text of event i
+# is rawToChar(as.raw(data[(c(0, end)[i] + 1):end[i]])), with data and end from "events/data" and "events/data_end".
 
 read_session <- function(folder) {
   files <- list.files(folder, pattern = "[.]csv$", full.names = TRUE)

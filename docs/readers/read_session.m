@@ -30,7 +30,15 @@ function session = read_session(file)
     session.events.(name{1}) = values(:);
   end
   session.events.kind = texts(get('events/kind'));
-  session.events.data = texts(get('events/data'));
+  data = get('events/data');
+  if isnumeric(data)  % bytes, one text after the other
+    data = char(data(:)');
+    stops = double(get('events/data_end'));
+    starts = [0; stops(:)];
+    session.events.data = arrayfun(@(a, b) data(a + 1:b), starts(1:end - 1), stops(:), 'UniformOutput', false);
+  else  % format version 1
+    session.events.data = texts(data);
+  end
   for name = {'number', 'index', 'direction', 'score'}
     values = get(['trials/' name{1}]);
     session.trials.(name{1}) = values(:);

@@ -22,6 +22,7 @@ from sessions.recording import LoggedEvent
 from sessions.recording.calibration_uncertainty import gain_error_content
 from sessions.recording.schema import COLUMNS, FORMAT, FORMAT_VERSION, SEALED_FILE
 from sessions.recording.sealed_copy import DataSet, texts, write_copy
+from sessions.recording.text_column import read_texts
 from sessions.strokes.decisions import content_of
 
 PART = 65_536  # readings at once
@@ -59,11 +60,13 @@ def read(path: Path) -> ExportedSession:
         )
         columns = [file[f"events/{name}"][...].tolist() for name in ("number", "time_ns", "trial", "readings")]
         beside = [_text(file[name][0]).encode() if name in file else b"" for name in (DECIDED, UNCERTAIN)]
-        kinds, data = (list(map(_text, file[f"events/{name}"][...])) for name in ("kind", "data"))
-    events = tuple(
-        LoggedEvent(number, time_ns, kind, trial or None, readings, json.loads(text))
-        for number, time_ns, trial, readings, kind, text in zip(*columns, kinds, data, strict=True)
-    )
+        kinds = map(_text, file["events/kind"][...].tolist())
+        events = tuple(
+            LoggedEvent(number, time_ns, kind, trial or None, readings, json.loads(text))
+            for number, time_ns, trial, readings, kind, text in zip(
+                *columns, kinds, read_texts(file, "events/data"), strict=True
+            )
+        )
     return ExportedSession("hdf5", path, head, events, lambda: _blocks(path), *beside)
 
 

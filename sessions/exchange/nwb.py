@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sessions.exchange import ExportError, ExportSource, Progress
 from sessions.exchange.session_tables import Column, Table, tables
@@ -199,10 +200,11 @@ def _dynamic(table: Table, mark: str) -> object:
     return DynamicTable(name=table.name, description=f"{mark}{table.meaning}", columns=columns)
 
 
-def _values(column: Column) -> list[str] | list[int] | list[float]:
+def _values(column: Column) -> NDArray[np.object_] | list[int] | list[float]:
     values = column.values
     if any(isinstance(value, str) for value in values):
-        return ["" if value is None else str(value) for value in values]
+        # As objects: of a list NumPy makes an array in which each text takes the room of the longest.
+        return np.array(["" if value is None else str(value) for value in values], object)
     if any(value is None or isinstance(value, float) for value in values):
         return [math.nan if value is None else float(value) for value in values]
     return [int(value or 0) for value in values]

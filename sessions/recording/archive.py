@@ -45,7 +45,7 @@ def seal(folder: Path) -> None:
         write_whole(folder / DESCRIPTION_FILE, json.dumps(description(recording), indent=1).encode() + b"\n")
         for name in SEALED:
             (folder / name).chmod(0o444)
-        list_in_manifest(folder, SEALED, recording.simulated_sentence)
+        list_in_manifest(folder, SEALED, recording.simulated_sentence, recording.head["format"])
     except (OSError, RuntimeError) as error:  # h5py raises either when the disk is full
         new.unlink(missing_ok=True)
         raise RecordingError(

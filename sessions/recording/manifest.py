@@ -8,7 +8,7 @@ from typing import Any
 
 from sessions.recording.atomic_file import write_whole
 from sessions.recording.errors import RecordingError
-from sessions.recording.schema import FORMAT, FORMAT_VERSION, MANIFEST_FILE
+from sessions.recording.schema import MANIFEST_FILE
 
 
 def is_sealed(folder: Path) -> bool:
@@ -16,13 +16,16 @@ def is_sealed(folder: Path) -> bool:
     return (folder / MANIFEST_FILE).exists()
 
 
-def list_in_manifest(folder: Path, names: Iterable[str], simulated: str | None) -> None:
-    """Take the files called `names` into the manifest as they are now; the others stay as listed."""
+def list_in_manifest(
+    folder: Path, names: Iterable[str], simulated: str | None, form: Mapping[str, Any] | None = None
+) -> None:
+    """Take the files called `names` into the manifest as they are now; the others stay as listed.
+
+    A new manifest says of itself what the live file does: what was `simulated`, and its format.
+    """
     sealed = is_sealed(folder)
     files: dict[str, Any] = _files(folder) if sealed else {}
-    head = (
-        _head_of(folder) if sealed else {**_simulated(simulated), "format": {"name": FORMAT, "version": FORMAT_VERSION}}
-    )
+    head = _head_of(folder) if sealed else {**_simulated(simulated), "format": form}
     for name in names:
         path = folder / name
         files[name] = {"sha256": file_sha256(path), "bytes": path.stat().st_size}

@@ -11,6 +11,7 @@ import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from sessions.recording.head import calibration_hash
 from sessions.recording.log import OUTCOMES
 from sessions.recording.reader import Recording
 from sessions.recording.schema import COLUMNS, FORMAT, FORMAT_VERSION, SEALED_FILE
+from sessions.recording.text_column import TextColumn, read_texts, write_texts
 
 # Superblock 2 and nothing that HDF5 1.8 does not know: older MATLAB cannot read later files.
 LIBVER = ("v108", "v108")
@@ -55,7 +57,7 @@ def write_copy(
         if recording.simulated_sentence:
             file.attrs["SIMULATED"] = _attribute(recording.simulated_sentence)
         file.attrs["format"] = _attribute(FORMAT)
-        file.attrs["format_version"] = recording.head["format"]["version"]
+        file.attrs["format_version"] = FORMAT_VERSION  # of the copy: the live file may be of an earlier one
         file.attrs["description"] = _attribute("every table, data set, unit and byte: docs/session-format.md")
         readings = _empty_readings(file)
         for block in recording.blocks():
@@ -74,8 +76,11 @@ def write_copy(
             # An empty data set has no chunks, and so nothing to protect.
             protected = {"chunks": made.values.shape, "fletcher32": True} if made.values.size else {}
             written = file.create_dataset(made.name, data=made.values.astype(kind), **protected)
-            written.attrs["unit"] = _attribute(made.unit)
-            written.attrs["note"] = _attribute(made.note)
+            _describe(written, made.unit, made.note)
+        column = event_data(recording)
+        written, ends = write_texts(file, column)
+        _describe(written, "", column.note)
+        _describe(ends, "bytes", f"where each text of {column.name} ends; it begins where the one before ends")
 
 
 def differences(recording: Recording) -> Iterator[str]:
@@ -89,6 +94,7 @@ def differences(recording: Recording) -> Iterator[str]:
                     continue  # a later version holds more
                 if not _same(np.asarray(file[made.name]), made.values):
                     yield f"{made.name} of {SEALED_FILE} differs from the live file"
+            yield from _different_texts(event_data(recording), file)
             if file.attrs.get("SIMULATED") != _attribute(recording.simulated_sentence):
                 yield f"{SEALED_FILE} does not say of itself what the live file says: {recording.simulated_sentence}"
     except (OSError, KeyError, RuntimeError) as error:
@@ -96,7 +102,7 @@ def differences(recording: Recording) -> Iterator[str]:
 
 
 def data_sets(recording: Recording) -> tuple[DataSet, ...]:
-    """Return everything the copy holds besides the readings."""
+    """Return everything the copy holds besides the readings and the data of the events."""
     return (*_head(recording), *_calibration(recording), *_events(recording), *_trials(recording))
 
 
@@ -128,7 +134,13 @@ def _events(recording: Recording) -> Iterator[DataSet]:
     yield DataSet("events/kind", texts([e.kind for e in events]), "", "what happened")
     yield DataSet("events/trial", _whole([e.trial or 0 for e in events]), "", "number of the trial; 0 for none")
     yield DataSet("events/readings", _whole([e.readings for e in events]), "", "readings recorded before it")
-    yield DataSet("events/data", texts([_plain_json(e.data) for e in events]), "", "what else is known, as JSON")
+
+
+def event_data(recording: Recording) -> TextColumn:
+    """Return what the events hold besides, one JSON text each; an answer's may be thousands of times another's."""
+    return TextColumn(
+        "events/data", lambda: (_plain_json(e.data) for e in recording.events), "what else is known, as JSON"
+    )
 
 
 def _trials(recording: Recording) -> Iterator[DataSet]:
@@ -186,6 +198,17 @@ def _different_readings(recording: Recording, file: h5py.File) -> Iterator[str]:
         length = int(file["readings"][name].shape[0])
         if length != start:
             yield f"{SEALED_FILE} holds {length} of {name}, the live file {start}"
+
+
+def _different_texts(column: TextColumn, file: h5py.File) -> Iterator[str]:
+    """Compare text by text."""
+    pairs = zip_longest(read_texts(file, column.name), column.texts())
+    if any(found is None or text is None or found != text.encode() for found, text in pairs):
+        yield f"{column.name} of {SEALED_FILE} differs from the live file"
+
+
+def _describe(written: h5py.Dataset, unit: str, note: str) -> None:
+    written.attrs["unit"], written.attrs["note"] = _attribute(unit), _attribute(note)
 
 
 def _same(found: NDArray[Any], expected: NDArray[Any]) -> bool:

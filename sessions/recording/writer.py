@@ -17,7 +17,9 @@ from sessions.recording.errors import RecordingError
 from sessions.recording.head import info_to_dict, json_text, plan_to_dict, simulated_sentence
 from sessions.recording.log import LoggedEvent
 from sessions.recording.manifest import is_sealed
+from sessions.recording.provenance import without_home
 from sessions.recording.reader import Recording
+from sessions.recording.rescue import identities, rescued
 from sessions.recording.schema import (
     APPLICATION_ID,
     FORMAT,
@@ -51,6 +53,7 @@ class SessionWriter:
         """Use `SessionWriter.create`."""
         self._connection = connection
         self._path = path
+        self._identities = identities(path)
         self._clock = clock
         self._blocks: list[ReadingBlock] = []  # handed over, not yet safe
         self._events: list[LoggedEvent] = []
@@ -61,7 +64,7 @@ class SessionWriter:
         self._failure: str | None = None
         self._reserve: Reserve | None = None
         self.safe: Callable[[Sequence[LoggedEvent]], None] = lambda _: None  # told of events once they are safe
-        self.full: str | None = None  # why only the end should still be written: the reserve is being used
+        self.must_end: str | None = None  # why only the end should still be written
 
     @classmethod
     def create(
@@ -200,13 +203,19 @@ class SessionWriter:
         return event
 
     def commit(self) -> Acknowledged:
-        """Make all that was handed over safe, and say how much that is now."""
+        """Make all that was handed over safe, and say how much that is now.
+
+        What was written is safe only in a file that can be found: where its name is gone or names another file, all of
+        it is written to a new folder, which is `folder` from then on, and `must_end` tells. Raises RecordingError.
+        """
         self._check()
         now_ns = self._clock.now_ns()
         try:
             rows = self._written()
         except sqlite3.Error as error:
-            rows = self._written_from_the_reserve(error)
+            rows = self._written_again(error)
+        if self._lost_sight():
+            self._rescue()
         self._block_rows = rows
         self._blocks.clear()
         safe, self._events = self._events, []
@@ -236,22 +245,46 @@ class SessionWriter:
         self._connection.execute("COMMIT")
         return rows
 
-    def _written_from_the_reserve(self, error: sqlite3.Error) -> int:
-        """Undo a commit that failed, and try it once more in the room that was kept back."""
+    def _written_again(self, error: sqlite3.Error) -> int:
+        """Undo a commit that failed, and try it once more: elsewhere, or in the room that was kept back."""
         with suppress(sqlite3.Error):
             self._connection.execute("ROLLBACK")
-        if self._reserve is None or self.full is not None:
+        if self._lost_sight():
+            self._rescue()
+        elif self._reserve is None or self.must_end is not None:
             self._fail(error)
-        self.full = (
-            f"the disk took no more ({error}); all that was measured is safe: free space on the disk, and resume"
-        )
-        self._give_back()
+        else:
+            self.must_end = (
+                f"the disk took no more ({error}); all that was measured is safe: free space on the disk, and resume"
+            )
+            self._give_back()
         try:
             return self._written()
         except sqlite3.Error as again:
             with suppress(sqlite3.Error):
                 self._connection.execute("ROLLBACK")
             self._fail(again)
+
+    def _lost_sight(self) -> bool:
+        """Say whether the names of the live file and its log are gone, or name other files than the open ones."""
+        return identities(self._path) != self._identities
+
+    def _rescue(self) -> None:
+        """Go on in a new folder that holds all that the open file does. Raises RecordingError where none can be."""
+        lost, self._failure = self._path, "it was removed, renamed or replaced"
+        self._path = rescued(self._connection, lost)
+        self._connection.close()
+        self._reserve = None
+        self._connection = sqlite3.connect(self._path, isolation_level=None)
+        try:
+            _make_durable(self._connection)
+        except sqlite3.Error as error:
+            self._fail(error)
+        self._identities, self._failure = identities(self._path), None
+        self.must_end = (
+            f"{without_home(str(lost))} was removed, renamed or replaced; all that was measured is safe in"
+            f" {without_home(str(self.folder))}: resume the session there"
+        )
 
     def _give_back(self) -> None:
         """Give the reserve back to the disk."""
@@ -312,3 +345,4 @@ def _make_durable(connection: sqlite3.Connection) -> None:
     if mode != "wal":
         raise sqlite3.OperationalError(f"the disk allows no write-ahead log, journal mode is {mode}")
     connection.execute("PRAGMA synchronous=FULL")
+    connection.execute("SELECT count(*) FROM sqlite_master").fetchone()  # the log is there from the first reading on

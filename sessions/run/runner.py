@@ -191,8 +191,8 @@ class _Run:
             began_ns = self._clock.now_ns()
             if (ending := stop()) is not None:
                 return ending
-            if self._writer.full is not None:
-                return "disk", self._writer.full
+            if self._writer.must_end is not None:
+                return "disk", self._writer.must_end
             self._listen()
             if isinstance(self._state, Resting) and self._rest_is_over():
                 self._take(RestOver())

@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -272,3 +273,24 @@ def test_a_stop_breaks_off_a_connection_that_does_not_come_about():
     assert failed.request == "Connect"
     assert failed.sentence.endswith("stopped by the user")
     assert not desk.of(NoDevice)
+
+
+def test_a_session_whose_folder_is_removed_stops_within_seconds_and_goes_on_in_the_folder_it_names(tmp_path):
+    folder = tmp_path / "s"
+    with Recorder.start(PACE) as recorder:
+        desk = Desk(recorder)
+        recorder.send(Connect("sim:?seed=7"))
+        desk.until(Device)
+        recorder.send(StartSession(PLAN, str(folder), People("simulated hand", 7)))
+        desk.until(AskStroke)
+        shutil.rmtree(folder)
+        ended = desk.until(SessionEnded)
+        rescued = Path(ended.folder)
+        assert rescued == tmp_path / "s-rescued"
+        assert (ended.end.cause, ended.resumable) == ("disk", True)
+        assert str(rescued) in ended.end.reason
+        assert desk.of(LoggedEvent) == list(Recording.open(rescued).events)
+        recorder.send(ResumeSession(str(rescued)))
+        desk.until(Sealed)
+    assert {record.outcome for record in Recording.open(rescued).trials} == {"scored"}
+    assert not folder.exists()

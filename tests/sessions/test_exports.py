@@ -9,6 +9,7 @@ import math
 import shutil
 import subprocess
 import sys
+import tracemalloc
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -127,6 +128,28 @@ def test_the_csv_holds_every_number_of_the_live_file_to_the_last_bit(sources, ex
     # 1e-6 N and 1e-3 N mm a count: the calibration of the stand-in.
     wrench = [float(number) for number in rows[1][11:]]
     assert wrench == pytest.approx([r * s for r, s in zip(kept[0][5:], [1e-6] * 3 + [1e-3] * 3, strict=True)])
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_one_long_answer_takes_room_and_memory_once_in_every_export(exports, tmp_path, form):
+    assert exports[form, "whole"].exists()  # so that its libraries are loaded
+    writer = begun(tmp_path / "s")
+    writer.readings(readings(0, 100))
+    positions = [[1000.0 + i / 60, i % 101 * 0.99] for i in range(60_000)]
+    writer.event("scored", 1, {"score": 42.5, "positions": positions}, commit=False)
+    for i in range(118):
+        writer.event("note", data={"text": f"{i}"}, commit=False)
+    writer.event("ended", data={"reason": "every trial is done"})
+    writer.close()
+    recording = Recording.open(tmp_path / "s")
+    source = ExportSource(recording, {"made_by": {}, **analyse(recording).to_dict()}, None)
+    tracemalloc.start()
+    folder = export(source, form, tmp_path / "out")
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    recorded = (tmp_path / "s" / "session.sqlite").stat().st_size  # [bytes]
+    assert sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) < 6 * recorded
+    assert peak < 60 * recorded  # as Python holds it, more than once; padding takes it 120 times or more
 
 
 @pytest.mark.parametrize("form", AGAIN)

@@ -9,8 +9,10 @@ import pytest
 from recordings import begun, change, ended, rows
 
 from daq_app.cli.main import run
+from sessions.exchange.import_session import exported, import_session
 from sessions.recording import Recording, RecordingError, writer
 from sessions.recording.archive import problems, seal
+from sessions.recording.digests import digest_of
 from sessions.recording.head import plan_to_dict
 from sessions.recording.schema import FORMAT_VERSION
 from sessions.strokes import analyse
@@ -44,6 +46,15 @@ def test_a_sealed_session_of_every_version_gives_what_was_planted_in_it(tmp_path
         assert stroke.mu_dynamic == pytest.approx(0.5, abs=0.002)  # 1 N of drag under 2 N
         assert stroke.speed == pytest.approx(20.0, rel=0.01)
         assert stroke.direction == 1
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_copy_of_every_version_is_imported_as_the_session_it_was_made_of(tmp_path, version):
+    folder = kept(version, "sealed", tmp_path)
+    made = import_session(exported(folder / "session.h5"), tmp_path / "again")
+    assert made.differences == ()
+    before, after = Recording.open(folder), Recording.open(tmp_path / "again")
+    assert digest_of(after.blocks(), after.events) == digest_of(before.blocks(), before.events)
 
 
 @pytest.mark.parametrize("version", VERSIONS)

@@ -1,9 +1,11 @@
 import hashlib
+import itertools
 import json
 import math
 import shutil
 import sqlite3
 import stat
+import tracemalloc
 from dataclasses import replace
 
 import h5py
@@ -16,6 +18,7 @@ from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems, seal
 from sessions.recording.derived import load_derived, store_derived, store_page
 from sessions.recording.manifest import list_in_manifest
+from sessions.recording.text_column import TextColumn, read_texts, write_texts
 
 REAL = replace(INFO, simulated=False)
 
@@ -74,7 +77,11 @@ def test_the_copy_holds_events_trials_and_the_plan(sealed):
     recording = Recording.open(sealed)
     with h5py.File(sealed / "session.h5") as copy:
         assert copy["events/kind"][...].tolist() == [event.kind.encode() for event in recording.events]
-        assert [json.loads(data) for data in copy["events/data"]] == [event.data for event in recording.events]
+        ends = copy["events/data_end"][...].tolist()
+        data = [copy["events/data"][a:b].tobytes() for a, b in itertools.pairwise([0, *ends])]
+        assert [json.loads(text) for text in data] == [event.data for event in recording.events]
+        assert copy["events/data"].fletcher32
+        assert copy["events/data_end"].fletcher32
         assert copy["trials/score"][...].tolist() == [42.5]
         assert copy["trials/index"][...].tolist() == [20]
         plan = json.loads(copy["head/plan"][0])
@@ -155,6 +162,34 @@ def test_a_recording_without_trials_is_sealed(tmp_path):
     with h5py.File(tmp_path / "s" / "session.h5") as copy:
         assert copy["trials/number"].shape == (0,)
     assert problems(tmp_path / "s") == ("the session has no end: it was cut short, or is still running",)
+
+
+def test_one_long_answer_takes_room_and_memory_once_not_once_for_each_event(tmp_path):
+    writer = begun(tmp_path / "s")
+    positions = [[1000.0 + i / 60, i % 101 * 0.99] for i in range(60_000)]
+    writer.event("scored", 1, {"score": 42.5, "positions": positions}, commit=False)
+    for i in range(118):
+        writer.event("note", data={"text": f"{i}"}, commit=False)
+    writer.event("ended", data={"reason": "every trial is done"})
+    writer.close()
+    del positions
+    tracemalloc.start()
+    seal(tmp_path / "s")
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert problems(tmp_path / "s") == ()
+    recorded = (tmp_path / "s" / "session.sqlite").stat().st_size  # [bytes]
+    assert recorded > 1e6
+    assert (tmp_path / "s" / "session.h5").stat().st_size < 1.5 * recorded
+    assert peak < 60 * recorded  # the answer as Python holds it, in one recording and in the next; 120 times is padding
+
+
+@pytest.mark.parametrize("texts", [(), ("",), ("", "a" * 32_768, "", "b"), ("c" * 100_000, "{}"), ("12",) * 40_000])
+def test_texts_of_any_length_come_back_as_they_were(tmp_path, texts):
+    with h5py.File(tmp_path / "texts.h5", "w") as file:
+        write_texts(file, TextColumn("any", lambda: texts, ""))
+    with h5py.File(tmp_path / "texts.h5") as file:
+        assert tuple(text.decode() for text in read_texts(file, "any")) == texts
 
 
 # ---- what is refused
@@ -262,6 +297,14 @@ def test_a_score_changed_in_the_copy_is_named_even_when_the_manifest_was_changed
         copy["trials/score"][0] = 99.0
     list_in_manifest(sealed, ("session.h5",), Recording.open(sealed).simulated_sentence)
     assert problems(sealed) == ("trials/score of session.h5 differs from the live file",)
+
+
+def test_an_event_changed_in_the_copy_is_named_even_when_the_manifest_was_changed_to_match(sealed):
+    with h5py.File(writable(sealed / "session.h5"), "r+") as copy:
+        text = copy["events/data"][...].tobytes()
+        copy["events/data"][text.index(b"42.5")] = ord("9")
+    list_in_manifest(sealed, ("session.h5",), Recording.open(sealed).simulated_sentence)
+    assert problems(sealed) == ("events/data of session.h5 differs from the live file",)
 
 
 def test_a_reading_changed_in_the_live_file_is_named_by_its_block_too(sealed):

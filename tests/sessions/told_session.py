@@ -28,7 +28,7 @@ class Session:
 
     def run(self, **options):
         self.end = run_session(self.plan, self.writer, self.hands, self.transducer, self.clock, **options)
-        return Recording.open(self.folder)
+        return Recording.open(self.writer.folder)
 
 
 def once(events):

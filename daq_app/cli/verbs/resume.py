@@ -51,7 +51,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     people = None if simulated is None else People("simulated people", simulated)
     with Recorder.start(factor, debug=options.debug) as recorder:
         outcome = attended(recorder, ResumeSession(str(folder.absolute()), options.device, people), console)
-    end = outcome.end
+    end, folder = outcome.end, Path(outcome.folder)
     gap = next(event.data["gap"] for event in reversed(Recording.open(folder).events) if event.kind == "resumed")
     console.result({"session": str(folder), "end": asdict(end), "sealed": outcome.sealed, "gap": gap})
     console.say(f"{folder}: {end.reason}; {end.readings} readings in all, {end.health.lost} lost since it was resumed")

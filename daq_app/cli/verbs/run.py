@@ -88,6 +88,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         )
         outcome = attended(recorder, asked, console)
     end = outcome.end
+    if Path(outcome.folder) != folder.absolute():  # it was taken away meanwhile
+        folder = Path(outcome.folder)
     console.result({"session": str(folder), "end": asdict(end), "sealed": outcome.sealed, "seed": seed})
     console.say(f"{folder}: {end.reason}; {end.readings} readings, {end.health.lost} lost")
     if end.health.flagged:

@@ -158,6 +158,11 @@ def test_the_recording_lamp_is_fed_by_what_the_disk_acknowledged_and_by_nothing_
     assert derive_view(after(status(2_000), state=state)).lamp.grade == "on"
 
 
+def test_a_session_goes_on_in_the_folder_that_its_end_names():
+    state = after(*MOUNT, m.SessionEnded("recordings/P07-rescued", LOST, True))
+    assert derive_view(state).banner.sends == m.ResumeSession("recordings/P07-rescued")
+
+
 def test_a_session_that_has_ended_shows_no_recording():
     state = after(*MOUNT, status(1_000), m.SessionEnded("recordings/P07", END, False), m.Sealing(""), m.Sealed(""))
     assert derive_view(state).lamp == replace(derive_view(state).lamp, grade="off", words="ended and sealed")
