@@ -56,7 +56,7 @@ def nearby(finger: FiniteFinger, scene: Scene, start: Shape, stop: Callable[[], 
         if force is None:
             shape = newton.settle(start, pull_sliding(scene), limit=FEW)
         else:
-            near = replace(start, pull=_under(scene)._replace(depth=start.pull.depth, travel=start.pull.travel))
+            near = replace(start, pull=pull_sliding(scene)._replace(depth=start.pull.depth, travel=start.pull.travel))
             found = balanced(newton, near, Given(force, None), limit=FEW)
             shape = newton.settle(found, found.pull, limit=FEW)
         return shape if stands(finger, shape, stop) else None
@@ -132,7 +132,7 @@ def _sliding_under(
 ) -> Shape:
     """Return settled sliding under the normal force of a scene, from `start` or reached as the force grows."""
     newton = finger.newton
-    pull = _under(scene)
+    pull = pull_sliding(scene)
     capped = steep(pull)
     if start is not None:
         near = replace(start, pull=pull._replace(depth=start.pull.depth, travel=start.pull.travel))
@@ -155,11 +155,6 @@ def _sliding_under(
         return _deeper(finger, shape, force, stop)
     assert shape is not None
     return steady(finger, shape.pull, start=shape, stop=stop)
-
-
-def _under(scene: Scene) -> Pull:
-    """Return what the surface does while it slides under a normal force, before that has pressed."""
-    return Pull(0.0, float(scene.friction.mu), scene.friction.cap, -(scene.loading.direction or 1))
 
 
 def _grown(newton: Newton, pull: Pull, force: float, stop: Callable[[], bool]) -> Iterator[Shape]:
@@ -205,8 +200,8 @@ def pull_sliding(scene: Scene) -> Pull:
 
 
 def pull_of(scene: Scene) -> Pull:
-    """Return depth, friction and bound of a scene as what the surface does."""
-    return Pull(scene.loading.depth, float(scene.friction.mu), scene.friction.cap)
+    """Return depth, friction and bound of a scene as what the surface does; depth 0 where a force is to find it."""
+    return Pull(scene.loading.indentation or 0.0, float(scene.friction.mu), scene.friction.cap)
 
 
 def presses(times: float) -> int:
