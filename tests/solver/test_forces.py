@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solver.failures import NoSteadyState, SolveFailure
+from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.reference import SLIPPERINESS, STICKINESS, scene
-from solver.scene import Finger, Friction, Loading, Scene, SceneError, Solve
+from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, SceneError, Solve
 from solver.solution import solve
 
 KINEMATICS = ("small", "finite")
@@ -224,3 +224,29 @@ def test_a_press_is_found_whatever_would_become_of_a_slide():
     )
     depths = [solve(replace(pressed, friction=Friction(mu))).indentation for mu in (1.6, 10.0)]
     assert depths[0] == pytest.approx(depths[1], rel=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("dermis", "friction", "normal_force", "tolerance"),
+    [
+        (0.08, Friction(1.118277397182296, 0.002070548525770076), 0.0044497192655214915, 0.003),
+        (5407.8454161623995, Friction(0.5586545703197969, 0.025616377070578233), 0.1910637957430237, 0.003),
+        (150.69821590921816, Friction(0.3094747251088029, 0.0016722533203269358), 0.4910914796322509, None),
+    ],
+)
+def test_a_force_that_one_mesh_does_not_meet_is_met_on_another_or_refused_in_a_sentence(
+    dermis, friction, normal_force, tolerance
+):
+    given = Scene(
+        materials=Materials(dermis=Material(dermis, 0.48)),
+        friction=friction,
+        loading=Loading(normal_force=normal_force, slide="-x"),
+        solve=Solve("finite", tolerance=tolerance, evidence="quick"),
+    )
+    try:
+        found = solve(given)
+    except NotConverged as refused:
+        assert str(refused).endswith(".")
+        return
+    assert found.normal_force == pytest.approx(normal_force, rel=1e-8)
