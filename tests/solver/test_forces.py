@@ -246,7 +246,9 @@ def test_a_force_that_one_mesh_does_not_meet_is_met_on_another_or_refused_in_a_s
     )
     try:
         found = solve(given)
-    except NotConverged as refused:
-        assert str(refused).endswith(".")
+    except NotConverged as failure:
+        found = failure
+    if isinstance(found, NotConverged):
+        assert str(found).endswith(".")
         return
     assert found.normal_force == pytest.approx(normal_force, rel=1e-8)
