@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver import finite_forced, reach, sliding
-from solver.existence import all_at_the_bound, stands, steady, steep
+from solver.existence import DEPTHS_APART, all_at_the_bound, stands, steady, steep
 from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.finite_finger import FiniteFinger
 from solver.finite_forced import Given, balanced
@@ -184,14 +184,31 @@ def _at_force(newton: Newton, start: Shape, force: float, stop: Callable[[], boo
 def _deeper(finger: FiniteFinger, shape: Shape, force: float, stop: Callable[[], bool]) -> Shape:
     """Return settled sliding under `force` [N/mm] deeper than `shape`, from where it did not grow on.
 
-    How deep sliding goes, and how hard it presses there, is told by `solver.reach`. Raises as `settled`.
+    How deep sliding goes, and how hard it presses there, is told by `solver.reach`; but only where driven a little
+    deeper it has no state. Where it has one, that is where the search goes on. Raises as `settled`.
     """
     proof = reach.of_depth(finger.scene, shape.pull._replace(depth=BEYOND * shape.pull.depth), stop)
     if proof.limited and not proof.lost and proof.numbers[1] < force:
-        most = proof.numbers[1]
-        raise NoSteadyState("There is none so deep.", limit_indentation=proof.value, limit_normal_force=most)
+        shape = _risen_to(finger, shape, proof, force, stop)
     found = _at_force(finger.newton, shape, force, stop)
     return steady(finger, found.pull, start=found, stop=stop)
+
+
+def _risen_to(finger: FiniteFinger, shape: Shape, proof: reach.Reach, force: float, stop: Callable[[], bool]) -> Shape:
+    """Return a slide beyond the depth at which `proof` ends that presses with `force` [N/mm] or more.
+
+    Depths grow by as much as limits of two meshes differ. Raises NoSteadyState between a depth with a state and one
+    without, NotConverged where it is not known whether there is one.
+    """
+    depth, most = proof.value, float(proof.numbers[1])
+    while most < force:
+        tell("trying whether the finger slides deeper than it was followed to", most / force)
+        try:
+            shape = steady(finger, shape.pull._replace(depth=(1.0 + DEPTHS_APART) * depth), start=shape, stop=stop)
+        except NoSteadyState as failure:
+            raise NoSteadyState("There is none so deep.", limit_indentation=depth, limit_normal_force=most) from failure
+        depth, most = shape.pull.depth, float(shape.force[1])
+    return shape
 
 
 def pull_sliding(scene: Scene) -> Pull:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from solver import finite_forced, reach
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.reference import SLIPPERINESS, STICKINESS, scene
 from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, SceneError, Solve
@@ -252,3 +253,35 @@ def test_a_force_that_one_mesh_does_not_meet_is_met_on_another_or_refused_in_a_s
         assert str(found).endswith(".")
         return
     assert found.normal_force == pytest.approx(normal_force, rel=1e-8)
+
+
+@pytest.mark.slow
+def test_a_limit_under_a_force_has_a_slide_a_little_less_deep_and_none_a_little_deeper():
+    given = Scene(friction=Friction(1.108), loading=Loading(normal_force=0.2568), solve=Solve("finite", tolerance=0.1))
+    with pytest.raises(NoSteadyState) as refused:
+        solve(given)
+    deepest = refused.value.limit_indentation
+    below = solve(replace(given, loading=Loading(0.97 * deepest)))
+    assert below.normal_force == pytest.approx(refused.value.limit_normal_force, rel=0.05)
+    with pytest.raises(NoSteadyState):
+        solve(replace(given, loading=Loading(1.06 * deepest)))
+
+
+def test_a_largest_depth_that_has_a_slide_beyond_it_is_no_limit_under_a_force(monkeypatch):
+    """Planted: the force is lost while it grows, and the branch seems to end at two thirds of the depth."""
+    given = Scene(friction=Friction(0.3), loading=Loading(normal_force=0.1), solve=Solve("finite", tolerance=COARSE))
+    whole, followed, grown = solve(given), reach.of_depth, finite_forced.march
+
+    def ends_too_early(scene, pull, stop=lambda: False):
+        depth = whole.indentation / 1.5
+        return replace(followed(scene, pull._replace(depth=depth), stop), value=depth, limited=True, lost=False)
+
+    def lost_on_its_way(newton, start, begin, course, stop=lambda: False):
+        yield from grown(newton, start, begin, course[:3], stop)
+        raise NotConverged("lost")
+
+    monkeypatch.setattr(reach, "of_depth", ends_too_early)
+    monkeypatch.setattr(finite_forced, "march", lost_on_its_way)
+    found = solve(given)
+    assert found.normal_force == pytest.approx(0.1, rel=1e-8)
+    assert found.indentation == pytest.approx(whole.indentation, rel=1e-3)
