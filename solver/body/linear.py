@@ -188,6 +188,7 @@ def _touchable(mesh: Mesh, stiffness: Array, loads: Array, free: Sequence[Motion
         tangential_free=moved[k:],
         motions=motions,
         resultants=-motions.T @ load,
+        carried=bool(free),
     )
 
 

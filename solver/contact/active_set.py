@@ -49,6 +49,7 @@ class Touchable:
     motions: Array  # (2 k, r) displacement of the points, normal ones first, by each free motion
     resultants: Array  # (r,) what the surface's forces must amount to along each free motion [N/mm]
     in_loops: bool = False  # whether compiled loops find its contact, `solver._kernels.rubbing`
+    carried: bool = False  # whether dead loads are balanced by the surface alone, so that they act from first touch on
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,7 +207,7 @@ class Course:
         """
         depth, travel = finite("depth", depth), finite("travel", travel)
         if self.body.motions.shape[1]:
-            before = lowered(self.law, before)
+            before = lowered(self.law, before, len(self.body.resultants) if self.body.carried else 1)
         self._resultants = self.body.resultants if resultants is None else resultants
         try:
             return self._consistent(depth, travel, before.shift, before.state, before.sense, free=True)
@@ -322,20 +323,31 @@ class Course:
 
 
 def untouched(body: Touchable, depth: float = 0.0) -> Contact:
-    """Return the state before first touch."""
+    """Return the state before first touch of a body driven to `depth` [mm].
+
+    Dead loads have displaced the skin that they leave clear of the surface. Skin that they would press into it, and all
+    skin of a body whose loads the surface carries, touches before they act: it is where it was without them. Under
+    a given force the body starts clear of the surface.
+    """
     count = len(body.gap)
     zero = np.zeros(count)
     state = np.full(count, OPEN, np.int8)
-    gap = body.gap + body.normal_free - depth
-    return Contact(state, np.ones(count), zero, zero, body.tangential_free, gap, np.zeros(0), 0)
+    clear = np.full(count, not body.carried)
+    if not body.motions.shape[1]:
+        clear = body.gap + body.normal_free >= depth
+    gap = body.gap + np.where(clear, body.normal_free, 0.0) - depth
+    return Contact(state, np.ones(count), zero, zero, np.where(clear, body.tangential_free, 0.0), gap, np.zeros(0), 0)
 
 
-def lowered(law: FrictionLaw, contact: Contact) -> Contact:
-    """Return `contact` with the lowest point on the surface, where nothing touches: under a force something does."""
+def lowered(law: FrictionLaw, contact: Contact, count: int = 1) -> Contact:
+    """Return `contact` with its `count` lowest points on the surface, where nothing touches: forces need some that do.
+
+    A body that nothing holds needs as many as it has free motions.
+    """
     if contact.touching.any():
         return contact
     state = contact.state.copy()
-    state[np.argmin(contact.gap)] = SLIP if law.frictionless else STICK
+    state[np.argsort(contact.gap, kind="stable")[:count]] = SLIP if law.frictionless else STICK
     return replace(contact, state=state)
 
 

@@ -17,6 +17,7 @@ from solver.failures import NoSteadyState, NotConverged
 from solver.scene import Scene
 
 FAR = 0.9  # of the friction asked for, below which a limit is beyond doubt
+DEPTHS_APART = 0.06  # of the largest depth on two meshes, each good to 3 %: so much deeper there must be no state [-]
 ALIKE = 0.1  # relative difference of SED and forces within which a state is that of another mesh
 
 
@@ -152,7 +153,7 @@ def _refused(scene: Scene, pull: Pull, proof: Reach, stop: Callable[[], bool]) -
     beyond = ""
     with suppress(NotConverged):
         deepest = reach.of_depth(scene, pull, stop)
-        if deepest.limited and not deepest.lost:
+        if deepest.limited and not deepest.lost and _none_beyond(scene, pull, deepest.value, stop):
             depth = deepest.value
             beyond = f", and with this friction up to {depth:.4g} mm"
     return NoSteadyState(
@@ -161,6 +162,15 @@ def _refused(scene: Scene, pull: Pull, proof: Reach, stop: Callable[[], bool]) -
         limit_mu=largest,
         limit_indentation=depth,
     )
+
+
+def _none_beyond(scene: Scene, pull: Pull, depth: float, stop: Callable[[], bool]) -> bool:
+    """Return whether a little below `depth` [mm] friction as `pull` has it is not reached either, at that depth."""
+    further = (1.0 + DEPTHS_APART) * depth
+    if further >= pull.depth:
+        return True  # `pull` itself is what has no state
+    proof = reach.of_friction(scene, pull._replace(depth=further), pull.mu, stop)
+    return proof.limited and not proof.lost
 
 
 def _proven(finger: FiniteFinger, shape: Shape, proof: Reach) -> bool:

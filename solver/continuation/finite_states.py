@@ -8,7 +8,7 @@ import numpy as np
 
 from solver._kernels import STICK
 from solver.continuation import limit_point as reach
-from solver.continuation.existence import all_at_the_bound, stands, steady, steep
+from solver.continuation.existence import DEPTHS_APART, all_at_the_bound, stands, steady, steep
 from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium import full_slip as sliding
 from solver.equilibrium.finite_finger import FiniteFinger
@@ -58,7 +58,7 @@ def nearby(finger: FiniteFinger, scene: Scene, start: Shape, stop: Callable[[], 
         if force is None:
             shape = newton.settle(start, pull_sliding(scene), limit=FEW)
         else:
-            near = replace(start, pull=_under(scene)._replace(depth=start.pull.depth, travel=start.pull.travel))
+            near = replace(start, pull=pull_sliding(scene)._replace(depth=start.pull.depth, travel=start.pull.travel))
             found = balanced(newton, near, Given(force, None), limit=FEW)
             shape = newton.settle(found, found.pull, limit=FEW)
         return shape if stands(finger, shape, stop) else None
@@ -134,7 +134,7 @@ def _sliding_under(
 ) -> Shape:
     """Return settled sliding under the normal force of a scene, from `start` or reached as the force grows."""
     newton = finger.newton
-    pull = _under(scene)
+    pull = pull_sliding(scene)
     capped = steep(pull)
     if start is not None:
         near = replace(start, pull=pull._replace(depth=start.pull.depth, travel=start.pull.travel))
@@ -157,11 +157,6 @@ def _sliding_under(
         return _deeper(finger, shape, force, stop)
     assert shape is not None
     return steady(finger, shape.pull, start=shape, stop=stop)
-
-
-def _under(scene: Scene) -> Pull:
-    """Return what the surface does while it slides under a normal force, before that has pressed."""
-    return Pull(0.0, float(scene.friction.mu), scene.friction.cap, -(scene.loading.direction or 1))
 
 
 def _grown(newton: Newton, pull: Pull, force: float, stop: Callable[[], bool]) -> Iterator[Shape]:
@@ -191,14 +186,31 @@ def _at_force(newton: Newton, start: Shape, force: float, stop: Callable[[], boo
 def _deeper(finger: FiniteFinger, shape: Shape, force: float, stop: Callable[[], bool]) -> Shape:
     """Return settled sliding under `force` [N/mm] deeper than `shape`, from where it did not grow on.
 
-    How deep sliding goes, and how hard it presses there, is told by `limit_point`. Raises as `settled`.
+    How deep sliding goes, and how hard it presses there, is told by `limit_point`; but only where driven a little
+    deeper it has no state. Where it has one, that is where the search goes on. Raises as `settled`.
     """
     proof = reach.of_depth(finger.scene, shape.pull._replace(depth=BEYOND * shape.pull.depth), stop)
     if proof.limited and not proof.lost and proof.numbers[1] < force:
-        most = proof.numbers[1]
-        raise NoSteadyState("There is none so deep.", limit_indentation=proof.value, limit_normal_force=most)
+        shape = _risen_to(finger, shape, proof, force, stop)
     found = _at_force(finger.newton, shape, force, stop)
     return steady(finger, found.pull, start=found, stop=stop)
+
+
+def _risen_to(finger: FiniteFinger, shape: Shape, proof: reach.Reach, force: float, stop: Callable[[], bool]) -> Shape:
+    """Return a slide beyond the depth at which `proof` ends that presses with `force` [N/mm] or more.
+
+    Depths grow by as much as limits of two meshes differ. Raises NoSteadyState between a depth with a state and one
+    without, NotConverged where it is not known whether there is one.
+    """
+    depth, most = proof.value, float(proof.numbers[1])
+    while most < force:
+        tell("trying whether the finger slides deeper than it was followed to", most / force)
+        try:
+            shape = steady(finger, shape.pull._replace(depth=(1.0 + DEPTHS_APART) * depth), start=shape, stop=stop)
+        except NoSteadyState as failure:
+            raise NoSteadyState("There is none so deep.", limit_indentation=depth, limit_normal_force=most) from failure
+        depth, most = shape.pull.depth, float(shape.force[1])
+    return shape
 
 
 def pull_sliding(scene: Scene) -> Pull:
@@ -207,8 +219,8 @@ def pull_sliding(scene: Scene) -> Pull:
 
 
 def pull_of(scene: Scene) -> Pull:
-    """Return depth, friction and bound of a scene as what the surface does."""
-    return Pull(scene.loading.depth, float(scene.friction.mu), scene.friction.cap)
+    """Return depth, friction and bound of a scene as what the surface does; depth 0 where a force is to find it."""
+    return Pull(scene.loading.indentation or 0.0, float(scene.friction.mu), scene.friction.cap)
 
 
 def presses(times: float) -> int:

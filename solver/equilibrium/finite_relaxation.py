@@ -31,9 +31,10 @@ from solver.equilibrium.load_path import (
     Aim,
 )
 from solver.equilibrium.newton import Newton, Shape
-from solver.equilibrium.relaxation import wait
+from solver.equilibrium.relaxation import RELAXED, wait
 from solver.failures import Cancelled, NotConverged, followed_to
 from solver.mesh import Array, Indices
+from solver.progress import tell
 from solver.scene import Scene
 
 FIRST, LARGEST = 0.02, 0.1  # steps of a slide, by the indentation; each a fifth longer than the one before
@@ -153,12 +154,14 @@ class RelaxingCourse:
         count = round(PRESSING_STEPS * self._times)
         for number in range(1, count + 1):
             part = number / count
+            tell("pressing step by step, since the tissues relax", part)
             self._go(Aim(PRESSING_TIME * part, press * part, 0.0))
         if drag is not None:
             pull = -loading.direction * drag
             count = round(DRAGGING_STEPS * self._times)
             for number in range(1, count + 1):
                 part = number / count
+                tell("dragging step by step, since the tissues relax", part)
                 self._go(Aim(PRESSING_TIME + DRAGGING_TIME * part, press, pull * part))
         else:
             for direction in loading.directions:
@@ -170,6 +173,7 @@ class RelaxingCourse:
         depth = self.shapes[-1].pull.depth
         step, distance = FIRST / self._times * depth, 0.0
         while distance < LONG * depth:
+            tell("sliding step by step until nothing sticks, since the tissues relax", distance / (LONG * depth))
             self._go(Aim(self._aim.time + step / abs(speed), self._aim.press, self._aim.along + np.sign(speed) * step))
             distance += step
             step = min(1.2 * step, LARGEST / self._times * depth)
@@ -184,7 +188,11 @@ class RelaxingCourse:
         """Go on until all terms have relaxed."""
         self._sense = -int(np.sign(speed))  # by now all that touches slips, whatever comes to touch
 
+        begun, longest = self.times[-1], RELAXED * self._scene.materials.longest_creep
+
         def go(step: float) -> None:
+            part = min((self.times[-1] - begun) / longest, 1.0)
+            tell("waiting step by step until the tissues have relaxed", part)
             self._go(Aim(self._aim.time + step, self._aim.press, self._aim.along + speed * step))
 
         wait(go, self.times[-1] - self.times[-2], self._scene.materials.longest_creep, self.sed, self._times)

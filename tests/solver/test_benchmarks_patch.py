@@ -79,7 +79,6 @@ def test_a_block_sheared_below_mu_p_sticks_at_every_point(part):
     mesh, loads = pressed(0.48, part * mu * 1e-3, 1)
     body = Body.of(mesh, [Hooke(0.08, 0.48)], loads, free=("x", "y", "turn"))
     still = replace(untouched(body.touchable), state=np.full(len(mesh.skin), STICK, np.int8))
-    still = replace(still, shift=np.zeros(len(mesh.skin)))
     found = Course(body.touchable, FrictionLaw(mu, np.inf)).step(still, 0.0, 0.0)
     assert (found.state == STICK).all()
     assert np.abs(found.tangential / body.touchable.length + part * mu * 1e-3).max() < 1e-15

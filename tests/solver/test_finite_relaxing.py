@@ -19,6 +19,7 @@ from solver.constitutive.linear import Hooke, Prony
 from solver.constitutive.overstress import Past
 from solver.equilibrium.finite_relaxation import RelaxingNewton
 from solver.equilibrium.newton import Pull, Shape
+from solver.progress import listening
 from solver.response.solution import solve
 from solver.scene import Materials, Relaxation, Solve
 from solver.scene.published import SLIPPERINESS, scene
@@ -305,6 +306,18 @@ def test_in_the_end_a_sliding_finger_has_its_relaxed_moduli_and_overshoots_on_th
     assert 5e-4 < found.audits["course_viscous_work"] < 0.01  # of the work that a slide of 1,844 mm took
     assert found.history.normal_force.max() > 1.2 * found.normal_force
     assert found.history.sed_ending[-1] == pytest.approx(found.sed_ending, rel=1e-6)
+
+
+def test_a_relaxing_course_says_at_every_step_what_it_does_and_why_it_takes_steps():
+    heard = []
+    with listening(lambda doing, part: heard.append((doing, part))):
+        found = solve(published(of_layers(Relaxation(0.3, 0.07)), indentation=0.3))
+    course = [(doing, part) for doing, part in heard if "relax" in doing]
+    assert len(course) >= len(found.history.time)
+    for doing in dict.fromkeys(doing for doing, _ in course):
+        parts = [part for one, part in course if one == doing]
+        assert parts == sorted(parts)
+        assert 0.0 <= parts[0] < parts[-1] <= 1.0
 
 
 @pytest.mark.slow

@@ -7,9 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solver.failures import NoSteadyState, SolveFailure
+from solver.continuation import limit_point as reach
+from solver.equilibrium import force_control as finite_forced
+from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.response.solution import solve
-from solver.scene import Finger, Friction, Loading, Scene, SceneError, Solve
+from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, SceneError, Solve
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
 KINEMATICS = ("small", "finite")
@@ -224,3 +226,63 @@ def test_a_press_is_found_whatever_would_become_of_a_slide():
     )
     depths = [solve(replace(pressed, friction=Friction(mu))).indentation for mu in (1.6, 10.0)]
     assert depths[0] == pytest.approx(depths[1], rel=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("dermis", "friction", "normal_force", "tolerance"),
+    [
+        (0.08, Friction(1.118277397182296, 0.002070548525770076), 0.0044497192655214915, 0.003),
+        (5407.8454161623995, Friction(0.5586545703197969, 0.025616377070578233), 0.1910637957430237, 0.003),
+        (150.69821590921816, Friction(0.3094747251088029, 0.0016722533203269358), 0.4910914796322509, None),
+    ],
+)
+def test_a_force_that_one_mesh_does_not_meet_is_met_on_another_or_refused_in_a_sentence(
+    dermis, friction, normal_force, tolerance
+):
+    given = Scene(
+        materials=Materials(dermis=Material(dermis, 0.48)),
+        friction=friction,
+        loading=Loading(normal_force=normal_force, slide="-x"),
+        solve=Solve("finite", tolerance=tolerance, evidence="quick"),
+    )
+    try:
+        found = solve(given)
+    except NotConverged as failure:
+        found = failure
+    if isinstance(found, NotConverged):
+        assert str(found).endswith(".")
+        return
+    assert found.normal_force == pytest.approx(normal_force, rel=1e-8)
+
+
+@pytest.mark.slow
+def test_a_limit_under_a_force_has_a_slide_a_little_less_deep_and_none_a_little_deeper():
+    given = Scene(friction=Friction(1.108), loading=Loading(normal_force=0.2568), solve=Solve("finite", tolerance=0.1))
+    with pytest.raises(NoSteadyState) as refused:
+        solve(given)
+    deepest = refused.value.limit_indentation
+    below = solve(replace(given, loading=Loading(0.97 * deepest)))
+    assert below.normal_force == pytest.approx(refused.value.limit_normal_force, rel=0.05)
+    with pytest.raises(NoSteadyState):
+        solve(replace(given, loading=Loading(1.06 * deepest)))
+
+
+def test_a_largest_depth_that_has_a_slide_beyond_it_is_no_limit_under_a_force(monkeypatch):
+    """Planted: the force is lost while it grows, and the branch seems to end at two thirds of the depth."""
+    given = Scene(friction=Friction(0.3), loading=Loading(normal_force=0.1), solve=Solve("finite", tolerance=COARSE))
+    whole, followed, grown = solve(given), reach.of_depth, finite_forced.march
+
+    def ends_too_early(scene, pull, stop=lambda: False):
+        depth = whole.indentation / 1.5
+        return replace(followed(scene, pull._replace(depth=depth), stop), value=depth, limited=True, lost=False)
+
+    def lost_on_its_way(newton, start, begin, course, stop=lambda: False):
+        yield from grown(newton, start, begin, course[:3], stop)
+        raise NotConverged("lost")
+
+    monkeypatch.setattr(reach, "of_depth", ends_too_early)
+    monkeypatch.setattr(finite_forced, "march", lost_on_its_way)
+    found = solve(given)
+    assert found.normal_force == pytest.approx(0.1, rel=1e-8)
+    assert found.indentation == pytest.approx(whole.indentation, rel=1e-3)

@@ -90,7 +90,6 @@ def test_below_the_friction_limit_every_point_sticks_and_carries_the_same_tracti
     mesh, loads = pressed_block(part * mu * PRESSURE, confined=True)
     body = Body.of(mesh, [DERMIS], loads, free=("x", "y", "turn"))
     start = replace(untouched(body.touchable), state=np.full(len(mesh.skin), STICK, np.int8))
-    start = replace(start, shift=np.zeros(len(mesh.skin)))
     found = Course(body.touchable, FrictionLaw(mu, np.inf)).step(start, 0.0, 0.0)
     assert (found.state == STICK).all()
     assert np.allclose(found.normal, PRESSURE * body.touchable.length, rtol=0, atol=1e-15)
