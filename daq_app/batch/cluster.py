@@ -31,10 +31,11 @@ def by_cluster(folders: Sequence[Path], options: VisitOptions, address: str) -> 
     except ImportError as error:
         raise SchedulerError("a cluster needs the package distributed: pip install 'daq-app[cluster]'") from error
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it logs as errors is told in a sentence below
-    kind = asyncio.run(_identity(library, address))
+    security: Any = library.Security()  # certificates as Dask's own configuration names them, for tls:// addresses
+    kind = asyncio.run(_identity(library, address, security))
     if kind != "Scheduler":
         raise SchedulerError(f"{address} is the address of a Dask {kind.lower()}: give that of its scheduler")
-    client: Any = library.Client(address, timeout=ANSWERS, set_as_default=False)
+    client: Any = library.Client(address, timeout=ANSWERS, set_as_default=False, security=security)
     try:
         yield from _by_client(client, library.as_completed(loop=client.loop), folders, options, address)
     except OSError as error:
@@ -77,10 +78,11 @@ def _refuse_unlike(there: Mapping[str, Any], address: str, who: str) -> None:
         )
 
 
-async def _identity(library: Any, address: str) -> str:  # noqa: ANN401 - distributed declares no types
+async def _identity(library: Any, address: str, security: Any) -> str:  # noqa: ANN401 - distributed declares no types
     """Return what answers at an address. Raises SchedulerError: a client alone waits for ever for what keeps silent."""
     try:
-        async with asyncio.timeout(ANSWERS), library.rpc(address, timeout=ANSWERS) as there:
+        secured = security.get_connection_args("client")
+        async with asyncio.timeout(ANSWERS), library.rpc(address, timeout=ANSWERS, connection_args=secured) as there:
             return str((await there.identity())["type"])
     except Exception as error:  # any program may listen there and answer anything
         why = " ".join(str(error).split()) or f"nothing within {ANSWERS:.0f} s"

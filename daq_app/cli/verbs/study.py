@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="page, table and results (FOLDER/pooled); with --synthetic the study too",
     )
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster you trust, such as tls://host:8786")
     parser.add_argument("--workers", type=int, metavar="N", help="processes on this computer (as many as cores)")
     parser.add_argument(
         "--kinematics",
