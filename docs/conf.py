@@ -7,7 +7,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import generate
 
 project = "daq-app"
-author = "the authors of daq-app"
+author = "The daq-app authors"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.viewcode", "sphinx-mathjax-offline"]
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
 myst_heading_anchors = 4
