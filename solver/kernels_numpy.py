@@ -7,7 +7,7 @@ import numpy as np
 from solver._kernels.skin import STEEP
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import shape, slopes
-from solver.contact.law import CAP, OPEN, SLIP, STICK, FrictionLaw
+from solver.contact.law import SHEAR_LIMITED, OPEN, SLIP, STICK, FrictionLaw
 from solver.mesh import Array, Flags, Indices
 
 IMAGINARY = 1e-30  # step whose square is nothing [-]
@@ -204,17 +204,17 @@ def restated(
     length = np.maximum(length, 0.0)  # skin that hangs over has no limit
     was_open, stuck, slips = state == OPEN, state == STICK, state >= SLIP
     coulomb, bound, most = law.mu * np.maximum(push, 0.0), law.bound(length), law.limit(push, length)
-    at_bound = (bound < coulomb - slack) | ((state == CAP) & (bound <= coulomb + slack))
-    now, turned = np.where(at_bound, CAP, SLIP), sense.copy()
+    at_bound = (bound < coulomb - slack) | ((state == SHEAR_LIMITED) & (bound <= coulomb + slack))
+    now, turned = np.where(at_bound, SHEAR_LIMITED, SLIP), sense.copy()
     if direction == 0:
         over = np.abs(drag) > most + slack
         turned = np.where(stuck & over & (push >= -slack), np.where(drag > 0.0, 1, -1), sense)
-        now = np.where(stuck, np.where(over, np.where(bound < coulomb, CAP, SLIP), STICK), now)
+        now = np.where(stuck, np.where(over, np.where(bound < coulomb, SHEAR_LIMITED, SLIP), STICK), now)
         now = np.where(slips & (slid * sense > small) & (most > 0.0), STICK, now)
         entering = SLIP if law.frictionless else STICK
     else:
         turned = np.where(was_open | (push < -slack), sense, direction)
-        entering = CAP if law.mu > STEEP and law.tau_max < np.inf else SLIP
+        entering = SHEAR_LIMITED if law.mu > STEEP and law.tau_max < np.inf else SLIP
         turned = np.where(was_open & (above < -small), direction, turned)
     now = np.where(push < -slack, OPEN, now)
     now = np.where(was_open, np.where(above < -small, entering, OPEN), now)

@@ -5,7 +5,7 @@
 """
 
 from solver._kernels.carrying import carry
-from solver._kernels.compiling import CAP, HELD_X, HELD_Y, OPEN, SLIP, STICK, ending
+from solver._kernels.compiling import SHEAR_LIMITED, HELD_X, HELD_Y, OPEN, SLIP, STICK, ending
 from solver._kernels.elements import assemble, energies, forces
 from solver._kernels.fronts import condense, eliminate, unfold
 from solver._kernels.iterating import meet, move, touch
@@ -14,7 +14,7 @@ from solver._kernels.overstress import add_overstress
 from solver._kernels.skin import STEEP, impose, restate, rubbed, solve, tributary
 
 __all__ = [
-    "CAP",
+    "SHEAR_LIMITED",
     "HELD_X",
     "HELD_Y",
     "OPEN",

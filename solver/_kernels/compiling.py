@@ -25,7 +25,7 @@ Compiled = TypeVar("Compiled", bound=Callable[..., Any])
 Result = TypeVar("Result")
 
 HELD_X, HELD_Y = 1, 2  # of a node of the skin that is held; both: their sum
-OPEN, STICK, SLIP, CAP = 0, 1, 2, 3  # states of a node of the skin
+OPEN, STICK, SLIP, SHEAR_LIMITED = 0, 1, 2, 3  # states of a node of the skin
 _FAST = {"contract", "reassoc", "arcp", "nsz"}  # nan and infinity keep their meaning
 _ONE_BY_ONE = Lock()  # neither numba's compiler nor LLVM's linker likes company
 

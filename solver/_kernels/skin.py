@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from solver._kernels.compiling import CAP, HELD_X, HELD_Y, OPEN, SLIP, STICK, Array, Narrow, compiled
+from solver._kernels.compiling import SHEAR_LIMITED, HELD_X, HELD_Y, OPEN, SLIP, STICK, Array, Narrow, compiled
 
 # how the length of skin of an edge's first, middle and last node grows with the positions of the three: Simpson's rule
 _LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
@@ -128,7 +128,7 @@ def impose(
                 value = mine[y - 1] - drag * other[y - 1]
                 right[r, 0] -= value * steps[y - 1, 0]
                 right[r, 3] -= value
-        if state[i] == CAP:
+        if state[i] == SHEAR_LIMITED:
             drag = sense[i] * tau
             right[r, 0] += drag * length[i]
             for edge in range(max(i - 1, 0), min(i + 2, size)):
@@ -221,7 +221,7 @@ def restate(
             if above[i] < -small:
                 now = STICK if direction == 0 and mu > 0.0 and tau > 0.0 else SLIP
                 if direction != 0 and mu > STEEP and tau < np.inf:
-                    now = CAP
+                    now = SHEAR_LIMITED
                 turned = direction if direction != 0 else turned
         elif reaction[i, 1] < -slack:
             now = OPEN
@@ -230,15 +230,23 @@ def restate(
             most = min(coulomb, bound)
             if direction != 0:
                 turned = direction
-                now = CAP if bound < coulomb - slack or (was == CAP and bound <= coulomb + slack) else SLIP
+                now = (
+                    SHEAR_LIMITED
+                    if bound < coulomb - slack or (was == SHEAR_LIMITED and bound <= coulomb + slack)
+                    else SLIP
+                )
             elif was == STICK:
                 if abs(reaction[i, 0]) > most + slack:
                     turned = 1 if reaction[i, 0] > 0.0 else -1
-                    now = CAP if bound < coulomb else SLIP
+                    now = SHEAR_LIMITED if bound < coulomb else SLIP
             elif slid[i] * sense[i] > small and most > 0.0:
                 now = STICK
             else:
-                now = CAP if bound < coulomb - slack or (was == CAP and bound <= coulomb + slack) else SLIP
+                now = (
+                    SHEAR_LIMITED
+                    if bound < coulomb - slack or (was == SHEAR_LIMITED and bound <= coulomb + slack)
+                    else SLIP
+                )
         if now != was or (now >= SLIP and turned != sense[i]):
             changed += 1
         state[i], sense[i] = now, turned
@@ -299,9 +307,9 @@ def settle(
         if restate(state, sense, reaction, reached, ahead - anchor, lengths, mu, tau, direction) == 0:
             break
         for i in range(size):
-            if before[i] == OPEN and state[i] == CAP:
+            if before[i] == OPEN and state[i] == SHEAR_LIMITED:
                 entered[i] += 1
-                state[i] = CAP if entered[i] % 2 == 1 else SLIP
+                state[i] = SHEAR_LIMITED if entered[i] % 2 == 1 else SLIP
     return True
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.body.validation import finite
-from solver.contact.law import CAP, OPEN, SLIP, STICK, FrictionLaw
+from solver.contact.law import SHEAR_LIMITED, OPEN, SLIP, STICK, FrictionLaw
 from solver.linalg.lapack import dgesv, dgetrf, dgetrs
 
 Array = NDArray[np.float64]
@@ -134,7 +134,7 @@ class Course:
             guesses = guesses if low.any() else []
             guesses += [np.where(self.body.gap <= height, SLIP, OPEN) for height in self._heights()]
         if guess is None and np.isfinite(self.law.tau_max):
-            guesses.append(np.where(low, CAP, OPEN))
+            guesses.append(np.where(low, SHEAR_LIMITED, OPEN))
         if guess is None and not self.body.motions.shape[1]:
             found = self._slid(depth, -float(direction))
             if found is not None:
@@ -192,7 +192,7 @@ class Course:
                 tangential = np.where(on & ~capped, sense * mu * normal, pull)
                 shift = body.tangential_free + body.tangential_by_tangential @ tangential
                 shift += body.normal_by_tangential.T @ normal
-                state = np.where(capped, CAP, np.where(on, SLIP, OPEN)).astype(np.int8)
+                state = np.where(capped, SHEAR_LIMITED, np.where(on, SLIP, OPEN)).astype(np.int8)
                 return Contact(state, np.full(len(on), sense), normal, tangential, shift, gap, np.zeros(0), iteration)
             on, capped = now, over
         return None
@@ -300,15 +300,15 @@ class Course:
         touching = found.state != OPEN
         slack = SMALL * force
         bound = law.bound(body.length)
-        change((found.state == SLIP) & (law.mu * found.normal > bound + slack), CAP, found.normal)
-        change((found.state == CAP) & (law.mu * found.normal < bound - slack), SLIP, found.normal)
+        change((found.state == SLIP) & (law.mu * found.normal > bound + slack), SHEAR_LIMITED, found.normal)
+        change((found.state == SHEAR_LIMITED) & (law.mu * found.normal < bound - slack), SLIP, found.normal)
         if free and not law.frictionless:
             over = np.abs(found.tangential) - law.limit(found.normal, body.length)
             loose = (found.state == STICK) & (over > slack)
             sense[loose] = np.sign(found.tangential[loose])
             capped = law.mu * found.normal > bound
             change(loose & ~capped, SLIP, over)
-            change(loose & capped, CAP, over)
+            change(loose & capped, SHEAR_LIMITED, over)
             # a point that slips along its friction force sticks; one whose force is about to change is asked later
             forward = (found.shift - anchor) * found.sense
             stops = (found.state >= SLIP) & (state == found.state) & (forward > SMALL * height)

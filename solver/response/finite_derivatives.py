@@ -3,7 +3,7 @@
 import numpy as np
 
 from solver import _kernels as kernels
-from solver._kernels import CAP
+from solver._kernels import SHEAR_LIMITED
 from solver.body.finite import FiniteBody, FiniteProbes
 from solver.constitutive.hyperelastic import slopes
 from solver.equilibrium.finite_finger import FiniteFinger
@@ -47,7 +47,7 @@ def _followed(newton: Newton, shape: Shape) -> Array:
     free, by = free[:count], np.zeros((count, 3))
     by[:, MU], by[:, DEPTH] = right[:count, BY_FRICTION], right[:count, BY_DEPTH]
     at, along = np.divmod(free, 2)
-    by[:, TAU_MAX] = np.where((shape.state[at] == CAP) & (along == 0), shape.sense[at] * length[at], 0.0)
+    by[:, TAU_MAX] = np.where((shape.state[at] == SHEAR_LIMITED) & (along == 0), shape.sense[at] * length[at], 0.0)
     out = np.zeros((3, 2 * size))
     out[DEPTH] = steps[:, BY_DEPTH]
     out[:, free] = np.linalg.solve(matrix[: count * count].reshape(count, count), by).T

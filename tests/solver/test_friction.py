@@ -12,7 +12,7 @@ from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.contact import law as friction
 from solver.contact.active_set import Contact, Course, Touchable, untouched
-from solver.contact.law import CAP, LAWS, NAMES, OPEN, SLIP, STICK, FrictionLaw
+from solver.contact.law import SHEAR_LIMITED, LAWS, NAMES, OPEN, SLIP, STICK, FrictionLaw
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, BY_TRAVEL, Newton, Pull, Shape
 from solver.mesh.blocks import block
 from solver.response.small_stepper import Condensed, SmallStepper
@@ -142,7 +142,7 @@ def course(request, cushion):
 
 def test_every_law_of_the_list_is_tested_here():
     assert {type(law) for law in MEMBERS} == set(LAWS)
-    assert (OPEN, STICK, SLIP, CAP) == (kernels.OPEN, kernels.STICK, kernels.SLIP, kernels.CAP)
+    assert (OPEN, STICK, SLIP, SHEAR_LIMITED) == (kernels.OPEN, kernels.STICK, kernels.SLIP, kernels.SHEAR_LIMITED)
     assert friction.STEEP == kernels.STEEP
 
 
@@ -165,11 +165,11 @@ def test_wherever_contact_is_looked_for_what_is_found_is_what_the_law_says(cours
         assert (at.tangential * at.slid).max() < close * np.abs(at.slid).max() + 1e-300
         slips = at.state >= SLIP
         assert (at.tangential * at.sense)[slips].min(initial=0.0) >= -close
-        for state, force in ((SLIP, law.mu * at.normal), (CAP, law.tau_max * at.length)):
+        for state, force in ((SLIP, law.mu * at.normal), (SHEAR_LIMITED, law.tau_max * at.length)):
             np.testing.assert_allclose(np.abs(at.tangential)[at.state == state], force[at.state == state], atol=close)
         met |= set(at.state.tolist())
-    possible = {OPEN, SLIP} if law.frictionless else {OPEN, STICK, SLIP, CAP}
-    assert met <= possible | {CAP}
+    possible = {OPEN, SLIP} if law.frictionless else {OPEN, STICK, SLIP, SHEAR_LIMITED}
+    assert met <= possible | {SHEAR_LIMITED}
     assert OPEN in met
     if law.frictionless:
         assert STICK not in met
@@ -238,7 +238,7 @@ def test_the_loop_of_finite_strain_changes_the_states_that_its_plain_twin_change
 def test_its_slopes_are_the_derivatives_of_its_forces(law):
     """By a step in imaginary direction through s min(mu N, tau_max L)."""
     step, sense = 1e-30j, np.array([1.0, -1.0])
-    state = np.array([SLIP, CAP])
+    state = np.array([SLIP, SHEAR_LIMITED])
 
     def forces(normal, length):
         return sense * np.array([law.mu * normal, law.tau_max * length if law.tau_max < np.inf else 0.0 * length])
@@ -256,7 +256,7 @@ def test_a_state_of_all_kinds_at_finite_strain_moves_as_its_tangent_says(cushion
     start = dragged(cushion, law, ((0.06, 0.0), (0.06, 0.004)))[-1]
     here = Pull(0.06, law.mu, law.tau_max, 0, 0.015)
     now = cushion.settle(start, here, 1e-13)
-    assert set(now.state.tolist()) == {OPEN, STICK, SLIP, CAP}
+    assert set(now.state.tolist()) == {OPEN, STICK, SLIP, SHEAR_LIMITED}
     anchor = start.place(cushion.body)[:, 0] + here.travel - start.pull.travel
     assert cushion.linearise(now, here, anchor)
     tangent, skin = cushion.steps.copy(), cushion.body.mesh.skin

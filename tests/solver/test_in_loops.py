@@ -12,7 +12,7 @@ from solver.body.linear import Body, elimination
 from solver.body.linear_compiled import ReducedInLoops
 from solver.body.stiffness import Elastic
 from solver.constitutive.linear import Hooke, Moduli
-from solver.contact.active_set import CAP, SLIP, STICK, ContactLost, Course, forced, untouched
+from solver.contact.active_set import SHEAR_LIMITED, SLIP, STICK, ContactLost, Course, forced, untouched
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.load_path import march
 from solver.linalg.dissection import Reduced
@@ -120,7 +120,7 @@ def test_a_course_of_stick_slip_and_turning_round_is_the_plain_one(both, law):
         states = [course.step(state, depth, travel) for course, state in zip(courses, states, strict=True)]
         agree(states[1], states[0])
         met |= set(states[0].state)
-    assert law.frictionless or (met >= {STICK, SLIP} and (CAP in met) == np.isfinite(law.tau_max))
+    assert law.frictionless or (met >= {STICK, SLIP} and (SHEAR_LIMITED in met) == np.isfinite(law.tau_max))
 
 
 @pytest.mark.parametrize("drag", [0.02, None])

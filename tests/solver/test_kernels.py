@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from solver import _kernels as kernels
 from solver import kernels_numpy
-from solver._kernels import CAP, OPEN, SLIP, STICK
+from solver._kernels import SHEAR_LIMITED, OPEN, SLIP, STICK
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import LAWS, NeoHooke
 from solver.contact.skin_compression import crosses_itself, pinched
@@ -148,7 +148,7 @@ def test_contact_rows_are_the_derivatives_of_their_conditions():
     body, u = distorted(NeoHooke(0.08, 0.48))
     newton = Newton(body)
     start = Shape.undeformed(body)
-    state = np.array([STICK, SLIP, CAP, CAP, CAP, SLIP, OPEN], np.int32)
+    state = np.array([STICK, SLIP, SHEAR_LIMITED, SHEAR_LIMITED, SHEAR_LIMITED, SLIP, OPEN], np.int32)
     sense = np.array([1, 1, -1, -1, -1, -1, 1], np.int32)
     pull = Pull(0.05, 0.4, 0.01, 0)
     anchor = newton.skin_x + 0.01
@@ -169,7 +169,7 @@ def test_contact_rows_are_the_derivatives_of_their_conditions():
                 out[x] = place[i, 0] - anchor[i]
             elif state[i] == SLIP:
                 out[x] = force[x] - sense[i] * pull.mu * force[y]
-            elif state[i] == CAP:
+            elif state[i] == SHEAR_LIMITED:
                 out[x] = force[x] - sense[i] * pull.tau * length[i]
         return out, at
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from solver import kernels_numpy
-from solver._kernels import CAP, OPEN, SLIP
+from solver._kernels import SHEAR_LIMITED, OPEN, SLIP
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.equilibrium.full_slip import settled
@@ -60,7 +60,7 @@ def test_forces_of_touching_points_obey_the_friction_law(capped):
     newton, shape = capped
     pull, body = shape.pull, newton.body
     length = kernels_numpy.tributary(shape.place(body)[:, 0])
-    slip, cap, open_ = (shape.state == code for code in (SLIP, CAP, OPEN))
+    slip, cap, open_ = (shape.state == code for code in (SLIP, SHEAR_LIMITED, OPEN))
     np.testing.assert_allclose(shape.reaction[slip, 0], pull.mu * shape.reaction[slip, 1], atol=1e-12)
     np.testing.assert_allclose(shape.reaction[cap, 0], pull.tau * length[cap], atol=1e-12)
     np.testing.assert_allclose(shape.reaction[open_], 0.0, atol=1e-12)
