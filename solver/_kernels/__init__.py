@@ -11,7 +11,7 @@ from solver._kernels.fronts import condense, eliminate, unfold
 from solver._kernels.iterating import meet, move, touch
 from solver._kernels.outline import crosses, pinched
 from solver._kernels.overstress import add_overstress
-from solver._kernels.skin import STEEP, impose, restate, rubbed, solve, tributary
+from solver._kernels.skin import STEEP, assemble_contact_system, update_contact_states, rubbed, solve, tributary
 
 __all__ = [
     "SHEAR_LIMITED",
@@ -30,11 +30,11 @@ __all__ = [
     "ending",
     "energies",
     "forces",
-    "impose",
+    "assemble_contact_system",
     "meet",
     "move",
     "pinched",
-    "restate",
+    "update_contact_states",
     "rubbed",
     "solve",
     "touch",

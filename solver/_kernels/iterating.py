@@ -9,7 +9,7 @@ import numpy as np
 from solver._kernels.compiling import Array, Narrow, Wide, compiled
 from solver._kernels.elements import advance
 from solver._kernels.fronts import condense, unfold
-from solver._kernels.skin import restate, rubbed, settle
+from solver._kernels.skin import update_contact_states, rubbed, solve_active_set
 
 
 @compiled
@@ -46,10 +46,10 @@ def touch(
     steps: Array,
     reaction: Array,
 ) -> bool:
-    """Condense the forces of displacements `u` (nodes, 2) onto the skin and settle its contact; False where it fails.
+    """Condense the forces of displacements `u` (nodes, 2) onto the skin and solve_active_set its contact; False where it fails.
 
     The surface has risen by `depth`; `load` (n,) are dead loads, `place` (nodes, 2) undeformed positions, `skin` (k,)
-    the skin's nodes. Left behind are `force` less its loads, `carried`, and what `settle` fills.
+    the skin's nodes. Left behind are `force` less its loads, `carried`, and what `solve_active_set` fills.
     """
     size, count = skin.shape[0], force.shape[0]
     for i in range(count):
@@ -58,7 +58,7 @@ def touch(
     condense(carried, start, inner, border, border_at, numbers, factor_at, factors, near)
     x, above = np.empty(size), np.empty(size)
     _lie(u, depth, place, skin, x, above)
-    if not settle(
+    if not solve_active_set(
         stiffness, carried[count - 2 * size :], held, at, state, sense, mu, tau, direction, x, above, anchor, rounds,
         length, free, matrix, right, steps, reaction,
     ):  # fmt: skip
@@ -144,7 +144,7 @@ def meet(
     x, above = np.empty(skin.shape[0]), np.empty(skin.shape[0])
     _lie(u, depth, place, skin, x, above)
     rubbed(x, at, state, mu, length)
-    return restate(state, sense, reaction, above, x - anchor, length, mu, tau, direction)
+    return update_contact_states(state, sense, reaction, above, x - anchor, length, mu, tau, direction)
 
 
 @compiled

@@ -106,7 +106,7 @@ def slide(
 
 
 @compiled
-def settle(
+def solve_active_set(
     gap: Array,
     length: Array,
     by_normal: Array,

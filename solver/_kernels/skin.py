@@ -54,7 +54,7 @@ def rubs(state: Narrow, edge: int, node: int, mu: float) -> bool:
 
 
 @compiled
-def impose(
+def assemble_contact_system(
     stiffness: Array,
     force: Array,
     held: Narrow,
@@ -189,7 +189,7 @@ def solve(matrix: Array, right: Array, size: int) -> bool:
 
 
 @compiled
-def restate(
+def update_contact_states(
     state: Narrow,
     sense: Narrow,
     reaction: Array,
@@ -254,7 +254,7 @@ def restate(
 
 
 @compiled
-def settle(
+def solve_active_set(
     stiffness: Array,
     force: Array,
     held: Narrow,
@@ -279,7 +279,7 @@ def settle(
 
     That is the contact of the linearised body, exact where the rounds suffice. `x` (k,) are positions along the
     surface, `anchor` (k,) those where nodes stick; filled beside `steps`: `reaction` (k, 2). For the rest see
-    `impose` and `restate`. A node that comes to touch at the bound again and again slips every other time. False where
+    `assemble_contact_system` and `update_contact_states`. A node that comes to touch at the bound again and again slips every other time. False where
     a system cannot be solved.
     """
     size = state.shape[0]
@@ -288,7 +288,7 @@ def settle(
     for turn in range(rounds + 1):
         before[:] = state
         rubbed(x, at, state, mu, length)
-        count = impose(
+        count = assemble_contact_system(
             stiffness, force, held, at, state, sense, mu, tau, above, x - anchor, length, free, matrix, right, steps
         )
         if not solve(matrix, right[:count], count):
@@ -304,7 +304,7 @@ def settle(
             break
         ahead = x + steps[::2, 0]
         reached, lengths = above + steps[1::2, 0], _lengths(ahead, at, state, mu)
-        if restate(state, sense, reaction, reached, ahead - anchor, lengths, mu, tau, direction) == 0:
+        if update_contact_states(state, sense, reaction, reached, ahead - anchor, lengths, mu, tau, direction) == 0:
             break
         for i in range(size):
             if before[i] == OPEN and state[i] == SHEAR_LIMITED:

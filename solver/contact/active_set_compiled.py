@@ -42,7 +42,7 @@ def consistent(
     found = _blank(body, guess[0].copy(), guess[1].copy())
     motions = np.ascontiguousarray(body.motions)  # loops are compiled for one order of numbers in memory
     free = entering is not None
-    systems = rubbing.settle(
+    systems = rubbing.solve_active_set(
         body.gap, body.length, body.normal_by_normal, body.normal_by_tangential, body.tangential_by_tangential,
         body.normal_free, body.tangential_free, motions, resultants, law.mu, law.tau_max, *drive, anchor, free,
         entering if free else rubbing.SLIP, patience, found.state, found.sense, found.normal, found.tangential,

@@ -40,7 +40,7 @@ def _followed(newton: Newton, shape: Shape) -> Array:
     free, matrix = np.zeros(2 * size, np.int32), np.zeros(4 * size * size)
     right, steps = np.zeros((2 * size, 4)), np.zeros((2 * size, 4))
     still = np.zeros(size)  # on the surface, and nowhere else than where it sticks
-    count = kernels.impose(
+    count = kernels.assemble_contact_system(
         newton.inside.stiffness, newton.inside.felt, body.held, body.middle, shape.state, shape.sense, pull.mu,
         pull.tau, still, still, length, free, matrix, right, steps,
     )  # fmt: skip

@@ -228,7 +228,9 @@ def test_the_loop_of_finite_strain_changes_the_states_that_its_plain_twin_change
         reaction, slid, direction = np.stack([drag, push], axis=1), draw.normal(size=9), number % 3 - 1
         expected = kernels_numpy.restated(state, sense, reaction, above, slid, length, law, direction)
         found, turned = state.copy(), sense.copy()
-        changed = kernels.restate(found, turned, reaction, above, slid, length, law.mu, law.tau_max, direction)
+        changed = kernels.update_contact_states(
+            found, turned, reaction, above, slid, length, law.mu, law.tau_max, direction
+        )
         np.testing.assert_array_equal(found, expected[0])
         np.testing.assert_array_equal(turned, expected[1])
         assert changed == np.sum((found != state) | ((found >= SLIP) & (turned != sense)))

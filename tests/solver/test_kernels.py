@@ -256,7 +256,7 @@ def test_no_bit_depends_on_which_loops_a_process_called_before():
         "states, zero = np.zeros(3, np.int32), np.zeros(3)\n"
         "kernels.tributary(np.arange(3.0), np.array([0, 1, 0], np.int32), zero)\n"
         "kernels.solve(np.eye(2).ravel(), np.zeros((2, 4)), 2)\n"
-        "kernels.restate(states, states.copy(), np.zeros((3, 2)), zero, zero, zero, 0.1, 0.1, 1)\n"
+        "kernels.update_contact_states(states, states.copy(), np.zeros((3, 2)), zero, zero, zero, 0.1, 0.1, 1)\n"
     )
     first, then = (
         subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
