@@ -5,24 +5,25 @@
 """
 
 from solver._kernels.carrying import carry
-from solver._kernels.compiling import SHEAR_LIMITED, HELD_X, HELD_Y, OPEN, SLIP, STICK, ending
+from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, ending
 from solver._kernels.elements import assemble, energies, forces
 from solver._kernels.fronts import condense, eliminate, unfold
 from solver._kernels.iterating import meet, move, touch
 from solver._kernels.outline import crosses, pinched
 from solver._kernels.overstress import add_overstress
-from solver._kernels.skin import STEEP, assemble_contact_system, update_contact_states, rubbed, solve, tributary
+from solver._kernels.skin import STEEP, assemble_contact_system, rubbed, solve, tributary, update_contact_states
 
 __all__ = [
-    "SHEAR_LIMITED",
     "HELD_X",
     "HELD_Y",
     "OPEN",
+    "SHEAR_LIMITED",
     "SLIP",
     "STEEP",
     "STICK",
     "add_overstress",
     "assemble",
+    "assemble_contact_system",
     "carry",
     "condense",
     "crosses",
@@ -30,14 +31,13 @@ __all__ = [
     "ending",
     "energies",
     "forces",
-    "assemble_contact_system",
     "meet",
     "move",
     "pinched",
-    "update_contact_states",
     "rubbed",
     "solve",
     "touch",
     "tributary",
     "unfold",
+    "update_contact_states",
 ]

@@ -7,7 +7,7 @@ Shapes: k points that may touch. Displacements and forces are (2 k,), those alon
 
 import numpy as np
 
-from solver._kernels.compiling import SHEAR_LIMITED, OPEN, SLIP, STICK, Array, Narrow, compiled
+from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, Array, Narrow, compiled
 
 SMALL = 1e-11  # a contradiction smaller than this, relative to the largest of its kind, is round-off
 LOST, STICKING, SLIDING = -1, 0, 1  # what `follow` returns

@@ -9,7 +9,7 @@ import numpy as np
 from solver._kernels.compiling import Array, Narrow, Wide, compiled
 from solver._kernels.elements import advance
 from solver._kernels.fronts import condense, unfold
-from solver._kernels.skin import update_contact_states, rubbed, solve_active_set
+from solver._kernels.skin import rubbed, solve_active_set, update_contact_states
 
 
 @compiled

@@ -9,7 +9,7 @@ displacements by dead loads alone; `mu`, `tau`, the friction law. Filled: `state
 
 import numpy as np
 
-from solver._kernels.compiling import SHEAR_LIMITED, OPEN, SLIP, STICK, Array, States, compiled
+from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, Array, States, compiled
 from solver._kernels.following import SMALL, solve
 
 LOST, AMBIGUOUS = 0, -1  # what these loops return in place of the number of linear systems they solved

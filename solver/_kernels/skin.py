@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from solver._kernels.compiling import SHEAR_LIMITED, HELD_X, HELD_Y, OPEN, SLIP, STICK, Array, Narrow, compiled
+from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, Array, Narrow, compiled
 
 # how the length of skin of an edge's first, middle and last node grows with the positions of the three: Simpson's rule
 _LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
@@ -279,8 +279,8 @@ def solve_active_set(
 
     That is the contact of the linearised body, exact where the rounds suffice. `x` (k,) are positions along the
     surface, `anchor` (k,) those where nodes stick; filled beside `steps`: `reaction` (k, 2). For the rest see
-    `assemble_contact_system` and `update_contact_states`. A node that comes to touch at the bound again and again slips every other time. False where
-    a system cannot be solved.
+    `assemble_contact_system` and `update_contact_states`. A node that comes to touch at the bound again and again slips every other time.
+    False where a system cannot be solved.
     """
     size = state.shape[0]
     entered = np.zeros(size, np.int32)  # how often each node came to touch

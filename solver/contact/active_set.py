@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.body.validation import finite
-from solver.contact.law import SHEAR_LIMITED, OPEN, SLIP, STICK, FrictionLaw
+from solver.contact.law import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
 from solver.linalg.lapack import dgesv, dgetrf, dgetrs
 
 Array = NDArray[np.float64]

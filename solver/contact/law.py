@@ -71,7 +71,7 @@ class FrictionLaw:
         none: the first bear no force, and that of the others is unknown. The forces are the slopes times force and
         length, so that this is the law's consistent tangent too.
 
-        >>> one, other = FrictionLaw(0.5, 0.02).slopes(np.array([OPEN, STICK, SLIP, SHEAR_LIMITED]), np.array([1, 1, 1, -1.0]))
+        >>> one, other = FrictionLaw(0.5, 0.02).slopes(np.arange(4), np.array([1, 1, 1, -1.0]))
         >>> one.tolist(), other.tolist()
         ([0.0, 0.0, 0.5, 0.0], [0.0, 0.0, 0.0, -0.02])
         """

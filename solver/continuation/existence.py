@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver._kernels import SHEAR_LIMITED, OPEN, STEEP
+from solver._kernels import OPEN, SHEAR_LIMITED, STEEP
 from solver.continuation import limit_point as reach
 from solver.continuation.arc_length import follow
 from solver.continuation.limit_point import PLAIN, Reach, folded, sound

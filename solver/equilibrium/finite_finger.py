@@ -8,7 +8,7 @@ import numpy as np
 from numpy.linalg import LinAlgError
 
 from solver import _kernels as kernels
-from solver._kernels import SHEAR_LIMITED, OPEN
+from solver._kernels import OPEN, SHEAR_LIMITED
 from solver.body.finite import FiniteBody, FiniteProbes
 from solver.body.receptor import ROW, endings, middle
 from solver.body.tissues import finite_laws

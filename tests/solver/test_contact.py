@@ -7,7 +7,7 @@ import pytest
 
 from solver.body.linear import Body
 from solver.constitutive.linear import Hooke
-from solver.contact.active_set import SHEAR_LIMITED, OPEN, SLIP, STICK, ContactLost, Course, forced, untouched
+from solver.contact.active_set import OPEN, SHEAR_LIMITED, SLIP, STICK, ContactLost, Course, forced, untouched
 from solver.contact.law import FrictionLaw
 from solver.mesh.blocks import block
 

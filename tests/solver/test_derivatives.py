@@ -12,7 +12,7 @@ from solver.body.stiffness import Elastic, Probes
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
 from solver.constitutive.hyperelastic import shape as grown
 from solver.constitutive.linear import Hooke
-from solver.contact.active_set import SHEAR_LIMITED, OPEN, SLIP, STICK, Course, Touchable
+from solver.contact.active_set import OPEN, SHEAR_LIMITED, SLIP, STICK, Course, Touchable
 from solver.contact.law import FrictionLaw
 from solver.continuation.small_states import law_of, numbers_on, settled
 from solver.equilibrium import force_control as finite_forced

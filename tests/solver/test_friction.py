@@ -12,7 +12,7 @@ from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.contact import law as friction
 from solver.contact.active_set import Contact, Course, Touchable, untouched
-from solver.contact.law import SHEAR_LIMITED, LAWS, NAMES, OPEN, SLIP, STICK, FrictionLaw
+from solver.contact.law import LAWS, NAMES, OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, BY_TRAVEL, Newton, Pull, Shape
 from solver.mesh.blocks import block
 from solver.response.small_stepper import Condensed, SmallStepper

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from solver import _kernels as kernels
 from solver import kernels_numpy
-from solver._kernels import SHEAR_LIMITED, OPEN, SLIP, STICK
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import LAWS, NeoHooke
 from solver.contact.skin_compression import crosses_itself, pinched

@@ -8,7 +8,7 @@ import pytest
 from solver.body.linear import Body, edge_load
 from solver.body.stiffness import Probes
 from solver.constitutive.linear import Hooke
-from solver.contact.active_set import SHEAR_LIMITED, OPEN, SLIP, STICK, ContactLost, Course, untouched
+from solver.contact.active_set import OPEN, SHEAR_LIMITED, SLIP, STICK, ContactLost, Course, untouched
 from solver.contact.law import FrictionLaw
 from solver.mesh import Mesh
 from solver.mesh.blocks import block

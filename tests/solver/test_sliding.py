@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from solver import kernels_numpy
-from solver._kernels import SHEAR_LIMITED, OPEN, SLIP
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.equilibrium.full_slip import settled
