@@ -7,7 +7,7 @@
 from solver._kernels.carrying import carry
 from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, ending
 from solver._kernels.elements import assemble, energies, forces
-from solver._kernels.fronts import condense, eliminate, unfold
+from solver._kernels.fronts import back_substitute, condense, eliminate
 from solver._kernels.iterating import meet, move, touch
 from solver._kernels.outline import crosses, pinched
 from solver._kernels.overstress import add_overstress
@@ -24,6 +24,7 @@ __all__ = [
     "add_overstress",
     "assemble",
     "assemble_contact_system",
+    "back_substitute",
     "carry",
     "condense",
     "crosses",
@@ -38,6 +39,5 @@ __all__ = [
     "solve",
     "touch",
     "tributary",
-    "unfold",
     "update_contact_states",
 ]

@@ -221,7 +221,7 @@ def condense(
 
 
 @compiled
-def unfold_part(
+def back_substitute_part(
     p: int,
     carried: Array,
     start: Narrow,
@@ -264,7 +264,7 @@ def unfold_part(
 
 
 @compiled
-def unfold(
+def back_substitute(
     carried: Array,
     skin: Array,
     start: Narrow,
@@ -283,4 +283,4 @@ def unfold(
     """
     out[out.shape[0] - skin.shape[0] :] = skin
     for p in range(start.shape[0] - 1, -1, -1):
-        unfold_part(p, carried, start, inner, border, border_at, numbers, factor_at, factors, near, out)
+        back_substitute_part(p, carried, start, inner, border, border_at, numbers, factor_at, factors, near, out)

@@ -7,7 +7,7 @@
 import numpy as np
 
 from solver._kernels.compiling import Array, Flags, Narrow, Wide, compiled
-from solver._kernels.fronts import unfold_part
+from solver._kernels.fronts import back_substitute_part
 
 
 @compiled
@@ -176,7 +176,7 @@ def displace(
         for p in range(parts - 1, -1, -1):
             if not needed[p]:
                 continue
-            unfold_part(p, carried, start, inner, border, border_at, numbers, factor_at, factors, near, inside)
+            back_substitute_part(p, carried, start, inner, border, border_at, numbers, factor_at, factors, near, inside)
         for e in range(nodes.shape[0]):
             if not used[e]:
                 continue

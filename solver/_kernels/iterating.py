@@ -8,7 +8,7 @@ import numpy as np
 
 from solver._kernels.compiling import Array, Narrow, Wide, compiled
 from solver._kernels.elements import advance
-from solver._kernels.fronts import condense, unfold
+from solver._kernels.fronts import back_substitute, condense
 from solver._kernels.skin import rubbed, solve_active_set, update_contact_states
 
 
@@ -116,7 +116,7 @@ def move(
         for c in range(size):
             total += stiffness[i, c] * step[c]
         reaction[i // 2, i % 2] = total
-    unfold(carried, step, start, inner, border, border_at, numbers, factor_at, factors, near, every)
+    back_substitute(carried, step, start, inner, border, border_at, numbers, factor_at, factors, near, every)
     largest = advance(u, pressure, every, scale, nodes, unknown, lame, fold, dilate, volume, u_new, pressure_new)
     return largest, meet(u_new, anchor, depth, mu, tau, direction, state, sense, reaction, place, skin, at, length)
 

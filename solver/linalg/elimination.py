@@ -160,13 +160,13 @@ class Elimination:
         return self._eliminate(tangent)
 
     def condense(self, force: Array) -> Array:
-        """Return the forces (m,) that the skin feels of `force` (n,), all of it being kept for `unfold`."""
+        """Return the forces (m,) that the skin feels of `force` (n,), all of it being kept for `back_substitute`."""
         self.carried[:] = force
         kernels.condense(self.carried, *self.factored)
         return self.felt
 
-    def unfold(self, skin: Array, *, still: bool = False) -> Array:
+    def back_substitute(self, skin: Array, *, still: bool = False) -> Array:
         """Return all displacements (n,) for the skin's (m,), balancing the forces condensed last, or none of them."""
         out = np.empty(self.plan.size)
-        kernels.unfold(self._still if still else self.carried, skin, *self.factored, out)
+        kernels.back_substitute(self._still if still else self.carried, skin, *self.factored, out)
         return out

@@ -27,7 +27,7 @@ def of_shape(finger: FiniteFinger, scene: Scene, shape: Shape) -> Derivatives:
         raise ValueError("the state has no tangent")
     skin = _followed(newton, shape)
     along, up = newton.follows(skin.T)
-    inner = _spread(newton, np.stack([newton.inside.unfold(one, still=True) for one in skin], axis=1))
+    inner = _spread(newton, np.stack([newton.inside.back_substitute(one, still=True) for one in skin], axis=1))
     sed = slope(finger.ending, newton.body, shape.u, inner)[0]
     return driven(scene, sed, up, pull.sense * along)
 

@@ -117,7 +117,7 @@ def test_the_body_eliminated_part_by_part_is_the_body_solved_at_once(columns, he
     inside = body.size - len(skin)
     for still, load in ((False, force), (True, np.zeros(body.size))):
         expected = np.linalg.solve(tangent[:inside, :inside], -load[:inside] - tangent[:inside, inside:] @ skin)
-        found = newton.inside.unfold(skin, still=still)
+        found = newton.inside.back_substitute(skin, still=still)
         np.testing.assert_allclose(found, np.r_[expected, skin], rtol=1e-9, atol=1e-9)
 
 
