@@ -41,8 +41,8 @@ def assemble(
     unknown: Narrow,
     tangent: Array,
     force: Array,
-    fold: Array,
-    core: Array,
+    recovery_matrix: Array,
+    condensed_inverse: Array,
     dilate: Array,
     volume: Array,
 ) -> float:
@@ -52,8 +52,8 @@ def assemble(
     from `u` alone. `grad_x`, `grad_y` (e, q, 9), `weight` (e, q), `modes` (e, q, 3, orthonormal over the element),
     `laplace` (e, 9, 9) integrals of the products of gradients times `shear`;
     `shear`, `stiffening` (Ogden's exponent), `lame` (e,); `nodes` (e, 9), `unknown` (e, 8, 2), -1 where fixed.
-    Filled: `tangent` (e, 16, 16) of the outer nodes, lower half, `force` (n,), `fold` (e, 2, 17)
-    (centre = -(fold @ (outer unknowns, 1))), `core` (e, 3) of the centre's stiffness inverted (xx, xy, yy),
+    Filled: `tangent` (e, 16, 16) of the outer nodes, lower half, `force` (n,), `recovery_matrix` (e, 2, 17)
+    (centre = -(recovery_matrix @ (outer unknowns, 1))), `condensed_inverse` (e, 3) of the centre's stiffness inverted (xx, xy, yy),
     `dilate` (e, 3, 18) derivative of the modes of ln J, `volume` (e, 3) those modes.
     Where det F is not positive, the arrays are left half filled.
     """
@@ -166,7 +166,7 @@ def assemble(
                 yy += more[q] * s[q, 17] * s[q, 17]
         det = xx * yy - xy * xy
         k00, k01, k11 = yy / det, -xy / det, xx / det
-        core[e, 0], core[e, 1], core[e, 2] = k00, k01, k11
+        condensed_inverse[e, 0], condensed_inverse[e, 1], condensed_inverse[e, 2] = k00, k01, k11
         for c in range(16):
             i = c % 8
             if c < 8:
@@ -202,9 +202,9 @@ def assemble(
                 tangent[e, 2 * i + 1, 2 * c + 1] = own[8 + i, 8 + c] + by_y[i, 8 + c] + even[i, c]
         for m in range(2):
             for c in range(8):
-                fold[e, m, 2 * c], fold[e, m, 2 * c + 1] = right[3 + m, c], right[3 + m, 8 + c]
-        fold[e, 0, 16] = k00 * f[16] + k01 * f[17]
-        fold[e, 1, 16] = k01 * f[16] + k11 * f[17]
+                recovery_matrix[e, m, 2 * c], recovery_matrix[e, m, 2 * c + 1] = right[3 + m, c], right[3 + m, 8 + c]
+        recovery_matrix[e, 0, 16] = k00 * f[16] + k01 * f[17]
+        recovery_matrix[e, 1, 16] = k01 * f[16] + k11 * f[17]
         for c in range(16):
             row = unknown[e, c % 8, c // 8]
             if row >= 0:
@@ -225,14 +225,14 @@ def forces(
     nodes: Narrow,
     unknown: Narrow,
     force: Array,
-    fold: Array,
-    core: Array,
+    recovery_matrix: Array,
+    condensed_inverse: Array,
     volume: Array,
 ) -> float:
     """Fill the internal forces at displacements `u` for a tangent assembled elsewhere; return the least det F.
 
-    Of that tangent are `fold` and `core`, by which the centres are eliminated. Filled: `force` (n,), the last column of
-    `fold`, and `volume`.
+    Of that tangent are `recovery_matrix` and `condensed_inverse`, by which the centres are eliminated. Filled: `force` (n,), the last column of
+    `recovery_matrix`, and `volume`.
     """
     force[:] = 0.0
     least = np.inf
@@ -280,13 +280,13 @@ def forces(
             for i in range(9):
                 fx[i] += p00 * gx[i] + p01 * gy[i]
                 fy[i] += p10 * gx[i] + p11 * gy[i]
-        fold[e, 0, 16] = core[e, 0] * fx[8] + core[e, 1] * fy[8]
-        fold[e, 1, 16] = core[e, 1] * fx[8] + core[e, 2] * fy[8]
+        recovery_matrix[e, 0, 16] = condensed_inverse[e, 0] * fx[8] + condensed_inverse[e, 1] * fy[8]
+        recovery_matrix[e, 1, 16] = condensed_inverse[e, 1] * fx[8] + condensed_inverse[e, 2] * fy[8]
         for i in range(16):
             row = unknown[e, i // 2, i % 2]
             if row >= 0:
                 mine = fx[i // 2] if i % 2 == 0 else fy[i // 2]
-                force[row] += mine - fold[e, 0, i] * fx[8] - fold[e, 1, i] * fy[8]
+                force[row] += mine - recovery_matrix[e, 0, i] * fx[8] - recovery_matrix[e, 1, i] * fy[8]
     return least
 
 
@@ -299,7 +299,7 @@ def advance(
     nodes: Narrow,
     unknown: Narrow,
     lame: Array,
-    fold: Array,
+    recovery_matrix: Array,
     dilate: Array,
     volume: Array,
     u_new: Array,
@@ -319,9 +319,9 @@ def advance(
             row = unknown[e, i // 2, i % 2]
             move[i] = step[row] if row >= 0 else 0.0
         for a in range(2):
-            centre = fold[e, a, 16]
+            centre = recovery_matrix[e, a, 16]
             for i in range(16):
-                centre += fold[e, a, i] * move[i]
+                centre += recovery_matrix[e, a, i] * move[i]
             move[16 + a] = -centre
         for i in range(18):
             largest = max(largest, abs(move[i]))

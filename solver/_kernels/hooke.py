@@ -24,14 +24,14 @@ def stiffen(
     dilatation: Array,
     centre: Array,
     outer: Array,
-    fold: Array,
+    recovery_matrix: Array,
 ) -> bool:
     """Fill the elements' stiffness, and what is left of it for their outer nodes; False where an element is folded.
 
     `place` (nodes, 2) undeformed, `nodes` (e, 9), `shear`, `lame` (e,); `values`, `along`, `up` (q, 9) are the shape
     functions and their slopes at the quadrature points, `weights` (q,). Filled: `stiffness` (e, 18, 18), ordered
     x, y, x, y, ...; `dilatation` (e, 3, 18), displacements to the modes 1, x - xc, y - yc of the volume strain;
-    `centre` (e, 2) xc, yc; `outer` (e, 16, 16), lower half; `fold` (e, 2, 16), centre = -(fold @ outer displacements).
+    `centre` (e, 2) xc, yc; `outer` (e, 16, 16), lower half; `recovery_matrix` (e, 2, 16), centre = -(recovery_matrix @ outer displacements).
     """
     # columns by direction, as in `solver._kernels.elements`: x of nine nodes, then y
     h, bent = np.empty((9, 18)), np.empty((9, 18))
@@ -122,12 +122,12 @@ def stiffen(
         det = full[16, 16] * full[17, 17] - full[17, 16] * full[17, 16]
         k00, k01, k11 = full[17, 17] / det, -full[17, 16] / det, full[16, 16] / det
         for i in range(16):
-            fold[e, 0, i] = k00 * full[16, i] + k01 * full[17, i]
-            fold[e, 1, i] = k01 * full[16, i] + k11 * full[17, i]
+            recovery_matrix[e, 0, i] = k00 * full[16, i] + k01 * full[17, i]
+            recovery_matrix[e, 1, i] = k01 * full[16, i] + k11 * full[17, i]
         for i in range(16):
             c0, c1 = full[16, i], full[17, i]
             for k in range(i + 1):
-                outer[e, i, k] = full[i, k] - c0 * fold[e, 0, k] - c1 * fold[e, 1, k]
+                outer[e, i, k] = full[i, k] - c0 * recovery_matrix[e, 0, k] - c1 * recovery_matrix[e, 1, k]
     return True
 
 
@@ -147,7 +147,7 @@ def displace(
     factors: Array,
     unknown: Narrow,
     nodes: Wide,
-    fold: Array,
+    recovery_matrix: Array,
     out: Array,
 ) -> None:
     """Fill `out` (nodes, 2, c) with the displacements of a reduced body when those of its skin are `skin` (c, m).
@@ -187,7 +187,7 @@ def displace(
                 for a in range(2):
                     total = own[e, a]
                     for i in range(16):
-                        total -= fold[e, a, i] * move[i]
+                        total -= recovery_matrix[e, a, i] * move[i]
                     out[nodes[e, 8], a, c] = total
 
 

@@ -99,7 +99,7 @@ def move(
     nodes: Narrow,
     unknown: Narrow,
     lame: Array,
-    fold: Array,
+    recovery_matrix: Array,
     dilate: Array,
     volume: Array,
     length: Array,
@@ -117,7 +117,9 @@ def move(
             total += stiffness[i, c] * step[c]
         reaction[i // 2, i % 2] = total
     back_substitute(carried, step, start, inner, border, border_at, numbers, factor_at, factors, near, every)
-    largest = advance(u, pressure, every, scale, nodes, unknown, lame, fold, dilate, volume, u_new, pressure_new)
+    largest = advance(
+        u, pressure, every, scale, nodes, unknown, lame, recovery_matrix, dilate, volume, u_new, pressure_new
+    )
     return largest, meet(u_new, anchor, depth, mu, tau, direction, state, sense, reaction, place, skin, at, length)
 
 

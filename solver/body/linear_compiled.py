@@ -37,13 +37,17 @@ class ReducedInLoops:
         shear = np.array([m.shear for m in materials])[mesh.region]
         lame = np.array([m.lame for m in materials])[mesh.region]
         stiffness, dilatation, centre = np.empty((count, 18, 18)), np.empty((count, 3, 18)), np.empty((count, 2))
-        self._fold, self._factors, skin = np.empty((count, 2, 16)), np.empty(plan.factors), np.empty((width, width))
+        self._recovery_matrix, self._factors, skin = (
+            np.empty((count, 2, 16)),
+            np.empty(plan.factors),
+            np.empty((width, width)),
+        )
         with _ALONE:
             room = _room(256 * count + plan.waiting)
             outer, waiting = room[: 256 * count].reshape(count, 16, 16), room[256 * count :]
             if not hooke.stiffen(
                 mesh.nodes, mesh.elements, shear, lame, _VALUES, _ALONG, _UP, Q2P1.weights, stiffness, dilatation,
-                centre, outer, self._fold,
+                centre, outer, self._recovery_matrix,
             ):  # fmt: skip
                 raise LinAlgError("an element is folded")
             sound = eliminate(
@@ -90,7 +94,7 @@ class ReducedInLoops:
         mesh, plan, nodal = self._mesh, self._plan, load.reshape(-1, 2)
         centre = nodal[mesh.elements[:, 8], :, None]
         own: Array = np.asarray(np.linalg.solve(self.elastic.stiffness[:, 16:, 16:], centre)[:, :, 0], np.float64)
-        passed = (np.swapaxes(self._fold, 1, 2) @ centre)[:, :, 0]  # (e, 16)
+        passed = (np.swapaxes(self._recovery_matrix, 1, 2) @ centre)[:, :, 0]  # (e, 16)
         free = plan.unknown >= 0
         force = np.zeros(plan.size)
         force[plan.unknown[free]] = -nodal[mesh.elements[:, :8]].reshape(-1, 16)[free]
@@ -115,7 +119,7 @@ class ReducedInLoops:
         out = np.zeros((*mesh.nodes.shape, kept.shape[1]))
         hooke.displace(
             skin, *under, asked, plan.start, plan.inner, plan.border, plan.children, plan.border_at, plan.numbers,
-            plan.factor_at, self._factors, plan.unknown, mesh.elements, self._fold, out,
+            plan.factor_at, self._factors, plan.unknown, mesh.elements, self._recovery_matrix, out,
         )  # fmt: skip
         return out.reshape(-1, kept.shape[1])
 

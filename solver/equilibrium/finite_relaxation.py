@@ -88,7 +88,7 @@ class RelaxingNewton(Newton):
         body = self.body
         kernels.add_overstress(
             shape.u, self._tensor, body.grad_x, body.grad_y, body.weight, body.nodes, body.unknown, self.tangent,
-            self.force, self.fold, self.core, anew,
+            self.force, self.recovery_matrix, self.condensed_inverse, anew,
         )  # fmt: skip
 
 

@@ -103,11 +103,16 @@ class Newton:
         self.force = np.zeros(body.size)
         if beside is not None and beside.body.plan is body.plan:
             self.tangent, self.inside = beside.tangent, beside.inside
-            self.fold, self.dilate, self.core, self.volume = beside.fold, beside.dilate, beside.core, beside.volume
+            self.recovery_matrix, self.dilate, self.condensed_inverse, self.volume = (
+                beside.recovery_matrix,
+                beside.dilate,
+                beside.condensed_inverse,
+                beside.volume,
+            )
         else:
             self.tangent, self.inside = np.zeros((count, 16, 16)), Elimination(body.plan)
-            self.fold, self.dilate = np.zeros((count, 2, 17)), np.zeros((count, 3, 18))
-            self.core, self.volume = np.zeros((count, 3)), np.zeros((count, 3))
+            self.recovery_matrix, self.dilate = np.zeros((count, 2, 17)), np.zeros((count, 3, 18))
+            self.condensed_inverse, self.volume = np.zeros((count, 3)), np.zeros((count, 3))
         self.steps = np.zeros((2 * skin, 4))  # of the skin
         self.length = np.zeros(skin)
         self.bulk = float((body.lame / body.shear).max())  # how much stiffer the body is to a change of volume [-]
@@ -121,12 +126,12 @@ class Newton:
         lies = place, skin, body.middle
         self._assemble = ending(
             kernels.assemble, body.grad_x, body.grad_y, body.weight, body.modes, body.laplace, body.shear,
-            body.stiffening, body.lame, body.nodes, body.unknown, self.tangent, self.force, self.fold, self.core,
+            body.stiffening, body.lame, body.nodes, body.unknown, self.tangent, self.force, self.recovery_matrix, self.condensed_inverse,
             self.dilate, self.volume,
         )  # fmt: skip
         self._forces = ending(
             kernels.forces, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening, body.lame,
-            body.nodes, body.unknown, self.force, self.fold, self.core, self.volume,
+            body.nodes, body.unknown, self.force, self.recovery_matrix, self.condensed_inverse, self.volume,
         )  # fmt: skip
         self._settle_skin = ending(
             kernels.touch, self.force, self.load, place, skin, body.held, body.middle, *factored, self.inside.carried,
@@ -135,7 +140,7 @@ class Newton:
         )  # fmt: skip
         self._move = ending(
             kernels.move, self.inside.stiffness, *lies, *factored, self.inside.carried, self._every, body.nodes,
-            body.unknown, body.lame, self.fold, self.dilate, self.volume, self.length,
+            body.unknown, body.lame, self.recovery_matrix, self.dilate, self.volume, self.length,
         )  # fmt: skip
         self._meet = ending(kernels.meet, *lies, self.length)
 

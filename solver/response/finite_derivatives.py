@@ -60,7 +60,7 @@ def _spread(newton: Newton, unknowns: Array) -> Array:
     out = np.zeros((*body.mesh.nodes.shape, unknowns.shape[1]))
     outer = np.where((body.unknown >= 0)[..., None], unknowns[body.unknown], 0.0)  # (e, 8, 2, c)
     out[body.nodes[:, :8]] = outer
-    out[body.nodes[:, 8]] = -newton.fold[:, :, :16] @ outer.reshape(len(outer), 16, -1)
+    out[body.nodes[:, 8]] = -newton.recovery_matrix[:, :, :16] @ outer.reshape(len(outer), 16, -1)
     return out
 
 

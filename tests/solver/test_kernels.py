@@ -30,7 +30,7 @@ def assembled(body, u, pressure):
     newton = Newton(body)
     least = kernels.assemble(
         u, pressure, body.grad_x, body.grad_y, body.weight, body.modes, body.laplace, body.shear, body.stiffening,
-        body.lame, body.nodes, body.unknown, newton.tangent, newton.force, newton.fold, newton.core, newton.dilate,
+        body.lame, body.nodes, body.unknown, newton.tangent, newton.force, newton.recovery_matrix, newton.condensed_inverse, newton.dilate,
         newton.volume,
     )  # fmt: skip
     return newton, least
@@ -59,7 +59,7 @@ def test_forces_for_a_tangent_kept_from_another_state_agree_with_the_plain_ones(
     other = distorted(law, seed=5)[1]
     least = kernels.forces(
         other, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening, body.lame, body.nodes,
-        body.unknown, newton.force, newton.fold, newton.core, newton.volume,
+        body.unknown, newton.force, newton.recovery_matrix, newton.condensed_inverse, newton.volume,
     )  # fmt: skip
     force, _ = kernels_numpy.forces_and_tangents(body, other, newton_pressure(body, other))
     centre = np.linalg.solve(tangent[:, 16:, 16:], force[:, 16:, None])
@@ -67,7 +67,7 @@ def test_forces_for_a_tangent_kept_from_another_state_agree_with_the_plain_ones(
     left = force[:, :16] - (tangent[:, :16, 16:] @ centre)[:, :, 0]
     np.add.at(expected, body.unknown.reshape(-1, 16)[free], left[free])
     np.testing.assert_allclose(newton.force, expected, atol=1e-13 * np.abs(tangent).max())
-    np.testing.assert_allclose(newton.fold[:, :, 16], centre[:, :, 0], atol=1e-12)
+    np.testing.assert_allclose(newton.recovery_matrix[:, :, 16], centre[:, :, 0], atol=1e-12)
     assert least == pytest.approx(np.linalg.det(kernels_numpy.deformation(body, other)).min(), rel=1e-12)
 
 
