@@ -24,7 +24,7 @@ from solver.scene import Solve
 FILES = {
     "mesher": "mesh and tables", "grid": "mesh and tables", "outline": "mesh and tables", "mesh": "mesh and tables",
     "finite_body": "mesh and tables", "carrying": "carrying states", "elements": "assembly", "stiffness": "assembly",
-    "dissection": "factorisation", "elimination": "factorisation", "fronts": "factorisation", "body": "factorisation",
+    "dissection": "factorisation", "elimination": "factorisation", "multifrontal": "factorisation", "body": "factorisation",
     "contact": "contact", "friction": "contact", "skin": "contact", "receptor": "receptor", "newton": "iteration",
     "sliding": "iteration", "existence": "proof of existence", "crossing": "proof of existence",
     "limit": "proof of existence", "audits": "audits and evidence", "evidence": "audits and evidence",
@@ -139,6 +139,6 @@ def _part(function: Function) -> str | None:
     file = Path(path)
     if "solver" not in file.parts:
         return None
-    if name in LOOPS and file.stem.startswith(("kernels", "elements", "fronts", "skin")):
+    if name in LOOPS and file.stem.startswith(("kernels", "elements", "multifrontal", "skin")):
         return LOOPS[name]
     return FILES.get(file.stem)

@@ -7,8 +7,8 @@
 from solver._kernels.carrying import carry
 from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, ending
 from solver._kernels.elements import assemble, energies, forces
-from solver._kernels.fronts import back_substitute, condense, eliminate
 from solver._kernels.iterating import meet, move, touch
+from solver._kernels.multifrontal import back_substitute, condense, eliminate
 from solver._kernels.outline import crosses, pinched
 from solver._kernels.overstress import add_overstress
 from solver._kernels.skin import STEEP, assemble_contact_system, rubbed, solve, tributary, update_contact_states

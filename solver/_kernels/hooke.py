@@ -7,7 +7,7 @@
 import numpy as np
 
 from solver._kernels.compiling import Array, Flags, Narrow, Wide, compiled
-from solver._kernels.fronts import back_substitute_part
+from solver._kernels.multifrontal import back_substitute_part
 
 
 @compiled
@@ -153,7 +153,7 @@ def displace(
     """Fill `out` (nodes, 2, c) with the displacements of a reduced body when those of its skin are `skin` (c, m).
 
     Added are those of the forces `carried` (n,), from `condense`, with the skin held, and `own` (e, 2) of the centres
-    alone. Only nodes `asked` for (nodes,) are sure to be filled. The other arguments are those of `Plan` and `stiffen`.
+    alone. Only nodes `asked` for (nodes,) are sure to be filled. The other arguments are those of `SymbolicFactorization` and `stiffen`.
     """
     parts, size = start.shape[0], carried.shape[0]
     wanted, needed = np.zeros(size, np.bool_), np.zeros(parts, np.bool_)

@@ -8,7 +8,7 @@ import numpy as np
 
 from solver._kernels.compiling import Array, Narrow, Wide, compiled
 from solver._kernels.elements import advance
-from solver._kernels.fronts import back_substitute, condense
+from solver._kernels.multifrontal import back_substitute, condense
 from solver._kernels.skin import rubbed, solve_active_set, update_contact_states
 
 

@@ -12,7 +12,7 @@ from solver.body.receptor import Endings
 from solver.body.validation import check_body, check_driven, check_laws
 from solver.constitutive.hyperelastic import Law
 from solver.element import Q2P1
-from solver.linalg.elimination import Plan
+from solver.linalg.elimination import SymbolicFactorization
 from solver.mesh import Array, Indices, Mesh
 
 Narrow = NDArray[np.int32]
@@ -40,7 +40,7 @@ class FiniteBody:
     lame: Array  # (e,) [MPa]
     nodes: Narrow  # (e, 9)
     unknown: Narrow  # (e, 8, 2) of the outer nodes, -1 where fixed
-    plan: Plan  # of the elimination
+    plan: SymbolicFactorization  # of the elimination
     held: Narrow  # (k,) whether a node of the skin is held: along x HELD_X, along y HELD_Y, both their sum
     middle: Narrow  # (k,) 1 at the middle of an edge of the skin, 0 at its ends
 
@@ -73,7 +73,7 @@ class FiniteBody:
         grad_x, grad_y = np.ascontiguousarray(gradient[..., 0]), np.ascontiguousarray(gradient[..., 1])
         stiff = (weight * shear[:, None])[:, :, None]
         laplace = np.swapaxes(stiff * grad_x, 1, 2) @ grad_x + np.swapaxes(stiff * grad_y, 1, 2) @ grad_y
-        plan = Plan.of(mesh)
+        plan = SymbolicFactorization.of(mesh)
         at_middle = (np.arange(len(mesh.skin)) % 2).astype(np.int32)
         return FiniteBody(
             mesh,

@@ -148,9 +148,9 @@ def planned(mesh: Mesh, *, in_loops: bool) -> Tree | None:
     """Return the `elimination` of `mesh`; None where it is that of the loops, which is kept where they find it."""
     if not in_loops:
         return elimination(mesh)
-    from solver.linalg.elimination import Plan
+    from solver.linalg.elimination import SymbolicFactorization
 
-    Plan.of(mesh)
+    SymbolicFactorization.of(mesh)
     return None
 
 

@@ -16,7 +16,7 @@ from numpy.linalg import LinAlgError
 from solver._kernels import condense, eliminate, hooke
 from solver.body.stiffness import Elastic, Isotropic
 from solver.element import Q2P1
-from solver.linalg.elimination import Plan
+from solver.linalg.elimination import SymbolicFactorization
 from solver.mesh import Array, Indices, Mesh
 
 _VALUES, _SLOPES = Q2P1.shape(Q2P1.points)
@@ -32,7 +32,7 @@ class ReducedInLoops:
 
         Raises LinAlgError where an element is folded, or the inner stiffness is not positive definite.
         """
-        plan = Plan.of(mesh)
+        plan = SymbolicFactorization.of(mesh)
         count, width = len(mesh.elements), int(plan.border[-1])
         shear = np.array([m.shear for m in materials])[mesh.region]
         lame = np.array([m.lame for m in materials])[mesh.region]

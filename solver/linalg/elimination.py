@@ -16,7 +16,7 @@ LEAF: Final = 8  # elements in a part that is not halved any more
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plan:
+class SymbolicFactorization:
     """Parts of a body, p of them, children before parents, and the unknowns n that each eliminates.
 
     Unknowns are numbered in the order of their elimination; those of the skin, m, come last: x, y of each of its nodes.
@@ -41,7 +41,7 @@ class Plan:
     waiting: int  # numbers that wait at once
 
     @staticmethod
-    def of(mesh: Mesh) -> "Plan":
+    def of(mesh: Mesh) -> "SymbolicFactorization":
         """Plan the elimination of `mesh`, the centres of its elements already eliminated inside them.
 
         It does not depend on where nodes lie, so the last plans are kept for meshes that differ in nothing else.
@@ -50,7 +50,7 @@ class Plan:
 
 
 @lru_cache(maxsize=4)
-def _planned(count: int, *numbers: bytes) -> Plan:
+def _planned(count: int, *numbers: bytes) -> SymbolicFactorization:
     """Return the plan for `count` nodes and the numbers of elements' nodes (e, 9), the skin's, and unknowns held."""
     elements, skin_nodes, fixed = (np.frombuffer(part, np.int64) for part in numbers)
     elements = elements.reshape(-1, 9)
@@ -84,7 +84,7 @@ def _planned(count: int, *numbers: bytes) -> Plan:
             at[part.elements] = where[number[raw[tree.order[part.elements]]]]
     sizes = inner * (inner + border)
     wait_at, waiting = _waiting(children, border)
-    return Plan(
+    return SymbolicFactorization(
         unknown=_narrow(number[raw]),
         size=total,
         start=_narrow(start),
@@ -136,7 +136,7 @@ def _waiting(children: Indices, border: Indices) -> tuple[Indices, int]:
 class Elimination:
     """One body's tangent, eliminated again and again; the memory is set aside once."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: SymbolicFactorization) -> None:
         """Set memory aside for `plan`."""
         skin = int(plan.border[-1])
         self.plan = plan

@@ -1,5 +1,5 @@
 # ruff: noqa: C901 - a compiled loop is flat: calls inside it would cost more than they explain
-"""Elimination of a symmetric body down to its skin, part by part of a plan (`solver.linalg.elimination.Plan`).
+"""Elimination of a symmetric body down to its skin, part by part of a plan (`solver.linalg.elimination.SymbolicFactorization`).
 
 n unknowns are numbered in the order of their elimination, the m of the skin last. A part's front is a symmetric matrix
 of its inner unknowns (k, eliminated in it) and its border (b, passed on to its parent). The inner rows of its factor
@@ -32,7 +32,7 @@ def eliminate(
 ) -> bool:
     """Fill `factors` and the skin's stiffness `skin` (m, m); False where a pivot is zero.
 
-    `tangent` (e, 16, 16), lower half, of the elements; the other arguments are those of `Plan`. No pivoting: with its
+    `tangent` (e, 16, 16), lower half, of the elements; the other arguments are those of `SymbolicFactorization`. No pivoting: with its
     skin held, the tissue inside is stable but for what its pressure adds on the way to an equilibrium.
     """
     for p in range(start.shape[0]):
