@@ -3,7 +3,8 @@
 
 import numpy as np
 
-from solver._kernels.compiling import Array, Narrow, compiled
+from solver._kernels.arguments import BodyState, ElementArrays, ElementSystem, ProbeArrays
+from solver._kernels.compiling import Array, compiled
 
 PLAIN = 2.0  # exponent of tissue that does not stiffen
 
@@ -26,37 +27,14 @@ def stiffened(exponent: float, excess: float) -> tuple[float, float]:
 
 
 @compiled
-def assemble(
-    u: Array,
-    pressure: Array,
-    grad_x: Array,
-    grad_y: Array,
-    weight: Array,
-    modes: Array,
-    laplace: Array,
-    shear: Array,
-    stiffening: Array,
-    lame: Array,
-    nodes: Narrow,
-    unknown: Narrow,
-    tangent: Array,
-    force: Array,
-    recovery_matrix: Array,
-    condensed_inverse: Array,
-    dilate: Array,
-    volume: Array,
-) -> float:
-    """Fill the tangents and the internal forces at displacements `u` (nodes, 2); return the least det F.
+def assemble(u: Array, pressure: Array, elements: ElementArrays, system: ElementSystem) -> float:
+    """Fill the elements' `system` at displacements `u` (nodes, 2); return the least det F.
 
     `pressure` (e, 3) are the pressure modes that the tangent sees (the linearised prediction), while the forces follow
-    from `u` alone. `grad_x`, `grad_y` (e, q, 9), `weight` (e, q), `modes` (e, q, 3, orthonormal over the element),
-    `laplace` (e, 9, 9) integrals of the products of gradients times `shear`;
-    `shear`, `stiffening` (Ogden's exponent), `lame` (e,); `nodes` (e, 9), `unknown` (e, 8, 2), -1 where fixed.
-    Filled: `tangent` (e, 16, 16) of the outer nodes, lower half, `force` (n,), `recovery_matrix` (e, 2, 17)
-    (centre = -(recovery_matrix @ (outer unknowns, 1))), `condensed_inverse` (e, 3) of the centre's stiffness inverted (xx, xy, yy),
-    `dilate` (e, 3, 18) derivative of the modes of ln J, `volume` (e, 3) those modes.
-    Where det F is not positive, the arrays are left half filled.
+    from `u` alone. Where det F is not positive, the system is left half filled.
     """
+    grad_x, grad_y, weight, modes, laplace, shear, stiffening, lame, nodes, unknown = elements
+    tangent, force, recovery_matrix, condensed_inverse, dilate, volume = system
     force[:] = 0.0
     least = np.inf
     # Sums over quadrature points are products of small matrices of a fixed size, sixteen columns at a time: x of the
@@ -213,27 +191,14 @@ def assemble(
 
 
 @compiled
-def forces(
-    u: Array,
-    grad_x: Array,
-    grad_y: Array,
-    weight: Array,
-    modes: Array,
-    shear: Array,
-    stiffening: Array,
-    lame: Array,
-    nodes: Narrow,
-    unknown: Narrow,
-    force: Array,
-    recovery_matrix: Array,
-    condensed_inverse: Array,
-    volume: Array,
-) -> float:
+def forces(u: Array, elements: ElementArrays, system: ElementSystem) -> float:
     """Fill the internal forces at displacements `u` for a tangent assembled elsewhere; return the least det F.
 
     Of that tangent are `recovery_matrix` and `condensed_inverse`, by which the centres are eliminated. Filled: `force` (n,), the last column of
     `recovery_matrix`, and `volume`.
     """
+    grad_x, grad_y, weight, modes, _, shear, stiffening, lame, nodes, unknown = elements
+    _, force, recovery_matrix, condensed_inverse, _, volume = system
     force[:] = 0.0
     least = np.inf
     ux, uy = np.empty(9), np.empty(9)
@@ -292,24 +257,16 @@ def forces(
 
 @compiled
 def advance(
-    u: Array,
-    pressure: Array,
-    step: Array,
-    scale: float,
-    nodes: Narrow,
-    unknown: Narrow,
-    lame: Array,
-    recovery_matrix: Array,
-    dilate: Array,
-    volume: Array,
-    u_new: Array,
-    pressure_new: Array,
+    before: BodyState, step: Array, scale: float, after: BodyState, elements: ElementArrays, system: ElementSystem
 ) -> float:
-    """Fill `u_new`, `pressure_new` after `scale` times the `step` (n,) of the unknowns; return the largest move.
+    """Fill the state `after` going `scale` times the `step` (n,) of the unknowns; return the largest move.
 
     The pressure is the linearised prediction at the end of the full step, approached by `scale`: the mixed
     integration points of Magisano, Leonetti and Garcea (2017), Int. J. Numer. Meth. Eng. 109, 1237.
     """
+    nodes, unknown, lame = elements.nodes, elements.unknown, elements.lame
+    recovery_matrix, dilate, volume = system.recovery_matrix, system.dilate, system.volume
+    u, pressure, u_new, pressure_new = before.u, before.pressure, after.u, after.pressure
     largest = 0.0
     for n in range(u.shape[0]):
         u_new[n, 0], u_new[n, 1] = u[n, 0], u[n, 1]
@@ -335,26 +292,10 @@ def advance(
 
 
 @compiled
-def energies(
-    u: Array,
-    grad_x: Array,
-    grad_y: Array,
-    weight: Array,
-    modes: Array,
-    shear: Array,
-    stiffening: Array,
-    lame: Array,
-    nodes: Narrow,
-    at_element: Narrow,
-    at_x: Array,
-    at_y: Array,
-    at_modes: Array,
-    out: Array,
-) -> None:
-    """Fill `out` (p,) with the strain-energy density at probes; ln J is the element's best fit by its three modes.
-
-    `at_element` (p,), `at_x`, `at_y` (p, 9) gradients of the shape functions there, `at_modes` (p, 3) the modes there.
-    """
+def energies(u: Array, elements: ElementArrays, probes: ProbeArrays, out: Array) -> None:
+    """Fill `out` (p,) with the strain-energy density at probes; ln J is the element's best fit by its three modes."""
+    grad_x, grad_y, weight, modes, _, shear, stiffening, lame, nodes, _ = elements
+    at_element, at_x, at_y, at_modes = probes
     seen = -1
     v0 = v1 = v2 = 0.0
     for p in range(at_element.shape[0]):

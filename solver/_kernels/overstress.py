@@ -3,30 +3,23 @@
 
 import numpy as np
 
-from solver._kernels.compiling import Array, Narrow, compiled
+from solver._kernels.arguments import ElementArrays, ElementSystem
+from solver._kernels.compiling import Array, compiled
 
 
 @compiled
-def add_overstress(
-    u: Array,
-    tensor: Array,
-    grad_x: Array,
-    grad_y: Array,
-    weight: Array,
-    nodes: Narrow,
-    unknown: Narrow,
-    tangent: Array,
-    force: Array,
-    recovery_matrix: Array,
-    condensed_inverse: Array,
-    anew: bool,
-) -> None:
+def add_overstress(u: Array, tensor: Array, elements: ElementArrays, system: ElementSystem, anew: bool) -> None:
     """Add the forces of W = 1/2 J^-2/3 T:C at displacements `u`, and where `anew` its tangent.
 
-    `tensor` (e, q, 4) is T: xx, yy, xy, zz [MPa]; the others as in `assemble` and `forces`, by which `tangent`,
-    `force`, `recovery_matrix` and `condensed_inverse` were filled, the centre of each element eliminated. `anew`: it is eliminated again, with
-    what is added; otherwise the tangent is one kept from elsewhere.
+    `tensor` (e, q, 4) is T: xx, yy, xy, zz [MPa]. The `system` was filled by `assemble` or `forces`, with the centre of
+    each element eliminated. Where `anew`, it is eliminated again with what is added; otherwise the tangent is one kept
+    from another state.
     """
+    grad_x, grad_y, weight, nodes, unknown = (
+        elements.grad_x, elements.grad_y, elements.weight, elements.nodes, elements.unknown
+    )  # fmt: skip
+    tangent, force = system.tangent, system.force
+    recovery_matrix, condensed_inverse = system.recovery_matrix, system.condensed_inverse
     ux, uy = np.empty(9), np.empty(9)
     full, own = np.empty((18, 18)), np.empty(18)
     hx, hy, mx, my = np.empty(9), np.empty(9), np.empty(9), np.empty(9)

@@ -112,8 +112,8 @@ def marched(
     law, loading = law_of(scene), scene.loading_per_mm
     if not scene.materials.relax:
         return march(finger.body.touchable, law, loading, progress, times), None
-    laws, in_loops = relaxing_laws(scene.materials), finger.body.touchable.in_loops
-    body = RelaxingBody(finger.geometry.mesh, laws, in_loops=in_loops, checked=True)
+    laws = relaxing_laws(scene.materials)
+    body = RelaxingBody(finger.geometry.mesh, laws, checked=True)
     first = PRESSING_TIME / round(PRESSING_STEPS * times)
     way = RelaxingWay(body, law, loading, finger.ending, finger.point, first)
     march_relaxing(way, loading, scene.materials.longest_creep, progress, times)

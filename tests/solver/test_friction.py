@@ -44,7 +44,7 @@ class Told:
     length: np.ndarray
 
 
-def springs(*, in_loops=False):
+def springs(*):
     """Five points that do not feel each other, the outer two above any depth."""
     one, zero = np.eye(5), np.zeros(5)
     along_y, across, along_x = COMPLIANCE
@@ -58,8 +58,8 @@ def told(found: Contact, before: Contact):
     return Told(found.state, found.sense, found.normal, found.tangential, found.gap, found.shift - before.shift, LENGTH)
 
 
-def driven(law, *, in_loops=False):
-    body = springs(in_loops=in_loops)
+def driven(law, *):
+    body = springs()
     course, states = Course(body, law), [untouched(body)]
     for depth, travel in DRIVES:
         states.append(course.step(states[-1], depth, travel))
@@ -67,7 +67,7 @@ def driven(law, *, in_loops=False):
 
 
 def driven_in_loops(law):
-    return driven(law, in_loops=True)
+    return driven(law)
 
 
 def slid_at_once(law):
@@ -75,7 +75,7 @@ def slid_at_once(law):
     rubbed = []
     for in_loops in (False, True):
         for direction in (1, -1):
-            found = Course(springs(in_loops=in_loops), law).sliding(0.3, direction)
+            found = Course(springs(), law).sliding(0.3, direction)
             rubbed.append(replace(told(found, found), slid=np.full(5, 100.0 * direction)))
     return rubbed
 
@@ -197,7 +197,7 @@ def test_points_on_springs_carry_what_their_springs_and_the_law_say(law):
     """No point feels another, and without coupling N = (d - g)/a; T is the springs' pull, cut off."""
     body = replace(springs(), normal_by_tangential=np.zeros((5, 5)))
     for in_loops in (False, True):
-        course = Course(replace(body, in_loops=in_loops), law)
+        course = Course(replace(body), law)
         before = untouched(body)
         for depth, travel in DRIVES:
             normal = np.maximum(depth - body.gap, 0.0) / COMPLIANCE[0]

@@ -1,4 +1,5 @@
-"""What `solver._kernels` computes, said once more in plain NumPy: slow, short, and what the tests hold the other to."""
+# ruff: noqa: N803, N806 - the letters of the literature
+"""Finite strain in plain NumPy: the judge of the compiled loops."""
 
 from typing import cast
 
@@ -57,15 +58,6 @@ def pressure(body: FiniteBody, u: Array) -> Array:
 def energy(body: FiniteBody, u: Array) -> float:
     """Return the energy stored in the body [N mm per mm]."""
     return _stored(body, _gradient(body, u)).real
-
-
-def energy_slope(body: FiniteBody, u: Array, way: Array) -> float:
-    """Return by how much the stored energy grows at `u` along `way` (nodes, 2) [N mm per mm].
-
-    From the energy alone, by a step in imaginary direction (Squire and Trapp 1998, SIAM Rev. 40, 110), no stress asked.
-    """
-    H = _gradient(body, u) + 1j * IMAGINARY * _gradient(body, way)
-    return _stored(body, cast("Array", H)).imag / IMAGINARY
 
 
 def _stored(body: FiniteBody, H: Array) -> complex:
