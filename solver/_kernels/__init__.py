@@ -1,6 +1,6 @@
 """The compiled loops of the solver, and the only modules that are compiled (numba, cached on disk).
 
-`tests.solver.oracle` says the same in plain NumPy, and the tests compare the two.
+The tests hold a plain twin of them in NumPy, and compare the two.
 """
 
 from solver._kernels.carrying import carry

@@ -3,7 +3,7 @@
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import ExitStack, contextmanager
 from functools import cache
 from hashlib import blake2b
@@ -76,11 +76,11 @@ class _SharedCache(_caching.FunctionCache):
     def save_overload(self, sig: object, data: object) -> None:
         """Keep compiled code and its entry in the index."""
         with _alone(Path(os.environ["NUMBA_CACHE_DIR"])):
-            super().save_overload(sig, data)
+            _caching.FunctionCache.save_overload(self, sig, data)
 
 
 @contextmanager
-def _alone(folder: Path) -> Iterator[None]:
+def _alone(folder: Path) -> Generator[None]:
     """Keep other processes of this machine out until the block ends, where the system has such locks."""
     with ExitStack() as held:
         try:

@@ -194,8 +194,8 @@ def assemble(u: Array, pressure: Array, elements: ElementArrays, system: Element
 def forces(u: Array, elements: ElementArrays, system: ElementSystem) -> float:
     """Fill the internal forces at displacements `u` for a tangent assembled elsewhere; return the least det F.
 
-    Of that tangent are `recovery_matrix` and `condensed_inverse`, by which the centres are eliminated. Filled: `force` (n,), the last column of
-    `recovery_matrix`, and `volume`.
+    Of that tangent are `recovery_matrix` and `condensed_inverse`, by which the centres are eliminated. Filled: `force`,
+    the last column of `recovery_matrix`, and `volume`.
     """
     grad_x, grad_y, weight, modes, _, shear, stiffening, lame, nodes, unknown = elements
     _, force, recovery_matrix, condensed_inverse, _, volume = system

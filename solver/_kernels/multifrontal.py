@@ -16,9 +16,9 @@ from solver._kernels.compiling import Array, compiled
 def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiting: Array, skin: Array) -> bool:
     """Fill `factors` and the skin's stiffness `skin` (m, m); False where a pivot is zero.
 
-    `tangent` (e, 16, 16), lower half, of the elements; `factors` and `waiting` are memory as large as `plan` says. There
-    is no pivoting: with its skin held, the tissue inside is stable but for what its pressure adds on the way to an
-    equilibrium.
+    `tangent` (e, 16, 16), lower half, of the elements; `factors` and `waiting` are memory as large as `plan` says.
+    There is no pivoting: with its skin held, the tissue inside is stable but for what its pressure adds on the way to
+    an equilibrium.
     """
     start, inner, border, children, border_at = plan.start, plan.inner, plan.border, plan.children, plan.border_at
     place, run, factor_at, wait_at = plan.place, plan.run, plan.factor_at, plan.wait_at
@@ -226,7 +226,7 @@ def back_substitute_part(p: int, carried: Array, factors: Factors, out: Array) -
 
 @compiled
 def back_substitute(carried: Array, skin: Array, factors: Factors, out: Array) -> None:
-    """Fill `out` (n,) with the displacements under -`carried` (n,), from `condense`, when the skin's are `skin` (m,)."""
+    """Fill `out` (n,) with the displacements under -`carried` (n,), of `condense`, when the skin's are `skin` (m,)."""
     first = out.shape[0] - skin.shape[0]
     for i in range(skin.shape[0]):
         out[first + i] = skin[i]

@@ -44,8 +44,8 @@ class Body:
         """Reduce a body of `materials` by region under dead `loads` (nodes, 2) [N/mm].
 
         What is held moves with the drive, and by `prescribed` (nodes, 2) [mm] relative to it. A body that nothing holds
-        names in `free` the motions along which the surface alone balances the loads. Raises BodyError and MeshError, unless `checked` before, and
-        LinAlgError where what is held or free leaves it a motion.
+        names in `free` the motions along which the surface alone balances the loads. Raises BodyError and MeshError,
+        unless `checked` before, and LinAlgError where what is held or free leaves it a motion.
         """
         if not checked:
             check_body(mesh, materials)

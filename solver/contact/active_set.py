@@ -157,7 +157,8 @@ class Course:
         found = _blank(body, np.zeros(count, np.int8), np.full(count, sense))
         systems = rubbing.slide(
             body.gap, body.length, body.normal_by_normal, body.normal_by_tangential, body.tangential_by_tangential,
-            body.normal_free, body.tangential_free, law.mu, law.tau_max, depth, sense, ROUNDS, HERTZ, found.state,
+            np.ascontiguousarray(body.normal_free),
+            np.ascontiguousarray(body.tangential_free), law.mu, law.tau_max, depth, sense, ROUNDS, HERTZ, found.state,
             found.normal, found.tangential, found.shift, found.gap,
         )  # fmt: skip
         return None if systems == rubbing.LOST else replace(found, iterations=systems)
@@ -186,10 +187,12 @@ class Course:
     ) -> Contact:
         """Change states until none contradicts the solution; with `free`, points may stick and turn round."""
         body, law, found = self.body, self.law, _blank(self.body, state.copy(), sense.copy())
-        motions = np.ascontiguousarray(body.motions)  # loops are compiled for one order of numbers in memory
+        # loops are compiled for one order of numbers in memory
+        motions, anchor = np.ascontiguousarray(body.motions), np.ascontiguousarray(anchor)
+        up, along = np.ascontiguousarray(body.normal_free), np.ascontiguousarray(body.tangential_free)
         systems = rubbing.solve_active_set(
             body.gap, body.length, body.normal_by_normal, body.normal_by_tangential, body.tangential_by_tangential,
-            body.normal_free, body.tangential_free, motions, self._resultants, law.mu, law.tau_max, depth, travel,
+            up, along, motions, self._resultants, law.mu, law.tau_max, depth, travel,
             anchor, free, self._entering if free else SLIP, self._patience, found.state, found.sense, found.normal,
             found.tangential, found.shift, found.gap, found.motion,
         )  # fmt: skip

@@ -85,7 +85,6 @@ def halves():
     return whole, replace(half, held_x=np.setdiff1d(at(half, 0, 0.0), half.held)), old
 
 
-@pytest.mark.parametrize("in_loops", [False, True])
 @pytest.mark.parametrize("mu", [0.0, 0.3])
 def test_half_a_body_at_its_plane_of_symmetry_is_the_whole_to_round_off_at_small_strain(mu):
     whole, half, old = halves()
