@@ -72,7 +72,7 @@ def on_mesh(scenes: Sequence[Scene], fineness: float, shift: bool) -> list[list[
     """Return the numbers (3, 3) of the surfaces on one mesh at small strain."""
     depth = scenes[0].loading.depth
     for margin in (1.0, 4.0, WIDE):
-        finger = FingerModel.of(scenes[0], Sizing(fineness, depth, shift, margin), in_loops=True)
+        finger = FingerModel.of(scenes[0], Sizing(fineness, depth, shift, margin))
         contacts = [settled(scene, finger) for scene in scenes]
         if not any(finger.reaches_out(contact, finger.displacement(contact), depth) for contact in contacts):
             break
@@ -93,7 +93,7 @@ def measured(number: int, kinematics: Literal["small", "finite"]) -> dict[str, A
         for tolerance in TOLERANCES:
             asked = [replace(s, solve=replace(s.solve, tolerance=tolerance, evidence="estimated")) for s in scenes]
             begun = process_time()
-            found = solve_together(asked, in_loops=True)
+            found = solve_together(asked)
             answers[str(tolerance)] = {
                 "numbers": [told(one)[:3] for one in found],
                 "warned": any("Differences" in warning for warning in found[0].warnings),

@@ -95,7 +95,7 @@ def on_mesh(scene: Scene, fineness: float, shift: bool) -> list[float]:
     """Return the three numbers on one mesh."""
     depth = scene.loading.indentation
     for margin in (1.0, 4.0, WIDE):
-        finger = FingerModel.of(scene, Sizing(fineness, depth, shift, margin), in_loops=True)
+        finger = FingerModel.of(scene, Sizing(fineness, depth, shift, margin))
         contact = settled(scene, finger)
         if not finger.reaches_out(contact, finger.displacement(contact), depth):
             break

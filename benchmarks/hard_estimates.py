@@ -125,7 +125,7 @@ def measured(family: str, number: int, kinematics: str) -> dict[str, Any]:
     for tolerance in ASKED:
         begun = process_time()
         asked = replace(drawn, solve=replace(drawn.solve, tolerance=tolerance))
-        answer = answers([asked], in_loops=True)[0]
+        answer = answers([asked])[0]
         told = _numbers(answer) if isinstance(answer, Prediction) else str(answer)
         row["answers"].append({"told": told, "seconds": process_time() - begun})
     try:

@@ -12,8 +12,8 @@ if __name__ == "__main__":
     for kinematics in ("small", "finite"):
         published = scene(SLIPPERINESS[-1])
         asked = replace(published, solve=replace(published.solve, kinematics=kinematics))
-        solve(asked, in_loops=True)
-        solve(replace(asked, solve=replace(asked.solve, course="history")), in_loops=True)
+        solve(asked)
+        solve(replace(asked, solve=replace(asked.solve, course="history")))
         stepper(asked).step(0.05, 0.01)
     # pytest keeps bytecode of its own of every test.
     subprocess.run([sys.executable, "-m", "pytest", "-q", "--collect-only"], stdout=subprocess.DEVNULL, check=False)

@@ -24,12 +24,12 @@ from solver.scene import Solve
 FILES = {
     "mesher": "mesh and tables", "grid": "mesh and tables", "outline": "mesh and tables", "mesh": "mesh and tables",
     "finite_body": "mesh and tables", "carrying": "carrying states", "elements": "assembly", "stiffness": "assembly",
-    "dissection": "factorisation", "elimination": "factorisation", "fronts": "factorisation", "body": "factorisation",
+    "nested_dissection": "factorisation", "linear_elimination": "factorisation", "multifrontal": "factorisation",
+    "body": "factorisation",
     "contact": "contact", "friction": "contact", "skin": "contact", "receptor": "receptor", "newton": "iteration",
     "sliding": "iteration", "existence": "proof of existence", "crossing": "proof of existence",
     "limit": "proof of existence", "audits": "audits and evidence", "evidence": "audits and evidence",
-    "kernels_numpy": "audits and evidence", "hooke": "assembly", "in_loops": "factorisation", "rubbing": "contact",
-    "contact_in_loops": "contact", "small_states": "contact", "holding": "audits and evidence",
+    "hooke": "assembly", "rubbing": "contact", "small_states": "contact", "holding": "audits and evidence",
     "finite_audits": "audits and evidence",
 }  # fmt: skip
 LOOPS = {"energies": "receptor", "displace": "factorisation"}
@@ -66,14 +66,14 @@ def measure(asked: Asked, found: Found) -> Iterator[Cost | LeftOut]:
             return
         kinematics, tolerance = work
         scene = replace(cases(kinematics)[-1], solve=Solve(kinematics, tolerance=tolerance))
-        solve(scene, in_loops=True)
+        solve(scene)
         begun, before = clock(), perf_counter()
-        answer = solve(scene, in_loops=True)
+        answer = solve(scene)
         own = (clock() - begun) / (perf_counter() - before)  # of the time that passed, by which answers tell theirs
-        span = timed(partial(solve, scene, in_loops=True), 5, 1.5)
+        span = timed(partial(solve, scene), 5, 1.5)
         profile = cProfile.Profile(builtins=False)
         profile.enable()
-        solve(scene, in_loops=True)
+        solve(scene)
         profile.disable()
         yield Cost(
                 kinematics, tolerance, answer.dofs, span, own * answer.setup_s, own * answer.wall_s,
@@ -139,6 +139,6 @@ def _part(function: Function) -> str | None:
     file = Path(path)
     if "solver" not in file.parts:
         return None
-    if name in LOOPS and file.stem.startswith(("kernels", "elements", "fronts", "skin")):
+    if name in LOOPS and file.stem.startswith(("kernels", "elements", "multifrontal", "skin")):
         return LOOPS[name]
     return FILES.get(file.stem)

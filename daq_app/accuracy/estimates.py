@@ -87,7 +87,7 @@ def _published(asked: Asked, found: Found, kinematics: Kinematics) -> Iterator[E
             yield tolerance if isinstance(tolerance, LeftOut) else LeftOut(f"No truth is known at {kinematics} strain.")
             return
         begun = clock()
-        found_all = answers([replace(s, solve=Solve(kinematics, tolerance=tolerance)) for s in chosen], in_loops=True)
+        found_all = answers([replace(s, solve=Solve(kinematics, tolerance=tolerance)) for s in chosen])
         took = clock() - begun
         rows: list[Estimate] = []
         good = [a for a in found_all if isinstance(a, Prediction)]

@@ -136,9 +136,9 @@ def loaded(progress: Progress) -> None:
     for kinematics in ("small", "finite"):
         scene = cases(kinematics)[-1]
         asked = replace(scene, solve=replace(scene.solve, tolerance=0.1))
-        solve(asked, in_loops=True)
+        solve(asked)
         if kinematics == "small":
-            solve(replace(asked, solve=replace(asked.solve, course="history")), in_loops=True)
+            solve(replace(asked, solve=replace(asked.solve, course="history")))
         stepper(scene).step(1e-3, 0.0)
 
 

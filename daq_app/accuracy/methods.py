@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import groupby
 from time import perf_counter
 from typing import Any, Literal, Protocol
@@ -27,7 +26,7 @@ from solver.scene import Friction, Scene
 
 SHORTEST = 0.02  # of truths, elements where the cut meets the bone, by tip radius, below which none are asked for
 HALF, LITTLE_LESS = 0.5, 0.7  # each by the one before; the second where the first leads nowhere
-FALLS = 0.8  # with the power of that length what is left there falls (docs/solver-finite-strain.md)
+FALLS = 0.8  # with the power of that length what is left there falls (docs/explanation/solver-model.md)
 LEAST = 0.35  # det F there, below which such states are no longer one row
 Kinematics = Literal["small", "finite"]
 State = Any  # of contact at small strain, of the body, with its mesh or not, at finite strain; only handed back
@@ -80,12 +79,11 @@ class Method:
 class SmallMeshed:
     """Small strain: all but the skin eliminated once, contact on what remains."""
 
-    def __init__(self, scene: Scene, fineness: float, shift: bool, in_loops: bool = True) -> None:
-        """Mesh and reduce the finger of `scene`, in compiled loops or in NumPy."""
-        self._in_loops = in_loops
+    def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
+        """Mesh and reduce the finger of `scene`."""
         self._moduli = settled_moduli(scene.materials)
         begun, passing = clock(), perf_counter()
-        self.finger = FingerModel.of(scene, Sizing(fineness, scene.loading.depth, shift, margin=4.0), in_loops=in_loops)
+        self.finger = FingerModel.of(scene, Sizing(fineness, scene.loading.depth, shift, margin=4.0))
         took, passed = clock() - begun, perf_counter() - passing
         self.prepared_s = took * self.finger.solve_s / passed  # which it tells by the time that passes
         self.setup_s = took - self.prepared_s
@@ -111,7 +109,7 @@ class SmallMeshed:
         """Return what assembling, eliminating and unfolding once took."""
         skin = np.ones((2 * len(self.finger.body.touchable.gap), 1))
         begun = clock()
-        Body.of(self.finger.geometry.mesh, self._moduli, in_loops=self._in_loops).displacement(skin)
+        Body.of(self.finger.geometry.mesh, self._moduli).displacement(skin)
         return clock() - begun
 
 
@@ -276,14 +274,9 @@ def pull_of(scene: Scene) -> Pull:
     return Pull(loading.depth, float(friction.mu), friction.cap, -(loading.direction or 1))
 
 
-_FRONTS = "nested dissection in compiled loops"
-SMALL = Method("small strain", "small", Q2P1.name, Q2P1.order, _FRONTS, "one guess", SmallMeshed)
-FINITE = Method("finite strain", "finite", Q2P1.name, Q2P1.order, _FRONTS, "rough state", ClimbingMeshed)
-PLAIN = Method("finite strain, plain mesh", "finite", Q2P1.name, Q2P1.order, _FRONTS, "undeformed", FiniteMeshed)
-NUMPY = Method(  # what `daq-app solve` takes, which would wait longer for the loops than it takes to solve one scene
-    "small strain, NumPy", "small", Q2P1.name, Q2P1.order, "nested dissection in NumPy and LAPACK", "one guess",
-    partial(SmallMeshed, in_loops=False),
-)  # fmt: skip
-
-METHODS = (SMALL, NUMPY, FINITE, PLAIN)
+_ELIMINATION = "nested dissection in compiled loops"
+SMALL = Method("small strain", "small", Q2P1.name, Q2P1.order, _ELIMINATION, "one guess", SmallMeshed)
+FINITE = Method("finite strain", "finite", Q2P1.name, Q2P1.order, _ELIMINATION, "rough state", ClimbingMeshed)
+PLAIN = Method("finite strain, plain mesh", "finite", Q2P1.name, Q2P1.order, _ELIMINATION, "undeformed", FiniteMeshed)
+METHODS = (SMALL, FINITE, PLAIN)
 MAIN: dict[Kinematics, Method] = {"small": SMALL, "finite": FINITE}  # the one an answer comes from

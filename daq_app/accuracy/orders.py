@@ -112,7 +112,7 @@ def small_finger(quick: bool) -> Iterator[Order]:
     """Yield the SED of the finger's ending at small strain: order 2, over shifted meshes of nearly one size."""
 
     def sed(asked: Scene, fineness: float, shift: bool) -> float:
-        model = FingerModel.of(asked, Sizing(fineness, 2.0, shift), in_loops=True)
+        model = FingerModel.of(asked, Sizing(fineness, 2.0, shift))
         return float(numbers_on(model, [settled(asked, model)])[0, 0])
 
     overkill, finenesses = (14.0, (3.0, 4.0, 5.0, 7.0)) if quick else (20.0, (3.0, 4.0, 5.0, 7.0, 10.0))

@@ -7,7 +7,7 @@ from statistics import median
 import numpy as np
 
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, timed, within
-from daq_app.accuracy.methods import FINITE, METHODS, NUMPY, PLAIN, SMALL, Meshed, Method
+from daq_app.accuracy.methods import FINITE, METHODS, PLAIN, SMALL, Meshed, Method
 from daq_app.accuracy.truth import JUDGED, Truth, cases, known
 from solver.contact.active_set import ContactLost
 from solver.failures import SolveFailure
@@ -16,14 +16,12 @@ from solver.scene import Scene
 
 MESHES = {  # elements to a tip radius; 840 to 15,000 unknowns, and 1,480 to 11,000 where meshes follow the contact
     SMALL.name: (2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0),
-    NUMPY.name: (2.5, 6.0),
     FINITE.name: (5.5, 6.5, 8.0, 10.0, 12.0, 16.0, 20.0),
     PLAIN.name: (3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 14.0),
 }
 LITTLE = 0.25  # patience of a quick run
 QUICK = {
     SMALL.name: (2.5, 3.0, 5.0, 8.0),
-    NUMPY.name: (2.5,),
     FINITE.name: (5.5, 10.0, 20.0),
     PLAIN.name: (4.0, 8.0),
 }

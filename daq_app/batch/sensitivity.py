@@ -193,7 +193,7 @@ def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
 
 def _settled(scene: Scene) -> float:
     asked = replace(scene.solve, course="steady", evidence="quick")
-    return solve(replace(scene, solve=asked), in_loops=True).sed_ending
+    return solve(replace(scene, solve=asked)).sed_ending
 
 
 def _value(scene: Any, name: str) -> float | None:  # noqa: ANN401  the scene or a table of it

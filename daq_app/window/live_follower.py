@@ -89,7 +89,7 @@ class Follower:
         scene, self._area, _ = self._made_for
         self._kinematics: Kinematics = use.kinematics
         sizing = Sizing(FINENESS["small"], scene.loading.depth, margin=MARGIN["small"])
-        finger = FingerModel.of(scene, sizing, in_loops=True)
+        finger = FingerModel.of(scene, sizing)
         self._scene = scene
         self._small, self._drawn = SmallStepper(Condensed.of(finger), LEAST_MU), LivePicture.of(finger)
         self._small.step(1e-3, 0.0)  # compiles, or loads what was compiled
@@ -180,7 +180,7 @@ class Follower:
 def _settled(asked: Settle, kinematics: Kinematics, provisional: float | None, seen: _Seen | None) -> Settled:
     scene = settled_scene(asked.plan, asked.friction, asked.normal_force, kinematics)
     try:
-        found = None if scene is None else solve(scene, in_loops=True)
+        found = None if scene is None else solve(scene)
     except SolveFailure as failure:
         return _unsettled(asked, kinematics, provisional, seen, str(failure.in_a_sentence()), failed=True)
     if found is None:

@@ -58,7 +58,7 @@ def predict(
     matches = asked.kinematics == "small"
     forces = [_force_per_mm(prepared[n]) if matches else None for n in solved]
     wanted = [(scene, force) for scene, force in zip(scenes, forces, strict=True) if force is not None]
-    matched = iter(matching_depths([scene for scene, _ in wanted], [force for _, force in wanted], in_loops=True))
+    matched = iter(matching_depths([scene for scene, _ in wanted], [force for _, force in wanted]))
     depths = [None if force is None else next(matched) for force in forces]
     ways: dict[int, Way] = {}
     found: dict[int, Prediction | SolveFailure] = {}
@@ -75,7 +75,7 @@ def predict(
             told(solved[at], known(at), ways.get(at))
 
     both = [one for scene in scenes for one in (scene, quick(opposite(scene)))]
-    found |= dict(enumerate(answers(both, progress, seen if watch else None, in_loops=True)))
+    found |= dict(enumerate(answers(both, progress, seen if watch else None)))
     for at, number in enumerate(solved):
         rows[number] = known(at)
     base = asked.scene

@@ -27,7 +27,7 @@ def solved(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[P
 
 
 def _answers(scenes: Sequence[Scene], progress: Progress | None) -> tuple[Prediction | SolveFailure, ...]:
-    return answers([quick(scene) for scene in scenes], progress, in_loops=True)
+    return answers([quick(scene) for scene in scenes], progress)
 
 
 def quick(scene: Scene) -> Scene:
@@ -61,7 +61,7 @@ def slides(predictions: Sequence[Prediction], progress: Progress | None = None) 
 
     None where there is none that does not depend on the way to it. Raises Cancelled.
     """
-    for number, slide in enumerate(nearby(predictions, in_loops=True)):
+    for number, slide in enumerate(nearby(predictions)):
         if progress is not None and not progress(number / len(predictions)):
             raise Cancelled
         yield slide

@@ -1,43 +1,51 @@
 """The compiled loops of the solver, and the only modules that are compiled (numba, cached on disk).
 
-`solver.kernels_numpy` says the same of finite strain in plain NumPy, `stiffness`, `dissection` and
-`solver.contact.active_set` of small strain (`hooke`, `rubbing`, `following`); the tests compare them.
+The tests hold a plain twin of them in NumPy, and compare the two.
 """
 
 from solver._kernels.carrying import carry
-from solver._kernels.compiling import CAP, HELD_X, HELD_Y, OPEN, SLIP, STICK, ending
+from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, bind_arguments
 from solver._kernels.elements import assemble, energies, forces
-from solver._kernels.fronts import condense, eliminate, unfold
-from solver._kernels.iterating import meet, move, touch
+from solver._kernels.iterating import condense_forces, meet, move
+from solver._kernels.multifrontal import back_substitute, condense, eliminate
 from solver._kernels.outline import crosses, pinched
 from solver._kernels.overstress import add_overstress
-from solver._kernels.skin import STEEP, impose, restate, rubbed, solve, tributary
+from solver._kernels.skin import (
+    STEEP,
+    assemble_contact_system,
+    rubbed,
+    solve,
+    solve_active_set,
+    tributary,
+    update_contact_states,
+)
 
 __all__ = [
-    "CAP",
     "HELD_X",
     "HELD_Y",
     "OPEN",
+    "SHEAR_LIMITED",
     "SLIP",
     "STEEP",
     "STICK",
     "add_overstress",
     "assemble",
+    "assemble_contact_system",
+    "back_substitute",
+    "bind_arguments",
     "carry",
     "condense",
+    "condense_forces",
     "crosses",
     "eliminate",
-    "ending",
     "energies",
     "forces",
-    "impose",
     "meet",
     "move",
     "pinched",
-    "restate",
     "rubbed",
     "solve",
-    "touch",
+    "solve_active_set",
     "tributary",
-    "unfold",
+    "update_contact_states",
 ]

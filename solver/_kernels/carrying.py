@@ -1,33 +1,17 @@
 """A state of one mesh taken to another: displacements by the elements' own functions, pressures by their elements."""
 
-from solver._kernels.compiling import Array, Narrow, compiled
+from solver._kernels.arguments import MeshTransferArrays
+from solver._kernels.compiling import Array, compiled
 
 
 @compiled
-def carry(
-    u: Array,
-    pressure: Array,
-    combination: Array,
-    centre: Array,
-    along: Narrow,
-    along_parts: Array,
-    across: Narrow,
-    across_parts: Array,
-    station: Narrow,
-    layer: Narrow,
-    points: Array,
-    weight: Array,
-    modes: Array,
-    u_new: Array,
-    pressure_new: Array,
-) -> None:
-    """Fill `u_new` (n, 2) and `pressure_new` (e, 3) from `u` and `pressure` on a mesh of r rows of nodes across.
+def carry(u: Array, pressure: Array, transfer: MeshTransferArrays, u_new: Array, pressure_new: Array) -> None:
+    """Fill `u_new` (n, 2) and `pressure_new` (e, 3) of a new mesh from `u` and `pressure` of an old one.
 
-    A node in line i and row j of the new mesh takes its part of three lines of the old one from `along[i]` on, and of
-    three rows from `across[j]` on, by `along_parts` (lines, 3) and `across_parts` (rows, 3). Quadrature points of the
-    new elements lie in the old elements of `station` (a, 3) and `layer` (b, 3), whose pressure is a combination of
-    1, x, y (`FiniteBody.combination`, `centre`); `points` (e, 9, 2), `weight` (e, 9) and `modes` (e, 9, 3) are new.
+    A node in line i and row j of the new mesh takes its part of three old lines from `along[i]` on, and of three rows
+    from `across[j]` on. The pressure at a quadrature point is that of the old element it lies in.
     """
+    combination, centre, along, along_parts, across, across_parts, station, layer, points, weight, modes = transfer
     lines, rows = along.shape[0], across.shape[0]
     old_rows = across[rows - 1] + 3
     for i in range(lines):

@@ -1,203 +1,145 @@
-"""How the loops are compiled, once on a machine, and the words they share."""
+"""How numba compiles the loops, once on a machine, and the types and constants they share."""
 
-from collections.abc import Callable, Iterator
-from contextlib import suppress
-from functools import cache, update_wrapper
+import os
+import signal
+import threading
+from collections.abc import Callable, Generator
+from contextlib import ExitStack, contextmanager
+from functools import cache
+from hashlib import blake2b
 from importlib import import_module
 from pathlib import Path
-from threading import Lock
-from types import FunctionType
-from typing import Any, ClassVar, TypeVar, cast
+from types import FrameType
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver._kernels import keeping
 from solver.progress import aside
-from solver.uninterrupted import beside
 
 Array = NDArray[np.float64]
 Narrow = NDArray[np.int32]
 Wide = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 States = NDArray[np.int8]
-Compiled = TypeVar("Compiled", bound=Callable[..., Any])
+Loop = TypeVar("Loop", bound=Callable[..., Any])
 Result = TypeVar("Result")
 
 HELD_X, HELD_Y = 1, 2  # of a node of the skin that is held; both: their sum
-OPEN, STICK, SLIP, CAP = 0, 1, 2, 3  # states of a node of the skin
+OPEN, STICK, SLIP, SHEAR_LIMITED = 0, 1, 2, 3  # states of a node of the skin
 _FAST = {"contract", "reassoc", "arcp", "nsz"}  # nan and infinity keep their meaning
-_ONE_BY_ONE = Lock()  # neither numba's compiler nor LLVM's linker likes company
+_FOLDER = Path(__file__).parent
 
 
-def compiled(function: Compiled) -> Compiled:
-    """Return `function` as a compiled loop: numba compiles it where its machine code is not kept on disk.
+def _cache_folder() -> Path:
+    """Return where numba keeps compiled loops: one folder for each version of their sources.
 
-    What a loop calls is compiled into it. Else each loop's code would hold a copy of what it calls, optimised once
-    more, the copy a process loads first would serve all, and last bits would fall by what was called first.
+    Numba looks at a loop's own file alone to see whether its code is out of date, and not at what the loop calls. The
+    folder lies beside the sources where nobody but the user may write there, else among the user's own caches. The
+    environment variable NUMBA_CACHE_DIR stands before both.
     """
-    return cast("Compiled", Loop(cast("FunctionType", function)))
+    sources = blake2b(digest_size=8)
+    for file in sorted(_FOLDER.glob("*.py")):
+        sources.update(file.read_bytes())
+    version = f"solver-{sources.hexdigest()}"
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    if given:
+        return Path(given) if Path(given).name == version else Path(given) / version
+    if _only_mine(_FOLDER):
+        return _FOLDER / "__pycache__" / version
+    from platformdirs import user_cache_path
+
+    return user_cache_path("daq-app", appauthor=False) / version
 
 
-class Loop:
-    """A compiled loop. What is kept on disk is called without numba, whose import takes longer than a solve."""
-
-    _all: ClassVar[list["Loop"]] = []
-    _compiled: ClassVar[int] = 0  # in this process
-
-    def __init__(self, function: FunctionType) -> None:
-        """Compile nothing yet."""
-        self.function = function
-        self._entries: dict[tuple[object, ...], Callable[..., Any]] = {}
-        self._without_numba = True  # until that is seen to fail
-        self._all.append(self)
-        update_wrapper(self, function)
-
-    def __call__(self, *given: object) -> Any:  # noqa: ANN401 - each returns what its function says
-        """Call the code for arguments of these types; it believes what it is told of them, so all are looked at."""
-        kinds = _kinds(given)
-        entry = self._entries.get(kinds)
-        if entry is None:
-            entry = self._entries[kinds] = self.entry(given)
-        return entry(*given)
-
-    def entry(self, given: tuple[object, ...]) -> Callable[..., Any]:
-        """Return the code for arguments of the types of those `given`. Raises TypeError where loops take none such."""
-        for number, argument in enumerate(given):
-            if not isinstance(argument, np.ndarray | np.number | np.bool | bool | int | float):
-                kind = type(argument).__name__
-                raise TypeError(
-                    f"argument {number} of {self.function.__name__} is a {kind}; loops take numbers and arrays"
-                )
-        types = tuple(_type_name(a) for a in given)
-        if types not in self._entries and not self._found(types):  # kinds of numbers may differ where types do not
-            _warn()
-            Loop._compiled += 1
-            with aside(self._told()):
-                beside(lambda: self._compile(types))
-        return self._entries[types]
-
-    def _found(self, types: tuple[str, ...]) -> bool:
-        """Take the code for arguments of these `types` from the disk; return whether it was there."""
-        with _ONE_BY_ONE:
-            if types not in self._entries:
-                kept = self._kept(types)
-                if kept is not None:
-                    self._entries[types] = kept
-            return types in self._entries
-
-    def _kept(self, types: tuple[str, ...]) -> Callable[..., Any] | None:
-        """Return the code that is on the disk, None where there is none.
-
-        Where it is not known how to link it without numba, or that fails, numba does all its own way.
-        """
-        if self._without_numba and keeping.known():
-            try:
-                return keeping.linked(self._place(types))
-            except Exception:  # noqa: BLE001 - whatever it is: numba can do
-                pass
-        self._without_numba = False
-        dispatcher = self.dispatcher(cached=True)
-        kept = Path(dispatcher.stats.cache_path or "").glob(f"*{self.function.__name__}-*.nbi")
-        return dispatcher if any(kept) else None
-
-    def _compile(self, types: tuple[str, ...]) -> None:
-        """Compile for arguments of these `types`, unless another thread just has, and keep the code on disk."""
-        with _ONE_BY_ONE:
-            if types in self._entries:
-                return
-            if self._without_numba:
-                with suppress(Exception):  # as above
-                    entry, made = self._made(types)
-                    keeping.keep(self._place(types), *made)
-                    self._entries[types] = entry
-                    return
-            dispatcher = self.dispatcher(cached=True)
-            dispatcher.compile(_signature(types))
-            self._entries[types] = dispatcher
-
-    def _place(self, types: tuple[str, ...]) -> keeping.Place:
-        name = f"{Path(self.function.__code__.co_filename).stem}.{self.function.__name__}"
-        return keeping.Place(name, types, self.sources())
-
-    def _told(self) -> str:
-        """Say which loop is being compiled: its number in this process, of all that are called by no other."""
-        inside = {called.function for one in self._all for called in one.calls()}
-        most = max(len({one.function for one in self._all} - inside), Loop._compiled)
-        return f"compiling {self.function.__name__}, loop {Loop._compiled} of {most} at most, once on this machine"
-
-    def _made(self, types: tuple[str, ...]) -> tuple[Callable[..., Any], tuple[bytes, str, str, list[str]]]:
-        """Compile for arguments of these `types`; return the code to call, and what `keeping.keep` asks for."""
-        signature = _signature(types)
-        dispatcher = self.dispatcher(cached=False)
-        dispatcher.compile(signature)
-        made: Any = dispatcher.overloads[signature]
-        code, module = made.library.serialize_using_object_code()[2]
-        assert not made.environment.consts, "a loop may not return a new array: it would need numba to run"
-        functions: Any = import_module("llvmlite.binding").parse_bitcode(module).functions
-        declared = [str(one.name) for one in functions if one.is_declaration]
-        outside = [name for name in declared if not name.startswith("llvm.")]
-        return made.entry_point, (code, made.fndesc.llvm_cpython_wrapper_name, made.fndesc.env_name, outside)
-
-    @cache  # noqa: B019 - loops live as long as the process
-    def dispatcher(self, *, cached: bool) -> Any:  # noqa: ANN401 - numba declares no types
-        """Return numba's own view of this loop, and of the loops that it calls; `cached` on disk in numba's way."""
-        numba: Any = import_module("numba")
-        others: dict[str, Any] = {loop.function.__name__: loop.dispatcher(cached=cached) for loop in self.calls()}
-        known: dict[str, Any] = self.function.__globals__ | others
-        twin = FunctionType(self.function.__code__, known, self.function.__name__)
-        return numba.njit(fastmath=_FAST, forceinline=True, cache=cached)(twin)
-
-    def sources(self) -> frozenset[str]:
-        """Return the files that this loop is made of: its own, this one, and those of the loops it calls."""
-        return frozenset({__file__, self.function.__code__.co_filename}).union(*(c.sources() for c in self.calls()))
-
-    def calls(self) -> Iterator["Loop"]:
-        """Return the loops that it calls, which are compiled into it."""
-        named = (self.function.__globals__.get(name) for name in self.function.__code__.co_names)
-        return (one for one in named if isinstance(one, Loop))
+def _only_mine(folder: Path) -> bool:
+    """Return whether this user may write in `folder` and no other may."""
+    if not hasattr(os, "getuid") or not os.access(folder, os.W_OK):
+        return False
+    found = folder.stat()
+    return found.st_uid == os.getuid() and not found.st_mode & 0o022
 
 
-def _signature(types: tuple[str, ...]) -> Any:  # noqa: ANN401 - numba declares no types
-    return import_module("numba.core.sigutils").normalize_signature(f"({', '.join(types)},)")[0]
+os.environ["NUMBA_CACHE_DIR"] = str(_cache_folder())  # numba reads it once, when it is imported
+_numba: Any = import_module("numba")
+_caching: Any = import_module("numba.core.caching")
+_event: Any = import_module("numba.core.event")
 
 
-def ending(loop: Callable[..., Result], *last: object) -> Callable[..., Result]:
-    """Return `loop` with its `last` arguments given for good, so that only the first are looked at in every call.
+class _SharedCache(_caching.FunctionCache):
+    """Numba's cache on disk, which processes that start together write one after the other.
 
-    To look at thirty arrays takes as long as a tenth of the work on a small mesh.
+    Numba reads the index of a loop, adds an entry, and writes it back: two processes at once could lose an entry, or
+    point it to the other's code.
     """
-    entries: dict[tuple[object, ...], Callable[..., Result]] = {}
 
-    def call(*first: object) -> Result:
-        kinds = _kinds(first)
-        entry = entries.get(kinds)
-        if entry is None:
-            entry = entries[kinds] = cast("Loop", loop).entry((*first, *last))
-        return entry(*first, *last)
-
-    return call
+    def save_overload(self, sig: object, data: object) -> None:
+        """Keep compiled code and its entry in the index."""
+        with _alone(Path(os.environ["NUMBA_CACHE_DIR"])):
+            _caching.FunctionCache.save_overload(self, sig, data)
 
 
-def _kinds(given: tuple[object, ...]) -> tuple[object, ...]:
-    return tuple([(a.dtype.num, a.ndim, a.flags.c_contiguous) if type(a) is np.ndarray else type(a) for a in given])
+@contextmanager
+def _alone(folder: Path) -> Generator[None]:
+    """Keep other processes of this machine out until the block ends, where the system has such locks."""
+    with ExitStack() as held:
+        try:
+            from fcntl import LOCK_EX, flock
+
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            flock(held.enter_context((folder / "lock").open("w")), LOCK_EX)
+        except (ImportError, OSError):  # no such locks here: code may be compiled once more
+            pass
+        yield
 
 
-def _type_name(argument: object) -> str:
-    """Return what numba calls the type of an argument.
+class _Compilation(_event.Listener):
+    """Says which loop is being compiled, and makes sure that Ctrl-C is not lost meanwhile.
 
-    >>> _type_name(np.zeros((2, 3))), _type_name(np.zeros(4, np.int32)[::2]), _type_name(np.float64(0.5))
-    ('float64[:, ::1]', 'int32[:]', 'float64')
+    Python delivers Ctrl-C between two of its own steps. One that comes while LLVM calls Python is printed and lost, so
+    it is raised once more when the loop is compiled.
     """
-    if isinstance(argument, np.ndarray):
-        array = cast("NDArray[Any]", argument)
-        last = "::1" if array.flags.c_contiguous else ":"
-        return f"{_scalar_name(array.dtype)}[{', '.join([':'] * (array.ndim - 1) + [last])}]"
-    return _scalar_name(np.dtype(type(argument)))
 
+    def __init__(self) -> None:
+        """Listen to nothing yet."""
+        self._count = 0
+        self._open: ExitStack | None = None
+        self._loop: object = None
+        self._stopped = False
 
-def _scalar_name(dtype: "np.dtype[Any]") -> str:
-    return {"b": "boolean", "i": f"int{8 * dtype.itemsize}", "f": f"float{8 * dtype.itemsize}"}[dtype.kind]
+    def on_start(self, event: Any) -> None:  # noqa: ANN401 - numba declares no types
+        """Report the loop whose compilation begins, unless it is part of another's."""
+        loop = event.data["dispatcher"]
+        if self._open is not None or loop.py_func.__module__.rpartition(".")[0] != __name__.rpartition(".")[0]:
+            return
+        _warn()
+        self._count += 1
+        self._loop, self._open = loop, ExitStack()
+        doing = f"compiling {loop.py_func.__name__}, loop number {self._count}, once on this machine"
+        self._open.enter_context(aside(doing))
+        self._hear_ctrl_c()
+
+    def on_end(self, event: Any) -> None:  # noqa: ANN401 - numba declares no types
+        """Report again what was reported before; raise KeyboardInterrupt where Ctrl-C came meanwhile."""
+        if self._open is None or event.data["dispatcher"] is not self._loop:
+            return
+        opened, self._open = self._open, None
+        opened.close()
+        if self._stopped:
+            self._stopped = False
+            raise KeyboardInterrupt
+
+    def _hear_ctrl_c(self) -> None:
+        mine = threading.current_thread() is threading.main_thread()
+        if not mine or signal.getsignal(signal.SIGINT) is not signal.default_int_handler or self._open is None:
+            return
+
+        def stop(number: int, frame: FrameType | None) -> None:
+            self._stopped = True
+            signal.default_int_handler(number, frame)
+
+        signal.signal(signal.SIGINT, stop)
+        self._open.callback(signal.signal, signal.SIGINT, signal.default_int_handler)
 
 
 @cache
@@ -205,4 +147,40 @@ def _warn() -> None:
     """Say, once a process, why the first run ever takes so long."""
     import logging
 
-    logging.getLogger(__name__).warning("Compiling the loops, once on this machine: a minute, more if it is busy.")
+    logging.getLogger(__name__).warning("Compiling the loops, once on this machine: half a minute if it is not busy.")
+
+
+_event.register("numba:compile", _Compilation())
+
+
+def compiled(function: Loop) -> Loop:
+    """Return `function` as a loop that numba compiles when Python first calls it, and keeps on disk.
+
+    What a loop calls is copied into it before it is compiled. To compile that by itself too would take as long again
+    for each level of calls; and of two versions of it in two loops, the one that a process loads first would serve
+    both, so that the last bits of a result would depend on what was called before.
+    """
+    loop = _numba.njit(fastmath=_FAST, inline="always")(function)
+    loop._cache = _SharedCache(function)  # noqa: SLF001 - what `cache=True` does, with a lock
+    return cast("Loop", loop)
+
+
+def bind_arguments(loop: Callable[..., Result], *last: object) -> Callable[..., Result]:
+    """Return `loop` with its `last` arguments given for good, so that only the first are looked at in every call.
+
+    For numba to look at thirty arrays takes five times as long as to hand them over, and as long as a tenth of the
+    work on a small mesh. Tuples among the first arguments must hold the same types in every call.
+    """
+    entries: dict[tuple[object, ...], Callable[..., Result]] = {}
+
+    def call(*first: object) -> Result:
+        kinds = tuple([(a.dtype.num, a.ndim, a.flags.num) if type(a) is np.ndarray else type(a) for a in first])
+        entry = entries.get(kinds)
+        if entry is None:
+            found: Any = loop
+            types = tuple(_numba.typeof(argument) for argument in (*first, *last))
+            found.compile(types)  # or load
+            entry = entries[kinds] = found.overloads[types].entry_point
+        return entry(*first, *last)
+
+    return call

@@ -3,7 +3,8 @@
 
 import numpy as np
 
-from solver._kernels.compiling import Array, Narrow, compiled
+from solver._kernels.arguments import BodyState, ElementArrays, ElementSystem, ProbeArrays
+from solver._kernels.compiling import Array, compiled
 
 PLAIN = 2.0  # exponent of tissue that does not stiffen
 
@@ -26,37 +27,14 @@ def stiffened(exponent: float, excess: float) -> tuple[float, float]:
 
 
 @compiled
-def assemble(
-    u: Array,
-    pressure: Array,
-    grad_x: Array,
-    grad_y: Array,
-    weight: Array,
-    modes: Array,
-    laplace: Array,
-    shear: Array,
-    stiffening: Array,
-    lame: Array,
-    nodes: Narrow,
-    unknown: Narrow,
-    tangent: Array,
-    force: Array,
-    fold: Array,
-    core: Array,
-    dilate: Array,
-    volume: Array,
-) -> float:
-    """Fill the tangents and the internal forces at displacements `u` (nodes, 2); return the least det F.
+def assemble(u: Array, pressure: Array, elements: ElementArrays, system: ElementSystem) -> float:
+    """Fill the elements' `system` at displacements `u` (nodes, 2); return the least det F.
 
     `pressure` (e, 3) are the pressure modes that the tangent sees (the linearised prediction), while the forces follow
-    from `u` alone. `grad_x`, `grad_y` (e, q, 9), `weight` (e, q), `modes` (e, q, 3, orthonormal over the element),
-    `laplace` (e, 9, 9) integrals of the products of gradients times `shear`;
-    `shear`, `stiffening` (Ogden's exponent), `lame` (e,); `nodes` (e, 9), `unknown` (e, 8, 2), -1 where fixed.
-    Filled: `tangent` (e, 16, 16) of the outer nodes, lower half, `force` (n,), `fold` (e, 2, 17)
-    (centre = -(fold @ (outer unknowns, 1))), `core` (e, 3) of the centre's stiffness inverted (xx, xy, yy),
-    `dilate` (e, 3, 18) derivative of the modes of ln J, `volume` (e, 3) those modes.
-    Where det F is not positive, the arrays are left half filled.
+    from `u` alone. Where det F is not positive, the system is left half filled.
     """
+    grad_x, grad_y, weight, modes, laplace, shear, stiffening, lame, nodes, unknown = elements
+    tangent, force, recovery_matrix, condensed_inverse, dilate, volume = system
     force[:] = 0.0
     least = np.inf
     # Sums over quadrature points are products of small matrices of a fixed size, sixteen columns at a time: x of the
@@ -166,7 +144,7 @@ def assemble(
                 yy += more[q] * s[q, 17] * s[q, 17]
         det = xx * yy - xy * xy
         k00, k01, k11 = yy / det, -xy / det, xx / det
-        core[e, 0], core[e, 1], core[e, 2] = k00, k01, k11
+        condensed_inverse[e, 0], condensed_inverse[e, 1], condensed_inverse[e, 2] = k00, k01, k11
         for c in range(16):
             i = c % 8
             if c < 8:
@@ -202,9 +180,9 @@ def assemble(
                 tangent[e, 2 * i + 1, 2 * c + 1] = own[8 + i, 8 + c] + by_y[i, 8 + c] + even[i, c]
         for m in range(2):
             for c in range(8):
-                fold[e, m, 2 * c], fold[e, m, 2 * c + 1] = right[3 + m, c], right[3 + m, 8 + c]
-        fold[e, 0, 16] = k00 * f[16] + k01 * f[17]
-        fold[e, 1, 16] = k01 * f[16] + k11 * f[17]
+                recovery_matrix[e, m, 2 * c], recovery_matrix[e, m, 2 * c + 1] = right[3 + m, c], right[3 + m, 8 + c]
+        recovery_matrix[e, 0, 16] = k00 * f[16] + k01 * f[17]
+        recovery_matrix[e, 1, 16] = k01 * f[16] + k11 * f[17]
         for c in range(16):
             row = unknown[e, c % 8, c // 8]
             if row >= 0:
@@ -213,27 +191,14 @@ def assemble(
 
 
 @compiled
-def forces(
-    u: Array,
-    grad_x: Array,
-    grad_y: Array,
-    weight: Array,
-    modes: Array,
-    shear: Array,
-    stiffening: Array,
-    lame: Array,
-    nodes: Narrow,
-    unknown: Narrow,
-    force: Array,
-    fold: Array,
-    core: Array,
-    volume: Array,
-) -> float:
+def forces(u: Array, elements: ElementArrays, system: ElementSystem) -> float:
     """Fill the internal forces at displacements `u` for a tangent assembled elsewhere; return the least det F.
 
-    Of that tangent are `fold` and `core`, by which the centres are eliminated. Filled: `force` (n,), the last column of
-    `fold`, and `volume`.
+    Of that tangent are `recovery_matrix` and `condensed_inverse`, by which the centres are eliminated. Filled: `force`,
+    the last column of `recovery_matrix`, and `volume`.
     """
+    grad_x, grad_y, weight, modes, _, shear, stiffening, lame, nodes, unknown = elements
+    _, force, recovery_matrix, condensed_inverse, _, volume = system
     force[:] = 0.0
     least = np.inf
     ux, uy = np.empty(9), np.empty(9)
@@ -280,36 +245,28 @@ def forces(
             for i in range(9):
                 fx[i] += p00 * gx[i] + p01 * gy[i]
                 fy[i] += p10 * gx[i] + p11 * gy[i]
-        fold[e, 0, 16] = core[e, 0] * fx[8] + core[e, 1] * fy[8]
-        fold[e, 1, 16] = core[e, 1] * fx[8] + core[e, 2] * fy[8]
+        recovery_matrix[e, 0, 16] = condensed_inverse[e, 0] * fx[8] + condensed_inverse[e, 1] * fy[8]
+        recovery_matrix[e, 1, 16] = condensed_inverse[e, 1] * fx[8] + condensed_inverse[e, 2] * fy[8]
         for i in range(16):
             row = unknown[e, i // 2, i % 2]
             if row >= 0:
                 mine = fx[i // 2] if i % 2 == 0 else fy[i // 2]
-                force[row] += mine - fold[e, 0, i] * fx[8] - fold[e, 1, i] * fy[8]
+                force[row] += mine - recovery_matrix[e, 0, i] * fx[8] - recovery_matrix[e, 1, i] * fy[8]
     return least
 
 
 @compiled
 def advance(
-    u: Array,
-    pressure: Array,
-    step: Array,
-    scale: float,
-    nodes: Narrow,
-    unknown: Narrow,
-    lame: Array,
-    fold: Array,
-    dilate: Array,
-    volume: Array,
-    u_new: Array,
-    pressure_new: Array,
+    before: BodyState, step: Array, scale: float, after: BodyState, elements: ElementArrays, system: ElementSystem
 ) -> float:
-    """Fill `u_new`, `pressure_new` after `scale` times the `step` (n,) of the unknowns; return the largest move.
+    """Fill the state `after` going `scale` times the `step` (n,) of the unknowns; return the largest move.
 
     The pressure is the linearised prediction at the end of the full step, approached by `scale`: the mixed
     integration points of Magisano, Leonetti and Garcea (2017), Int. J. Numer. Meth. Eng. 109, 1237.
     """
+    nodes, unknown, lame = elements.nodes, elements.unknown, elements.lame
+    recovery_matrix, dilate, volume = system.recovery_matrix, system.dilate, system.volume
+    u, pressure, u_new, pressure_new = before.u, before.pressure, after.u, after.pressure
     largest = 0.0
     for n in range(u.shape[0]):
         u_new[n, 0], u_new[n, 1] = u[n, 0], u[n, 1]
@@ -319,9 +276,9 @@ def advance(
             row = unknown[e, i // 2, i % 2]
             move[i] = step[row] if row >= 0 else 0.0
         for a in range(2):
-            centre = fold[e, a, 16]
+            centre = recovery_matrix[e, a, 16]
             for i in range(16):
-                centre += fold[e, a, i] * move[i]
+                centre += recovery_matrix[e, a, i] * move[i]
             move[16 + a] = -centre
         for i in range(18):
             largest = max(largest, abs(move[i]))
@@ -335,26 +292,10 @@ def advance(
 
 
 @compiled
-def energies(
-    u: Array,
-    grad_x: Array,
-    grad_y: Array,
-    weight: Array,
-    modes: Array,
-    shear: Array,
-    stiffening: Array,
-    lame: Array,
-    nodes: Narrow,
-    at_element: Narrow,
-    at_x: Array,
-    at_y: Array,
-    at_modes: Array,
-    out: Array,
-) -> None:
-    """Fill `out` (p,) with the strain-energy density at probes; ln J is the element's best fit by its three modes.
-
-    `at_element` (p,), `at_x`, `at_y` (p, 9) gradients of the shape functions there, `at_modes` (p, 3) the modes there.
-    """
+def energies(u: Array, elements: ElementArrays, probes: ProbeArrays, out: Array) -> None:
+    """Fill `out` (p,) with the strain-energy density at probes; ln J is the element's best fit by its three modes."""
+    grad_x, grad_y, weight, modes, _, shear, stiffening, lame, nodes, _ = elements
+    at_element, at_x, at_y, at_modes = probes
     seen = -1
     v0 = v1 = v2 = 0.0
     for p in range(at_element.shape[0]):

@@ -7,7 +7,7 @@ Shapes: k points that may touch. Displacements and forces are (2 k,), those alon
 
 import numpy as np
 
-from solver._kernels.compiling import CAP, OPEN, SLIP, STICK, Array, Narrow, compiled
+from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, Array, Narrow, compiled
 
 SMALL = 1e-11  # a contradiction smaller than this, relative to the largest of its kind, is round-off
 LOST, STICKING, SLIDING = -1, 0, 1  # what `follow` returns
@@ -134,7 +134,7 @@ def follow(
             for j in range(k):
                 if state[j] == SLIP:
                     matrix[travel, number[j]] = sense[j] * mu
-                elif state[j] == CAP:
+                elif state[j] == SHEAR_LIMITED:
                     right[travel] -= sense[j] * tau * length[j]
         if not solve(matrix, right):
             return LOST
@@ -147,7 +147,7 @@ def follow(
                 force[k + i] = answer[number[k + i]]
             elif state[i] == SLIP:
                 force[k + i] = sense[i] * mu * force[i]
-            elif state[i] == CAP:
+            elif state[i] == SHEAR_LIMITED:
                 force[k + i] = sense[i] * tau * length[i]
             else:
                 force[k + i] = 0.0
@@ -184,11 +184,11 @@ def follow(
                 if state[i] == STICK:
                     if abs(force[k + i]) > min(coulomb, bound) + SMALL * push:
                         along = 1 if force[k + i] > 0.0 else -1
-                        now = CAP if coulomb > bound else SLIP
+                        now = SHEAR_LIMITED if coulomb > bound else SLIP
                         bad = abs(force[k + i]) - min(coulomb, bound)
                 elif state[i] == SLIP and coulomb > bound + SMALL * push:
-                    now, bad = CAP, force[i]
-                elif state[i] == CAP and coulomb < bound - SMALL * push:
+                    now, bad = SHEAR_LIMITED, force[i]
+                elif state[i] == SHEAR_LIMITED and coulomb < bound - SMALL * push:
                     now, bad = SLIP, force[i]
                 elif stuck > 0 and mu > 0.0 and tau > 0.0 and slipped * sense[i] > SMALL * height:
                     now, bad = STICK, slipped * sense[i] * push / height

@@ -1,38 +1,29 @@
 # ruff: noqa: C901 - a compiled loop is flat: calls inside it would cost more than they explain
-"""A body at small strain: stiffness, elimination, displacements. e elements of nine nodes, q = 9 quadrature points.
-
-`stiffness.Elastic.of` and `dissection.Reduced` say the same in plain NumPy; the tests compare them.
-"""
+"""A body at small strain: stiffness, elimination, displacements. e elements of nine nodes, q = 9 quadrature points."""
 
 import numpy as np
 
-from solver._kernels.compiling import Array, Flags, Narrow, Wide, compiled
-from solver._kernels.fronts import unfold_part
+from solver._kernels.arguments import (
+    Factors,
+    LinearElements,
+    LinearMesh,
+    RecoveryArrays,
+    ShapeFunctions,
+    SymbolicFactorization,
+)
+from solver._kernels.compiling import Array, Flags, compiled
+from solver._kernels.multifrontal import back_substitute_part
 
 
 @compiled
-def stiffen(
-    place: Array,
-    nodes: Wide,
-    shear: Array,
-    lame: Array,
-    values: Array,
-    along: Array,
-    up: Array,
-    weights: Array,
-    stiffness: Array,
-    dilatation: Array,
-    centre: Array,
-    outer: Array,
-    fold: Array,
-) -> bool:
-    """Fill the elements' stiffness, and what is left of it for their outer nodes; False where an element is folded.
+def stiffen(mesh: LinearMesh, shapes: ShapeFunctions, elastic: LinearElements, outer: Array) -> bool:
+    """Fill the `elastic` elements and what is left of their stiffness for their outer nodes; False where one is folded.
 
-    `place` (nodes, 2) undeformed, `nodes` (e, 9), `shear`, `lame` (e,); `values`, `along`, `up` (q, 9) are the shape
-    functions and their slopes at the quadrature points, `weights` (q,). Filled: `stiffness` (e, 18, 18), ordered
-    x, y, x, y, ...; `dilatation` (e, 3, 18), displacements to the modes 1, x - xc, y - yc of the volume strain;
-    `centre` (e, 2) xc, yc; `outer` (e, 16, 16), lower half; `fold` (e, 2, 16), centre = -(fold @ outer displacements).
+    `outer` (e, 16, 16), lower half, is ordered x, y, x, y, ...
     """
+    place, nodes, shear, lame = mesh
+    values, along, up, weights = shapes
+    stiffness, dilatation, centre, recovery_matrix = elastic
     # columns by direction, as in `solver._kernels.elements`: x of nine nodes, then y
     h, bent = np.empty((9, 18)), np.empty((9, 18))
     spot, modes = np.empty((9, 2)), np.empty((9, 3))
@@ -122,12 +113,12 @@ def stiffen(
         det = full[16, 16] * full[17, 17] - full[17, 16] * full[17, 16]
         k00, k01, k11 = full[17, 17] / det, -full[17, 16] / det, full[16, 16] / det
         for i in range(16):
-            fold[e, 0, i] = k00 * full[16, i] + k01 * full[17, i]
-            fold[e, 1, i] = k01 * full[16, i] + k11 * full[17, i]
+            recovery_matrix[e, 0, i] = k00 * full[16, i] + k01 * full[17, i]
+            recovery_matrix[e, 1, i] = k01 * full[16, i] + k11 * full[17, i]
         for i in range(16):
             c0, c1 = full[16, i], full[17, i]
             for k in range(i + 1):
-                outer[e, i, k] = full[i, k] - c0 * fold[e, 0, k] - c1 * fold[e, 1, k]
+                outer[e, i, k] = full[i, k] - c0 * recovery_matrix[e, 0, k] - c1 * recovery_matrix[e, 1, k]
     return True
 
 
@@ -137,24 +128,18 @@ def displace(
     carried: Array,
     own: Array,
     asked: Flags,
-    start: Narrow,
-    inner: Narrow,
-    border: Narrow,
-    children: Narrow,
-    border_at: Narrow,
-    numbers: Narrow,
-    factor_at: Wide,
-    factors: Array,
-    unknown: Narrow,
-    nodes: Wide,
-    fold: Array,
+    plan: SymbolicFactorization,
+    factors: Factors,
+    body: RecoveryArrays,
     out: Array,
 ) -> None:
     """Fill `out` (nodes, 2, c) with the displacements of a reduced body when those of its skin are `skin` (c, m).
 
     Added are those of the forces `carried` (n,), from `condense`, with the skin held, and `own` (e, 2) of the centres
-    alone. Only nodes `asked` for (nodes,) are sure to be filled. The other arguments are those of `Plan` and `stiffen`.
+    alone. Only nodes `asked` for (nodes,) are sure to be filled.
     """
+    start, inner, children, unknown = plan.start, plan.inner, plan.children, plan.unknown
+    nodes, recovery_matrix = body
     parts, size = start.shape[0], carried.shape[0]
     wanted, needed = np.zeros(size, np.bool_), np.zeros(parts, np.bool_)
     used = np.zeros(nodes.shape[0], np.bool_)
@@ -170,13 +155,14 @@ def displace(
             needed[p] |= child >= 0 and needed[child]
         for i in range(start[p], start[p] + inner[p]):
             needed[p] |= wanted[i]
-    near, inside, move = np.empty((inner + border).max()), np.zeros(size), np.empty(16)
+    inside, move = np.zeros(size), np.empty(16)
     for c in range(skin.shape[0]):
-        inside[size - skin.shape[1] :] = skin[c]
+        for i in range(skin.shape[1]):
+            inside[size - skin.shape[1] + i] = skin[c, i]
         for p in range(parts - 1, -1, -1):
             if not needed[p]:
                 continue
-            unfold_part(p, carried, start, inner, border, border_at, numbers, factor_at, factors, near, inside)
+            back_substitute_part(p, carried, factors, inside)
         for e in range(nodes.shape[0]):
             if not used[e]:
                 continue
@@ -187,15 +173,18 @@ def displace(
                 for a in range(2):
                     total = own[e, a]
                     for i in range(16):
-                        total -= fold[e, a, i] * move[i]
+                        total -= recovery_matrix[e, a, i] * move[i]
                     out[nodes[e, 8], a, c] = total
 
 
 @compiled
-def definite(start: Narrow, inner: Narrow, border: Narrow, factor_at: Wide, factors: Array) -> bool:
+def definite(factors: Factors) -> bool:
     """Return whether every pivot of an elimination is positive, as those of a stable body are."""
+    start, inner, border, factor_at, values = (
+        factors.start, factors.inner, factors.border, factors.factor_at, factors.values
+    )  # fmt: skip
     for p in range(start.shape[0]):
         for i in range(inner[p]):
-            if not factors[factor_at[p] + i * (inner[p] + border[p] + 1)] > 0.0:
+            if not values[factor_at[p] + i * (inner[p] + border[p] + 1)] > 0.0:
                 return False
     return True

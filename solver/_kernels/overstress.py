@@ -3,30 +3,23 @@
 
 import numpy as np
 
-from solver._kernels.compiling import Array, Narrow, compiled
+from solver._kernels.arguments import ElementArrays, ElementSystem
+from solver._kernels.compiling import Array, compiled
 
 
 @compiled
-def add_overstress(
-    u: Array,
-    tensor: Array,
-    grad_x: Array,
-    grad_y: Array,
-    weight: Array,
-    nodes: Narrow,
-    unknown: Narrow,
-    tangent: Array,
-    force: Array,
-    fold: Array,
-    core: Array,
-    anew: bool,
-) -> None:
+def add_overstress(u: Array, tensor: Array, elements: ElementArrays, system: ElementSystem, anew: bool) -> None:
     """Add the forces of W = 1/2 J^-2/3 T:C at displacements `u`, and where `anew` its tangent.
 
-    `tensor` (e, q, 4) is T: xx, yy, xy, zz [MPa]; the others as in `assemble` and `forces`, by which `tangent`,
-    `force`, `fold` and `core` were filled, the centre of each element eliminated. `anew`: it is eliminated again, with
-    what is added; otherwise the tangent is one kept from elsewhere.
+    `tensor` (e, q, 4) is T: xx, yy, xy, zz [MPa]. The `system` was filled by `assemble` or `forces`, with the centre of
+    each element eliminated. Where `anew`, it is eliminated again with what is added; otherwise the tangent is one kept
+    from another state.
     """
+    grad_x, grad_y, weight, nodes, unknown = (
+        elements.grad_x, elements.grad_y, elements.weight, elements.nodes, elements.unknown
+    )  # fmt: skip
+    tangent, force = system.tangent, system.force
+    recovery_matrix, condensed_inverse = system.recovery_matrix, system.condensed_inverse
     ux, uy = np.empty(9), np.empty(9)
     full, own = np.empty((18, 18)), np.empty(18)
     hx, hy, mx, my = np.empty(9), np.empty(9), np.empty(9), np.empty(9)
@@ -77,36 +70,40 @@ def add_overstress(
                             both * hy[i] * hx[k] + third * hx[i] * hy[k] - part * (my[i] * hx[k] + hy[i] * mx[k])
                         )
         if not anew:
-            fold[e, 0, 16] += core[e, 0] * own[16] + core[e, 1] * own[17]
-            fold[e, 1, 16] += core[e, 1] * own[16] + core[e, 2] * own[17]
+            recovery_matrix[e, 0, 16] += condensed_inverse[e, 0] * own[16] + condensed_inverse[e, 1] * own[17]
+            recovery_matrix[e, 1, 16] += condensed_inverse[e, 1] * own[16] + condensed_inverse[e, 2] * own[17]
             for i in range(16):
                 row = unknown[e, i // 2, i % 2]
                 if row >= 0:
-                    force[row] += own[i] - fold[e, 0, i] * own[16] - fold[e, 1, i] * own[17]
+                    force[row] += own[i] - recovery_matrix[e, 0, i] * own[16] - recovery_matrix[e, 1, i] * own[17]
             continue
         # the centre comes back, gets its share, and is eliminated again
-        det = core[e, 0] * core[e, 2] - core[e, 1] * core[e, 1]
-        k00, k01, k11 = core[e, 2] / det, -core[e, 1] / det, core[e, 0] / det
+        det = condensed_inverse[e, 0] * condensed_inverse[e, 2] - condensed_inverse[e, 1] * condensed_inverse[e, 1]
+        k00, k01, k11 = condensed_inverse[e, 2] / det, -condensed_inverse[e, 1] / det, condensed_inverse[e, 0] / det
         for i in range(17):
-            across[0, i] = k00 * fold[e, 0, i] + k01 * fold[e, 1, i]
-            across[1, i] = k01 * fold[e, 0, i] + k11 * fold[e, 1, i]
+            across[0, i] = k00 * recovery_matrix[e, 0, i] + k01 * recovery_matrix[e, 1, i]
+            across[1, i] = k01 * recovery_matrix[e, 0, i] + k11 * recovery_matrix[e, 1, i]
         for i in range(16):
             row = unknown[e, i // 2, i % 2]
             if row >= 0:
-                force[row] += own[i] + across[0, i] * fold[e, 0, 16] + across[1, i] * fold[e, 1, 16]
+                force[row] += (
+                    own[i] + across[0, i] * recovery_matrix[e, 0, 16] + across[1, i] * recovery_matrix[e, 1, 16]
+                )
             for k in range(i + 1):
-                tangent[e, i, k] += full[i, k] + across[0, i] * fold[e, 0, k] + across[1, i] * fold[e, 1, k]
+                tangent[e, i, k] += (
+                    full[i, k] + across[0, i] * recovery_matrix[e, 0, k] + across[1, i] * recovery_matrix[e, 1, k]
+                )
         k00, k01, k11 = k00 + full[16, 16], k01 + full[17, 16], k11 + full[17, 17]
         det = k00 * k11 - k01 * k01
-        core[e, 0], core[e, 1], core[e, 2] = k11 / det, -k01 / det, k00 / det
+        condensed_inverse[e, 0], condensed_inverse[e, 1], condensed_inverse[e, 2] = k11 / det, -k01 / det, k00 / det
         for i in range(17):
             across[0, i] += own[16] if i == 16 else full[16, i]
             across[1, i] += own[17] if i == 16 else full[17, i]
-            fold[e, 0, i] = core[e, 0] * across[0, i] + core[e, 1] * across[1, i]
-            fold[e, 1, i] = core[e, 1] * across[0, i] + core[e, 2] * across[1, i]
+            recovery_matrix[e, 0, i] = condensed_inverse[e, 0] * across[0, i] + condensed_inverse[e, 1] * across[1, i]
+            recovery_matrix[e, 1, i] = condensed_inverse[e, 1] * across[0, i] + condensed_inverse[e, 2] * across[1, i]
         for i in range(16):
             row = unknown[e, i // 2, i % 2]
             if row >= 0:
-                force[row] -= across[0, i] * fold[e, 0, 16] + across[1, i] * fold[e, 1, 16]
+                force[row] -= across[0, i] * recovery_matrix[e, 0, 16] + across[1, i] * recovery_matrix[e, 1, 16]
             for k in range(i + 1):
-                tangent[e, i, k] -= across[0, i] * fold[e, 0, k] + across[1, i] * fold[e, 1, k]
+                tangent[e, i, k] -= across[0, i] * recovery_matrix[e, 0, k] + across[1, i] * recovery_matrix[e, 1, k]

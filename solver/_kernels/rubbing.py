@@ -9,7 +9,7 @@ displacements by dead loads alone; `mu`, `tau`, the friction law. Filled: `state
 
 import numpy as np
 
-from solver._kernels.compiling import CAP, OPEN, SLIP, STICK, Array, States, compiled
+from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, Array, States, compiled
 from solver._kernels.following import SMALL, solve
 
 LOST, AMBIGUOUS = 0, -1  # what these loops return in place of the number of linear systems they solved
@@ -58,7 +58,7 @@ def slide(
         matrix, right = np.empty((count, count)), answer[:count]
         for c in range(count):
             j = at[c]
-            if state[j] == CAP:
+            if state[j] == SHEAR_LIMITED:
                 tangential[j] = sense * tau * length[j]
                 for i in range(k):
                     lifted[i] += across[i, j] * tangential[j]
@@ -91,8 +91,8 @@ def slide(
                 now = SLIP if above[i] < -SMALL * high else OPEN
             elif normal[i] < -slack:
                 now = OPEN
-            elif mu * normal[i] > tau * length[i] + (-slack if was == CAP else slack):
-                now = CAP
+            elif mu * normal[i] > tau * length[i] + (-slack if was == SHEAR_LIMITED else slack):
+                now = SHEAR_LIMITED
             changed |= now != was
             state[i] = now
         if not changed:
@@ -106,7 +106,7 @@ def slide(
 
 
 @compiled
-def settle(
+def solve_active_set(
     gap: Array,
     length: Array,
     by_normal: Array,
@@ -160,11 +160,11 @@ def settle(
                 stuck += 1
         matrix, right = np.zeros((size + r, size + r)), np.empty(size + r)
         for i in range(k):
-            tangential[i] = sense[i] * tau * length[i] if state[i] == CAP else 0.0
+            tangential[i] = sense[i] * tau * length[i] if state[i] == SHEAR_LIMITED else 0.0
         for i in range(k):
             lifted[i], moved[i] = gap[i] + up[i] - depth, along[i] + travel
             for j in range(k):
-                if state[j] == CAP:
+                if state[j] == SHEAR_LIMITED:
                     lifted[i] += across[i, j] * tangential[j]
                     moved[i] += by_tangential[i, j] * tangential[j]
         for a in range(2 * k):
@@ -188,7 +188,7 @@ def settle(
         for m in range(r):
             right[size + m] = resultants[m]
             for j in range(k):
-                if state[j] == CAP:
+                if state[j] == SHEAR_LIMITED:
                     right[size + m] -= motions[k + j, m] * tangential[j]
                 if state[j] != OPEN:
                     drag = sense[j] * mu if state[j] == SLIP else 0.0
@@ -243,10 +243,10 @@ def settle(
                 over = abs(tangential[i]) - min(max(coulomb, 0.0), bound)
                 if free and not frictionless and over > slack:
                     way = 1.0 if tangential[i] > 0.0 else -1.0
-                    now, bad = CAP if coulomb > bound else SLIP, over
+                    now, bad = SHEAR_LIMITED if coulomb > bound else SLIP, over
             elif state[i] == SLIP and coulomb > bound + slack:
-                now, bad = CAP, normal[i]
-            elif state[i] == CAP and coulomb < bound - slack:
+                now, bad = SHEAR_LIMITED, normal[i]
+            elif state[i] == SHEAR_LIMITED and coulomb < bound - slack:
                 now, bad = SLIP, normal[i]
             elif free and not frictionless:
                 forward = (shift[i] - anchor[i]) * sense[i]

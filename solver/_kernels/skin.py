@@ -3,7 +3,8 @@
 
 import numpy as np
 
-from solver._kernels.compiling import CAP, HELD_X, HELD_Y, OPEN, SLIP, STICK, Array, Narrow, compiled
+from solver._kernels.arguments import ContactStates, ContactSystem, LoadState, Skin, SkinPosition
+from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, Array, Narrow, compiled
 
 # how the length of skin of an edge's first, middle and last node grows with the positions of the three: Simpson's rule
 _LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
@@ -54,40 +55,38 @@ def rubs(state: Narrow, edge: int, node: int, mu: float) -> bool:
 
 
 @compiled
-def impose(
+def assemble_contact_system(
     stiffness: Array,
     force: Array,
-    held: Narrow,
-    at: Narrow,
-    state: Narrow,
-    sense: Narrow,
-    mu: float,
-    tau: float,
-    above: Array,
-    behind: Array,
-    length: Array,
-    free: Narrow,
-    matrix: Array,
-    right: Array,
-    steps: Array,
+    skin: Skin,
+    states: ContactStates,
+    load: LoadState,
+    position: SkinPosition,
+    system: ContactSystem,
 ) -> int:
     """Write down the skin's system of contact: return its size f, and fill its `matrix` (f f,) and `right` (f, 4).
 
     `stiffness` (2 k, 2 k) and `force` (2 k,) are the body's as its skin feels them: x, y of one node, x, y of the next.
-    `held` (k,) says along what a node is fixed (HELD_X, HELD_Y, their sum), `above` (k,) heights over the surface,
-    `behind` (k,) distances of stuck nodes from where they stick, `length` from `rubbed`. The columns of `right` are the
-    step to equilibrium, and its derivatives with respect to depth, mu and travel of the surface along +x. `steps`
-    (2 k, 4) is filled where the contact's conditions prescribe displacements; what is unknown is listed in `free`
-    (f,).
+    `length` is that of `rubbed`. The columns of `right` are the step to equilibrium, and its derivatives with respect
+    to depth, mu and travel of the surface along +x. `steps` (2 k, 4) is filled where the contact's conditions prescribe
+    displacements; what is unknown is listed in `free` (f,).
     """
+    held, at = skin.held, skin.middle
+    state, sense = states.state, states.sense
+    mu, tau = load.mu, load.tau
+    x_now, above, anchor = position
+    length, free, matrix, right, steps = system
     size = state.shape[0]
-    steps[:, :] = 0.0
+    for i in range(2 * size):
+        for c in range(COLUMNS):
+            steps[i, c] = 0.0
+            right[i, c] = 0.0
     f = 0
     for i in range(size):
         x, y = 2 * i, 2 * i + 1
         if held[i] & HELD_X == 0:
             if state[i] == STICK:
-                steps[x, 0], steps[x, 3] = -behind[i], 1.0
+                steps[x, 0], steps[x, 3] = anchor[i] - x_now[i], 1.0
             else:
                 free[f] = x
                 f += 1
@@ -97,11 +96,12 @@ def impose(
                 f += 1
             else:
                 steps[y, 0], steps[y, 1] = -above[i], 1.0
-    spot = np.full(2 * size, -1)
+    spot = np.empty(2 * size, np.int64)
+    for i in range(2 * size):
+        spot[i] = -1
     for r in range(f):
         spot[free[r]] = r
     square = matrix[: f * f].reshape(f, f)
-    right[:, :] = 0.0
     for r in range(f):
         row = free[r]
         i = row // 2
@@ -128,7 +128,7 @@ def impose(
                 value = mine[y - 1] - drag * other[y - 1]
                 right[r, 0] -= value * steps[y - 1, 0]
                 right[r, 3] -= value
-        if state[i] == CAP:
+        if state[i] == SHEAR_LIMITED:
             drag = sense[i] * tau
             right[r, 0] += drag * length[i]
             for edge in range(max(i - 1, 0), min(i + 2, size)):
@@ -189,24 +189,18 @@ def solve(matrix: Array, right: Array, size: int) -> bool:
 
 
 @compiled
-def restate(
-    state: Narrow,
-    sense: Narrow,
-    reaction: Array,
-    above: Array,
-    slid: Array,
-    length: Array,
-    mu: float,
-    tau: float,
-    direction: int,
+def update_contact_states(
+    states: ContactStates, x: Array, above: Array, anchor: Array, length: Array, load: LoadState
 ) -> int:
-    """Change `state` and `sense` (k,) in place where the solution contradicts them; return how many were changed.
+    """Change `states` in place where the solution contradicts them; return how many were changed.
 
-    `reaction` (k, 2) forces on the skin, `above` (k,) heights over the surface, `slid` (k,) how far each node went
-    along +x relative to the surface since the last step. With `direction` -1 or +1 every touching node slips, the
-    friction force pointing there; with 0 nodes stick, slip and turn round. Where friction is steep, slip is a bad guess
-    of a node that comes to touch: its own drag may lift it off by more than it is pressed, and open it goes through.
+    `x`, `above` (k,) are where the nodes are and `anchor` (k,) where they were along the surface at the last step,
+    `length` (k,) as in `rubbed`. Where the load has a sense every touching node slips, the friction force pointing
+    there; else nodes stick, slip and turn round. Where friction is steep, slip is a bad guess of a node that comes to
+    touch: its own drag may lift it off by more than it is pressed, and open it goes through.
     """
+    state, sense, reaction = states.state, states.sense, states.reaction
+    mu, tau, direction = load.mu, load.tau, load.sense
     changed = 0
     size = state.shape[0]
     force = reach = 0.0
@@ -221,7 +215,7 @@ def restate(
             if above[i] < -small:
                 now = STICK if direction == 0 and mu > 0.0 and tau > 0.0 else SLIP
                 if direction != 0 and mu > STEEP and tau < np.inf:
-                    now = CAP
+                    now = SHEAR_LIMITED
                 turned = direction if direction != 0 else turned
         elif reaction[i, 1] < -slack:
             now = OPEN
@@ -230,15 +224,23 @@ def restate(
             most = min(coulomb, bound)
             if direction != 0:
                 turned = direction
-                now = CAP if bound < coulomb - slack or (was == CAP and bound <= coulomb + slack) else SLIP
+                now = (
+                    SHEAR_LIMITED
+                    if bound < coulomb - slack or (was == SHEAR_LIMITED and bound <= coulomb + slack)
+                    else SLIP
+                )
             elif was == STICK:
                 if abs(reaction[i, 0]) > most + slack:
                     turned = 1 if reaction[i, 0] > 0.0 else -1
-                    now = CAP if bound < coulomb else SLIP
-            elif slid[i] * sense[i] > small and most > 0.0:
+                    now = SHEAR_LIMITED if bound < coulomb else SLIP
+            elif (x[i] - anchor[i]) * sense[i] > small and most > 0.0:
                 now = STICK
             else:
-                now = CAP if bound < coulomb - slack or (was == CAP and bound <= coulomb + slack) else SLIP
+                now = (
+                    SHEAR_LIMITED
+                    if bound < coulomb - slack or (was == SHEAR_LIMITED and bound <= coulomb + slack)
+                    else SLIP
+                )
         if now != was or (now >= SLIP and turned != sense[i]):
             changed += 1
         state[i], sense[i] = now, turned
@@ -246,47 +248,37 @@ def restate(
 
 
 @compiled
-def settle(
+def solve_active_set(
     stiffness: Array,
     force: Array,
-    held: Narrow,
-    at: Narrow,
-    state: Narrow,
-    sense: Narrow,
-    mu: float,
-    tau: float,
-    direction: int,
-    x: Array,
-    above: Array,
-    anchor: Array,
+    skin: Skin,
+    states: ContactStates,
+    load: LoadState,
+    position: SkinPosition,
     rounds: int,
-    length: Array,
-    free: Narrow,
-    matrix: Array,
-    right: Array,
-    steps: Array,
-    reaction: Array,
+    system: ContactSystem,
 ) -> bool:
     """Solve the skin's system of contact for `steps`, changing states up to `rounds` times until none contradicts it.
 
-    That is the contact of the linearised body, exact where the rounds suffice. `x` (k,) are positions along the
-    surface, `anchor` (k,) those where nodes stick; filled beside `steps`: `reaction` (k, 2). For the rest see
-    `impose` and `restate`. A node that comes to touch at the bound again and again slips every other time. False where
-    a system cannot be solved.
+    That is the contact of the linearised body, exact where the rounds suffice. Filled beside `steps`: the reactions of
+    `states`. A node that comes to touch at the shear limit again and again slips every other time. False where a system
+    cannot be solved.
     """
+    state, reaction = states.state, states.reaction
+    x, above, anchor = position
+    length, free, matrix, right, steps = system
     size = state.shape[0]
     entered = np.zeros(size, np.int32)  # how often each node came to touch
-    before = np.empty_like(state)
+    before = np.empty(size, np.int32)
+    ahead, reached = np.empty(size), np.empty(size)
     for turn in range(rounds + 1):
-        before[:] = state
-        rubbed(x, at, state, mu, length)
-        count = impose(
-            stiffness, force, held, at, state, sense, mu, tau, above, x - anchor, length, free, matrix, right, steps
-        )
-        if not solve(matrix, right[:count], count):
+        rubbed(x, skin.middle, state, load.mu, length)
+        count = assemble_contact_system(stiffness, force, skin, states, load, position, system)
+        if not solve(matrix, right, count):
             return False
         for r in range(count):
-            steps[free[r]] = right[r]
+            for c in range(COLUMNS):
+                steps[free[r], c] = right[r, c]
         for i in range(2 * size):
             total = force[i]
             for c in range(2 * size):
@@ -294,19 +286,15 @@ def settle(
             reaction[i // 2, i % 2] = total
         if turn == rounds:
             break
-        ahead = x + steps[::2, 0]
-        reached, lengths = above + steps[1::2, 0], _lengths(ahead, at, state, mu)
-        if restate(state, sense, reaction, reached, ahead - anchor, lengths, mu, tau, direction) == 0:
+        for i in range(size):
+            before[i] = state[i]
+            ahead[i], reached[i] = x[i] + steps[2 * i, 0], above[i] + steps[2 * i + 1, 0]
+        rubbed(ahead, skin.middle, state, load.mu, length)
+        if update_contact_states(states, ahead, reached, anchor, length, load) == 0:
             break
         for i in range(size):
-            if before[i] == OPEN and state[i] == CAP:
+            if before[i] == OPEN and state[i] == SHEAR_LIMITED:
                 entered[i] += 1
-                state[i] = CAP if entered[i] % 2 == 1 else SLIP
+                state[i] = SHEAR_LIMITED if entered[i] % 2 == 1 else SLIP
+    rubbed(x, skin.middle, state, load.mu, length)
     return True
-
-
-@compiled
-def _lengths(x: Array, at: Narrow, state: Narrow, mu: float) -> Array:
-    out = np.empty_like(x)
-    rubbed(x, at, state, mu, out)
-    return out

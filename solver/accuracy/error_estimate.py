@@ -14,8 +14,7 @@ hardly faster than elements get shorter. Where skin slips at the bound up to an 
 moved there is one of the others, and `felt` says what a number makes of the bound. Near the friction limit of small
 strain numbers grow without bound, and each mesh has its own limit: there `felt` says what they make of the coefficient.
 Meshes were chosen on the published finger; others' errors are larger, the more so the thinner the bone is, whatever two
-meshes differ by. The factors were chosen and measured with benchmarks/error_estimate.py and finite_error_estimate.py;
-docs/solver.md and docs/solver-finite-strain.md have the figures.
+meshes differ by. The factors were chosen and measured with benchmarks/error_estimate.py and finite_error_estimate.py.
 """
 
 from math import sqrt
@@ -262,7 +261,7 @@ def _of_light(scene: Scene, width: float) -> tuple[float, float]:
     """Return what the SED, relative, and the contact `width` [mm] may be off by for a contact shorter than elements.
 
     The smallest element does not get smaller with the contact. Both vanish where it is much shorter: at 0.01 mm of
-    indentation the first is 4e-5. Held against Hertz (docs/solver.md).
+    indentation the first is 4e-5.
     """
     smallest = FINEST * scene.finger.tip_radius
     shorter = 2.0 * smallest / max(width, smallest / 2.0)

@@ -5,7 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from solver import kernels_numpy
+from solver import _kernels as kernels
+from solver.body.finite_measures import deformation, element_forces, energy, energy_slope
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.finite_relaxation import RelaxingNewton
@@ -26,14 +27,14 @@ def audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: Newton) -> 
     `cone_violation`: as at small strain, the bound on the deformed length.
     """
     body, mesh = finger.newton.body, finger.geometry.mesh
-    element_forces = kernels_numpy.forces(body, shape.u)
-    grown = kernels_numpy.energy_slope(body, shape.u, shape.u)
+    local = element_forces(body, shape.u)
+    grown = energy_slope(body, shape.u, shape.u)
     if isinstance(newton, RelaxingNewton):
         excess = newton.excess(shape)
-        element_forces = element_forces + excess
+        local = local + excess
         grown += float(np.sum(excess * shape.u[body.nodes].reshape(excess.shape)))
     inner = np.zeros(mesh.nodes.shape)
-    np.add.at(inner, body.nodes, element_forces.reshape(-1, 9, 2))
+    np.add.at(inner, body.nodes, local.reshape(-1, 9, 2))
     total = max(float(shape.force[1]), np.finfo(float).tiny)
     bone = inner[mesh.held].sum(axis=0)
     left = inner.copy()
@@ -44,7 +45,9 @@ def audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: Newton) -> 
     normal, tangential = shape.reaction[:, 1], shape.reaction[:, 0]
     push = max(float(normal.max(initial=0.0)), np.finfo(float).tiny)
     # Open skin may hang over, its length along the surface negative: no limit of it is meant.
-    length = np.maximum(kernels_numpy.rubbed(shape.place(body)[:, 0], shape.touching, shape.pull.mu), 0.0)
+    length = np.empty(len(shape.state))
+    kernels.rubbed(np.ascontiguousarray(shape.place(body)[:, 0]), body.middle, shape.state, shape.pull.mu, length)
+    length = np.maximum(length, 0.0)
     limit = FrictionLaw(float(scene.friction.mu), scene.friction.cap).limit(normal, length)
     return {
         "equilibrium_x": abs(float(bone[0] + shape.force[0])) / total,
@@ -54,7 +57,7 @@ def audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: Newton) -> 
         "penetration": max(-float(height.min()), 0.0) / scene.loading.depth,
         "tension": max(-float(normal.min(initial=0.0)), 0.0) / push,
         "cone_violation": max(float((np.abs(tangential) - limit).max(initial=0.0)), 0.0) / push,
-        "smallest_det_F": float(np.linalg.det(kernels_numpy.deformation(body, shape.u)).min()),
+        "smallest_det_F": float(np.linalg.det(deformation(body, shape.u)).min()),
     }
 
 
@@ -84,13 +87,11 @@ def course_audits(newton: Newton, way: Sequence[Shape]) -> dict[str, float]:
     lost = -float(np.sum(mean[..., 0] * slid[..., 0]))
     friction = -np.sum(reaction[1:, :, 0] * slid[..., 0], axis=1)
     scale = max(abs(bone), np.finfo(float).tiny)
-    stored = kernels_numpy.energy(body, shapes[-1].u)
+    stored = energy(body, shapes[-1].u)
     least = {"course_least_dissipation": float(friction.min()) / scale}
     if isinstance(newton, RelaxingNewton):
         return {"course_viscous_work": (bone - lost - stored - newton.excess_energy()) / scale} | least
-    halfway = sum(
-        kernels_numpy.energy_slope(body, (one.u + other.u) / 2.0, other.u - one.u) for one, other in pairwise(shapes)
-    )
+    halfway = sum(energy_slope(body, (one.u + other.u) / 2.0, other.u - one.u) for one, other in pairwise(shapes))
     elastic = (float(np.sum(mean * moved)) + 2.0 * halfway) / 3.0
     return {
         "course_work_balance": abs(elastic - stored) / scale,

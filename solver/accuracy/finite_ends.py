@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver._kernels import CAP
+from solver._kernels import SHEAR_LIMITED
 from solver.accuracy.step_error import HALF, Steps
 from solver.continuation.finite_states import course, depends_on_way
 from solver.equilibrium.finite_finger import FiniteFinger
@@ -59,7 +59,7 @@ def felt_of_bound(scene: Scene, finger: FiniteFinger, shape: Shape, stop: Callab
     Zero where nothing slips at the bound in `shape`, the end, or where that is a slide. Raises NotConverged, Cancelled.
     """
     bound = scene.friction.tau_max
-    if bound is None or not (shape.state == CAP).any() or not depends_on_way(scene, shape):
+    if bound is None or not (shape.state == SHEAR_LIMITED).any() or not depends_on_way(scene, shape):
         return np.zeros(6)
     scenes = [replace(scene, friction=replace(scene.friction, tau_max=most)) for most in (bound, (1.0 + NUDGE) * bound)]
     here, beside = (finger.all_numbers(end(finger, beside, stop, HALF)) for beside in scenes)

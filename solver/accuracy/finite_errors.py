@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver import kernels_numpy
 from solver.accuracy import finite_ends
 from solver.accuracy.adaptivity import Ascent, Climbed, climbed
 from solver.accuracy.error_estimate import FROM_MESHES, Errors, errors
 from solver.accuracy.step_error import Steps
+from solver.body.finite_measures import deformation
 from solver.body.tissues import stiff, strains_the_cut
 from solver.continuation.finite_states import depends_on_way
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
@@ -88,7 +88,7 @@ def _squeezed(scene: Scene, at: Climbed) -> float:
 
 def _volumes(at: Climbed) -> Array:
     """Return det F (e, 9) at the quadrature points."""
-    return np.linalg.det(kernels_numpy.deformation(at.finger.newton.body, at.shape.u))
+    return np.linalg.det(deformation(at.finger.newton.body, at.shape.u))
 
 
 def _crowded(scene: Scene, at: Climbed) -> bool:

@@ -57,15 +57,15 @@ def relaxing(scene: Scene) -> Scene | None:
     return replace(scene, materials=replace(scene.materials, **soft))
 
 
-def with_held(found: Prediction, stop: Callable[[], bool] = lambda: False, *, in_loops: bool = False) -> Prediction:
-    """Return `found` with the evidence on viscosity marched, where that can be; `in_loops` as in `solution.answers`.
+def with_held(found: Prediction, stop: Callable[[], bool] = lambda: False) -> Prediction:
+    """Return `found` with the evidence on viscosity marched, where that can be.
 
     Raises Cancelled as `stop` says.
     """
     scene, begun = found.scene, perf_counter()
     if scene.materials.relax and scene.solve.course == "history":
         return found
-    still = held(found, stop, in_loops=in_loops)
+    still = held(found, stop)
     took = perf_counter() - begun
     if still is None:
         return replace(found, evidence_s=took)
@@ -91,7 +91,7 @@ def with_held(found: Prediction, stop: Callable[[], bool] = lambda: False, *, in
     )
 
 
-def held(found: Prediction, stop: Callable[[], bool] = lambda: False, *, in_loops: bool = False) -> Held | None:
+def held(found: Prediction, stop: Callable[[], bool] = lambda: False) -> Held | None:
     """Return what tissues would still hold in the scene of `found`, whose skin says how long the slide lasts.
 
     None where the rough mesh has no such course. Raises Cancelled where `stop` says so.
@@ -108,15 +108,15 @@ def held(found: Prediction, stop: Callable[[], bool] = lambda: False, *, in_loop
     if slide > 0.0:
         aims += [Aim(PRESSING_TIME + lasting * part, depth, direction * slide * part) for part in along.tolist()]
     try:
-        then, at_last = _small(scene, aims, in_loops) if kind == "small" else _finite(scene, aims, stop)
+        then, at_last = _small(scene, aims) if kind == "small" else _finite(scene, aims, stop)
     except (ContactLost, SolveFailure):
         return None
     return Held(abs(then / at_last - 1.0), lasting) if at_last > 0.0 else None
 
 
-def _small(scene: Scene, aims: list[Aim], in_loops: bool) -> tuple[float, float]:
+def _small(scene: Scene, aims: list[Aim]) -> tuple[float, float]:
     """Return the SED [MPa] after the last of `aims`, and that of the settled state."""
-    finger, body = _rough(scene.finger, scene.materials, scene.receptor, scene.loading.depth, in_loops)
+    finger, body = _rough(scene.finger, scene.materials, scene.receptor, scene.loading.depth)
     body = copy(body)  # each course has a past of its own
     body.rest()
     way = RelaxingWay(body, law_of(scene), scene.loading_per_mm, finger.ending, finger.point, aims[0].time)
@@ -126,13 +126,11 @@ def _small(scene: Scene, aims: list[Aim], in_loops: bool) -> tuple[float, float]
 
 
 @lru_cache(maxsize=1)
-def _rough(
-    finger: Finger, materials: Materials, receptor: Receptor, depth: float, in_loops: bool
-) -> tuple[FingerModel, RelaxingBody]:
+def _rough(finger: Finger, materials: Materials, receptor: Receptor, depth: float) -> tuple[FingerModel, RelaxingBody]:
     """Return a rough mesh of a finger, settled and relaxing; surfaces of one finger follow each other and share it."""
     scene = Scene(finger=finger, materials=materials, friction=Friction(0.0), loading=Loading(depth), receptor=receptor)
-    made = FingerModel.of(scene, Sizing(ROUGH["small"], depth, margin=4.0), in_loops=in_loops)
-    body = RelaxingBody(made.geometry.mesh, relaxing_laws(materials), in_loops=in_loops, checked=True)
+    made = FingerModel.of(scene, Sizing(ROUGH["small"], depth, margin=4.0))
+    body = RelaxingBody(made.geometry.mesh, relaxing_laws(materials), checked=True)
     body.ready(PRESSING_TIME / STEPS["small"][0])
     return made, body
 

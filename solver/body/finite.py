@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from solver import _kernels as kernels
 from solver._kernels import HELD_X, HELD_Y
+from solver._kernels.arguments import ElementArrays, ProbeArrays, Skin, SymbolicFactorization
 from solver.body.receptor import Endings
 from solver.body.validation import check_body, check_driven, check_laws
 from solver.constitutive.hyperelastic import Law
 from solver.element import Q2P1
-from solver.linalg.elimination import Plan
+from solver.linalg.multifrontal import symbolic_factorization
 from solver.mesh import Array, Indices, Mesh
 
 Narrow = NDArray[np.int32]
@@ -40,7 +41,7 @@ class FiniteBody:
     lame: Array  # (e,) [MPa]
     nodes: Narrow  # (e, 9)
     unknown: Narrow  # (e, 8, 2) of the outer nodes, -1 where fixed
-    plan: Plan  # of the elimination
+    plan: SymbolicFactorization  # of the elimination
     held: Narrow  # (k,) whether a node of the skin is held: along x HELD_X, along y HELD_Y, both their sum
     middle: Narrow  # (k,) 1 at the middle of an edge of the skin, 0 at its ends
 
@@ -73,7 +74,7 @@ class FiniteBody:
         grad_x, grad_y = np.ascontiguousarray(gradient[..., 0]), np.ascontiguousarray(gradient[..., 1])
         stiff = (weight * shear[:, None])[:, :, None]
         laplace = np.swapaxes(stiff * grad_x, 1, 2) @ grad_x + np.swapaxes(stiff * grad_y, 1, 2) @ grad_y
-        plan = Plan.of(mesh)
+        plan = symbolic_factorization(mesh)
         at_middle = (np.arange(len(mesh.skin)) % 2).astype(np.int32)
         return FiniteBody(
             mesh,
@@ -98,6 +99,19 @@ class FiniteBody:
     def skin(self) -> Indices:
         """Nodes of the skin that may touch (k,)."""
         return self.mesh.skin
+
+    @property
+    def elements(self) -> ElementArrays:
+        """The elements as loops take them."""
+        return ElementArrays(
+            self.grad_x, self.grad_y, self.weight, self.modes, self.laplace, self.shear, self.stiffening, self.lame,
+            self.nodes, self.unknown,
+        )  # fmt: skip
+
+    @property
+    def contact_skin(self) -> Skin:
+        """The skin as loops take it."""
+        return Skin(self.skin, self.held, self.middle)
 
     @property
     def size(self) -> int:
@@ -144,10 +158,8 @@ class FiniteProbes:
     def energy(self, body: FiniteBody, displacement: Array) -> Array:
         """Return the SED (p,) [MPa] for displacements (nodes, 2), ln J being each element's best fit of it."""
         out = np.empty(len(self.element))
-        kernels.energies(
-            displacement, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening, body.lame,
-            body.nodes, self.element, self.grad_x, self.grad_y, self.modes, out,
-        )  # fmt: skip
+        probes = ProbeArrays(self.element, self.grad_x, self.grad_y, self.modes)
+        kernels.energies(displacement, body.elements, probes, out)
         return out
 
     def average(self, body: FiniteBody, displacement: Array) -> Array:

@@ -1,21 +1,18 @@
 """A body of any shape: a mesh with its materials and loads, reduced to what the surface feels of it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.linalg import LinAlgError
 
+from solver.body.linear_elimination import LinearElimination
 from solver.body.stiffness import Elastic, Isotropic
 from solver.body.validation import check_body, check_held, check_loads, loose
 from solver.contact.active_set import Touchable
 from solver.element import GAUSS_4, line
-from solver.linalg.dissection import Reduced, Tree, places
 from solver.mesh import Array, Indices, Mesh
-
-if TYPE_CHECKING:
-    from solver.body.linear_compiled import ReducedInLoops
 
 Motion = Literal["x", "y", "turn"]
 _POINTS, _WEIGHTS = GAUSS_4
@@ -30,7 +27,7 @@ class Body:
 
     mesh: Mesh
     elastic: Elastic
-    reduced: "Reduced | ReducedInLoops"
+    reduced: LinearElimination
     touchable: Touchable
     prescribed: Array  # (nodes, 2) displacement of what is held relative to the drive, 0 elsewhere [mm]
 
@@ -41,38 +38,29 @@ class Body:
         loads: Array | None = None,
         prescribed: Array | None = None,
         free: Sequence[Motion] = (),
-        tree: Tree | None = None,
         *,
-        in_loops: bool = False,
         checked: bool = False,
     ) -> "Body":
         """Reduce a body of `materials` by region under dead `loads` (nodes, 2) [N/mm].
 
         What is held moves with the drive, and by `prescribed` (nodes, 2) [mm] relative to it. A body that nothing holds
-        names in `free` the motions along which the surface alone balances the loads. `tree` is the `elimination` of the
-        mesh, where it was made before. With `in_loops` compiled loops do all that, and find its contact: to round-off
-        the same, many times as fast once they are loaded. Raises BodyError and MeshError, unless `checked` before, and
-        LinAlgError where what is held or free leaves it a motion.
+        names in `free` the motions along which the surface alone balances the loads. Raises BodyError and MeshError,
+        unless `checked` before, and LinAlgError where what is held or free leaves it a motion.
         """
         if not checked:
             check_body(mesh, materials)
             check_loads(mesh, loads, prescribed)
             check_held(mesh, free)
-        whole = _in_loops(mesh, materials) if in_loops else None
-        elastic = Elastic.of(mesh, materials) if whole is None else whole.elastic
+        whole = LinearElimination(mesh, materials)
         moved = np.zeros(mesh.nodes.shape) if prescribed is None else np.array(prescribed, np.float64)
         force = np.zeros(mesh.nodes.size) if loads is None else np.array(loads, np.float64).ravel()
         if prescribed is not None:
             unknowns = _unknowns(mesh)
-            pushed = elastic.stiffness @ moved.ravel()[unknowns][:, :, None]
+            pushed = whole.elastic.stiffness @ moved.ravel()[unknowns][:, :, None]
             np.subtract.at(force, unknowns.ravel(), pushed.ravel())
-        if whole is not None:
-            reduced = whole.loaded(force) if force.any() else whole
-        else:
-            tree = elimination(mesh) if tree is None else tree
-            reduced = Reduced.of(tree, elastic.stiffness, force[:, None] if force.any() else None)
-        touchable = replace(_touchable(mesh, reduced.stiffness, reduced.load, free), in_loops=in_loops)
-        return Body(mesh, elastic, reduced, touchable, moved)
+        reduced = whole.loaded(force) if force.any() else whole
+        touchable = _touchable(mesh, reduced.stiffness, reduced.load, free)
+        return Body(mesh, reduced.elastic, reduced, touchable, moved)
 
     @property
     def dofs(self) -> int:
@@ -126,32 +114,9 @@ class Body:
         return out
 
 
-def _in_loops(mesh: Mesh, materials: Sequence[Isotropic]) -> "ReducedInLoops":
-    # Imported here: who solves once need not wait for the compiled loops to be loaded.
-    from solver.body.linear_compiled import ReducedInLoops
-
-    return ReducedInLoops(mesh, materials)
-
-
 def _unknowns(mesh: Mesh) -> Indices:
     """Return the numbers (e, 18) of the elements' unknowns: x of node n is 2 n, y is 2 n + 1."""
     return (2 * mesh.elements[:, :, None] + np.arange(2)).reshape(len(mesh.elements), 18)
-
-
-def elimination(mesh: Mesh) -> Tree:
-    """Return the order in which the body's unknowns are eliminated: all but the skin's, normal ones first."""
-    kept = np.concatenate([2 * mesh.skin + 1, 2 * mesh.skin])
-    return Tree.of(_unknowns(mesh), places(mesh.elements), mesh.fixed, kept)
-
-
-def planned(mesh: Mesh, *, in_loops: bool) -> Tree | None:
-    """Return the `elimination` of `mesh`; None where it is that of the loops, which is kept where they find it."""
-    if not in_loops:
-        return elimination(mesh)
-    from solver.linalg.elimination import Plan
-
-    Plan.of(mesh)
-    return None
 
 
 def _touchable(mesh: Mesh, stiffness: Array, loads: Array, free: Sequence[Motion]) -> Touchable:

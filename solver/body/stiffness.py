@@ -5,13 +5,18 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 
+from solver._kernels import hooke
+from solver._kernels.arguments import LinearElements, LinearMesh, ShapeFunctions
 from solver.element import Q2P1
 from solver.mesh import Array, Indices, Mesh
 
 _VALUES, _GRADIENTS = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
-_ALONG, _UP = np.ascontiguousarray(_GRADIENTS[..., 0].T), np.ascontiguousarray(_GRADIENTS[..., 1].T)  # (9 nodes, 9)
+_SHAPES = ShapeFunctions(
+    _VALUES, np.ascontiguousarray(_GRADIENTS[..., 0]), np.ascontiguousarray(_GRADIENTS[..., 1]), Q2P1.weights
+)
 
 
 class Isotropic(Protocol):
@@ -52,44 +57,28 @@ class Elastic:
         """Integrate the stiffness of every element with 3 x 3 Gauss points; `materials` by region.
 
         K = integral of 2 G eps:eps + lambda theta^2, where theta is the best fit of the volume strain by 1, x, y. That
-        is the mixed form with pressure lambda theta, its three pressure modes eliminated (exact for Hooke).
+        is the mixed form with pressure lambda theta, its three pressure modes eliminated (exact for Hooke). Raises
+        LinAlgError where an element is folded.
         """
-        corners = mesh.nodes[mesh.elements]  # (e, 9, 2)
-        count = len(corners)
-        x, y = np.ascontiguousarray(corners[..., 0]), np.ascontiguousarray(corners[..., 1])
-        x_xi, x_eta, y_xi, y_eta = x @ _ALONG, x @ _UP, y @ _ALONG, y @ _UP  # (e, q)
-        det = x_xi * y_eta - x_eta * y_xi
-        weight = det * Q2P1.weights
-        by_x = (y_eta / det)[:, :, None] * _ALONG.T  # (e, q, 9) dN/dx
-        by_x -= (y_xi / det)[:, :, None] * _UP.T
-        by_y = (x_xi / det)[:, :, None] * _UP.T
-        by_y -= (x_eta / det)[:, :, None] * _ALONG.T
+        return condensed_elements(mesh, materials, np.empty((len(mesh.elements), 16, 16)))[0]
 
-        shear = np.array([m.shear for m in materials])[mesh.region]
-        lame = np.array([m.lame for m in materials])[mesh.region]
-        place = _VALUES @ corners  # (e, q, 2)
-        centre = place.mean(axis=1)
-        modes = np.ones((count, 9, 3))
-        modes[:, :, 1:] = place - centre[:, None]
-        loaded = np.swapaxes(modes * weight[:, :, None], 1, 2)  # (e, 3, q)
-        moments = np.empty((count, 3, 9, 2))  # integral of mode times divergence
-        moments[..., 0], moments[..., 1] = loaded @ by_x, loaded @ by_y
-        moments = moments.reshape(count, 3, 18)
-        dilatation = np.linalg.inv(loaded @ modes) @ moments
-        stiff: Array = np.swapaxes(lame[:, None, None] * moments, 1, 2) @ dilatation
 
-        # K_ia,jb gets G (delta_ab grad N_i . grad N_j + dN_i/db dN_j/da), one pair of directions after the other
-        blocks = stiff.reshape(count, 9, 2, 9, 2)
-        weight *= shear[:, None]
-        along = np.swapaxes(by_x * weight[:, :, None], 1, 2)
-        xx, xy = along @ by_x, along @ by_y
-        yy = np.swapaxes(by_y * weight[:, :, None], 1, 2) @ by_y
-        both = xx + yy
-        blocks[:, :, 0, :, 0] += both + xx
-        blocks[:, :, 1, :, 1] += both + yy
-        blocks[:, :, 0, :, 1] += np.swapaxes(xy, 1, 2)
-        blocks[:, :, 1, :, 0] += xy
-        return Elastic(stiff, dilatation, centre, shear, lame)
+def condensed_elements(mesh: Mesh, materials: Sequence[Isotropic], outer: Array) -> tuple[Elastic, Array]:
+    """Return the elements of `mesh`, and the matrices (e, 2, 16) that recover their centre nodes.
+
+    Filled: `outer` (e, 16, 16), lower half, their stiffness when the centre nodes are eliminated. Raises LinAlgError
+    where an element is folded.
+    """
+    count = len(mesh.elements)
+    shear = np.array([m.shear for m in materials])[mesh.region]
+    lame = np.array([m.lame for m in materials])[mesh.region]
+    filled = LinearElements(
+        np.empty((count, 18, 18)), np.empty((count, 3, 18)), np.empty((count, 2)), np.empty((count, 2, 16))
+    )
+    if not hooke.stiffen(LinearMesh(mesh.nodes, mesh.elements, shear, lame), _SHAPES, filled, outer):
+        raise LinAlgError("an element is folded")
+    stiffness, dilatation, centre, recovery_matrix = filled
+    return Elastic(stiffness, dilatation, centre, shear, lame), recovery_matrix
 
 
 @dataclass(frozen=True, slots=True, eq=False)

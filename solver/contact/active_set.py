@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from solver._kernels import rubbing
 from solver.body.validation import finite
-from solver.contact.law import CAP, OPEN, SLIP, STICK, FrictionLaw
-from solver.linalg.lapack import dgesv, dgetrf, dgetrs
+from solver.contact.law import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
 
 Array = NDArray[np.float64]
 States = NDArray[np.int8]
@@ -48,7 +48,6 @@ class Touchable:
     tangential_free: Array  # (k,)
     motions: Array  # (2 k, r) displacement of the points, normal ones first, by each free motion
     resultants: Array  # (r,) what the surface's forces must amount to along each free motion [N/mm]
-    in_loops: bool = False  # whether compiled loops find its contact, `solver._kernels.rubbing`
     carried: bool = False  # whether dead loads are balanced by the surface alone, so that they act from first touch on
 
 
@@ -72,11 +71,10 @@ class Contact:
 
 
 class System:
-    """The linear system of one guess of states, factorised."""
+    """The linear system of one guess of states."""
 
     def __init__(self, body: Touchable, law: FrictionLaw, state: States, sense: Array) -> None:
-        """Factorise the system of `state` (k,), friction forces pointing along `sense` (k,)."""
-        self.key = state.tobytes() + sense.tobytes()
+        """Write down the system of `state` (k,), friction forces pointing along `sense` (k,)."""
         self.on = np.flatnonzero(state != OPEN)
         self.stuck = np.flatnonzero(state == STICK)
         on, stuck, free = self.on, self.stuck, body.motions.shape[1]
@@ -98,23 +96,21 @@ class System:
             matrix[: len(on), count:], matrix[len(on) : count, count:] = normal[on], tangential[stuck]
             matrix[count:, : len(on)] = (normal[on] + tangential[on] * drag[:, None]).T
             matrix[count:, len(on) : count] = tangential[stuck].T
-        self._factors = dgetrf(matrix) if len(matrix) else None
-        self.singular = self._factors is not None and bool(self._factors[2])
+        self._matrix = matrix
 
     def solve(self, right: Array) -> Array:
         """Return the solution for the right-hand side `right`, or for several side by side."""
-        return right if self._factors is None else dgetrs(self._factors[0], self._factors[1], right)[0]
+        return np.asarray(np.linalg.solve(self._matrix, right), np.float64)
 
 
 class Course:
-    """Contact of one body under one law, step after step; keeps the last factorisation, since most steps reuse it."""
+    """Contact of one body under one law, step after step."""
 
     def __init__(self, body: Touchable, law: FrictionLaw, patience: int | None = None) -> None:
         """Start with nothing known; a step is given up after `patience` corrections (None: when nothing can help)."""
         self.body = body
         self.law = law
         self._patience = 20 + 4 * len(body.gap) if patience is None else patience
-        self._system: System | None = None
         self._entering = SLIP  # what a point is first thought to do when it comes to touch
         self._resultants = body.resultants
 
@@ -135,7 +131,7 @@ class Course:
             guesses = guesses if low.any() else []
             guesses += [np.where(self.body.gap <= height, SLIP, OPEN) for height in self._heights()]
         if guess is None and np.isfinite(self.law.tau_max):
-            guesses.append(np.where(low, CAP, OPEN))
+            guesses.append(np.where(low, SHEAR_LIMITED, OPEN))
         if guess is None and not self.body.motions.shape[1]:
             found = self._slid(depth, -float(direction))
             if found is not None:
@@ -158,45 +154,15 @@ class Course:
 
         Points are then open, slipping or slipping at the bound, and the drag follows from the pressure.
         """
-        if self.body.in_loops:
-            from solver.contact.active_set_compiled import slid
-
-            return slid(self.body, self.law, depth, sense, ROUNDS, HERTZ)
-        body, mu = self.body, self.law.mu
-        slips = body.normal_by_normal + sense * mu * body.normal_by_tangential
-        above, bound = body.gap + body.normal_free - depth, self.law.bound(body.length)
-        on: Flags = above < -HERTZ * depth
-        none: Array = np.zeros(len(on))
-        capped: Flags = np.zeros(len(on), bool)
-        for iteration in range(1, ROUNDS + 1):
-            matrix, lifted, pull = slips, above, none
-            if capped.any():
-                pull = np.where(capped, sense * bound, 0.0)
-                matrix = np.where(capped, body.normal_by_normal, slips)
-                lifted = above + body.normal_by_tangential @ pull
-            at = on.nonzero()[0]
-            if not len(at):
-                return None
-            columns = matrix.take(at, 1)
-            found = dgesv(columns.take(at, 0), -lifted[at])
-            pressing: Array = found[2]
-            if found[3]:  # no unique forces
-                return None
-            normal = none.copy()
-            normal[at] = pressing
-            gap = lifted + columns @ pressing
-            slack = SMALL * max(float(pressing.max()), -float(pressing.min()))
-            low = -SMALL * max(float(body.gap.max()), float(gap.max()))
-            now: Flags = (on & (normal >= -slack)) | (~on & (gap < low))
-            over: Flags = now & on & (mu * normal > bound + np.where(capped, -slack, slack))
-            if (now == on).all() and (over == capped).all():
-                tangential = np.where(on & ~capped, sense * mu * normal, pull)
-                shift = body.tangential_free + body.tangential_by_tangential @ tangential
-                shift += body.normal_by_tangential.T @ normal
-                state = np.where(capped, CAP, np.where(on, SLIP, OPEN)).astype(np.int8)
-                return Contact(state, np.full(len(on), sense), normal, tangential, shift, gap, np.zeros(0), iteration)
-            on, capped = now, over
-        return None
+        body, law, count = self.body, self.law, len(self.body.gap)
+        found = _blank(body, np.zeros(count, np.int8), np.full(count, sense))
+        systems = rubbing.slide(
+            body.gap, body.length, body.normal_by_normal, body.normal_by_tangential, body.tangential_by_tangential,
+            np.ascontiguousarray(body.normal_free),
+            np.ascontiguousarray(body.tangential_free), law.mu, law.tau_max, depth, sense, ROUNDS, HERTZ, found.state,
+            found.normal, found.tangential, found.shift, found.gap,
+        )  # fmt: skip
+        return None if systems == rubbing.LOST else replace(found, iterations=systems)
 
     def step(self, before: Contact, depth: float, travel: float, resultants: Array | None = None) -> Contact:
         """Return the state after the body was driven to `depth` and `travel` along +x [mm], coming from `before`.
@@ -221,105 +187,28 @@ class Course:
         self, depth: float, travel: float, anchor: Array, state: States, sense: Array, *, free: bool
     ) -> Contact:
         """Change states until none contradicts the solution; with `free`, points may stick and turn round."""
-        if self.body.in_loops:
-            from solver.contact.active_set_compiled import consistent
+        body, law, found = self.body, self.law, _blank(self.body, state.copy(), sense.copy())
+        # loops are compiled for one order of numbers in memory
+        motions, anchor = np.ascontiguousarray(body.motions), np.ascontiguousarray(anchor)
+        up, along = np.ascontiguousarray(body.normal_free), np.ascontiguousarray(body.tangential_free)
+        systems = rubbing.solve_active_set(
+            body.gap, body.length, body.normal_by_normal, body.normal_by_tangential, body.tangential_by_tangential,
+            up, along, motions, self._resultants, law.mu, law.tau_max, depth, travel,
+            anchor, free, self._entering if free else SLIP, self._patience, found.state, found.sense, found.normal,
+            found.tangential, found.shift, found.gap, found.motion,
+        )  # fmt: skip
+        if systems == rubbing.AMBIGUOUS:
+            raise ContactLost(AMBIGUOUS)
+        if systems == rubbing.LOST:
+            raise ContactLost(CONTRADICTORY.format(self._patience))
+        return replace(found, iterations=systems)
 
-            entering = self._entering if free else None
-            guess = state, sense
-            return consistent(
-                self.body, self.law, (depth, travel), self._resultants, anchor, guess, entering, self._patience
-            )
-        seen: set[bytes] = set()
-        one_by_one = resticked = False
-        for iteration in range(1, self._patience + 1):
-            if self._system is None or self._system.key != state.tobytes() + sense.tobytes():
-                self._system = System(self.body, self.law, state, sense)
-            if self._system.singular:
-                touching = state != OPEN
-                if not free or resticked or (state == STICK).any() or not touching.any():
-                    raise ContactLost(AMBIGUOUS)
-                # a body that is free along x needs a point that holds it: all are asked again, one by one
-                state = np.where(touching, STICK, OPEN).astype(np.int8)
-                resticked = one_by_one = True
-                continue
-            found = self._solved(self._system, depth, travel, anchor, state, sense, iteration)
-            wanted, turned, badness = self._corrected(found, anchor, free=free)
-            changed = np.flatnonzero((wanted != state) | (turned != sense))
-            if not len(changed):
-                return found
-            if one_by_one:
-                worst = changed[np.argmax(badness[changed])]
-                keep = np.arange(len(state)) != worst
-                wanted, turned = np.where(keep, state, wanted), np.where(keep, sense, turned)
-            state, sense = wanted.astype(np.int8), turned
-            key = state.tobytes() + sense.tobytes()
-            if key in seen:
-                one_by_one = True
-                seen.clear()
-            seen.add(key)
-        raise ContactLost(CONTRADICTORY.format(self._patience))
 
-    def _solved(
-        self,
-        system: System,
-        depth: float,
-        travel: float,
-        anchor: Array,
-        state: States,
-        sense: Array,
-        iteration: int,
-    ) -> Contact:
-        body, on, stuck, tangential = self.body, system.on, system.stuck, system.capped
-        lifted = body.gap + body.normal_free - depth + body.normal_by_tangential @ tangential
-        moved = body.tangential_free + travel + body.tangential_by_tangential @ tangential
-        missing = self._resultants - body.motions[len(state) :].T @ tangential
-        answer = system.solve(np.concatenate([-lifted[on], (anchor - moved)[stuck], missing]))
-        normal = np.zeros(len(state))
-        normal[on] = answer[: len(on)]
-        rest = np.zeros(len(state))
-        rest[on] = system.drag * normal[on]
-        rest[stuck] = answer[len(on) : len(on) + len(stuck)]
-        motion = answer[len(on) + len(stuck) :]
-        up, along = np.split(body.motions @ motion, 2)
-        gap = lifted + up + body.normal_by_normal @ normal + body.normal_by_tangential @ rest
-        shift = moved + along + body.normal_by_tangential.T @ normal + body.tangential_by_tangential @ rest
-        return Contact(state, sense, normal, tangential + rest, shift, gap, motion, iteration)
-
-    def _corrected(self, found: Contact, anchor: Array, *, free: bool) -> tuple[States, Array, Array]:
-        """Return the states and senses that the solution calls for, and how badly each point contradicts its own."""
-        body, law = self.body, self.law
-        state, sense = found.state.copy(), found.sense.copy()
-        force = np.abs(found.normal).max(initial=0.0)
-        lengths = np.concatenate([body.gap, found.gap, found.shift])
-        height = max(float(np.abs(lengths).max(initial=0.0)), np.finfo(float).tiny)
-        badness = np.zeros(len(state))
-
-        def change(where: NDArray[np.bool_], to: int, how_bad: Array) -> None:
-            state[where] = to
-            badness[where] = how_bad[where]
-
-        touching = found.state != OPEN
-        slack = SMALL * force
-        bound = law.bound(body.length)
-        change((found.state == SLIP) & (law.mu * found.normal > bound + slack), CAP, found.normal)
-        change((found.state == CAP) & (law.mu * found.normal < bound - slack), SLIP, found.normal)
-        if free and not law.frictionless:
-            over = np.abs(found.tangential) - law.limit(found.normal, body.length)
-            loose = (found.state == STICK) & (over > slack)
-            sense[loose] = np.sign(found.tangential[loose])
-            capped = law.mu * found.normal > bound
-            change(loose & ~capped, SLIP, over)
-            change(loose & capped, CAP, over)
-            # a point that slips along its friction force sticks; one whose force is about to change is asked later
-            forward = (found.shift - anchor) * found.sense
-            stops = (found.state >= SLIP) & (state == found.state) & (forward > SMALL * height)
-            change(stops, STICK, forward * force / height)
-        change(touching & (found.normal < -slack), OPEN, -found.normal)
-        enters = ~touching & (found.gap < -SMALL * height)
-        if free:
-            sense[enters] = np.where(found.shift > anchor, -1.0, 1.0)[enters]
-        change(enters, self._entering, -found.gap * force / height)
-        return state, sense, badness
+def _blank(body: Touchable, state: States, sense: Array) -> Contact:
+    """Return a contact for the loops to fill."""
+    count, free = len(state), len(body.resultants)
+    normal, tangential, shift, gap = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
+    return Contact(state, sense, normal, tangential, shift, gap, np.zeros(free), 0)
 
 
 def untouched(body: Touchable, depth: float = 0.0) -> Contact:

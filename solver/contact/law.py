@@ -29,9 +29,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-OPEN, STICK, SLIP, CAP = 0, 1, 2, 3  # as the compiled loops number them, which a plain solve does not load
+OPEN, STICK, SLIP, SHEAR_LIMITED = 0, 1, 2, 3  # as the compiled loops number them, which a plain solve does not load
 STEEP = 1.0  # coefficient from which skin that slips at a bound does so up to where contact ends, likewise
-NAMES = {OPEN: "open", STICK: "stick", SLIP: "slip", CAP: "cap"}
+NAMES = {OPEN: "open", STICK: "stick", SLIP: "slip", SHEAR_LIMITED: "cap"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +71,13 @@ class FrictionLaw:
         none: the first bear no force, and that of the others is unknown. The forces are the slopes times force and
         length, so that this is the law's consistent tangent too.
 
-        >>> one, other = FrictionLaw(0.5, 0.02).slopes(np.array([OPEN, STICK, SLIP, CAP]), np.array([1, 1, 1, -1.0]))
+        >>> one, other = FrictionLaw(0.5, 0.02).slopes(np.arange(4), np.array([1, 1, 1, -1.0]))
         >>> one.tolist(), other.tolist()
         ([0.0, 0.0, 0.5, 0.0], [0.0, 0.0, 0.0, -0.02])
         """
-        return np.where(state == SLIP, sense * self.mu, 0.0), np.where(state == CAP, sense * self.tau_max, 0.0)
+        return np.where(state == SLIP, sense * self.mu, 0.0), np.where(
+            state == SHEAR_LIMITED, sense * self.tau_max, 0.0
+        )
 
     @property
     def frictionless(self) -> bool:

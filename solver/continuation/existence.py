@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver._kernels import CAP, OPEN, STEEP
+from solver._kernels import OPEN, SHEAR_LIMITED, STEEP
 from solver.continuation import limit_point as reach
 from solver.continuation.arc_length import follow
 from solver.continuation.limit_point import PLAIN, Reach, folded, sound
@@ -187,5 +187,5 @@ def all_at_the_bound(newton: Newton, pull: Pull, tolerance: float, stop: Callabl
     Raises NotConverged.
     """
     bare = settled(newton, pull._replace(mu=0.0), None, tolerance, stop)
-    state = np.where(bare.touching, CAP, OPEN).astype(bare.state.dtype)
+    state = np.where(bare.touching, SHEAR_LIMITED, OPEN).astype(bare.state.dtype)
     return settled(newton, pull, replace(bare, state=state, pull=pull._replace(tau=0.0)), tolerance, stop)

@@ -2,7 +2,7 @@
 
 A rough mesh is followed along the branch to near its end, and tells where the skin is squeezed most. Skin folds within
 some tenths of a millimetre: on a mesh with small elements there the branch is followed on. What that mesh is good to is
-measured (docs/solver-finite-strain.md).
+measured.
 """
 
 from collections.abc import Callable

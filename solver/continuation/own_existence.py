@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver import _kernels as kernels
-from solver import kernels_numpy
+from solver.body.finite_measures import deformation
 from solver.constitutive.hyperelastic import Law
 from solver.contact.skin_compression import Pinch
 from solver.continuation.arc_length import LARGEST_MU, followed, leapt
@@ -60,5 +60,5 @@ class _OwnBody:
 
     def spoilt(self, shape: Shape) -> bool:
         """Return whether contact has come to an end of the skin, or an element is crushed."""
-        det = np.linalg.det(kernels_numpy.deformation(self.newton.body, shape.u))
+        det = np.linalg.det(deformation(self.newton.body, shape.u))
         return bool(shape.touching[[0, -1]].any() or det.min() < CRUSHED)

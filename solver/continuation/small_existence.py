@@ -33,13 +33,13 @@ def direct(scene: Scene, finger: FingerModel, times: float = 1.0, *, widest: boo
     if not widest:
         return None
     if direction == 0:
-        raise _no_answer(scene, why, 0.0, finger)
+        raise _no_answer(scene, why, 0.0)
     if scene.normal_force is None:
         reached, limit = followed(finger.body.touchable, law_of(scene), scene.loading.depth, direction)
     else:
         reached, limit = followed_under(scene, finger)
     if reached is None:
-        raise _no_answer(scene, why, limit, finger)
+        raise _no_answer(scene, why, limit)
     return reached
 
 
@@ -54,7 +54,7 @@ def _pressed(scene: Scene) -> str:
     return f"{scene.loading.depth:g} mm indentation" if force is None else f"a normal force of {force:g} N/mm"
 
 
-def _no_answer(scene: Scene, why: str, limit_mu: float, finger: FingerModel) -> NoSteadyState | NotConverged:
+def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotConverged:
     """Return the failure that says what is known."""
     mu = float(scene.friction.mu)
     at = f"{_pressed(scene)} and mu = {mu:g}"
@@ -66,7 +66,7 @@ def _no_answer(scene: Scene, why: str, limit_mu: float, finger: FingerModel) -> 
         )
     limit_force = limit_depth = None
     with suppress(LinAlgError, ContactLost):  # of stiffnesses that a mesh for less depth does not stand
-        limit_force, limit_depth = limits(scene, law_of(scene), in_loops=finger.body.touchable.in_loops)
+        limit_force, limit_depth = limits(scene, law_of(scene))
     known = ((limit_force, "N/mm"), (limit_depth, "mm"))
     others = " and ".join(f"{limit:.3g} {unit}" for limit, unit in known if limit is not None)
     along = "+x" if scene.loading.direction > 0 else "-x"

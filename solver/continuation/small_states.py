@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.accuracy.step_error import HALF
 from solver.body.tissues import relaxing_laws
-from solver.contact.active_set import CAP, STICK, Contact, ContactLost, Course, forced
+from solver.contact.active_set import SHEAR_LIMITED, STICK, Contact, ContactLost, Course, forced
 from solver.contact.law import STEEP, FrictionLaw
 from solver.continuation.wedging import followed
 from solver.equilibrium.expected_depth import DEEPEST, within_reach
@@ -112,8 +112,8 @@ def marched(
     law, loading = law_of(scene), scene.loading_per_mm
     if not scene.materials.relax:
         return march(finger.body.touchable, law, loading, progress, times), None
-    laws, in_loops = relaxing_laws(scene.materials), finger.body.touchable.in_loops
-    body = RelaxingBody(finger.geometry.mesh, laws, in_loops=in_loops, checked=True)
+    laws = relaxing_laws(scene.materials)
+    body = RelaxingBody(finger.geometry.mesh, laws, checked=True)
     first = PRESSING_TIME / round(PRESSING_STEPS * times)
     way = RelaxingWay(body, law, loading, finger.ending, finger.point, first)
     march_relaxing(way, loading, scene.materials.longest_creep, progress, times)
@@ -177,7 +177,7 @@ def bounded_more(scene: Scene, finger: FingerModel, contact: Contact) -> Contact
     law, direction, force = law_of(scene), scene.loading.direction, scene.normal_force
     on = np.flatnonzero(contact.touching)
     last = contact.state[np.concatenate([on[:2], on[-2:]])]
-    if law.mu <= STEEP or direction == 0 or not (last == CAP).any():
+    if law.mu <= STEEP or direction == 0 or not (last == SHEAR_LIMITED).any():
         return None
     touch = finger.body.touchable
     touch, depth = (touch, scene.loading.depth) if force is None else (forced(touch, force), 0.0)
@@ -233,7 +233,7 @@ def felt_of_bound(scene: Scene, finger: FingerModel, half: Contact) -> Array:
     `half` is the end in half the usual steps. Zero where nothing slips at the bound. Raises as `end`.
     """
     bound = scene.friction.tau_max
-    if bound is None or not (half.state == CAP).any():
+    if bound is None or not (half.state == SHEAR_LIMITED).any():
         return np.zeros(6)
     more = replace(scene, friction=replace(scene.friction, tau_max=(1.0 + FURTHER) * bound))
     here, beside = (all_numbers(scene, finger, state) for state in (half, end(more, finger, HALF)))

@@ -64,9 +64,9 @@ def followed(
 class Bodies:
     """Meshes of one finger, each for depths around a power of two."""
 
-    def __init__(self, scene: Scene, *, in_loops: bool = False) -> None:
-        """Make none yet; `in_loops` as in `Body.of`."""
-        self._scene, self._in_loops = scene, in_loops
+    def __init__(self, scene: Scene) -> None:
+        """Make none yet."""
+        self._scene = scene
         self._made: dict[int, Touchable] = {}
 
     def at(self, depth: float) -> Touchable:
@@ -80,16 +80,15 @@ class Bodies:
         """Return a body with a mesh of its own."""
         scene = self._scene
         mesh = finger_mesh(scene.finger, scene.receptor, Sizing(fineness, depth, margin=WIDE)).mesh
-        return Body.of(mesh, settled_moduli(scene.materials), in_loops=self._in_loops, checked=True).touchable
+        return Body.of(mesh, settled_moduli(scene.materials), checked=True).touchable
 
 
-def limits(scene: Scene, law: FrictionLaw, *, in_loops: bool = False) -> tuple[float | None, float | None]:
+def limits(scene: Scene, law: FrictionLaw) -> tuple[float | None, float | None]:
     """Return the largest normal force [N/mm] and depth [mm] with settled sliding under `law`, each to 3 %.
 
-    Below those of the scene; the force is None where the scene gives none, and either where it is not known. `in_loops`
-    as in `Body.of`.
+    Below those of the scene; the force is None where the scene gives none, and either where it is not known.
     """
-    bodies = Bodies(scene, in_loops=in_loops)
+    bodies = Bodies(scene)
     if scene.normal_force is None:
         return None, _deepest(bodies, scene, law, scene.loading.depth)
     found = _strongest(bodies, scene, scene.normal_force, law)

@@ -21,31 +21,28 @@ NEARLY = 0.5  # of what makes it slide, from which a finger that is dragged is a
 DEEPEST = 0.85  # of the tissue between first touch and bone: beyond, a small-strain depth means nothing
 
 
-def matching_depths(
-    scenes: Sequence[Scene], normal_forces: Sequence[float], *, in_loops: bool = False
-) -> tuple[float | None, ...]:
+def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> tuple[float | None, ...]:
     """Return for each scene the indentation [mm] at which its settled normal force is the given one [N/mm].
 
     Found directly, with the depth as an unknown and the force given. All scenes share the finger, materials and
-    receptor of the first. None where the finger would be pressed to its bone, or has no such settled state. `in_loops`
-    as in `solver.response.solution.answers`.
+    receptor of the first. None where the finger would be pressed to its bone, or has no such settled state.
     """
     if not scenes:
         return ()
     deepest = DEEPEST * scenes[0].finger.pulp_thickness()
-    finger = _finger(_bare(scenes[0], deepest), in_loops)
+    finger = _finger(_bare(scenes[0], deepest))
     pressed = [_pressed(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True)]
     return tuple(None if found is None else depth_of(found) for found in pressed)
 
 
-def expected_depth(scene: Scene, *, in_loops: bool = False) -> float:
+def expected_depth(scene: Scene) -> float:
     """Return the indentation [mm], or about what a given force will lead to, for which meshes are made."""
     force = scene.normal_force
     if force is None:
         return scene.loading.depth
     deepest = DEEPEST * scene.finger.pulp_thickness()
     try:
-        finger = _finger(_bare(scene, deepest), in_loops)
+        finger = _finger(_bare(scene, deepest))
     except (MeshError, LinAlgError):  # who makes the meshes that count will tell
         return deepest
     found = _pressed(finger, scene, force, deepest)
@@ -94,9 +91,9 @@ def _bare(scene: Scene, deepest: float) -> Scene:
 
 
 @lru_cache(maxsize=1)
-def _finger(bare: Scene, in_loops: bool) -> FingerModel:
+def _finger(bare: Scene) -> FingerModel:
     """Return the finger on a rough mesh: surfaces of one finger follow each other and share it. Raises MeshError."""
-    return FingerModel.of(bare, Sizing(FINENESS, bare.loading.depth), in_loops=in_loops)
+    return FingerModel.of(bare, Sizing(FINENESS, bare.loading.depth))
 
 
 def _pressed(finger: FingerModel, scene: Scene, normal_force: float, deepest: float) -> Contact | None:

@@ -7,7 +7,7 @@ from time import perf_counter
 
 import numpy as np
 
-from solver.body.linear import Body, planned
+from solver.body.linear import Body
 from solver.body.receptor import ROW, Endings, endings, middle
 from solver.body.stiffness import Probes
 from solver.body.tissues import settled_moduli
@@ -30,19 +30,18 @@ class FingerModel:
     solve_s: float  # what assembling and reducing took, beside mesh and tables [s]
 
     @staticmethod
-    def of(scene: Scene, sizing: Sizing, *, in_loops: bool = False) -> "FingerModel":
+    def of(scene: Scene, sizing: Sizing) -> "FingerModel":
         """Mesh and reduce the finger of `scene`, whose friction and loading do not matter here.
 
-        `in_loops` as in `Body.of`. Raises MeshError where the outline cannot be meshed.
+        Raises MeshError where the outline cannot be meshed.
         """
-        return FingerModel.on(scene, finger_mesh(scene.finger, scene.receptor, sizing), in_loops=in_loops)
+        return FingerModel.on(scene, finger_mesh(scene.finger, scene.receptor, sizing))
 
     @staticmethod
-    def on(scene: Scene, geometry: FingerMesh, *, in_loops: bool = False) -> "FingerModel":
+    def on(scene: Scene, geometry: FingerMesh) -> "FingerModel":
         """Do the same on a mesh of the finger that was made before."""
-        tree = planned(geometry.mesh, in_loops=in_loops)
         begun = perf_counter()
-        body = Body.of(geometry.mesh, settled_moduli(scene.materials), tree=tree, in_loops=in_loops, checked=True)
+        body = Body.of(geometry.mesh, settled_moduli(scene.materials), checked=True)
         took = perf_counter() - begun
         at_touch = endings(geometry, body.elastic, scene.receptor, np.zeros(1))
         return FingerModel(scene.receptor, geometry, body, at_touch, took)

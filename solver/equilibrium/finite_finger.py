@@ -8,7 +8,7 @@ import numpy as np
 from numpy.linalg import LinAlgError
 
 from solver import _kernels as kernels
-from solver._kernels import CAP, OPEN
+from solver._kernels import OPEN, SHEAR_LIMITED
 from solver.body.finite import FiniteBody, FiniteProbes
 from solver.body.receptor import ROW, endings, middle
 from solver.body.tissues import finite_laws
@@ -146,7 +146,7 @@ class FiniteFinger:
         A drag too small to matter does not count.
         """
         on = [state for state in shape.state.tolist() if state != OPEN]
-        if CAP not in on[:2] + on[-2:]:
+        if SHEAR_LIMITED not in on[:2] + on[-2:]:
             return False
         along, up = shape.force
         return bool(abs(along) > RUBS * up) and self.edges(shape) is not None

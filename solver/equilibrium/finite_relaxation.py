@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from solver import _kernels as kernels
-from solver import kernels_numpy
 from solver._kernels import STICK
 from solver.body.finite import FiniteBody, FiniteProbes
+from solver.body.finite_measures import deformation
 from solver.body.tissues import relaxing_laws
 from solver.body.validation import check_moduli, check_terms
 from solver.constitutive import overstress
@@ -60,12 +60,12 @@ class RelaxingNewton(Newton):
 
     def took(self, shape: Shape, step: float) -> None:
         """Remember the step that was made ready and led to `shape`."""
-        self.past = self.past.after(kernels_numpy.deformation(self.body, shape.u).reshape(-1, 2, 2), step)
+        self.past = self.past.after(deformation(self.body, shape.u).reshape(-1, 2, 2), step)
 
     def excess(self, shape: Shape) -> Array:
         """Return the forces (e, 18) of the overstress on the nodes of the elements at `shape`."""
         body = self.body
-        stress = overstress.stress(self._tensor, kernels_numpy.deformation(body, shape.u))
+        stress = overstress.stress(self._tensor, deformation(body, shape.u))
         gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
         return np.einsum("eq,eqaA,eqiA->eia", body.weight, stress, gradient).reshape(len(body.nodes), 18)
 
@@ -86,11 +86,7 @@ class RelaxingNewton(Newton):
         return least
 
     def _add(self, shape: Shape, *, anew: bool) -> None:
-        body = self.body
-        kernels.add_overstress(
-            shape.u, self._tensor, body.grad_x, body.grad_y, body.weight, body.nodes, body.unknown, self.tangent,
-            self.force, self.fold, self.core, anew,
-        )  # fmt: skip
+        kernels.add_overstress(shape.u, self._tensor, self.body.elements, self.system, anew)
 
 
 def _terms(laws: Sequence[Prony], region: Indices) -> tuple[Array, Array]:

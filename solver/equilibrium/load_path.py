@@ -6,7 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.contact.active_set import CAP, SLIP, Contact, ContactLost, Course, Touchable, forced, lowered, untouched
+from solver.contact.active_set import (
+    SHEAR_LIMITED,
+    SLIP,
+    Contact,
+    ContactLost,
+    Course,
+    Touchable,
+    forced,
+    lowered,
+    untouched,
+)
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.root import UNMET, met
 from solver.failures import Cancelled, NotConverged, followed_to
@@ -187,6 +197,6 @@ def slide(way: Way, direction: int, speed: float, progress: Progress | None, tim
 
 def _settled(contact: Contact, direction: int, law: FrictionLaw) -> bool:
     """Return whether every touching point slips against the slide, so that further sliding changes nothing."""
-    slips = (contact.state == SLIP) | (contact.state == CAP)
+    slips = (contact.state == SLIP) | (contact.state == SHEAR_LIMITED)
     along = contact.sense == -direction
     return bool((~contact.touching | (slips & (along | law.frictionless))).all())

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver import _kernels as kernels
+from solver._kernels.arguments import MeshTransferArrays
 from solver.body.finite import VALUES, FiniteBody, Narrow
 from solver.contact.edges import arcs_of
 from solver.element import Q2P1
@@ -86,10 +87,11 @@ class Bridge:
         """
         old, new = self.old.body, self.new.body
         u_new, pressure_new = np.empty(new.mesh.nodes.shape), np.empty((len(new.nodes), 3))
-        kernels.carry(
-            u, pressure, old.combination, old.centre, self.along, self.along_parts, self.across, self.across_parts,
-            self.station, self.layer, self.new.points, new.weight, new.modes, u_new, pressure_new,
+        transfer = MeshTransferArrays(
+            old.combination, old.centre, self.along, self.along_parts, self.across, self.across_parts, self.station,
+            self.layer, self.new.points, new.weight, new.modes,
         )  # fmt: skip
+        kernels.carry(u, pressure, transfer, u_new, pressure_new)
         u_new[self.driven] = 0.0
         return u_new, pressure_new
 

@@ -13,12 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver import _kernels as kernels
-from solver._kernels import OPEN, ending
+from solver._kernels import OPEN, bind_arguments
+from solver._kernels.arguments import (
+    BodyState,
+    ContactStates,
+    ContactSystem,
+    ElementSystem,
+    LoadState,
+    SkinPosition,
+)
 from solver.body.finite import FiniteBody
 from solver.body.validation import finite
 from solver.contact.law import FrictionLaw
 from solver.failures import NotConverged
-from solver.linalg.elimination import Elimination
+from solver.linalg.multifrontal import Elimination
 from solver.mesh import Array
 
 States = NDArray[np.int32]
@@ -102,42 +110,28 @@ class Newton:
         self.load = np.zeros(body.size)  # dead loads on the body, of `solver.body.dead_loads`
         self.force = np.zeros(body.size)
         if beside is not None and beside.body.plan is body.plan:
-            self.tangent, self.inside = beside.tangent, beside.inside
-            self.fold, self.dilate, self.core, self.volume = beside.fold, beside.dilate, beside.core, beside.volume
+            self.inside, self.system = beside.inside, beside.system._replace(force=self.force)
         else:
-            self.tangent, self.inside = np.zeros((count, 16, 16)), Elimination(body.plan)
-            self.fold, self.dilate = np.zeros((count, 2, 17)), np.zeros((count, 3, 18))
-            self.core, self.volume = np.zeros((count, 3)), np.zeros((count, 3))
+            self.inside = Elimination(body.plan)
+            self.system = ElementSystem(
+                np.zeros((count, 16, 16)), self.force, np.zeros((count, 2, 17)), np.zeros((count, 3)),
+                np.zeros((count, 3, 18)), np.zeros((count, 3)),
+            )  # fmt: skip
         self.steps = np.zeros((2 * skin, 4))  # of the skin
-        self.length = np.zeros(skin)
         self.bulk = float((body.lame / body.shear).max())  # how much stiffer the body is to a change of volume [-]
-        self.skin_x = body.mesh.nodes[body.skin, 0]
-        self._reaction = np.zeros((skin, 2))
-        self._state, self._sense = np.zeros(skin, np.int32), np.zeros(skin, np.int32)
-        self._free = np.zeros(2 * skin, np.int32)
-        self._matrix, self._right = np.zeros(4 * skin * skin), np.zeros((2 * skin, 4))
-        self._every = np.empty(body.size)
-        place, skin, factored = body.mesh.nodes, body.skin, self.inside.factored
-        lies = place, skin, body.middle
-        self._assemble = ending(
-            kernels.assemble, body.grad_x, body.grad_y, body.weight, body.modes, body.laplace, body.shear,
-            body.stiffening, body.lame, body.nodes, body.unknown, self.tangent, self.force, self.fold, self.core,
-            self.dilate, self.volume,
-        )  # fmt: skip
-        self._forces = ending(
-            kernels.forces, body.grad_x, body.grad_y, body.weight, body.modes, body.shear, body.stiffening, body.lame,
-            body.nodes, body.unknown, self.force, self.fold, self.core, self.volume,
-        )  # fmt: skip
-        self._settle_skin = ending(
-            kernels.touch, self.force, self.load, place, skin, body.held, body.middle, *factored, self.inside.carried,
-            self.inside.stiffness, self._state, self._sense, self.length, self._free, self._matrix, self._right,
-            self.steps, self._reaction,
-        )  # fmt: skip
-        self._move = ending(
-            kernels.move, self.inside.stiffness, *lies, *factored, self.inside.carried, self._every, body.nodes,
-            body.unknown, body.lame, self.fold, self.dilate, self.volume, self.length,
-        )  # fmt: skip
-        self._meet = ending(kernels.meet, *lies, self.length)
+        self.skin_x, self._skin_y = body.mesh.nodes[body.skin, 0], body.mesh.nodes[body.skin, 1]
+        zero = np.zeros(skin, np.int32)
+        self._states = ContactStates(zero, zero.copy(), np.zeros((skin, 2)))
+        self._contact = ContactSystem(
+            np.zeros(skin), np.zeros(2 * skin, np.int32), np.zeros(4 * skin * skin), np.zeros((2 * skin, 4)), self.steps
+        )
+        elements, inside = body.elements, self.inside
+        self._assemble = bind_arguments(kernels.assemble, elements, self.system)
+        self._forces = bind_arguments(kernels.forces, elements, self.system)
+        self._condense = bind_arguments(kernels.condense_forces, self.force, self.load, inside.carried, inside.factors)
+        self._solve_contact = bind_arguments(kernels.solve_active_set, self._contact)
+        self._meet_skin = bind_arguments(kernels.meet, body.contact_skin, self._contact.length)
+        self._move = bind_arguments(kernels.move, inside.carried, inside.factors, elements, self.system)
 
     def linearise(self, shape: Shape, pull: Pull, anchor: Array, rounds: int = 0) -> bool:
         """Set up the system at `shape` under `pull`, solve it for the skin's `steps` (2 k, 4); False where it fails.
@@ -147,7 +141,7 @@ class Newton:
         """
         self.inside.found = None
         self.systems += 1
-        if not self._assembled(shape) > 0.0 or not self.inside.factorise(self.tangent):
+        if not self._assembled(shape) > 0.0 or not self.inside.factorise(self.system.tangent):
             return False
         return self._touch(shape, pull, anchor, rounds)
 
@@ -164,8 +158,19 @@ class Newton:
         return self._forces(shape.u)
 
     def _touch(self, shape: Shape, pull: Pull, anchor: Array, rounds: int) -> bool:
-        self._state[:], self._sense[:] = shape.state, shape.sense
-        return self._settle_skin(shape.u, anchor, pull.depth, pull.mu, pull.tau, pull.sense, rounds)
+        self._states.state[:], self._states.sense[:] = shape.state, shape.sense
+        self._condense()
+        inside, body = self.inside, self.body
+        solved = self._solve_contact(
+            inside.stiffness, inside.felt, body.contact_skin, self._states, load_state(pull),
+            self._position(shape.u, pull, anchor), rounds,
+        )  # fmt: skip
+        return solved and bool(np.isfinite(self.steps[:, EQUILIBRIUM]).all())
+
+    def _position(self, u: Array, pull: Pull, anchor: Array) -> SkinPosition:
+        """Return where the skin lies for displacements `u` (nodes, 2), relative to the surface."""
+        skin = self.body.skin
+        return SkinPosition(self.skin_x + u[skin, 0], self._skin_y + u[skin, 1] - pull.depth, anchor)
 
     def follows(self, steps: Array) -> Array:
         """Return how the force of the surface along x and y (2, c) changes with `steps` of the skin (2 k, c)."""
@@ -175,13 +180,13 @@ class Newton:
         self, shape: Shape, pull: Pull, skin: Array, anchor: Array, scale: float = 1.0
     ) -> tuple[Shape, float, int]:
         """Return the shape after the skin's step (2 k,), its largest move [mm], and how many states it changed."""
-        u, pressure, reaction = np.empty_like(shape.u), np.empty_like(shape.pressure), np.empty_like(shape.reaction)
-        state, sense = self._state.copy(), self._sense.copy()
-        largest, changed = self._move(
-            shape.u, shape.pressure, skin, scale, anchor, pull.depth, pull.mu, pull.tau, pull.sense, u, pressure, state,
-            sense, reaction,
-        )  # fmt: skip
-        return Shape(u, pressure, state, sense, reaction, pull, shape.iterations + 1), largest, changed
+        after = BodyState(np.empty_like(shape.u), np.empty_like(shape.pressure))
+        skin = np.ascontiguousarray(skin)
+        reaction = (self.inside.felt + self.inside.stiffness @ skin).reshape(-1, 2)
+        states = ContactStates(self._states.state.copy(), self._states.sense.copy(), reaction)
+        largest = self._move(BodyState(shape.u, shape.pressure), skin, scale, after)
+        changed = self._meet_skin(states, self._position(after.u, pull, anchor), load_state(pull))
+        return Shape(*after, *states, pull, shape.iterations + 1), largest, changed
 
     def settle(self, start: Shape, pull: Pull, tolerance: float = 1e-10, limit: int = 25) -> Shape:
         """Return the equilibrium under `pull`, from `start`, its displacements good to `tolerance` [mm].
@@ -228,6 +233,12 @@ class Newton:
 
     def _entered(self, start: Shape, pull: Pull, x: Array) -> Shape:
         """Return `start`, whose skin lies at `x` (k,) along the surface, with the states that `pull` brings at once."""
-        state, sense = start.state.copy(), start.sense.copy()
-        self._meet(start.u, x, pull.depth, pull.mu, pull.tau, pull.sense, state, sense, start.reaction)
-        return Shape(start.u, start.pressure, state, sense, start.reaction, start.pull, start.iterations)
+        states = ContactStates(start.state.copy(), start.sense.copy(), start.reaction)
+        position = SkinPosition(x, self._skin_y + start.u[self.body.skin, 1] - pull.depth, x)
+        self._meet_skin(states, position, load_state(pull))
+        return Shape(start.u, start.pressure, *states, start.pull, start.iterations)
+
+
+def load_state(pull: Pull) -> LoadState:
+    """Return `pull` as loops take it."""
+    return LoadState(float(pull.depth), float(pull.mu), float(pull.tau), int(pull.sense))

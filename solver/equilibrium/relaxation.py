@@ -17,7 +17,7 @@ from math import ceil
 
 import numpy as np
 
-from solver.body.linear import Body, planned
+from solver.body.linear import Body
 from solver.body.receptor import Endings
 from solver.body.stiffness import Elastic, Probes
 from solver.body.validation import check_body, check_driven, check_held, check_terms
@@ -46,8 +46,8 @@ class _Ready:
 class RelaxingBody:
     """A held body and its past; e elements, m terms at most in any of its materials."""
 
-    def __init__(self, mesh: Mesh, laws: Sequence[Prony], *, in_loops: bool = False, checked: bool = False) -> None:
-        """Start at rest; `laws` by region, `in_loops` as in `Body.of`. Raises BodyError and MeshError unless `checked`.
+    def __init__(self, mesh: Mesh, laws: Sequence[Prony], *, checked: bool = False) -> None:
+        """Start at rest; `laws` by region. Raises BodyError and MeshError unless `checked`.
 
         It takes no dead loads.
         """
@@ -56,8 +56,7 @@ class RelaxingBody:
             check_terms(laws)
             check_driven(mesh)
             check_held(mesh)
-        self.mesh, self._laws, self._in_loops = mesh, laws, in_loops
-        self._tree = planned(mesh, in_loops=in_loops)
+        self.mesh, self._laws = mesh, laws
         count, most = len(mesh.elements), max(len(law.terms) for law in laws)
         self._g, self._tau = np.zeros((count, most)), np.ones((count, most))
         for number, law in enumerate(laws):
@@ -172,8 +171,6 @@ class RelaxingBody:
             body = Body.of(
                 self.mesh,
                 [law.within(step) for law in self._laws],
-                tree=self._tree,
-                in_loops=self._in_loops,
                 checked=True,
             )
             t = body.touchable

@@ -15,7 +15,7 @@ from solver.scene import Finger, Receptor
 
 EPIDERMIS, DERMIS, FAT, BONE = 0, 1, 2, 3  # numbers of the regions
 CORE = 1.0 / 3.0  # radius of a meshed bone's core, which is driven, by the bone's [-]
-# Sizes of elements, by tip radius over fineness; chosen on random scenes at finite strain (docs/solver.md)
+# Sizes of elements, by tip radius over fineness; chosen on random scenes at finite strain
 ANYWHERE = 0.5  # along the skin that may touch, where the edges of contact are not known
 EDGE = 0.85  # along the skin at the edges of contact, where they are known
 MIDDLE = 1.7  # along the skin, in the middle of a contact whose edges are known
@@ -34,7 +34,7 @@ BEYOND = 0.1  # skin beyond known edges that is looked at for contact, by its wi
 FOLD = (0.015, 0.1)  # where the skin folds: of the tip radius, and of the epidermis if that is less
 AROUND, FROM_FOLD = 4.0, 0.5  # so many of these elements to each side are as small; growth from there [-]
 THIN = 2.0 / 3.0  # across the skin there, by that along it
-AT_CUT = 0.12  # along the skin at a free cut's palmar end, by tip radius (docs/solver-finite-strain.md)
+AT_CUT = 0.12  # along the skin at a free cut's palmar end, by tip radius (docs/explanation/solver-model.md)
 SHORT_AT_CUT = 0.03  # the same where tissue is hardly squeezed there
 COARSE, FROM_CUT = 10.0, 0.5  # fineness below which those are longer in proportion; growth from there [-]
 APART = 0.1  # skin nearer to where it is held is squeezed without bound, by tip radius

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.contact.active_set import CAP, SLIP, STICK, Contact, System, Touchable
+from solver.contact.active_set import SHEAR_LIMITED, SLIP, STICK, Contact, System, Touchable
 from solver.contact.law import FrictionLaw
 from solver.continuation.small_states import law_of
 from solver.equilibrium.finger import FingerModel
@@ -60,7 +60,7 @@ def of_forces(body: Touchable, law: FrictionLaw, contact: Contact) -> tuple[Arra
     """
     if (contact.state == STICK).any():
         raise ValueError("a state with sticking points depends on the way to it, which its tangent does not know")
-    slips, capped = contact.state == SLIP, contact.state == CAP
+    slips, capped = contact.state == SLIP, contact.state == SHEAR_LIMITED
     normal, tangential = np.zeros((2, len(contact.state), 3))
     tangential[slips, 0] = (contact.sense * contact.normal)[slips]  # what friction changes by itself
     tangential[capped, 1] = (contact.sense * body.length)[capped]

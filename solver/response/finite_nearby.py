@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver import _kernels as kernels
-from solver import kernels_numpy
+from solver.body.finite_measures import pressure
 from solver.continuation.arc_length import leapt
 from solver.continuation.limit_point import sound
 from solver.equilibrium import force_control as finite_forced
@@ -34,8 +34,8 @@ def met_again(found: Prediction) -> "FiniteNearby | None":
     pull = Pull(found.indentation, float(scene.friction.mu), scene.friction.cap, sense)
     state = states(skin).astype(np.int32)
     reaction = np.stack([skin.traction, skin.pressure], axis=1) * length[:, None]
-    pressure = kernels_numpy.pressure(body, found.displacement)
-    start = Shape(found.displacement, pressure, state, np.full(len(state), sense, np.int32), reaction, pull, 0)
+    modes = pressure(body, found.displacement)
+    start = Shape(found.displacement, modes, state, np.full(len(state), sense, np.int32), reaction, pull, 0)
     try:
         return FiniteNearby(scene, finger, finger.newton.settle(start, pull))
     except NotConverged:

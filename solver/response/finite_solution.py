@@ -11,7 +11,7 @@ from time import perf_counter
 
 import numpy as np
 
-from solver import kernels_numpy
+from solver import _kernels as kernels
 from solver._kernels import STICK
 from solver.accuracy import contrasts as differences
 from solver.accuracy import omitted_effects as evidence
@@ -190,9 +190,10 @@ def _slide(finger: FiniteFinger, shape: Shape) -> float:
 
 
 def _skin(finger: FiniteFinger, shape: Shape) -> Skin:
-    place = shape.place(finger.newton.body)
-    touching = shape.touching
-    length = np.where(touching, kernels_numpy.tributary(place[:, 0]), 1.0)
+    body = finger.newton.body
+    place, touching, length = shape.place(body), shape.touching, np.empty(len(shape.state))
+    kernels.tributary(np.ascontiguousarray(place[:, 0]), body.middle, length)
+    length = np.where(touching, length, 1.0)
     return Skin(
         x=place[:, 0],
         gap=np.where(touching, 0.0, place[:, 1] - shape.pull.depth),

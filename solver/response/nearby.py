@@ -39,11 +39,11 @@ class Nearby(Protocol):
         ...
 
 
-def nearby(predictions: Sequence[Prediction], *, in_loops: bool = False) -> Iterator[Nearby | None]:
+def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
     """Yield the slide of each prediction.
 
     None where the finger is only pressed or held by a drag, so that its state depends on the way to it, and where the
-    state is not met again. `in_loops` as in `solver.response.solution.answers`.
+    state is not met again.
     """
     model: FingerModel | None = None
     for found in predictions:
@@ -58,7 +58,7 @@ def nearby(predictions: Sequence[Prediction], *, in_loops: bool = False) -> Iter
             yield met_again(found)
             continue
         if model is None or model.geometry is not found.geometry:
-            model = FingerModel.on(scene, found.geometry, in_loops=in_loops)
+            model = FingerModel.on(scene, found.geometry)
         guess = states(found.skin).astype(np.int8)
         try:
             yield _SmallNearby(scene, model, _slide(model, scene, guess))

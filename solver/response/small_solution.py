@@ -79,9 +79,9 @@ class _Shared:
 class Fingers:
     """Makes the fingers of one group of scenes, each mesh once; those of the last fineness asked for are kept."""
 
-    def __init__(self, scene: Scene, *, in_loops: bool) -> None:
-        """Make none yet; `in_loops` as in `Body.of`."""
-        self._scene, self._in_loops = scene, in_loops
+    def __init__(self, scene: Scene) -> None:
+        """Make none yet."""
+        self._scene = scene
         self._fineness = 0.0
         self._made: dict[Sizing, tuple[FingerModel, float]] = {}
 
@@ -95,7 +95,7 @@ class Fingers:
         """Return the finger, and what it took to make [s]. Raises SceneError, NotConverged."""
         if sizing not in self._made:
             begun = perf_counter()
-            finger = _meshed(self._scene, sizing, self._in_loops)
+            finger = _meshed(self._scene, sizing)
             self._made[sizing] = finger, perf_counter() - begun
         return self._made[sizing]
 
@@ -163,9 +163,9 @@ def _report(progress: Progress | None, part: float) -> None:
         raise Cancelled
 
 
-def _meshed(scene: Scene, sizing: Sizing, in_loops: bool) -> FingerModel:
+def _meshed(scene: Scene, sizing: Sizing) -> FingerModel:
     try:
-        return FingerModel.of(scene, sizing, in_loops=in_loops)
+        return FingerModel.of(scene, sizing)
     except MeshError as bad:
         raise SceneError("finger.tip_radius", scene.finger.tip_radius, f"no mesh fits this finger ({bad})") from bad
     except LinAlgError as bad:

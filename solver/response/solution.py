@@ -29,15 +29,13 @@ FINEST_HAS = 0.5  # of an error that meshes have in common, the part that is the
 Rough = Callable[[Prediction], None]  # told an answer before more is made of it: what there is, should work be stopped
 
 
-def solve(
-    scene: Scene, progress: Progress | None = None, *, rough: Rough | None = None, in_loops: bool = False
-) -> Prediction:
-    """Return the prediction of one scene; `rough` and `in_loops` as in `answers`.
+def solve(scene: Scene, progress: Progress | None = None, *, rough: Rough | None = None) -> Prediction:
+    """Return the prediction of one scene; `rough` as in `answers`.
 
     Raises NoSteadyState where the scene has no settled sliding, NotConverged where none was found, SceneError where
     its finger cannot be meshed, Cancelled where `progress` says so.
     """
-    return solve_together((scene,), progress, rough=rough, in_loops=in_loops)[0]
+    return solve_together((scene,), progress, rough=rough)[0]
 
 
 def solve_together(
@@ -45,9 +43,8 @@ def solve_together(
     progress: Progress | None = None,
     *,
     rough: Rough | None = None,
-    in_loops: bool = False,
 ) -> tuple[Prediction, ...]:
-    """Return the predictions of several scenes, in their order; `rough` and `in_loops` as in `answers`.
+    """Return the predictions of several scenes, in their order; `rough` as in `answers`.
 
     Scenes with the same finger, materials and receptor share one mesh, fine enough for the strictest tolerance among
     them, so that differences between them are more accurate than each of them; at finite strain those do that are
@@ -57,7 +54,7 @@ def solve_together(
     Raises as `solve` does.
     """
     done: list[Prediction] = []
-    for answer in answers(scenes, progress, rough=rough, in_loops=in_loops):
+    for answer in answers(scenes, progress, rough=rough):
         if isinstance(answer, SolveFailure):
             raise answer
         done.append(answer)
@@ -70,12 +67,8 @@ def answers(
     watch: Watch | None = None,
     *,
     rough: Rough | None = None,
-    in_loops: bool = False,
 ) -> tuple[Prediction | SolveFailure, ...]:
     """Return the prediction of each scene or why it has none, as `solve_together` does.
-
-    With `in_loops` small strain is solved by compiled loops, as finite strain always is: to round-off the same, and
-    what a process should ask for that solves again and again. To load them takes longer than one solve without them.
 
     At small strain `watch` is told each answer, by the position of its scene, as soon as it is found, with the finger
     and the way that led to it; where another mesh is needed it is told once more. `rough` is told the answers that a
@@ -88,14 +81,14 @@ def answers(
         if id(answer) not in known:
             if rough is not None and isinstance(answer, Prediction):
                 rough(answer)
-            known[id(answer)] = answer, _with_evidence(answer, progress, in_loops)
+            known[id(answer)] = answer, _with_evidence(answer, progress)
         return known[id(answer)][1]
 
     def seen(number: int, answer: Answer, finger: FingerModel, way: March | None) -> None:
         assert watch is not None
         watch(number, evident(answer), finger, way)
 
-    found = _answers(scenes, progress, seen if watch else None, rough, in_loops=in_loops)
+    found = _answers(scenes, progress, seen if watch else None, rough)
     return tuple(evident(answer) for answer in found)
 
 
@@ -104,29 +97,27 @@ def _answers(
     progress: Progress | None = None,
     watch: Watch | None = None,
     rough: Rough | None = None,
-    *,
-    in_loops: bool,
 ) -> tuple[Answer, ...]:
     """Do the same, evidence as far as it comes with the answers."""
     out: dict[int, Answer] = {}
     for group in _groups(scenes):
-        found = _solve_group([scenes[i] for i in group], progress, _within(watch, group), rough, in_loops)
+        found = _solve_group([scenes[i] for i in group], progress, _within(watch, group), rough)
         out |= dict(zip(group, found, strict=True))
     told = {i: answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer for i, answer in out.items()}
     return tuple(told[i] for i in range(len(scenes)))
 
 
-def _with_evidence(found: Answer, progress: Progress | None, in_loops: bool) -> Answer:
+def _with_evidence(found: Answer, progress: Progress | None) -> Answer:
     """Return the answer with its evidence marched, and measured where its scene asks for that."""
     if not isinstance(found, Prediction) or found.scene.solve.evidence == "quick":
         return found
     tell("estimating what the model leaves out")
-    found = with_held(found, lambda: progress is not None and not progress(1.0), in_loops=in_loops)
-    found = _with_earlier_slides(found, lambda scenes: _answers(scenes, progress, in_loops=in_loops))
+    found = with_held(found, lambda: progress is not None and not progress(1.0))
+    found = _with_earlier_slides(found, lambda scenes: _answers(scenes, progress))
     if found.scene.solve.evidence == "estimated":
         return found
     tell("measuring what the model leaves out")
-    return measured(found, lambda scenes: _answers(scenes, progress, in_loops=in_loops))
+    return measured(found, lambda scenes: _answers(scenes, progress))
 
 
 def _with_earlier_slides(found: Prediction, solved: Answers) -> Prediction:
@@ -155,14 +146,14 @@ def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
 
 
 def _solve_group(
-    scenes: list[Scene], progress: Progress | None, watch: Watch | None, rough: Rough | None, in_loops: bool
+    scenes: list[Scene], progress: Progress | None, watch: Watch | None, rough: Rough | None
 ) -> list[Answer]:
     """Solve scenes that share a mesh on the coarsest that does."""
     asked = [s.solve.tolerance for s in scenes if s.solve.tolerance is not None]
     kind = scenes[0].solve.kinematics
-    depth = max(expected_depth(scene, in_loops=in_loops) for scene in scenes)
+    depth = max(expected_depth(scene) for scene in scenes)
     fineness: float = coarsest_for(scenes[0].driven(depth), min(asked)) if asked else DEFAULT[kind]
-    on_mesh = _Meshing(depth, progress, Fingers(scenes[0], in_loops=in_loops))
+    on_mesh = _Meshing(depth, progress, Fingers(scenes[0]))
     marched = kind == "small" and any(scene.solve.course == "history" for scene in scenes)
     if marched and (asked or differences.together(scenes)):
         return _marched(scenes, fineness, on_mesh, watch)

@@ -62,7 +62,7 @@ def stepper(scene: Scene) -> Stepper:
     Forces that press much deeper lose the state. Raises SceneError where the finger cannot be meshed.
     """
     kind = scene.solve.kinematics
-    sizing = Sizing(FINENESS[kind], expected_depth(scene, in_loops=True), margin=MARGIN[kind])
+    sizing = Sizing(FINENESS[kind], expected_depth(scene), margin=MARGIN[kind])
     mu, tau = float(scene.friction.mu), scene.friction.cap
     # Imported here: only what is asked for is loaded, compiled loops of the other kinematics are not.
     if kind == "finite":
@@ -73,7 +73,7 @@ def stepper(scene: Scene) -> Stepper:
     from solver.equilibrium.finger import FingerModel
     from solver.response.small_stepper import Condensed, SmallStepper
 
-    follower = SmallStepper(Condensed.of(FingerModel.of(scene, sizing, in_loops=True)), mu, tau)
+    follower = SmallStepper(Condensed.of(FingerModel.of(scene, sizing)), mu, tau)
     follower.step(1e-3, 0.0)  # compiles, or loads what was compiled
     follower.forget()
     return follower

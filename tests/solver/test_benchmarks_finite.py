@@ -8,7 +8,6 @@ import pytest
 from daq_app.accuracy.published.bodies import distorted
 from daq_app.accuracy.published.finite_contacts import ELEMENT, light_finite
 from daq_app.accuracy.published.problems import CAPPED, FINITE_PARTS
-from solver import kernels_numpy
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import LAWS, energy, stress
 from solver.equilibrium.full_slip import settled
@@ -16,6 +15,7 @@ from solver.equilibrium.newton import Pull
 from solver.mesh.blocks import block
 from solver.mesh.grid import quality
 from tests.solver.finite_examples import finger
+from tests.solver.oracle import finite as oracle
 
 MEMBERS = [law(0.08, nu) for law in LAWS for nu in (0.48, 0.4999999)]
 
@@ -55,16 +55,16 @@ def test_a_homogeneous_state_is_an_equilibrium_of_any_mesh_with_the_energy_and_f
     mesh, edge = sheet(kind)
     body = FiniteBody.of(mesh, [law])
     u = mesh.nodes @ (gradient - np.eye(2)).T
-    det = np.linalg.det(kernels_numpy.deformation(body, u))
+    det = np.linalg.det(oracle.deformation(body, u))
     pressure = body.lame[:, None] * np.einsum("eq,eqm,eq->em", body.weight, body.modes, np.log(det))
-    found, _ = kernels_numpy.forces_and_tangents(body, u, pressure)
+    found, _ = oracle.forces_and_tangents(body, u, pressure)
     force = np.zeros(mesh.nodes.shape)
     np.add.at(force, mesh.elements, found.reshape(-1, 9, 2))
     area = body.weight.sum()
     scale = np.abs(stress(law, gradient)).max() * 2.0
     inner = np.setdiff1d(np.arange(len(force)), edge)
     assert np.abs(force[inner]).max() < 1e-11 * scale * (5e6 if law.nu > 0.49 else 1.0)
-    assert kernels_numpy.energy(body, u) == pytest.approx(area * energy(law, gradient), rel=1e-7, abs=1e-15)
+    assert oracle.energy(body, u) == pytest.approx(area * energy(law, gradient), rel=1e-7, abs=1e-15)
     work = np.einsum("na,nb->ab", force, mesh.nodes) / area
     np.testing.assert_allclose(work, stress(law, gradient), atol=1e-9 * scale)
 
@@ -74,7 +74,7 @@ def test_without_friction_the_energy_that_is_stored_is_the_work_of_the_press():
     newton, _, _ = finger(5)
 
     def stored(depth):
-        return kernels_numpy.energy(newton.body, settled(newton, Pull(depth, 0.0, sense=1), tolerance=1e-12).u)
+        return oracle.energy(newton.body, settled(newton, Pull(depth, 0.0, sense=1), tolerance=1e-12).u)
 
     def slope(step):
         return (stored(1.5 + step) - stored(1.5 - step)) / (2.0 * step)

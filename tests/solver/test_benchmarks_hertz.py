@@ -9,7 +9,7 @@ import pytest
 from daq_app.accuracy.published import contacts
 from daq_app.accuracy.published.contacts import ELEMENT
 from daq_app.accuracy.published.problems import BELOW, CAPPED, HERTZ, PARTS
-from solver.contact.active_set import CAP, OPEN, SLIP
+from solver.contact.active_set import OPEN, SHEAR_LIMITED, SLIP
 from solver.contact.law import FrictionLaw
 
 
@@ -127,4 +127,4 @@ def test_a_bound_on_a_hertz_pressure_carries_the_elementary_integral(light, k, f
     assert contacts.capped_width(light, found, law) == pytest.approx(
         np.sqrt(1 - k**2), rel=0.005, abs=ELEMENT if k == 1.0 else 0.0
     )
-    assert set(found.state.tolist()) <= {OPEN, SLIP, CAP}
+    assert set(found.state.tolist()) <= {OPEN, SLIP, SHEAR_LIMITED}

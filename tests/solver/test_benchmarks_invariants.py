@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from solver.contact.active_set import CAP, SLIP, Contact, Course
+from solver.contact.active_set import SHEAR_LIMITED, SLIP, Contact, Course
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.load_path import march
@@ -57,14 +57,14 @@ def test_at_every_step_nothing_lies_below_the_surface_pulls_or_drags_beyond_the_
 @pytest.mark.parametrize("way", WAYS)
 def test_in_steady_sliding_the_drag_is_the_law_s(finger, ways, way):
     law, contact = LAWS[way[0]], ways[way].instants[-1].contact
-    assert set(contact.state[contact.touching].tolist()) <= {SLIP, CAP}
+    assert set(contact.state[contact.touching].tolist()) <= {SLIP, SHEAR_LIMITED}
     drag, force = -way[1] * contact.tangential.sum(), contact.normal.sum()
     if law.tau_max == np.inf:
         assert drag / force == pytest.approx(law.mu, rel=1e-12)
     else:
         length = finger.body.touchable.length[contact.touching].sum()
         assert drag <= min(law.mu * force, law.tau_max * length)
-        assert (contact.state == CAP).any()
+        assert (contact.state == SHEAR_LIMITED).any()
         assert (contact.state == SLIP).any()
 
 

@@ -9,7 +9,7 @@ from daq_app.accuracy.published.bodies import distorted
 from solver.body.linear import Body, edge_load
 from solver.body.stiffness import Probes
 from solver.constitutive.linear import Hooke
-from solver.contact.active_set import CAP, SLIP, STICK, Course, untouched
+from solver.contact.active_set import SHEAR_LIMITED, SLIP, STICK, Course, untouched
 from solver.contact.law import FrictionLaw
 from solver.element import Q2P1
 from solver.mesh import Mesh
@@ -92,6 +92,6 @@ def test_a_uniform_patch_drags_by_the_smaller_of_mu_p_and_the_bound_exactly(boun
     mesh, loads = pressed(0.48, shear, 1)
     body = Body.of(mesh, [Hooke(0.08, 0.48)], loads, free=("y", "turn"))
     found = Course(body.touchable, FrictionLaw(mu, bound)).sliding(0.0, 1)
-    assert (found.state == (SLIP if bound > mu * 1e-3 else CAP)).all()
+    assert (found.state == (SLIP if bound > mu * 1e-3 else SHEAR_LIMITED)).all()
     assert np.abs(found.tangential / body.touchable.length + shear).max() < 1e-15
     assert -found.tangential.sum() == pytest.approx(min(mu * 2e-3, bound * 2.0), rel=1e-12, abs=1e-18)

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from solver import kernels_numpy
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.mesh_transfer import Bridge, Places
 from solver.equilibrium.newton import Pull
 from solver.mesh.mesher import Sizing, finger_mesh
 from solver.scene import Finger, Receptor
 from tests.solver.finite_examples import finger
+from tests.solver.oracle import finite as oracle
 
 PULL = Pull(1.0, 0.28, 0.008033, -1)
 
@@ -36,7 +36,7 @@ def test_the_compiled_carrying_is_the_plain_one():
     slopes[:, 0] -= np.einsum("ei,ei->e", combined[:, 1:], old.body.centre)
     layers = len(old.heights) // 2
     host = bridge.station[:, None, :, None] * layers + bridge.layer[None, :, None, :]
-    u, pressure = kernels_numpy.carry(
+    u, pressure = oracle.carry(
         shape.u.reshape(len(old.arcs), len(old.heights), 2), slopes, (bridge.along, bridge.along_parts),
         (bridge.across, bridge.across_parts), host.reshape(-1, 9), new.points, new.body.weight, new.body.modes,
     )  # fmt: skip

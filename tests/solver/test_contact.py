@@ -7,7 +7,7 @@ import pytest
 
 from solver.body.linear import Body
 from solver.constitutive.linear import Hooke
-from solver.contact.active_set import CAP, OPEN, SLIP, STICK, ContactLost, Course, forced, untouched
+from solver.contact.active_set import OPEN, SHEAR_LIMITED, SLIP, STICK, ContactLost, Course, forced, untouched
 from solver.contact.law import FrictionLaw
 from solver.mesh.blocks import block
 
@@ -62,7 +62,7 @@ def test_friction_with_a_bound_on_a_hertz_pressure_carries_the_closed_form(press
     exact = {0.8: 0.895912, 0.6: 0.715243, 0.4: 0.495368}[k]
     assert -found.tangential.sum() / (mu * 0.01) == pytest.approx(exact, rel=0.005)
     x = body.mesh.nodes[body.mesh.skin, 0]
-    capped = x[found.state == CAP]
+    capped = x[found.state == SHEAR_LIMITED]
     assert np.ptp(capped) / 2 == pytest.approx(0.782578 * np.sqrt(1 - k**2), abs=0.035)
 
 
@@ -73,7 +73,7 @@ def test_the_short_way_to_settled_sliding_ends_where_steps_from_another_guess_do
     far = np.where(touch.gap < 0.02, SLIP, OPEN).astype(np.int8)
     short, long = course.sliding(0.01, +1), course.sliding(0.01, +1, far)
     assert np.array_equal(short.state, long.state)
-    assert (short.state == CAP).any() == (tau_max < np.inf)
+    assert (short.state == SHEAR_LIMITED).any() == (tau_max < np.inf)
     for name in ("normal", "tangential", "gap", "shift"):
         mine, other = getattr(short, name), getattr(long, name)
         np.testing.assert_allclose(mine, other, rtol=0.0, atol=1e-12 * np.abs(other).max() + 1e-300)

@@ -12,7 +12,7 @@ from solver.body.stiffness import Elastic, Probes
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
 from solver.constitutive.hyperelastic import shape as grown
 from solver.constitutive.linear import Hooke
-from solver.contact.active_set import CAP, OPEN, SLIP, STICK, Course, Touchable
+from solver.contact.active_set import OPEN, SHEAR_LIMITED, SLIP, STICK, Course, Touchable
 from solver.contact.law import FrictionLaw
 from solver.continuation.small_states import law_of, numbers_on, settled
 from solver.equilibrium import force_control as finite_forced
@@ -92,7 +92,7 @@ SMALL = {
 def test_at_small_strain_they_are_the_differences_of_solves_within_one_set_of_states(small, name):
     here = SMALL[name]
     contact = settled(here, small)
-    assert ("at the bound" in name) == (contact.state == CAP).any()
+    assert ("at the bound" in name) == (contact.state == SHEAR_LIMITED).any()
 
     def numbers(one):
         return small_numbers(small, one, contact.state)
@@ -137,7 +137,7 @@ def test_one_point_on_springs_answers_as_its_formula_says():
     assert normal[0] == pytest.approx([b * d / soft**2, 0.0, 1.0 / soft], rel=1e-14)
     assert drag[0] == pytest.approx([-d / soft - mu * b * d / soft**2, 0.0, -mu / soft], rel=1e-14)
     capped = Course(springs(b), FrictionLaw(mu, tau)).sliding(d, 1)
-    assert capped.state.tolist() == [CAP, OPEN]
+    assert capped.state.tolist() == [SHEAR_LIMITED, OPEN]
     normal, drag = of_forces(springs(b), FrictionLaw(mu, tau), capped)
     assert normal[0] == pytest.approx([0.0, b * length / 3.0, 1.0 / 3.0], rel=1e-14)
     assert drag[0] == pytest.approx([0.0, -length, 0.0], rel=1e-14)
@@ -213,7 +213,7 @@ FINITE = {
 def test_at_finite_strain_they_are_the_differences_of_solves_within_one_set_of_states(finite, name):
     here = FINITE[name]
     shape = slid(finite, here)
-    assert ("at the bound" in name) == (shape.state == CAP).any()
+    assert ("at the bound" in name) == (shape.state == SHEAR_LIMITED).any()
 
     def numbers(one):
         return finite_numbers(finite, one, shape)

@@ -116,14 +116,14 @@ def test_differences_between_surfaces_that_hardly_differ_are_good_to_5_percent_o
 def test_surfaces_that_the_finest_mesh_does_not_tell_apart_say_in_what_and_by_how_much(monkeypatch):
     monkeypatch.setitem(FINENESS, "small", (5, 6, 8))
     asked, true = hardly_different("small", None)
-    found = solve_together(asked, in_loops=True)
+    found = solve_together(asked)
     seds = np.array([p.sed_ending for p in found])
     wrong = np.ptp(seds - true[:, 0]) / np.ptp(true[:, 0])
     assert wrong > 0.02
     (told,) = {w for p in found for w in p.warnings if w.startswith("Differences in SED")}
     part = float(told.split(" may be off by ")[1].split(" %")[0])
     assert 100.0 * wrong < part < 1000.0 * wrong
-    quick = solve_together([replace(s, solve=Solve(evidence="quick")) for s in asked], in_loops=True)
+    quick = solve_together([replace(s, solve=Solve(evidence="quick")) for s in asked])
     assert not [w for p in quick for w in p.warnings if w.startswith("Differences")]
 
 
@@ -131,8 +131,8 @@ def test_surfaces_that_the_finest_mesh_does_not_tell_apart_say_in_what_and_by_ho
 def test_courses_of_surfaces_that_hardly_differ_are_marched_and_told_once_on_a_mesh_that_tells_them_apart():
     asked, true = hardly_different("small", None, "history")
     told = []
-    together = answers(asked, watch=lambda number, *_: told.append(number), in_loops=True)
+    together = answers(asked, watch=lambda number, *_: told.append(number))
     assert told == [0, 1, 2]
     found = np.array([p.sed_ending for p in together])
     assert np.ptp(found - true[:, 0]) < 0.05 * np.ptp(true[:, 0])
-    assert solve(asked[0], in_loops=True).dofs < together[0].dofs
+    assert solve(asked[0]).dofs < together[0].dofs

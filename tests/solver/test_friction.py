@@ -7,15 +7,17 @@ import numpy as np
 import pytest
 
 from solver import _kernels as kernels
-from solver import kernels_numpy
+from solver._kernels.arguments import ContactStates, LoadState
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.contact import law as friction
 from solver.contact.active_set import Contact, Course, Touchable, untouched
-from solver.contact.law import CAP, LAWS, NAMES, OPEN, SLIP, STICK, FrictionLaw
+from solver.contact.law import LAWS, NAMES, OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, BY_TRAVEL, Newton, Pull, Shape
 from solver.mesh.blocks import block
 from solver.response.small_stepper import Condensed, SmallStepper
+from tests.solver.oracle import finite as oracle
+from tests.solver.oracle.contact import Course as PlainCourse
 
 FREE, BOUND = FrictionLaw(0.5, np.inf), FrictionLaw(0.5, 0.02)
 STEEP, NEVER_FELT = FrictionLaw(1000.0, 0.02), FrictionLaw(0.5, 1e9)
@@ -44,13 +46,13 @@ class Told:
     length: np.ndarray
 
 
-def springs(*, in_loops=False):
+def springs():
     """Five points that do not feel each other, the outer two above any depth."""
     one, zero = np.eye(5), np.zeros(5)
     along_y, across, along_x = COMPLIANCE
     return Touchable(
         np.array([9.0, 0.0, 0.02, 0.15, 9.0]), LENGTH, along_y * one, across * one, along_x * one, zero, zero,
-        np.zeros((10, 0)), np.zeros(0), in_loops,
+        np.zeros((10, 0)), np.zeros(0),
     )  # fmt: skip
 
 
@@ -58,24 +60,24 @@ def told(found: Contact, before: Contact):
     return Told(found.state, found.sense, found.normal, found.tangential, found.gap, found.shift - before.shift, LENGTH)
 
 
-def driven(law, *, in_loops=False):
-    body = springs(in_loops=in_loops)
-    course, states = Course(body, law), [untouched(body)]
+def driven(law, search=Course):
+    body = springs()
+    course, states = search(body, law), [untouched(body)]
     for depth, travel in DRIVES:
         states.append(course.step(states[-1], depth, travel))
     return [told(now, before) for before, now in pairwise(states)]
 
 
-def driven_in_loops(law):
-    return driven(law, in_loops=True)
+def driven_plainly(law):
+    return driven(law, PlainCourse)
 
 
 def slid_at_once(law):
     """Settled slides either way, which know no way there: what slips does so against its force."""
     rubbed = []
-    for in_loops in (False, True):
+    for search in (PlainCourse, Course):
         for direction in (1, -1):
-            found = Course(springs(in_loops=in_loops), law).sliding(0.3, direction)
+            found = search(springs(), law).sliding(0.3, direction)
             rubbed.append(replace(told(found, found), slid=np.full(5, 100.0 * direction)))
     return rubbed
 
@@ -122,7 +124,7 @@ def finite(law, newton):
     out, shapes = [], dragged(newton, law)
     for before, now in pairwise(shapes):
         place, moved = now.place(newton.body), now.pull.travel - before.pull.travel
-        length = np.maximum(kernels_numpy.rubbed(place[:, 0], now.touching, law.mu), 0.0)
+        length = np.maximum(oracle.rubbed(place[:, 0], now.touching, law.mu), 0.0)
         slid = place[:, 0] - before.place(newton.body)[:, 0] - moved
         drag, push = now.reaction.T
         touching = now.state != OPEN  # elsewhere the body's own unbalanced forces, round-off of the iterations
@@ -131,7 +133,7 @@ def finite(law, newton):
     return out
 
 
-WAYS = [driven, driven_in_loops, slid_at_once, pressed_by_forces, finite]
+WAYS = [driven, driven_plainly, slid_at_once, pressed_by_forces, finite]
 
 
 @pytest.fixture(params=WAYS, ids=lambda way: way.__name__)
@@ -142,7 +144,7 @@ def course(request, cushion):
 
 def test_every_law_of_the_list_is_tested_here():
     assert {type(law) for law in MEMBERS} == set(LAWS)
-    assert (OPEN, STICK, SLIP, CAP) == (kernels.OPEN, kernels.STICK, kernels.SLIP, kernels.CAP)
+    assert (OPEN, STICK, SLIP, SHEAR_LIMITED) == (kernels.OPEN, kernels.STICK, kernels.SLIP, kernels.SHEAR_LIMITED)
     assert friction.STEEP == kernels.STEEP
 
 
@@ -165,18 +167,18 @@ def test_wherever_contact_is_looked_for_what_is_found_is_what_the_law_says(cours
         assert (at.tangential * at.slid).max() < close * np.abs(at.slid).max() + 1e-300
         slips = at.state >= SLIP
         assert (at.tangential * at.sense)[slips].min(initial=0.0) >= -close
-        for state, force in ((SLIP, law.mu * at.normal), (CAP, law.tau_max * at.length)):
+        for state, force in ((SLIP, law.mu * at.normal), (SHEAR_LIMITED, law.tau_max * at.length)):
             np.testing.assert_allclose(np.abs(at.tangential)[at.state == state], force[at.state == state], atol=close)
         met |= set(at.state.tolist())
-    possible = {OPEN, SLIP} if law.frictionless else {OPEN, STICK, SLIP, CAP}
-    assert met <= possible | {CAP}
+    possible = {OPEN, SLIP} if law.frictionless else {OPEN, STICK, SLIP, SHEAR_LIMITED}
+    assert met <= possible | {SHEAR_LIMITED}
     assert OPEN in met
     if law.frictionless:
         assert STICK not in met
 
 
 def test_every_state_is_met_in_every_course(cushion):
-    courses = [driven(BOUND), driven_in_loops(BOUND), pressed_by_forces(BOUND), finite(BOUND_OF_CUSHION, cushion)]
+    courses = [driven(BOUND), driven_plainly(BOUND), pressed_by_forces(BOUND), finite(BOUND_OF_CUSHION, cushion)]
     for points in courses:
         assert {NAMES[int(state)] for at in points for state in at.state} == set(NAMES.values())
 
@@ -196,8 +198,8 @@ def test_friction_that_vanishes_is_none_and_a_bound_that_is_never_felt_is_none(c
 def test_points_on_springs_carry_what_their_springs_and_the_law_say(law):
     """No point feels another, and without coupling N = (d - g)/a; T is the springs' pull, cut off."""
     body = replace(springs(), normal_by_tangential=np.zeros((5, 5)))
-    for in_loops in (False, True):
-        course = Course(replace(body, in_loops=in_loops), law)
+    for search in (PlainCourse, Course):
+        course = search(body, law)
         before = untouched(body)
         for depth, travel in DRIVES:
             normal = np.maximum(depth - body.gap, 0.0) / COMPLIANCE[0]
@@ -210,7 +212,7 @@ def test_points_on_springs_carry_what_their_springs_and_the_law_say(law):
 
 @pytest.mark.parametrize("law", MEMBERS, ids=str)
 def test_compiled_loops_find_the_states_and_forces_that_plain_numpy_finds(law):
-    for plain, found in zip(driven(law), driven_in_loops(law), strict=True):
+    for plain, found in zip(driven_plainly(law), driven(law), strict=True):
         np.testing.assert_array_equal(found.state, plain.state)
         for name in ("normal", "tangential", "gap", "slid"):
             np.testing.assert_allclose(getattr(found, name), getattr(plain, name), atol=1e-13)
@@ -226,9 +228,10 @@ def test_the_loop_of_finite_strain_changes_the_states_that_its_plain_twin_change
         length = draw.uniform(-0.2, 3.0, 9)
         drag = draw.normal(size=9) * law.limit(np.abs(push), np.abs(length))
         reaction, slid, direction = np.stack([drag, push], axis=1), draw.normal(size=9), number % 3 - 1
-        expected = kernels_numpy.restated(state, sense, reaction, above, slid, length, law, direction)
+        expected = oracle.restated(state, sense, reaction, above, slid, length, law, direction)
         found, turned = state.copy(), sense.copy()
-        changed = kernels.restate(found, turned, reaction, above, slid, length, law.mu, law.tau_max, direction)
+        states, load = ContactStates(found, turned, reaction), LoadState(0.0, law.mu, law.tau_max, direction)
+        changed = kernels.update_contact_states(states, slid, above, np.zeros(9), length, load)
         np.testing.assert_array_equal(found, expected[0])
         np.testing.assert_array_equal(turned, expected[1])
         assert changed == np.sum((found != state) | ((found >= SLIP) & (turned != sense)))
@@ -238,7 +241,7 @@ def test_the_loop_of_finite_strain_changes_the_states_that_its_plain_twin_change
 def test_its_slopes_are_the_derivatives_of_its_forces(law):
     """By a step in imaginary direction through s min(mu N, tau_max L)."""
     step, sense = 1e-30j, np.array([1.0, -1.0])
-    state = np.array([SLIP, CAP])
+    state = np.array([SLIP, SHEAR_LIMITED])
 
     def forces(normal, length):
         return sense * np.array([law.mu * normal, law.tau_max * length if law.tau_max < np.inf else 0.0 * length])
@@ -256,7 +259,7 @@ def test_a_state_of_all_kinds_at_finite_strain_moves_as_its_tangent_says(cushion
     start = dragged(cushion, law, ((0.06, 0.0), (0.06, 0.004)))[-1]
     here = Pull(0.06, law.mu, law.tau_max, 0, 0.015)
     now = cushion.settle(start, here, 1e-13)
-    assert set(now.state.tolist()) == {OPEN, STICK, SLIP, CAP}
+    assert set(now.state.tolist()) == {OPEN, STICK, SLIP, SHEAR_LIMITED}
     anchor = start.place(cushion.body)[:, 0] + here.travel - start.pull.travel
     assert cushion.linearise(now, here, anchor)
     tangent, skin = cushion.steps.copy(), cushion.body.mesh.skin

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import kernels_numpy
 from solver._kernels import SLIP, STICK
 from solver.accuracy.finite_audits import course_audits
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.march import march, press_and_slide
 from solver.equilibrium.newton import Pull
 from tests.solver.finite_examples import finger
+from tests.solver.oracle import finite as oracle
 
 
 @pytest.mark.parametrize(
@@ -43,7 +43,7 @@ def test_work_of_the_bone_is_stored_or_lost_to_friction_and_friction_only_takes(
         assert (shape.reaction[:, 0] * slid).max() < 1e-12
         lost -= float(push[:, 0] @ slid)
         before = shape
-    stored = [kernels_numpy.energy(body, shape.u) for shape in (fine[0], fine[-1])]
+    stored = [oracle.energy(body, shape.u) for shape in (fine[0], fine[-1])]
     assert lost > 0.1 * work
     assert work == pytest.approx(stored[1] - stored[0] + lost, rel=3e-3)
     assert course_audits(newton, fine)["course_least_dissipation"] > -1e-14

@@ -25,11 +25,11 @@ def rubbed(scene, mu):
 
 @pytest.fixture(scope="module")
 def found():
-    return dict(zip(DRIVEN, answers(tuple(DRIVEN.values()), in_loops=True), strict=True))
+    return dict(zip(DRIVEN, answers(tuple(DRIVEN.values())), strict=True))
 
 
 def taken_up(prediction):
-    (one,) = nearby([prediction], in_loops=True)
+    (one,) = nearby([prediction])
     return one
 
 
@@ -53,7 +53,7 @@ def test_states_beside_it_are_those_that_are_solved_alone(found, name):
     # Alone, a scene at finite strain or under a force has a mesh of its own, so that its difference holds mesh error.
     scene, one = DRIVEN[name], taken_up(found[name])
     beside = rubbed(scene, 1.05 * scene.friction.mu)
-    (alone,) = answers([beside], in_loops=True)
+    (alone,) = answers([beside])
     here, there = one.seds([scene, beside])[:, 0]
     assert there - here == pytest.approx(alone.sed_ending - here, rel=1e-6 if name == "small, by depth" else 0.05)
 
@@ -61,7 +61,7 @@ def test_states_beside_it_are_those_that_are_solved_alone(found, name):
 @pytest.mark.parametrize("name", ["small, by depth", "finite, by depth"])
 def test_beyond_the_limit_of_sliding_there_is_no_state_and_none_is_invented(name):
     scene = replace(DRIVEN[name], friction=Friction(0.3), loading=Loading(1.2))
-    (prediction,) = answers([scene], in_loops=True)
+    (prediction,) = answers([scene])
     seds = taken_up(prediction).seds([rubbed(scene, 0.31), rubbed(scene, 1.9)])
     assert np.isnan(seds).tolist() == [[False, False], [True, True]]
 
@@ -69,7 +69,7 @@ def test_beyond_the_limit_of_sliding_there_is_no_state_and_none_is_invented(name
 def test_a_finger_that_is_only_pressed_or_held_by_a_drag_depends_on_its_way():
     pressed = Loading(1.0, "none")
     held = Loading(normal_force=0.06, tangential_force=0.01)
-    found = answers([Scene(friction=Friction(0.4), loading=one) for one in (pressed, held)], in_loops=True)
+    found = answers([Scene(friction=Friction(0.4), loading=one) for one in (pressed, held)])
     assert [taken_up(one) for one in found] == [None, None]
 
 
@@ -85,6 +85,6 @@ def test_the_end_of_a_course_that_has_nearly_settled_is_taken_up_as_the_settled_
 @pytest.mark.parametrize("kinematics", ["small", "finite"])
 def test_no_sed_is_told_where_contact_would_reach_beyond_the_skin_that_was_looked_at(kinematics):
     scene = Scene(friction=Friction(0.3), loading=Loading(0.5), solve=Solve(kinematics))
-    (prediction,) = answers([scene], in_loops=True)
+    (prediction,) = answers([scene])
     seds = taken_up(prediction).seds([replace(scene, loading=Loading(depth)) for depth in (0.52, 1.5)])
     assert np.isnan(seds).tolist() == [[False, False], [True, True]]

@@ -8,7 +8,7 @@ import pytest
 from solver.body.linear import Body, edge_load
 from solver.body.stiffness import Probes
 from solver.constitutive.linear import Hooke
-from solver.contact.active_set import CAP, OPEN, SLIP, STICK, ContactLost, Course, untouched
+from solver.contact.active_set import OPEN, SHEAR_LIMITED, SLIP, STICK, ContactLost, Course, untouched
 from solver.contact.law import FrictionLaw
 from solver.mesh import Mesh
 from solver.mesh.blocks import block
@@ -112,7 +112,7 @@ def test_in_full_slip_every_point_carries_the_same_traction(bound):
     mesh, loads = pressed_block(shear, confined=True)
     body = Body.of(mesh, [DERMIS], loads, free=("y", "turn"))
     found = Course(body.touchable, FrictionLaw(mu, bound)).sliding(0.0, 1)
-    assert (found.state == (SLIP if bound == np.inf else CAP)).all()
+    assert (found.state == (SLIP if bound == np.inf else SHEAR_LIMITED)).all()
     assert np.allclose(found.normal, PRESSURE * body.touchable.length, rtol=0, atol=1e-15)
     assert np.allclose(found.tangential, -shear * body.touchable.length, rtol=0, atol=1e-15)
 

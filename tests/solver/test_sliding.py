@@ -4,13 +4,13 @@
 import numpy as np
 import pytest
 
-from solver import kernels_numpy
-from solver._kernels import CAP, OPEN, SLIP
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import Newton, Pull
 from tests.solver.finite_examples import block, finger
+from tests.solver.oracle import finite as oracle
 
 # ending-averaged SED [MPa], normal and tangential force [N/mm]: means of two independent codes (quadrilaterals with
 # exact contact, up to 36,000 unknowns; high-order triangles with penalty contact, 27,000), which agree to 0.05-0.2 %
@@ -46,7 +46,7 @@ def test_the_surface_and_the_bone_push_alike(capped):
     newton, shape = capped
     body = newton.body
     pressure = pressure_of(body, shape.u)
-    force, _ = kernels_numpy.forces_and_tangents(body, shape.u, pressure)
+    force, _ = oracle.forces_and_tangents(body, shape.u, pressure)
     whole = np.zeros(body.mesh.nodes.shape)
     np.add.at(whole, body.nodes, force.reshape(-1, 9, 2))
     bone = whole[body.mesh.held].sum(axis=0)
@@ -59,8 +59,8 @@ def test_the_surface_and_the_bone_push_alike(capped):
 def test_forces_of_touching_points_obey_the_friction_law(capped):
     newton, shape = capped
     pull, body = shape.pull, newton.body
-    length = kernels_numpy.tributary(shape.place(body)[:, 0])
-    slip, cap, open_ = (shape.state == code for code in (SLIP, CAP, OPEN))
+    length = oracle.tributary(shape.place(body)[:, 0])
+    slip, cap, open_ = (shape.state == code for code in (SLIP, SHEAR_LIMITED, OPEN))
     np.testing.assert_allclose(shape.reaction[slip, 0], pull.mu * shape.reaction[slip, 1], atol=1e-12)
     np.testing.assert_allclose(shape.reaction[cap, 0], pull.tau * length[cap], atol=1e-12)
     np.testing.assert_allclose(shape.reaction[open_], 0.0, atol=1e-12)
@@ -114,9 +114,9 @@ def test_a_block_pressed_between_its_sides_has_the_closed_form_pressure_at_every
     u = np.zeros(mesh.nodes.shape)
     u[:, 1] = (1.0 - mesh.nodes[:, 1]) * 0.2  # to 0.8 of its height; sigma_yy = -0.193089
     force = np.zeros(mesh.nodes.shape)
-    found, _ = kernels_numpy.forces_and_tangents(body, u, pressure_of(body, u))
+    found, _ = oracle.forces_and_tangents(body, u, pressure_of(body, u))
     np.add.at(force, mesh.elements, found.reshape(-1, 9, 2))
-    length = kernels_numpy.tributary(mesh.nodes[mesh.skin, 0])
+    length = oracle.tributary(mesh.nodes[mesh.skin, 0])
     np.testing.assert_allclose(force[mesh.skin[1:-1], 1], 0.193089 * length[1:-1], rtol=3e-6)
     inside = np.setdiff1d(np.arange(len(force)), np.concatenate([mesh.skin, mesh.held]))
     np.testing.assert_allclose(force[inside], 0.0, atol=1e-15)
@@ -126,13 +126,13 @@ def test_turning_the_unloaded_body_by_a_right_angle_stores_nothing():
     body = FiniteBody.of(block(distortion=0.06), [NeoHooke(0.08, 0.48)])
     x, y = body.mesh.nodes.T
     u = np.stack([-y - x, x - y], axis=1)
-    force, _ = kernels_numpy.forces_and_tangents(body, u, np.zeros((len(body.nodes), 3)))
-    assert abs(kernels_numpy.energy(body, u)) < 1e-15
+    force, _ = oracle.forces_and_tangents(body, u, np.zeros((len(body.nodes), 3)))
+    assert abs(oracle.energy(body, u)) < 1e-15
     np.testing.assert_allclose(force, 0.0, atol=1e-14)
 
 
 def pressure_of(body, u):
-    J = np.linalg.det(kernels_numpy.deformation(body, u))
+    J = np.linalg.det(oracle.deformation(body, u))
     return body.lame[:, None] * np.einsum("eq,eqm,eq->em", body.weight, body.modes, np.log(J))
 
 

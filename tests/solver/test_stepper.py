@@ -9,7 +9,7 @@ import pytest
 
 from solver._kernels.following import follow
 from solver.body.receptor import ROW
-from solver.contact.active_set import CAP, STICK, Course, forced, untouched
+from solver.contact.active_set import SHEAR_LIMITED, STICK, Course, forced, untouched
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
@@ -212,7 +212,7 @@ def test_the_compiled_search_finds_the_states_and_forces_of_the_plain_one(tau):
         follows_forces = follows.forces()
         np.testing.assert_allclose(follows_forces[:, 1], before.normal, atol=1e-12)
         np.testing.assert_allclose(follows_forces[:, 0], before.tangential, atol=1e-12)
-    assert (before.state == CAP).any() == (tau < np.inf)
+    assert (before.state == SHEAR_LIMITED).any() == (tau < np.inf)
 
 
 def test_the_condensed_finger_gives_the_energies_and_the_outline_of_the_meshed_one():

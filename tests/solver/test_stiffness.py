@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from solver.body.linear import Body, elimination
+from solver.body.linear import Body
 from solver.body.stiffness import Elastic, Probes, local_coordinates
 from solver.constitutive.linear import MATERIALS, Hooke
 from solver.element import Q2P1
-from solver.linalg.dissection import Reduced, Tree
+from solver.linalg.nested_dissection import Tree, places
 from solver.mesh.blocks import block
 from solver.mesh.mesher import Sizing, finger_mesh
 from solver.scene import Finger, Receptor
@@ -68,35 +68,10 @@ def test_places_are_found_again_in_curved_elements():
     assert np.abs(local_coordinates(corners, places, np.zeros_like(at)) - at).max() < 1e-11
 
 
-def test_elimination_gives_what_one_dense_solve_gives():
-    made = finger_mesh(Finger(), Receptor(), Sizing(4, 2.0))
-    mesh = made.mesh
-    elastic = Elastic.of(mesh, TISSUES)
-    tree = elimination(mesh)
-    load = np.random.default_rng(6).normal(size=(mesh.nodes.size, 1))
-    reduced = Reduced.of(tree, elastic.stiffness, load)
-    whole = np.zeros((mesh.nodes.size,) * 2)
-    unknowns = (2 * mesh.elements[:, :, None] + np.arange(2)).reshape(-1, 18)
-    for mine, stiffness in zip(unknowns, elastic.stiffness, strict=True):
-        whole[np.ix_(mine, mine)] += stiffness
-    fixed = np.concatenate([2 * mesh.held, 2 * mesh.held + 1])
-    inner = np.setdiff1d(np.arange(mesh.nodes.size), np.concatenate([fixed, tree.kept]))
-    kept = tree.kept
-    follow = np.linalg.solve(whole[np.ix_(inner, inner)], np.hstack([whole[np.ix_(inner, kept)], load[inner]]))
-    stiffness = whole[np.ix_(kept, kept)] - whole[np.ix_(kept, inner)] @ follow[:, :-1]
-    assert np.abs(reduced.stiffness - stiffness).max() < 1e-13
-    assert np.allclose(reduced.load, load[kept] - whole[np.ix_(kept, inner)] @ follow[:, -1:], atol=1e-12)
-    moved = np.random.default_rng(7).normal(size=(len(kept), 2))
-    found = reduced.all_unknowns(moved, loaded=True)
-    assert np.allclose(found[inner], follow[:, -1:] - follow[:, :-1] @ moved, atol=1e-10)
-    some = inner[::17]
-    assert np.array_equal(reduced.all_unknowns(moved, loaded=True, only=some)[some], found[some])
-
-
 def test_elimination_of_a_single_part_works_too():
     mesh = block(np.array([0.0, 1.0]), np.array([0.0, 1.0]))
-    assert len(elimination(mesh).parts) == 1
-    tree = Tree.of(mesh.elements, mesh.nodes[mesh.elements[:, 8]], mesh.held, mesh.skin)
+    tree = Tree.of(mesh.elements, places(mesh.elements), mesh.held, mesh.skin, 8)
+    assert len(tree.parts) == 1
     assert set(tree.parts[0].inner) == set(range(9)) - set(mesh.held) - set(mesh.skin)
 
 

@@ -25,7 +25,7 @@ class Touch:
 
 def of_light_touch(asked: Scene) -> Outcome:
     """Solve a scene of a light touch; SED, normal force and width must be Hertz's within their estimates."""
-    (found,) = answers([asked], in_loops=True)
+    (found,) = answers([asked])
     outcome = of_answer(found)
     if not isinstance(found, Prediction):
         return outcome
@@ -70,7 +70,7 @@ def hertz(asked: Scene) -> Touch:
 @cache
 def _finger(deeper: Scene) -> tuple[tuple[float, float], float]:
     """Return the depth [mm] and force [N/mm] of a touch, and its SED by the force squared [mm^2/(N^2) MPa]."""
-    (found,) = answers([deeper], in_loops=True)
+    (found,) = answers([deeper])
     if isinstance(found, SolveFailure):
         raise found
     force = found.normal_force

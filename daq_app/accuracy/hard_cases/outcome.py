@@ -29,7 +29,7 @@ class Outcome:
 
 def of_scene(asked: Scene) -> Outcome:
     """Solve a scene of the finger through the solver's front door."""
-    return of_answer(answers([asked], in_loops=True)[0])
+    return of_answer(answers([asked])[0])
 
 
 def of_answer(found: Prediction | SolveFailure) -> Outcome:

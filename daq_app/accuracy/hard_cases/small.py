@@ -20,7 +20,7 @@ TISSUES = (Hooke(0.136, 0.48), Hooke(0.08, 0.48), Hooke(0.034, 0.48))
 
 
 def _model(fineness: float = 8.0) -> FingerModel:
-    return FingerModel.of(scene(STICKINESS[0]), Sizing(fineness, DEPTH, margin=4.0), in_loops=True)
+    return FingerModel.of(scene(STICKINESS[0]), Sizing(fineness, DEPTH, margin=4.0))
 
 
 def _force(body: Body, law: FrictionLaw, depth: float = DEPTH) -> float:
@@ -88,7 +88,7 @@ def distorted_finger() -> Outcome:
     forces = [_force(model.body, law)]
     for seed in range(5):
         mesh = jittered(model.geometry.mesh, model.geometry.whole, 0.45, seed)
-        forces.append(_force(Body.of(mesh, TISSUES, in_loops=True), law))
+        forces.append(_force(Body.of(mesh, TISSUES), law))
     spread = max(abs(f / forces[0] - 1) for f in forces)
     flaw = "" if spread < 0.01 else f"the force changes by {spread:.1g}"
     told = f"N {forces[0]:.4g} undistorted; five distorted meshes differ by {percent(spread)} at most"
@@ -99,14 +99,14 @@ def stiff_part(ratio: float) -> Outcome:
     """Press a soft block by a plate in it that is `ratio` times stiffer, and by one held as a whole in its place."""
     law = FrictionLaw(0.3, np.inf)
     whole, alone = two_parts()
-    two = Body.of(whole, [Hooke(0.034, 0.48), Hooke(0.034 * ratio, 0.3)], in_loops=True)
+    two = Body.of(whole, [Hooke(0.034, 0.48), Hooke(0.034 * ratio, 0.3)])
     found = Course(two.touchable, law).sliding(0.3, 1)
     drag = -float(found.tangential.sum()) / float(found.normal.sum())
     skin = two.skin_displacement(np.concatenate([found.normal, found.tangential])[:, None])
     inner = two.reactions(two.displacement(skin))[:, :, 0]
     bone = inner[whole.held].sum(axis=0)
     balance = abs(bone[1] / found.normal.sum() + 1.0)
-    force, rigid = float(found.normal.sum()), _force(Body.of(alone, [Hooke(0.034, 0.48)], in_loops=True), law, 0.3)
+    force, rigid = float(found.normal.sum()), _force(Body.of(alone, [Hooke(0.034, 0.48)]), law, 0.3)
     off = abs(force / rigid - 1)
     good = balance < 1e-4 and off < 2.0 / ratio + 1e-9 and abs(drag - 0.3) < 1e-12
     flaw = "" if good else f"off by {off:.1g}"
@@ -116,7 +116,7 @@ def stiff_part(ratio: float) -> Outcome:
 
 def one_node() -> Outcome:
     """Press so lightly that one node touches: its force is its depth by its own compliance, and no more."""
-    body = Body.of(block(np.linspace(-4, 4, 17), np.linspace(0, 3, 7), radius=8.0), [Hooke(0.08, 0.48)], in_loops=True)
+    body = Body.of(block(np.linspace(-4, 4, 17), np.linspace(0, 3, 7), radius=8.0), [Hooke(0.08, 0.48)])
     touch, mu = body.touchable, 0.3
     middle, depth = len(touch.gap) // 2, 1e-5
     found = Course(touch, FrictionLaw(mu, math.inf)).sliding(depth, 1)
@@ -129,7 +129,7 @@ def one_node() -> Outcome:
 def aspect() -> Outcome:
     """Press a block of elements fifty times longer than wide, and the same block of squarer ones."""
     law = FrictionLaw(0.3, np.inf)
-    forces = [_force(Body.of(mesh, [Hooke(0.08, 0.48)], in_loops=True), law, 0.1) for mesh in slabs()]
+    forces = [_force(Body.of(mesh, [Hooke(0.08, 0.48)]), law, 0.1) for mesh in slabs()]
     off = abs(forces[1] / forces[0] - 1)
     told = f"N {forces[1]:.4g}, {percent(off)} from squarer elements'"
     return Outcome(True, tuple(forces), "" if off < 0.005 else f"off by {off:.1g}", told)

@@ -35,7 +35,7 @@ def half_plane(half_width: float, radius: float, law: Hooke, wide: float = 100.0
     """Return a half-plane with elements of 1/30 of the half-width where it touches; radius inf: flat."""
     x = mirrored(graded(ELEMENT, 0.3, 1.2, wide)) * half_width
     y = graded(ELEMENT, 0.3, 0.0, wide) * half_width
-    return Body.of(mound(x, y, radius, 3.0 * half_width), [law], in_loops=True)
+    return Body.of(mound(x, y, radius, 3.0 * half_width), [law])
 
 
 def pressed(body: Body, load: float, half_width: float) -> Contact:
@@ -46,7 +46,7 @@ def pressed(body: Body, load: float, half_width: float) -> Contact:
 def press(finest: float, nu: float) -> float:
     """Return the force [N/mm] of a light half-plane on elements of that size, pressed by 1e-3 half-widths."""
     x, y = mirrored(graded(finest, 0.3, 1.2, 20.0)), graded(finest, 0.3, 0.0, 20.0)
-    body = Body.of(mound(x, y, RADIUS, 3.0), [Hooke(0.08, nu)], in_loops=True)
+    body = Body.of(mound(x, y, RADIUS, 3.0), [Hooke(0.08, nu)])
     return float(Course(body.touchable, NONE).sliding(1e-3, 1).normal.sum())
 
 
@@ -95,7 +95,7 @@ def whole_cylinder(load: float, half_width: float, peak: float) -> Cylinder:
     traction = np.zeros((len(top), 2))
     traction[:, 1] = -peak * np.sqrt(np.clip(1 - (mesh.nodes[top, 0] / half_width) ** 2, 0, None))
     loads = edge_load(mesh, top, traction)
-    body = Body.of(mesh, [Hooke(0.08, 0.48)], loads * (load / -loads.sum()), free=("y", "turn"), in_loops=True)
+    body = Body.of(mesh, [Hooke(0.08, 0.48)], loads * (load / -loads.sum()), free=("y", "turn"))
     found = Course(body.touchable, NONE).sliding(0.0, 1, touching_within(body, 0.9 * half_width))
     moved = body.displacement(skin_motion(body, found)[:, None])[:, :, 0]
     centre = int(np.argmin(np.hypot(x, y)))

@@ -27,7 +27,7 @@ def widened(nu: float, radial: int, around: int) -> float:
     """Return the displacement of the hole that is found, mean over corner nodes [mm]."""
     mesh, hole = ring(INNER, OUTER, radial, around)
     at = mesh.nodes[hole]
-    body = Body.of(mesh, [Hooke(YOUNG, nu)], edge_load(mesh, hole, at / INNER), free=("x", "y", "turn"), in_loops=True)
+    body = Body.of(mesh, [Hooke(YOUNG, nu)], edge_load(mesh, hole, at / INNER), free=("x", "y", "turn"))
     moved = _free(body)[hole]
     return float(np.sum(moved * at, axis=1)[:-1:2].mean() / INNER)
 
@@ -42,7 +42,7 @@ def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
     mesh, hole = ring(INNER, OUTER, radial, 4 * radial)
     mesh = distorted(mesh, 0.2, 5)
     loads = edge_load(mesh, hole, mesh.nodes[hole] / INNER)
-    body = Body.of(mesh, [Hooke(YOUNG, nu)], loads, free=("x", "y", "turn"), in_loops=True)
+    body = Body.of(mesh, [Hooke(YOUNG, nu)], loads, free=("x", "y", "turn"))
     found = _free(body)
     x, y = mesh.nodes.T
     r2 = x * x + y * y
@@ -79,5 +79,5 @@ def cook(young: float, nu: float, force: float, count: int) -> tuple[float, floa
     """
     mesh = membrane(count, count)
     loads = edge_load(mesh, mesh.skin, np.tile([0.0, force / 16.0], (len(mesh.skin), 1)))
-    risen = Body.of(mesh, [Hooke(young, nu)], loads, in_loops=True).touchable.normal_free
+    risen = Body.of(mesh, [Hooke(young, nu)], loads).touchable.normal_free
     return float(risen[len(risen) // 2]), float(risen[-1])

@@ -1,8 +1,4 @@
-"""A body at small strain assembled and reduced to its skin by compiled loops.
-
-`stiffness.Elastic.of` and `dissection.Reduced` say the same in plain NumPy; the tests compare them. The
-loops are some ten times as fast; to load them takes longer than a solve, so who solves once does without.
-"""
+"""A body at small strain reduced to its skin: assembled and eliminated by the compiled loops."""
 
 from collections.abc import Sequence
 from copy import copy
@@ -13,47 +9,36 @@ from typing import Self
 import numpy as np
 from numpy.linalg import LinAlgError
 
-from solver._kernels import condense, eliminate, hooke
-from solver.body.stiffness import Elastic, Isotropic
-from solver.element import Q2P1
-from solver.linalg.elimination import Plan
+from solver import _kernels as kernels
+from solver._kernels import hooke
+from solver._kernels.arguments import RecoveryArrays
+from solver.body.stiffness import Isotropic, condensed_elements
+from solver.linalg.multifrontal import factors_of, symbolic_factorization
 from solver.mesh import Array, Indices, Mesh
 
-_VALUES, _SLOPES = Q2P1.shape(Q2P1.points)
-_ALONG, _UP = np.ascontiguousarray(_SLOPES[..., 0]), np.ascontiguousarray(_SLOPES[..., 1])
-_ALONE = Lock()  # held while the memory of `_room` is in use
+_ALONE = Lock()  # held while the memory of `_memory` is in use
 
 
-class ReducedInLoops:
-    """A body reduced to the displacements of its skin, normal ones first: m of them."""
+class LinearElimination:
+    """A body at small strain reduced to the displacements of its skin, normal ones first: m of them."""
 
     def __init__(self, mesh: Mesh, materials: Sequence[Isotropic]) -> None:
         """Assemble `mesh` of `materials` by region, and eliminate all but its skin.
 
         Raises LinAlgError where an element is folded, or the inner stiffness is not positive definite.
         """
-        plan = Plan.of(mesh)
+        plan = symbolic_factorization(mesh)
         count, width = len(mesh.elements), int(plan.border[-1])
-        shear = np.array([m.shear for m in materials])[mesh.region]
-        lame = np.array([m.lame for m in materials])[mesh.region]
-        stiffness, dilatation, centre = np.empty((count, 18, 18)), np.empty((count, 3, 18)), np.empty((count, 2))
-        self._fold, self._factors, skin = np.empty((count, 2, 16)), np.empty(plan.factors), np.empty((width, width))
+        values, skin = np.empty(plan.factors), np.empty((width, width))
         with _ALONE:
-            room = _room(256 * count + plan.waiting)
-            outer, waiting = room[: 256 * count].reshape(count, 16, 16), room[256 * count :]
-            if not hooke.stiffen(
-                mesh.nodes, mesh.elements, shear, lame, _VALUES, _ALONG, _UP, Q2P1.weights, stiffness, dilatation,
-                centre, outer, self._fold,
-            ):  # fmt: skip
-                raise LinAlgError("an element is folded")
-            sound = eliminate(
-                outer, plan.start, plan.inner, plan.border, plan.children, plan.border_at, plan.place, plan.run,
-                plan.factor_at, plan.wait_at, plan.leaf, plan.order, plan.at, self._factors, waiting, skin,
-            )  # fmt: skip
-        if not sound or not hooke.definite(plan.start, plan.inner, plan.border, plan.factor_at, self._factors):
+            memory = _memory(256 * count + plan.waiting)
+            outer, waiting = memory[: 256 * count].reshape(count, 16, 16), memory[256 * count :]
+            self.elastic, self._recovery_matrix = condensed_elements(mesh, materials, outer)
+            regular = kernels.eliminate(outer, plan, values, waiting, skin)
+        self._factors = factors_of(plan, values)
+        if not regular or not hooke.definite(self._factors):
             raise LinAlgError("the stiffness inside the body is not positive definite")
         self._mesh, self._plan = mesh, plan
-        self.elastic = Elastic(stiffness, dilatation, centre, shear, lame)
         nodes = np.arange(width // 2)
         self._kept = np.concatenate([2 * nodes + 1, 2 * nodes])  # where in the plan's skin they stand
         self.stiffness = skin[np.ix_(self._kept, self._kept)]  # (m, m)
@@ -90,15 +75,12 @@ class ReducedInLoops:
         mesh, plan, nodal = self._mesh, self._plan, load.reshape(-1, 2)
         centre = nodal[mesh.elements[:, 8], :, None]
         own: Array = np.asarray(np.linalg.solve(self.elastic.stiffness[:, 16:, 16:], centre)[:, :, 0], np.float64)
-        passed = (np.swapaxes(self._fold, 1, 2) @ centre)[:, :, 0]  # (e, 16)
+        passed = (np.swapaxes(self._recovery_matrix, 1, 2) @ centre)[:, :, 0]  # (e, 16)
         free = plan.unknown >= 0
         force = np.zeros(plan.size)
         force[plan.unknown[free]] = -nodal[mesh.elements[:, :8]].reshape(-1, 16)[free]
         np.add.at(force, plan.unknown[free], passed[free])
-        condense(
-            force, plan.start, plan.inner, plan.border, plan.border_at, plan.numbers, plan.factor_at, self._factors,
-            np.empty(int(plan.border.max())),
-        )  # fmt: skip
+        kernels.condense(force, self._factors)
         return force, own
 
     def _felt(self, carried: Array) -> Array:
@@ -113,14 +95,12 @@ class ReducedInLoops:
         skin = np.empty((kept.shape[1], len(kept)))
         skin[:, self._kept] = kept.T
         out = np.zeros((*mesh.nodes.shape, kept.shape[1]))
-        hooke.displace(
-            skin, *under, asked, plan.start, plan.inner, plan.border, plan.children, plan.border_at, plan.numbers,
-            plan.factor_at, self._factors, plan.unknown, mesh.elements, self._fold, out,
-        )  # fmt: skip
+        recovery = RecoveryArrays(mesh.elements, self._recovery_matrix)
+        hooke.displace(skin, *under, asked, plan, self._factors, recovery, out)
         return out.reshape(-1, kept.shape[1])
 
 
 @lru_cache(maxsize=1)
-def _room(size: int) -> Array:
+def _memory(size: int) -> Array:
     """Return memory for what is forgotten at once, always the same: to be given new takes as long as the work."""
     return np.empty(size)

@@ -1,6 +1,5 @@
 """The order in which a symmetric body is eliminated down to its skin, as the arrays that the compiled loops ask for."""
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
@@ -8,55 +7,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver import _kernels as kernels
-from solver.linalg.dissection import Tree, places
+from solver._kernels.arguments import Factors, SymbolicFactorization
+from solver.linalg.nested_dissection import Tree, places
 from solver.mesh import Array, Indices, Mesh
 
 Narrow = NDArray[np.int32]
 LEAF: Final = 8  # elements in a part that is not halved any more
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Plan:
-    """Parts of a body, p of them, children before parents, and the unknowns n that each eliminates.
+def symbolic_factorization(mesh: Mesh) -> SymbolicFactorization:
+    """Plan the elimination of `mesh`, the centres of its elements already eliminated inside them.
 
-    Unknowns are numbered in the order of their elimination; those of the skin, m, come last: x, y of each of its nodes.
+    It does not depend on where nodes lie, so the last ones are kept for meshes that differ in nothing else.
     """
-
-    unknown: Narrow  # (e, 16) of the elements' outer nodes, -1 where fixed
-    size: int  # n
-    start: Narrow  # (p,) first unknown eliminated in each part
-    inner: Narrow  # (p,) how many are
-    border: Narrow  # (p,) how many are passed on
-    children: Narrow  # (p, 2) parts joined in each, -1 in a leaf
-    border_at: Narrow  # (p,) where each part's border begins in `numbers` and `place`
-    numbers: Narrow  # unknowns of all borders
-    place: Narrow  # where each of them stands in the front of the parent
-    run: Narrow  # where in its border the run of neighbours ends that are neighbours there too
-    factor_at: Indices  # (p,) where each part's factor begins
-    wait_at: Indices  # (p,) where each part's border waits for the parent
-    leaf: Narrow  # (p, 2) range of `order` that belongs to each leaf
-    order: Narrow  # (e,) elements, leaf after leaf
-    at: Narrow  # (e, 16) in that order: where an element's unknowns stand in the front of its leaf, -1 where fixed
-    factors: int  # numbers that all factors hold
-    waiting: int  # numbers that wait at once
-
-    @staticmethod
-    def of(mesh: Mesh) -> "Plan":
-        """Plan the elimination of `mesh`, the centres of its elements already eliminated inside them.
-
-        It does not depend on where nodes lie, so the last plans are kept for meshes that differ in nothing else.
-        """
-        return _planned(len(mesh.nodes), mesh.elements.tobytes(), mesh.skin.tobytes(), mesh.fixed.tobytes())
+    return _planned(len(mesh.nodes), mesh.elements.tobytes(), mesh.skin.tobytes(), mesh.fixed.tobytes())
 
 
 @lru_cache(maxsize=4)
-def _planned(count: int, *numbers: bytes) -> Plan:
+def _planned(count: int, *numbers: bytes) -> SymbolicFactorization:
     """Return the plan for `count` nodes and the numbers of elements' nodes (e, 9), the skin's, and unknowns held."""
     elements, skin_nodes, fixed = (np.frombuffer(part, np.int64) for part in numbers)
     elements = elements.reshape(-1, 9)
     raw = (2 * elements[:, :8, None] + np.arange(2)).reshape(-1, 16)
     skin = (2 * skin_nodes[:, None] + np.arange(2)).ravel()
-    tree = Tree.of(raw, places(elements), fixed, skin, LEAF, flat=False)
+    tree = Tree.of(raw, places(elements), fixed, skin, LEAF)
     number = np.full(2 * count, -1)
     sequence = np.concatenate([*(part.inner for part in tree.parts), skin])
     number[sequence] = np.arange(len(sequence))
@@ -84,7 +58,7 @@ def _planned(count: int, *numbers: bytes) -> Plan:
             at[part.elements] = where[number[raw[tree.order[part.elements]]]]
     sizes = inner * (inner + border)
     wait_at, waiting = _waiting(children, border)
-    return Plan(
+    return SymbolicFactorization(
         unknown=_narrow(number[raw]),
         size=total,
         start=_narrow(start),
@@ -136,7 +110,7 @@ def _waiting(children: Indices, border: Indices) -> tuple[Indices, int]:
 class Elimination:
     """One body's tangent, eliminated again and again; the memory is set aside once."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: SymbolicFactorization) -> None:
         """Set memory aside for `plan`."""
         skin = int(plan.border[-1])
         self.plan = plan
@@ -144,29 +118,29 @@ class Elimination:
         self.found: Array | None = None  # the displacements found with the tangent that is eliminated
         self.carried = np.zeros(plan.size)  # L^-1 force, the skin's condensed forces at the end
         self._still = np.zeros(plan.size)
-        self._factors, self._waiting = np.empty(plan.factors), np.empty(plan.waiting)
-        self._near = np.empty(int((plan.inner + plan.border).max()))
+        values, waiting = np.empty(plan.factors), np.empty(plan.waiting)
         self.felt = self.carried[plan.size - skin :]
-        self.factored = (  # what loops ask for that solve with the factors
-            plan.start, plan.inner, plan.border, plan.border_at, plan.numbers, plan.factor_at, self._factors, self._near
-        )  # fmt: skip
-        self._eliminate = kernels.ending(
-            kernels.eliminate, plan.start, plan.inner, plan.border, plan.children, plan.border_at, plan.place, plan.run,
-            plan.factor_at, plan.wait_at, plan.leaf, plan.order, plan.at, self._factors, self._waiting, self.stiffness,
-        )  # fmt: skip
+        self.factors = factors_of(plan, values)
+        self._eliminate = kernels.bind_arguments(kernels.eliminate, plan, values, waiting, self.stiffness)
 
     def factorise(self, tangent: Array) -> bool:
         """Eliminate the elements' tangents (e, 16, 16), lower halves; False where that is not possible."""
         return self._eliminate(tangent)
 
     def condense(self, force: Array) -> Array:
-        """Return the forces (m,) that the skin feels of `force` (n,), all of it being kept for `unfold`."""
+        """Return the forces (m,) that the skin feels of `force` (n,), all of it being kept for `back_substitute`."""
         self.carried[:] = force
-        kernels.condense(self.carried, *self.factored)
+        kernels.condense(self.carried, self.factors)
         return self.felt
 
-    def unfold(self, skin: Array, *, still: bool = False) -> Array:
+    def back_substitute(self, skin: Array, *, still: bool = False) -> Array:
         """Return all displacements (n,) for the skin's (m,), balancing the forces condensed last, or none of them."""
         out = np.empty(self.plan.size)
-        kernels.unfold(self._still if still else self.carried, skin, *self.factored, out)
+        kernels.back_substitute(self._still if still else self.carried, np.ascontiguousarray(skin), self.factors, out)
         return out
+
+
+def factors_of(plan: SymbolicFactorization, values: Array) -> Factors:
+    """Return the factors in `values`, as loops take them."""
+    near = np.empty(int((plan.inner + plan.border).max()))
+    return Factors(plan.start, plan.inner, plan.border, plan.border_at, plan.numbers, plan.factor_at, values, near)

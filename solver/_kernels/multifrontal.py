@@ -1,5 +1,5 @@
 # ruff: noqa: C901 - a compiled loop is flat: calls inside it would cost more than they explain
-"""Elimination of a symmetric body down to its skin, part by part of a plan (`solver.linalg.elimination.Plan`).
+"""Elimination of a symmetric body down to its skin, part by part of a `SymbolicFactorization`.
 
 n unknowns are numbered in the order of their elimination, the m of the skin last. A part's front is a symmetric matrix
 of its inner unknowns (k, eliminated in it) and its border (b, passed on to its parent). The inner rows of its factor
@@ -8,33 +8,21 @@ U = D L^T are kept, (k, k + b) numbers each part, upper half; the border's rows 
 
 import numpy as np
 
-from solver._kernels.compiling import Array, Narrow, Wide, compiled
+from solver._kernels.arguments import Factors, SymbolicFactorization
+from solver._kernels.compiling import Array, compiled
 
 
 @compiled
-def eliminate(
-    tangent: Array,
-    start: Narrow,
-    inner: Narrow,
-    border: Narrow,
-    children: Narrow,
-    border_at: Narrow,
-    place: Narrow,
-    run: Narrow,
-    factor_at: Wide,
-    wait_at: Wide,
-    leaf: Narrow,
-    order: Narrow,
-    at: Narrow,
-    factors: Array,
-    waiting: Array,
-    skin: Array,
-) -> bool:
+def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiting: Array, skin: Array) -> bool:
     """Fill `factors` and the skin's stiffness `skin` (m, m); False where a pivot is zero.
 
-    `tangent` (e, 16, 16), lower half, of the elements; the other arguments are those of `Plan`. No pivoting: with its
-    skin held, the tissue inside is stable but for what its pressure adds on the way to an equilibrium.
+    `tangent` (e, 16, 16), lower half, of the elements; `factors` and `waiting` are memory as large as `plan` says.
+    There is no pivoting: with its skin held, the tissue inside is stable but for what its pressure adds on the way to
+    an equilibrium.
     """
+    start, inner, border, children, border_at = plan.start, plan.inner, plan.border, plan.children, plan.border_at
+    place, run, factor_at, wait_at = plan.place, plan.run, plan.factor_at, plan.wait_at
+    leaf, order, at = plan.leaf, plan.order, plan.at
     for p in range(start.shape[0]):
         k, b = inner[p], border[p]
         wide = k + b
@@ -186,25 +174,12 @@ def _update_one(top: Array, over: Array, count: int, r: int, one: Array) -> None
 
 
 @compiled
-def condense(
-    force: Array,
-    start: Narrow,
-    inner: Narrow,
-    border: Narrow,
-    border_at: Narrow,
-    numbers: Narrow,
-    factor_at: Wide,
-    factors: Array,
-    near: Array,
-) -> None:
-    """Replace `force` (n,) by L^-1 force inside the body, and at its end by the force that the skin feels.
-
-    `numbers` are the unknowns of all borders, one after the other from `border_at` on; `near` (k + b,) is memory for
-    the largest part.
-    """
+def condense(force: Array, factors: Factors) -> None:
+    """Replace `force` (n,) by L^-1 force inside the body, and at its end by the force that the skin feels."""
+    start, inner, border, border_at, numbers, factor_at, values, near = factors
     for p in range(start.shape[0]):
         k, b, first = inner[p], border[p], start[p]
-        top = factors[factor_at[p] : factor_at[p] + k * (k + b)].reshape(k, k + b)
+        top = values[factor_at[p] : factor_at[p] + k * (k + b)].reshape(k, k + b)
         passed = near[:b]
         passed[:] = 0.0
         for i in range(k):
@@ -221,26 +196,12 @@ def condense(
 
 
 @compiled
-def unfold_part(
-    p: int,
-    carried: Array,
-    start: Narrow,
-    inner: Narrow,
-    border: Narrow,
-    border_at: Narrow,
-    numbers: Narrow,
-    factor_at: Wide,
-    factors: Array,
-    near: Array,
-    out: Array,
-) -> None:
-    """Fill the displacements of `out` (n,) which part `p` of the body eliminates; those of its border are there.
-
-    `near` (k + b,) is memory for the largest part.
-    """
+def back_substitute_part(p: int, carried: Array, factors: Factors, out: Array) -> None:
+    """Fill the displacements of `out` (n,) which part `p` of the body eliminates; those of its border are there."""
+    start, inner, border, border_at, numbers, factor_at, values, near = factors
     k, b, first = inner[p], border[p], start[p]
     wide = k + b
-    top = factors[factor_at[p] : factor_at[p] + k * wide].reshape(k, wide)
+    top = values[factor_at[p] : factor_at[p] + k * wide].reshape(k, wide)
     beyond = numbers[border_at[p] : border_at[p] + b]
     for j in range(b):
         near[k + j] = out[beyond[j]]
@@ -264,23 +225,10 @@ def unfold_part(
 
 
 @compiled
-def unfold(
-    carried: Array,
-    skin: Array,
-    start: Narrow,
-    inner: Narrow,
-    border: Narrow,
-    border_at: Narrow,
-    numbers: Narrow,
-    factor_at: Wide,
-    factors: Array,
-    near: Array,
-    out: Array,
-) -> None:
-    """Fill `out` (n,) with the displacements under -`carried` (n,), from `condense`, when the skin's are `skin` (m,).
-
-    `near` (k + b,) is memory for the largest part.
-    """
-    out[out.shape[0] - skin.shape[0] :] = skin
-    for p in range(start.shape[0] - 1, -1, -1):
-        unfold_part(p, carried, start, inner, border, border_at, numbers, factor_at, factors, near, out)
+def back_substitute(carried: Array, skin: Array, factors: Factors, out: Array) -> None:
+    """Fill `out` (n,) with the displacements under -`carried` (n,), of `condense`, when the skin's are `skin` (m,)."""
+    first = out.shape[0] - skin.shape[0]
+    for i in range(skin.shape[0]):
+        out[first + i] = skin[i]
+    for p in range(factors.start.shape[0] - 1, -1, -1):
+        back_substitute_part(p, carried, factors, out)

@@ -1,4 +1,5 @@
-"""What `solver._kernels` computes, said once more in plain NumPy: slow, short, and what the tests hold the other to."""
+# ruff: noqa: N803, N806 - the letters of the literature
+"""Finite strain in plain NumPy: the judge of the compiled loops."""
 
 from typing import cast
 
@@ -7,7 +8,7 @@ import numpy as np
 from solver._kernels.skin import STEEP
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import shape, slopes
-from solver.contact.law import CAP, OPEN, SLIP, STICK, FrictionLaw
+from solver.contact.law import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
 from solver.mesh import Array, Flags, Indices
 
 IMAGINARY = 1e-30  # step whose square is nothing [-]
@@ -57,15 +58,6 @@ def pressure(body: FiniteBody, u: Array) -> Array:
 def energy(body: FiniteBody, u: Array) -> float:
     """Return the energy stored in the body [N mm per mm]."""
     return _stored(body, _gradient(body, u)).real
-
-
-def energy_slope(body: FiniteBody, u: Array, way: Array) -> float:
-    """Return by how much the stored energy grows at `u` along `way` (nodes, 2) [N mm per mm].
-
-    From the energy alone, by a step in imaginary direction (Squire and Trapp 1998, SIAM Rev. 40, 110), no stress asked.
-    """
-    H = _gradient(body, u) + 1j * IMAGINARY * _gradient(body, way)
-    return _stored(body, cast("Array", H)).imag / IMAGINARY
 
 
 def _stored(body: FiniteBody, H: Array) -> complex:
@@ -197,24 +189,24 @@ def restated(
 ) -> tuple[Indices, Indices]:
     """Return states and senses (k,) as `solver.contact.law` asks for them, for the forces and places of a solution.
 
-    Arguments as those of the loop `restate`, which changes its own.
+    Arguments as those of the loop `update_contact_states`, which changes its own.
     """
     slack, small = 1e-12 * np.abs(reaction[:, 1]).max(initial=0.0), 1e-13 * np.abs(above).max(initial=0.0)
     drag, push = reaction.T
     length = np.maximum(length, 0.0)  # skin that hangs over has no limit
     was_open, stuck, slips = state == OPEN, state == STICK, state >= SLIP
     coulomb, bound, most = law.mu * np.maximum(push, 0.0), law.bound(length), law.limit(push, length)
-    at_bound = (bound < coulomb - slack) | ((state == CAP) & (bound <= coulomb + slack))
-    now, turned = np.where(at_bound, CAP, SLIP), sense.copy()
+    at_bound = (bound < coulomb - slack) | ((state == SHEAR_LIMITED) & (bound <= coulomb + slack))
+    now, turned = np.where(at_bound, SHEAR_LIMITED, SLIP), sense.copy()
     if direction == 0:
         over = np.abs(drag) > most + slack
         turned = np.where(stuck & over & (push >= -slack), np.where(drag > 0.0, 1, -1), sense)
-        now = np.where(stuck, np.where(over, np.where(bound < coulomb, CAP, SLIP), STICK), now)
+        now = np.where(stuck, np.where(over, np.where(bound < coulomb, SHEAR_LIMITED, SLIP), STICK), now)
         now = np.where(slips & (slid * sense > small) & (most > 0.0), STICK, now)
         entering = SLIP if law.frictionless else STICK
     else:
         turned = np.where(was_open | (push < -slack), sense, direction)
-        entering = CAP if law.mu > STEEP and law.tau_max < np.inf else SLIP
+        entering = SHEAR_LIMITED if law.mu > STEEP and law.tau_max < np.inf else SLIP
         turned = np.where(was_open & (above < -small), direction, turned)
     now = np.where(push < -slack, OPEN, now)
     now = np.where(was_open, np.where(above < -small, entering, OPEN), now)

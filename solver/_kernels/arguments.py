@@ -1,0 +1,178 @@
+"""What the loops take: arrays that belong together, by name."""
+
+from typing import NamedTuple
+
+from solver._kernels.compiling import Array, Narrow, Wide
+
+
+class ElementArrays(NamedTuple):
+    """Elements of nine nodes and what they are made of: e elements, q = 9 quadrature points."""
+
+    grad_x: Array  # (e, q, 9) gradients of the shape functions at the quadrature points [1/mm]
+    grad_y: Array  # (e, q, 9)
+    weight: Array  # (e, q) areas of the quadrature points [mm2]
+    modes: Array  # (e, q, 3) pressure modes there, orthonormal over the element [1/mm]
+    laplace: Array  # (e, 9, 9) integrals of the shear modulus times grad N_i . grad N_j [N/mm per mm]
+    shear: Array  # (e,) [MPa]
+    stiffening: Array  # (e,) Ogden's exponent [-]
+    lame: Array  # (e,) [MPa]
+    nodes: Narrow  # (e, 9)
+    unknown: Narrow  # (e, 8, 2) of the outer nodes, -1 where fixed
+
+
+class ElementSystem(NamedTuple):
+    """Forces and tangents of e elements whose centre nodes are eliminated inside them; n unknowns."""
+
+    tangent: Array  # (e, 16, 16) of the outer nodes, lower half [N/mm per mm]
+    force: Array  # (n,) internal forces [N/mm]
+    recovery_matrix: Array  # (e, 2, 17): displacement of the centre = -(recovery_matrix @ (outer displacements, 1))
+    condensed_inverse: Array  # (e, 3) of the centre's stiffness: xx, xy, yy
+    dilate: Array  # (e, 3, 18) derivative of the modes of ln J
+    volume: Array  # (e, 3) those modes
+
+
+class BodyState(NamedTuple):
+    """Displacements and pressures of a body at finite strain."""
+
+    u: Array  # (nodes, 2) [mm]
+    pressure: Array  # (e, 3) modes
+
+
+class ProbeArrays(NamedTuple):
+    """Places inside elements, p of them."""
+
+    element: Narrow  # (p,)
+    grad_x: Array  # (p, 9) gradients of the shape functions there [1/mm]
+    grad_y: Array  # (p, 9)
+    modes: Array  # (p, 3) pressure modes there
+
+
+class LinearMesh(NamedTuple):
+    """Elements of a body at small strain, and what they are made of."""
+
+    place: Array  # (nodes, 2) undeformed positions [mm]
+    nodes: Wide  # (e, 9)
+    shear: Array  # (e,) [MPa]
+    lame: Array  # (e,) [MPa]
+
+
+class ShapeFunctions(NamedTuple):
+    """The shape functions of nine nodes at the quadrature points."""
+
+    values: Array  # (q, 9)
+    along: Array  # (q, 9) slopes along the first local coordinate
+    up: Array  # (q, 9) and along the second
+    weights: Array  # (q,)
+
+
+class LinearElements(NamedTuple):
+    """What is filled of elements at small strain; displacements are ordered x, y, x, y, ... within each."""
+
+    stiffness: Array  # (e, 18, 18) [N/mm per mm]
+    dilatation: Array  # (e, 3, 18) displacements to the modes 1, x - xc, y - yc of the volume strain
+    centre: Array  # (e, 2) xc, yc [mm]
+    recovery_matrix: Array  # (e, 2, 16): displacement of the centre node = -(recovery_matrix @ outer displacements)
+
+
+class RecoveryArrays(NamedTuple):
+    """What recovers the centre nodes of elements at small strain."""
+
+    nodes: Wide  # (e, 9)
+    recovery_matrix: Array  # (e, 2, 16)
+
+
+class SymbolicFactorization(NamedTuple):
+    """Parts of a body, p of them, children before parents, and the unknowns n that each eliminates.
+
+    Unknowns are numbered in the order of their elimination; those of the skin, m, come last: x, y of each of its nodes.
+    """
+
+    unknown: Narrow  # (e, 16) of the elements' outer nodes, -1 where fixed
+    size: int  # n
+    start: Narrow  # (p,) first unknown eliminated in each part
+    inner: Narrow  # (p,) how many are
+    border: Narrow  # (p,) how many are passed on
+    children: Narrow  # (p, 2) parts joined in each, -1 in a leaf
+    border_at: Narrow  # (p,) where each part's border begins in `numbers` and `place`
+    numbers: Narrow  # unknowns of all borders
+    place: Narrow  # where each of them stands in the front of the parent
+    run: Narrow  # where in its border the run of neighbours ends that are neighbours there too
+    factor_at: Wide  # (p,) where each part's factor begins
+    wait_at: Wide  # (p,) where each part's border waits for the parent
+    leaf: Narrow  # (p, 2) range of `order` that belongs to each leaf
+    order: Narrow  # (e,) elements, leaf after leaf
+    at: Narrow  # (e, 16) in that order: where an element's unknowns stand in the front of its leaf, -1 where fixed
+    factors: int  # numbers that all factors hold
+    waiting: int  # numbers that wait at once
+
+
+class Factors(NamedTuple):
+    """The factors of an elimination, and where they stand; the integer arrays are a SymbolicFactorization's."""
+
+    start: Narrow
+    inner: Narrow
+    border: Narrow
+    border_at: Narrow
+    numbers: Narrow
+    factor_at: Wide
+    values: Array  # rows of D L^T, part after part
+    near: Array  # (k + b,) memory for the largest part
+
+
+class Skin(NamedTuple):
+    """The skin that may touch: k nodes."""
+
+    nodes: Wide  # (k,)
+    held: Narrow  # (k,) whether a node is held: along x HELD_X, along y HELD_Y, both their sum
+    middle: Narrow  # (k,) 1 at the middle of an edge, 0 at its ends
+
+
+class LoadState(NamedTuple):
+    """What the surface does."""
+
+    depth: float  # how far it has risen [mm]
+    mu: float  # coefficient of friction [-]
+    tau: float  # bound of its traction [MPa]
+    sense: int  # +1, -1: all that touches slips, the friction force pointing there; 0: sticks, slips and turns round
+
+
+class SkinPosition(NamedTuple):
+    """Where the skin's nodes are in relation to the surface."""
+
+    x: Array  # (k,) along the surface [mm]
+    above: Array  # (k,) over it [mm]
+    anchor: Array  # (k,) positions along it where nodes stick [mm]
+
+
+class ContactStates(NamedTuple):
+    """States of the skin's k nodes and the forces on them."""
+
+    state: Narrow  # (k,) OPEN, STICK, SLIP or SHEAR_LIMITED
+    sense: Narrow  # (k,) direction of the friction force where they slip
+    reaction: Array  # (k, 2) forces of the surface on them [N/mm]
+
+
+class ContactSystem(NamedTuple):
+    """The linear system of the skin's contact, and memory for it."""
+
+    length: Array  # (k,) length of skin on which a bound acts that each node stands for [mm]
+    free: Narrow  # (2 k,) the unknown displacements
+    matrix: Array  # (4 k k,)
+    right: Array  # (2 k, 4)
+    steps: Array  # (2 k, 4) of the skin: to equilibrium, and by depth, mu and travel of the surface along +x
+
+
+class MeshTransferArrays(NamedTuple):
+    """Which parts of an old mesh of lines and rows of nodes the nodes and quadrature points of a new one lie in."""
+
+    combination: Array  # (old e, 3, 3) pressure modes as combinations of 1, x, y
+    centre: Array  # (old e, 2) what x, y are counted from [mm]
+    along: Narrow  # (lines,) first of the three old lines that a new line takes its values from
+    along_parts: Array  # (lines, 3) its part of each
+    across: Narrow  # (rows,) the same of rows
+    across_parts: Array  # (rows, 3)
+    station: Narrow  # (a, 3) old element along that holds each quadrature point
+    layer: Narrow  # (b, 3) and across
+    points: Array  # (e, q, 2) the new quadrature points [mm]
+    weight: Array  # (e, q) of them
+    modes: Array  # (e, q, 3) pressure modes there

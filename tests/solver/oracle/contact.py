@@ -1,0 +1,262 @@
+"""The search for contact states of a condensed body at small strain, in plain NumPy: the judge of the compiled one."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dgesv, dgetrf, dgetrs
+
+from solver.body.validation import finite
+from solver.contact.active_set import (
+    AMBIGUOUS,
+    CONTRADICTORY,
+    FIRST,
+    HERTZ,
+    ROUNDS,
+    SMALL,
+    Array,
+    Contact,
+    ContactLost,
+    Flags,
+    States,
+    Touchable,
+    lowered,
+)
+from solver.contact.law import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
+
+
+class System:
+    """The linear system of one guess of states, factorised."""
+
+    def __init__(self, body: Touchable, law: FrictionLaw, state: States, sense: Array) -> None:
+        """Factorise the system of `state` (k,), friction forces pointing along `sense` (k,)."""
+        self.key = state.tobytes() + sense.tobytes()
+        self.on = np.flatnonzero(state != OPEN)
+        self.stuck = np.flatnonzero(state == STICK)
+        on, stuck, free = self.on, self.stuck, body.motions.shape[1]
+        by_force, by_length = law.slopes(state, sense)
+        self.drag = drag = by_force[on]  # tangential by normal force
+        self.capped = by_length * body.length  # (k,) tangential force of points at the bound
+        count = len(on) + len(stuck)
+        matrix = np.zeros((count + free, count + free))
+        touch = body.normal_by_normal[np.ix_(on, on)] + body.normal_by_tangential[np.ix_(on, on)] * drag
+        matrix[: len(on), : len(on)] = touch
+        if len(stuck):
+            coupling = body.normal_by_tangential[np.ix_(on, stuck)]
+            inside = body.tangential_by_tangential[np.ix_(stuck, on)]
+            matrix[: len(on), len(on) : count] = coupling
+            matrix[len(on) : count, : len(on)] = coupling.T + inside * drag
+            matrix[len(on) : count, len(on) : count] = body.tangential_by_tangential[np.ix_(stuck, stuck)]
+        if free:
+            normal, tangential = np.split(body.motions, 2)
+            matrix[: len(on), count:], matrix[len(on) : count, count:] = normal[on], tangential[stuck]
+            matrix[count:, : len(on)] = (normal[on] + tangential[on] * drag[:, None]).T
+            matrix[count:, len(on) : count] = tangential[stuck].T
+        self._factors = dgetrf(matrix) if len(matrix) else None
+        self.singular = self._factors is not None and bool(self._factors[2])
+
+    def solve(self, right: Array) -> Array:
+        """Return the solution for the right-hand side `right`, or for several side by side."""
+        return right if self._factors is None else dgetrs(self._factors[0], self._factors[1], right)[0]
+
+
+class Course:
+    """Contact of one body under one law, step after step; keeps the last factorisation, since most steps reuse it."""
+
+    def __init__(self, body: Touchable, law: FrictionLaw, patience: int | None = None) -> None:
+        """Start with nothing known; a step is given up after `patience` corrections (None: when nothing can help)."""
+        self.body = body
+        self.law = law
+        self._patience = 20 + 4 * len(body.gap) if patience is None else patience
+        self._system: System | None = None
+        self._entering = SLIP  # what a point is first thought to do when it comes to touch
+        self._resultants = body.resultants
+
+    def sliding(self, depth: float, direction: int, guess: States | None = None) -> Contact:
+        """Return the settled sliding state of a body driven `depth` [mm] into the surface and along +x or -x.
+
+        Every touching point slips, so nothing is left of how it came there. Raises ContactLost where no such state
+        was found, ValueError for a depth or direction that is none.
+        """
+        depth = finite("depth", depth)
+        if direction not in (-1, 1):
+            raise ValueError(f"direction = {direction} is not allowed: it must be +1 or -1")
+        count = len(self.body.gap)
+        sense = np.full(count, -float(direction))
+        low = self.body.gap + self.body.normal_free < depth
+        guesses = [np.where(low, SLIP, OPEN)] if guess is None else [guess]
+        if guess is None and self.body.motions.shape[1]:  # the depth, or a part of it, is found
+            guesses = guesses if low.any() else []
+            guesses += [np.where(self.body.gap <= height, SLIP, OPEN) for height in self._heights()]
+        if guess is None and np.isfinite(self.law.tau_max):
+            guesses.append(np.where(low, SHEAR_LIMITED, OPEN))
+        if guess is None and not self.body.motions.shape[1]:
+            found = self._slid(depth, -float(direction))
+            if found is not None:
+                return found
+        for number, first in enumerate(guesses):
+            try:
+                return self._consistent(depth, 0.0, np.zeros(count), first.astype(np.int8), sense, free=False)
+            except ContactLost:
+                if number == len(guesses) - 1:
+                    raise
+        raise AssertionError  # there is always a guess
+
+    def _heights(self) -> Array:
+        """Return heights [mm] below which skin may first be thought to touch where a force finds the depth."""
+        low, high = float(self.body.gap.min()), float(self.body.gap.max())
+        return low + np.array(FIRST) * (high - low)
+
+    def _slid(self, depth: float, sense: float) -> Contact | None:
+        """Return what `_consistent` does where all that touches slips one way; None where that takes many rounds.
+
+        Points are then open, slipping or slipping at the bound, and the drag follows from the pressure.
+        """
+        body, mu = self.body, self.law.mu
+        slips = body.normal_by_normal + sense * mu * body.normal_by_tangential
+        above, bound = body.gap + body.normal_free - depth, self.law.bound(body.length)
+        on: Flags = above < -HERTZ * depth
+        none: Array = np.zeros(len(on))
+        capped: Flags = np.zeros(len(on), bool)
+        for iteration in range(1, ROUNDS + 1):
+            matrix, lifted, pull = slips, above, none
+            if capped.any():
+                pull = np.where(capped, sense * bound, 0.0)
+                matrix = np.where(capped, body.normal_by_normal, slips)
+                lifted = above + body.normal_by_tangential @ pull
+            at = on.nonzero()[0]
+            if not len(at):
+                return None
+            columns = matrix.take(at, 1)
+            found = dgesv(columns.take(at, 0), -lifted[at])
+            pressing: Array = found[2]
+            if found[3]:  # no unique forces
+                return None
+            normal = none.copy()
+            normal[at] = pressing
+            gap = lifted + columns @ pressing
+            slack = SMALL * max(float(pressing.max()), -float(pressing.min()))
+            low = -SMALL * max(float(body.gap.max()), float(gap.max()))
+            now: Flags = (on & (normal >= -slack)) | (~on & (gap < low))
+            over: Flags = now & on & (mu * normal > bound + np.where(capped, -slack, slack))
+            if (now == on).all() and (over == capped).all():
+                tangential = np.where(on & ~capped, sense * mu * normal, pull)
+                shift = body.tangential_free + body.tangential_by_tangential @ tangential
+                shift += body.normal_by_tangential.T @ normal
+                state = np.where(capped, SHEAR_LIMITED, np.where(on, SLIP, OPEN)).astype(np.int8)
+                return Contact(state, np.full(len(on), sense), normal, tangential, shift, gap, np.zeros(0), iteration)
+            on, capped = now, over
+        return None
+
+    def step(self, before: Contact, depth: float, travel: float, resultants: Array | None = None) -> Contact:
+        """Return the state after the body was driven to `depth` and `travel` along +x [mm], coming from `before`.
+
+        Backward Euler: a point sticks where it was, or slips from there against its friction force. `resultants` (r,)
+        [N/mm] take the place of the body's own where the forces along its free motions change with time. Raises
+        ContactLost, and ValueError for a depth or travel that is not finite.
+        """
+        depth, travel = finite("depth", depth), finite("travel", travel)
+        if self.body.motions.shape[1]:
+            before = lowered(self.law, before)
+        self._resultants = self.body.resultants if resultants is None else resultants
+        try:
+            return self._consistent(depth, travel, before.shift, before.state, before.sense, free=True)
+        except ContactLost:  # points that come to touch are then first thought to stick, not to slip
+            self._entering = SLIP if self.law.frictionless else STICK
+            return self._consistent(depth, travel, before.shift, before.state, before.sense, free=True)
+        finally:
+            self._entering = SLIP
+
+    def _consistent(
+        self, depth: float, travel: float, anchor: Array, state: States, sense: Array, *, free: bool
+    ) -> Contact:
+        """Change states until none contradicts the solution; with `free`, points may stick and turn round."""
+        seen: set[bytes] = set()
+        one_by_one = resticked = False
+        for iteration in range(1, self._patience + 1):
+            if self._system is None or self._system.key != state.tobytes() + sense.tobytes():
+                self._system = System(self.body, self.law, state, sense)
+            if self._system.singular:
+                touching = state != OPEN
+                if not free or resticked or (state == STICK).any() or not touching.any():
+                    raise ContactLost(AMBIGUOUS)
+                # a body that is free along x needs a point that holds it: all are asked again, one by one
+                state = np.where(touching, STICK, OPEN).astype(np.int8)
+                resticked = one_by_one = True
+                continue
+            found = self._solved(self._system, depth, travel, anchor, state, sense, iteration)
+            wanted, turned, badness = self._corrected(found, anchor, free=free)
+            changed = np.flatnonzero((wanted != state) | (turned != sense))
+            if not len(changed):
+                return found
+            if one_by_one:
+                worst = changed[np.argmax(badness[changed])]
+                keep = np.arange(len(state)) != worst
+                wanted, turned = np.where(keep, state, wanted), np.where(keep, sense, turned)
+            state, sense = wanted.astype(np.int8), turned
+            key = state.tobytes() + sense.tobytes()
+            if key in seen:
+                one_by_one = True
+                seen.clear()
+            seen.add(key)
+        raise ContactLost(CONTRADICTORY.format(self._patience))
+
+    def _solved(
+        self,
+        system: System,
+        depth: float,
+        travel: float,
+        anchor: Array,
+        state: States,
+        sense: Array,
+        iteration: int,
+    ) -> Contact:
+        body, on, stuck, tangential = self.body, system.on, system.stuck, system.capped
+        lifted = body.gap + body.normal_free - depth + body.normal_by_tangential @ tangential
+        moved = body.tangential_free + travel + body.tangential_by_tangential @ tangential
+        missing = self._resultants - body.motions[len(state) :].T @ tangential
+        answer = system.solve(np.concatenate([-lifted[on], (anchor - moved)[stuck], missing]))
+        normal = np.zeros(len(state))
+        normal[on] = answer[: len(on)]
+        rest = np.zeros(len(state))
+        rest[on] = system.drag * normal[on]
+        rest[stuck] = answer[len(on) : len(on) + len(stuck)]
+        motion = answer[len(on) + len(stuck) :]
+        up, along = np.split(body.motions @ motion, 2)
+        gap = lifted + up + body.normal_by_normal @ normal + body.normal_by_tangential @ rest
+        shift = moved + along + body.normal_by_tangential.T @ normal + body.tangential_by_tangential @ rest
+        return Contact(state, sense, normal, tangential + rest, shift, gap, motion, iteration)
+
+    def _corrected(self, found: Contact, anchor: Array, *, free: bool) -> tuple[States, Array, Array]:
+        """Return the states and senses that the solution calls for, and how badly each point contradicts its own."""
+        body, law = self.body, self.law
+        state, sense = found.state.copy(), found.sense.copy()
+        force = np.abs(found.normal).max(initial=0.0)
+        lengths = np.concatenate([body.gap, found.gap, found.shift])
+        height = max(float(np.abs(lengths).max(initial=0.0)), np.finfo(float).tiny)
+        badness = np.zeros(len(state))
+
+        def change(where: NDArray[np.bool_], to: int, how_bad: Array) -> None:
+            state[where] = to
+            badness[where] = how_bad[where]
+
+        touching = found.state != OPEN
+        slack = SMALL * force
+        bound = law.bound(body.length)
+        change((found.state == SLIP) & (law.mu * found.normal > bound + slack), SHEAR_LIMITED, found.normal)
+        change((found.state == SHEAR_LIMITED) & (law.mu * found.normal < bound - slack), SLIP, found.normal)
+        if free and not law.frictionless:
+            over = np.abs(found.tangential) - law.limit(found.normal, body.length)
+            loose = (found.state == STICK) & (over > slack)
+            sense[loose] = np.sign(found.tangential[loose])
+            capped = law.mu * found.normal > bound
+            change(loose & ~capped, SLIP, over)
+            change(loose & capped, SHEAR_LIMITED, over)
+            # a point that slips along its friction force sticks; one whose force is about to change is asked later
+            forward = (found.shift - anchor) * found.sense
+            stops = (found.state >= SLIP) & (state == found.state) & (forward > SMALL * height)
+            change(stops, STICK, forward * force / height)
+        change(touching & (found.normal < -slack), OPEN, -found.normal)
+        enters = ~touching & (found.gap < -SMALL * height)
+        if free:
+            sense[enters] = np.where(found.shift > anchor, -1.0, 1.0)[enters]
+        change(enters, self._entering, -found.gap * force / height)
+        return state, sense, badness

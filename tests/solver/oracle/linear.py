@@ -1,0 +1,87 @@
+"""A body at small strain assembled and eliminated in plain NumPy: the judge of the compiled loops."""
+
+import numpy as np
+
+from solver.body.stiffness import Elastic
+from solver.element import Q2P1
+
+_VALUES, _GRADIENTS = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
+_ALONG, _UP = np.ascontiguousarray(_GRADIENTS[..., 0].T), np.ascontiguousarray(_GRADIENTS[..., 1].T)  # (9 nodes, 9)
+
+
+def elastic(mesh, materials):
+    """Integrate the stiffness of every element with 3 x 3 Gauss points; `materials` by region.
+
+    K = integral of 2 G eps:eps + lambda theta^2, where theta is the best fit of the volume strain by 1, x, y. That
+    is the mixed form with pressure lambda theta, its three pressure modes eliminated (exact for Hooke).
+    """
+    corners = mesh.nodes[mesh.elements]  # (e, 9, 2)
+    count = len(corners)
+    x, y = np.ascontiguousarray(corners[..., 0]), np.ascontiguousarray(corners[..., 1])
+    x_xi, x_eta, y_xi, y_eta = x @ _ALONG, x @ _UP, y @ _ALONG, y @ _UP  # (e, q)
+    det = x_xi * y_eta - x_eta * y_xi
+    weight = det * Q2P1.weights
+    by_x = (y_eta / det)[:, :, None] * _ALONG.T  # (e, q, 9) dN/dx
+    by_x -= (y_xi / det)[:, :, None] * _UP.T
+    by_y = (x_xi / det)[:, :, None] * _UP.T
+    by_y -= (x_eta / det)[:, :, None] * _ALONG.T
+
+    shear = np.array([m.shear for m in materials])[mesh.region]
+    lame = np.array([m.lame for m in materials])[mesh.region]
+    place = _VALUES @ corners  # (e, q, 2)
+    centre = place.mean(axis=1)
+    modes = np.ones((count, 9, 3))
+    modes[:, :, 1:] = place - centre[:, None]
+    loaded = np.swapaxes(modes * weight[:, :, None], 1, 2)  # (e, 3, q)
+    moments = np.empty((count, 3, 9, 2))  # integral of mode times divergence
+    moments[..., 0], moments[..., 1] = loaded @ by_x, loaded @ by_y
+    moments = moments.reshape(count, 3, 18)
+    dilatation = np.linalg.inv(loaded @ modes) @ moments
+    stiff = np.swapaxes(lame[:, None, None] * moments, 1, 2) @ dilatation
+
+    # K_ia,jb gets G (delta_ab grad N_i . grad N_j + dN_i/db dN_j/da), one pair of directions after the other
+    blocks = stiff.reshape(count, 9, 2, 9, 2)
+    weight *= shear[:, None]
+    along = np.swapaxes(by_x * weight[:, :, None], 1, 2)
+    xx, xy = along @ by_x, along @ by_y
+    yy = np.swapaxes(by_y * weight[:, :, None], 1, 2) @ by_y
+    both = xx + yy
+    blocks[:, :, 0, :, 0] += both + xx
+    blocks[:, :, 1, :, 1] += both + yy
+    blocks[:, :, 0, :, 1] += np.swapaxes(xy, 1, 2)
+    blocks[:, :, 1, :, 0] += xy
+    return Elastic(stiff, dilatation, centre, shear, lame)
+
+
+class Reduced:
+    """A body reduced to the displacements of its skin, normal ones first, by one dense elimination of all others."""
+
+    def __init__(self, mesh, stiffness, loads=None):
+        count = mesh.nodes.size
+        at = (2 * mesh.elements[:, :, None] + np.arange(2)).reshape(len(mesh.elements), 18)
+        whole = np.zeros((count, count))
+        np.add.at(whole, (at[:, :, None], at[:, None, :]), stiffness)
+        self.loads = np.zeros((count, 1)) if loads is None else loads
+        self.kept = np.concatenate([2 * mesh.skin + 1, 2 * mesh.skin])
+        self.inner = np.setdiff1d(np.arange(count), np.concatenate([mesh.fixed, self.kept]))
+        self.inside = whole[np.ix_(self.inner, self.inner)]
+        self.across = whole[np.ix_(self.inner, self.kept)]
+        self.follow = np.linalg.solve(self.inside, self.across)
+        self.stiffness = whole[np.ix_(self.kept, self.kept)] - self.across.T @ self.follow
+        self.load = self.felt(self.loads)
+
+    def felt(self, loads):
+        """Return what the skin (m, l) feels of `loads` (size, l)."""
+        return loads[self.kept] - self.follow.T @ loads[self.inner]
+
+    def all_unknowns(self, kept, loads=None):
+        """Return all unknowns (size, c) for those of the skin (m, c), under `loads` (size, c) too."""
+        out = np.zeros((len(self.loads), kept.shape[1]))
+        out[self.kept] = kept
+        force = np.zeros(out.shape) if loads is None else loads
+        out[self.inner] = np.linalg.solve(self.inside, force[self.inner] - self.across @ kept)
+        return out
+
+    def under(self, loads):
+        """Return all unknowns (size, c) under `loads` (size, c) alone."""
+        return self.all_unknowns(np.linalg.solve(self.stiffness, self.felt(loads)), loads)
