@@ -169,18 +169,31 @@ def bind_arguments(loop: Callable[..., Result], *last: object) -> Callable[..., 
     """Return `loop` with its `last` arguments given for good, so that only the first are looked at in every call.
 
     For numba to look at thirty arrays takes five times as long as to hand them over, and as long as a tenth of the
-    work on a small mesh. Tuples among the first arguments must hold the same types in every call.
+    work on a small mesh.
     """
-    entries: dict[tuple[object, ...], Callable[..., Result]] = {}
+    ending = tuple([_kind(argument) for argument in last])
 
     def call(*first: object) -> Result:
-        kinds = tuple([(a.dtype.num, a.ndim, a.flags.num) if type(a) is np.ndarray else type(a) for a in first])
-        entry = entries.get(kinds)
+        key = (loop, tuple([_kind(argument) for argument in first]), ending)
+        entry = _ENTRIES.get(key)
         if entry is None:
             found: Any = loop
             types = tuple(_numba.typeof(argument) for argument in (*first, *last))
             found.compile(types)  # or load
-            entry = entries[kinds] = found.overloads[types].entry_point
+            entry = _ENTRIES[key] = found.overloads[types].entry_point
         return entry(*first, *last)
 
     return call
+
+
+def _kind(argument: object) -> object:
+    """Return what tells apart the types that numba knows, found faster than these."""
+    if type(argument) is np.ndarray:
+        array = cast("NDArray[Any]", argument)
+        return array.dtype.num, array.ndim, array.flags.num
+    if isinstance(argument, tuple):
+        return type(argument), *[_kind(one) for one in cast("tuple[object, ...]", argument)]
+    return type(argument)
+
+
+_ENTRIES: dict[tuple[object, ...], Callable[..., Any]] = {}  # by loop and the kinds of its arguments
