@@ -4,11 +4,12 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Generator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from hashlib import blake2b
 from importlib import import_module
 from pathlib import Path
+from tempfile import mkdtemp
 from types import FrameType
 from typing import Any, TypeVar, cast
 
@@ -35,27 +36,33 @@ def _cache_folder() -> Path:
     """Return where numba keeps compiled loops: one folder for each version of their sources.
 
     Numba looks at a loop's own file alone to see whether its code is out of date, and not at what the loop calls. The
-    folder lies beside the sources where nobody but the user may write there, else among the user's own caches. The
-    environment variable NUMBA_CACHE_DIR stands before both.
+    folder is the first of these in which nobody but the user may write, since the process runs what lies there: the one
+    that the environment variable NUMBA_CACHE_DIR names, one beside the sources, one among the user's own caches, and
+    else an empty one of this process, in which everything is compiled again.
     """
+    from platformdirs import user_cache_path
+
     sources = blake2b(digest_size=8)
     for file in sorted(_FOLDER.glob("*.py")):
         sources.update(file.read_bytes())
     version = f"solver-{sources.hexdigest()}"
     given = os.environ.get("NUMBA_CACHE_DIR")
+    places = [_FOLDER / "__pycache__"] if only_mine(_FOLDER) else []
+    places.append(user_cache_path("daq-app", appauthor=False))
     if given:
-        return Path(given) if Path(given).name == version else Path(given) / version
-    if _only_mine(_FOLDER):
-        return _FOLDER / "__pycache__" / version
-    from platformdirs import user_cache_path
+        places.insert(0, Path(given).parent if Path(given).name == version else Path(given))
+    for place in places:
+        with suppress(OSError):
+            (place / version).mkdir(mode=0o700, parents=True, exist_ok=True)
+            if all(only_mine(folder) for folder in (place, place / version)):
+                return place / version
+    return Path(mkdtemp(prefix="daq-app-"))
 
-    return user_cache_path("daq-app", appauthor=False) / version
 
-
-def _only_mine(folder: Path) -> bool:
-    """Return whether this user may write in `folder` and no other may."""
-    if not hasattr(os, "getuid") or not os.access(folder, os.W_OK):
-        return False
+def only_mine(folder: Path) -> bool:
+    """Return whether this user may write in `folder` and no other may, where the system has owners of files."""
+    if not os.access(folder, os.W_OK) or not hasattr(os, "getuid"):
+        return os.access(folder, os.W_OK)
     found = folder.stat()
     return found.st_uid == os.getuid() and not found.st_mode & 0o022
 
@@ -188,12 +195,13 @@ def bind_arguments(loop: Callable[..., Result], *last: object) -> Callable[..., 
 
 def _kind(argument: object) -> object:
     """Return what tells apart the types that numba knows, found faster than these."""
-    if type(argument) is np.ndarray:
+    kind = type(argument)
+    if kind is np.ndarray:
         array = cast("NDArray[Any]", argument)
         return array.dtype.num, array.ndim, array.flags.num
     if isinstance(argument, tuple):
-        return type(argument), *[_kind(one) for one in cast("tuple[object, ...]", argument)]
-    return type(argument)
+        return kind, tuple([_kind(one) for one in cast("tuple[object, ...]", argument)])
+    return kind
 
 
 _ENTRIES: dict[tuple[object, ...], Callable[..., Any]] = {}  # by loop and the kinds of its arguments

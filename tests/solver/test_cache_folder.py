@@ -1,0 +1,40 @@
+"""Compiled loops are loaded from a folder that nobody but the user may write in."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CODE = "import solver._kernels.compiling, os; print(os.environ['NUMBA_CACHE_DIR'])"
+
+
+def used(folder):
+    """Return the folder that a process uses whose environment names `folder`."""
+    told = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
+    done = subprocess.run([sys.executable, "-c", CODE], env=told, capture_output=True, text=True, check=True)
+    return Path(done.stdout.strip())
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="files have no owners here")
+@pytest.mark.parametrize("mode", [0o777, 0o775, 0o1777])
+def test_machine_code_in_a_folder_that_others_may_write_is_not_loaded(tmp_path, mode):
+    folder = tmp_path / "shared"
+    folder.mkdir()
+    folder.chmod(mode)
+    assert folder not in used(folder).parents
+
+
+def test_machine_code_in_a_folder_of_ones_own_is_kept_there(tmp_path):
+    folder = tmp_path / "mine"
+    folder.mkdir(mode=0o700)
+    assert used(folder).parent == folder
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="only root can give files away")
+def test_machine_code_in_a_folder_of_somebody_else_is_not_loaded(tmp_path):
+    folder = tmp_path / "theirs"
+    folder.mkdir(mode=0o700)
+    os.chown(folder, 12345, 12345)
+    assert folder not in used(folder).parents
