@@ -186,14 +186,14 @@ def bind_arguments(loop: Callable[..., Result], *last: object) -> Callable[..., 
     return call
 
 
-def _kind(argument: object) -> object:
+def _kind(argument: Any) -> object:  # noqa: ANN401 - an array, a number, or a tuple of both
     """Return what tells apart the types that numba knows, found faster than these."""
-    if type(argument) is np.ndarray:
-        array = cast("NDArray[Any]", argument)
-        return array.dtype.num, array.ndim, array.flags.num
-    if isinstance(argument, tuple):
-        return type(argument), *[_kind(one) for one in cast("tuple[object, ...]", argument)]
-    return type(argument)
+    kind: type = type(argument)
+    if kind is np.ndarray:
+        return argument.dtype.num, argument.ndim, argument.flags.num
+    if issubclass(kind, tuple):
+        return kind, *[_kind(one) for one in argument]
+    return kind
 
 
 _ENTRIES: dict[tuple[object, ...], Callable[..., Any]] = {}  # by loop and the kinds of its arguments
