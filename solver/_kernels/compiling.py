@@ -188,11 +188,11 @@ def bind_arguments(loop: Callable[..., Result], *last: object) -> Callable[..., 
 
 def _kind(argument: Any) -> object:  # noqa: ANN401 - an array, a number, or a tuple of both
     """Return what tells apart the types that numba knows, found faster than these."""
-    kind: type = type(argument)
+    kind: object = cast("object", argument.__class__)
     if kind is np.ndarray:
         return argument.dtype.num, argument.ndim, argument.flags.num
-    if issubclass(kind, tuple):
-        return kind, *[_kind(one) for one in argument]
+    if isinstance(argument, tuple):
+        return kind, *[_kind(one) for one in cast("tuple[object, ...]", argument)]
     return kind
 
 
