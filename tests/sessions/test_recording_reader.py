@@ -70,11 +70,11 @@ def test_a_file_that_is_no_recording_is_refused_with_a_sentence(tmp_path, conten
 
 def test_a_recording_of_a_later_format_is_refused_by_name(tmp_path):
     folder = ended(tmp_path / "s")
-    later = '{"name":"daq-app session","version":2}'
+    later = '{"name":"daq-app session","version":3}'
     import zlib
 
     change(folder, "UPDATE head SET value=?, crc32=? WHERE name='format'", (later, zlib.crc32(later.encode())))
-    with pytest.raises(RecordingError, match="up to version 1: use a later program"):
+    with pytest.raises(RecordingError, match="up to version 2: use a later program"):
         Recording.open(folder)
 
 
