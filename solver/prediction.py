@@ -12,6 +12,7 @@ from solver.mesh.mesher import FingerMesh
 from solver.scene import Scene
 
 Array = NDArray[np.float64]
+ROW: Array = 0.25 * np.arange(-32.0, 25.0)  # arc positions of the row of receptors [mm]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ from daq_app.qt.tokens import MODEL, SMALL, Tokens, font
 from daq_app.window.live_model import Picture
 from daq_app.window.plot_scale import PlotScale
 from daq_app.window.view_model import ModelWords
-from solver.body.receptor import ROW
+from solver.prediction import ROW
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class FingerView(QWidget):
         self.update()
 
     def show_model(self, picture: Picture | None, row: Array, words: ModelWords, clock: float) -> None:
-        """Show a state; `row` (r,) [MPa] at `solver.body.receptor.ROW`, `clock` [s] is for the scales' patience."""
+        """Show a state; `row` (r,) [MPa] at `solver.prediction.ROW`, `clock` [s] is for the scales' patience."""
         if words == self._words and (clock - self._drawn_at < EVERY or _alike(picture, self._picture)):
             return
         self._drawn_at = clock

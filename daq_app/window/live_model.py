@@ -60,7 +60,7 @@ class Provisional:
 
     time: Array  # (n,) [s, device time]
     sed: Array  # (n,) at the receptor [MPa]; 0 where nothing touches, nan beyond the model's reach
-    row: Array  # (r,) along the skin at the receptor's depth, at `solver.body.receptor.ROW` [MPa]
+    row: Array  # (r,) along the skin at the receptor's depth, at `solver.prediction.ROW` [MPa]
     picture: Picture
     depth: float  # of the bone, below first touch [mm]
     mu: float  # taken so far [-]

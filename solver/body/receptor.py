@@ -10,7 +10,6 @@ from solver.mesh import Array, Indices, Mesh, distinct
 from solver.mesh.mesher import FingerMesh
 from solver.scene import Receptor
 
-ROW: Array = 0.25 * np.arange(-32.0, 25.0)  # arc positions of the row of receptors [mm]
 _POINTS, _WEIGHTS = GAUSS_3
 _ASIDE = 1e-7  # [mm]: a point on a line between elements is probed on both sides
 

@@ -8,7 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from solver.body.linear import Body
-from solver.body.receptor import ROW, Endings, endings, middle
+from solver.body.receptor import Endings, endings, middle
 from solver.body.stiffness import Probes
 from solver.body.tissues import settled_moduli
 from solver.contact.active_set import Contact
@@ -16,6 +16,7 @@ from solver.contact.edges import arcs_of, width
 from solver.element import Q2P1
 from solver.mesh import Array, distinct
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
+from solver.prediction import ROW
 from solver.scene import Receptor, Scene
 
 

@@ -10,7 +10,7 @@ from numpy.linalg import LinAlgError
 from solver import _kernels as kernels
 from solver._kernels import OPEN, SHEAR_LIMITED
 from solver.body.finite import FiniteBody, FiniteProbes
-from solver.body.receptor import ROW, endings, middle
+from solver.body.receptor import endings, middle
 from solver.body.tissues import finite_laws
 from solver.contact.edges import edges, width
 from solver.contact.skin_compression import Pinch
@@ -19,6 +19,7 @@ from solver.equilibrium.newton import Newton, Shape
 from solver.mesh import Array
 from solver.mesh.grid import MeshError
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
+from solver.prediction import ROW
 from solver.scene import Scene, SceneError
 
 RUBS = 1e-3  # drag by normal force from which a traction bound matters

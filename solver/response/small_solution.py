@@ -25,7 +25,6 @@ from solver.accuracy.contrasts import those_of, together
 from solver.accuracy.omitted_effects import model, warnings
 from solver.accuracy.small_errors import error_estimates, others_on, steps_asked, times_on_way
 from solver.accuracy.step_error import Steps
-from solver.body.receptor import ROW
 from solver.contact.active_set import SLIP, STICK, Contact
 from solver.contact.law import NAMES, FrictionLaw
 from solver.continuation.small_existence import direct
@@ -47,7 +46,7 @@ from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.mesh import Array
 from solver.mesh.grid import MeshError
 from solver.mesh.mesher import Sizing
-from solver.prediction import History, Prediction, Row, Skin, drag
+from solver.prediction import ROW, History, Prediction, Row, Skin, drag
 from solver.scene import Scene, SceneError
 
 ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements once more

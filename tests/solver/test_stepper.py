@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from solver._kernels.following import follow
-from solver.body.receptor import ROW
 from solver.contact.active_set import SHEAR_LIMITED, STICK, Course, forced, untouched
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.finger import FingerModel
@@ -18,6 +17,7 @@ from solver.equilibrium.force_control import march as forced_march
 from solver.equilibrium.force_control import untouched as at_rest
 from solver.equilibrium.march import march, press_and_slide
 from solver.mesh.mesher import Sizing
+from solver.prediction import ROW
 from solver.response.finite_stepper import FiniteStepper
 from solver.response.small_stepper import Condensed, SmallStepper
 from solver.response.solution import solve
@@ -163,11 +163,11 @@ def test_a_drag_that_turns_within_one_reading_ends_where_one_that_never_turned_d
 def test_a_reading_may_be_a_number_of_any_kind_without_another_loop_being_compiled():
     follows, plain = made("small", 0.3), made("small", 0.3)
     assert follows.step(0.05, 0.01) == plain.step(0.05, 0.01)
-    before = len(follow._entries)
+    before = len(follow.signatures)
     for kind in (np.float32, np.float64, np.array):
         assert follows.step(kind(0.0625), kind(0.015625)) == plain.step(0.0625, 0.015625)
     follows.step(1, 0)
-    assert len(follow._entries) == before
+    assert len(follow.signatures) == before
 
 
 @pytest.mark.parametrize("readings_of_lift", [4, 8])  # 20 and 40 ms at 200 Hz
