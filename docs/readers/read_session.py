@@ -35,6 +35,7 @@ def read(folder):
             damaged.append(f"event {number}")
             continue
         events.append({"time_ns": time_ns, "kind": kind, "trial": trial, **json.loads(data)})
+    file.close()
     return {
         "simulated": None if head["simulated"] == "no" else head["simulated"],
         "plan": json.loads(head["plan"]),

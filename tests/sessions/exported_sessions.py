@@ -1,11 +1,10 @@
 """Sessions that hold all that an export has to carry, and their exports."""
 
 import math
-import sqlite3
 from dataclasses import replace
 
 import numpy as np
-from recordings import begun, readings
+from recordings import begun, change, readings
 from stand_ins import INFO, ToldClock
 from told_session import Session
 
@@ -39,8 +38,7 @@ def torn(folder):
     writer.event("scored", 1, {"score": 42.5, "positions": [[1.25, 40.0], [1.5, 42.5]], "hand": "left"})
     writer.event("told", data={"sentence": 'tab\tline\nquote " äöü, 漢'})
     writer.close()
-    with sqlite3.connect(folder / "session.sqlite") as file:
-        file.execute("UPDATE blocks SET crc32 = crc32 + 1 WHERE number = 4")
+    change(folder, "UPDATE blocks SET crc32 = crc32 + 1 WHERE number = 4")
 
 
 def scores_only(folder):
