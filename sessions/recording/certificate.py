@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from sessions.file_access import read_limited
 from sessions.recording.atomic_file import write_whole
 from sessions.recording.provenance import software_versions
 
@@ -28,10 +29,10 @@ def certificate_for(folder: Path) -> dict[str, Any] | None:
     for place in places:
         path = place / CERTIFICATE_FILE
         try:
-            certificate = json.loads(path.read_bytes())
+            certificate = json.loads(read_limited(path))
             if certificate["format"] != FORMAT or path.stat().st_dev != disk:
                 continue
             return {**certificate, "same_program": certificate["software"] == software_versions()}
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             continue
     return None

@@ -1,0 +1,68 @@
+"""Read files of a bounded size, make new ones that follow no link, and say what mends a file that failed."""
+
+import errno
+import os
+import re
+import sqlite3
+from pathlib import Path
+from typing import BinaryIO
+
+LARGEST_TEXT = 4 * 2**20  # of a file that people write [bytes]: the longest built-in protocol is a thousandth of it
+LARGEST_DOCUMENT = 256 * 2**20  # of a file that programs write [bytes]: a session of an hour makes a tenth of it
+
+_FULL = "free space on the disk"
+_DENIED = "permit reading and writing there"
+_FAILING = "check the disk and its cable"
+_BUSY = "end the program that uses it"
+_DAMAGED = "restore it from a copy"
+_TOO_LARGE = "give the file that was meant"
+_OTHER = "check its name, its disk and who may use it"
+_BY_ERRNO = {
+    errno.ENOSPC: _FULL,
+    errno.EDQUOT: _FULL,
+    errno.EACCES: _DENIED,
+    errno.EPERM: _DENIED,
+    errno.EROFS: _DENIED,
+    errno.EIO: _FAILING,
+    errno.EBUSY: _BUSY,
+    errno.EFBIG: _TOO_LARGE,
+}
+_BY_SQLITE = {
+    sqlite3.SQLITE_FULL: _FULL,
+    sqlite3.SQLITE_PERM: _DENIED,
+    sqlite3.SQLITE_READONLY: _DENIED,
+    sqlite3.SQLITE_AUTH: _DENIED,
+    sqlite3.SQLITE_IOERR: _FAILING,
+    sqlite3.SQLITE_BUSY: _BUSY,
+    sqlite3.SQLITE_LOCKED: _BUSY,
+    sqlite3.SQLITE_CANTOPEN: _OTHER,
+}
+
+
+def read_limited(path: Path, most: int = LARGEST_DOCUMENT) -> bytes:
+    """Return the bytes of a file, which may be a pipe. Raises OSError, also where there are more than `most`."""
+    with path.open("rb") as file:
+        if os.fstat(file.fileno()).st_size <= most and len(content := file.read(most + 1)) <= most:
+            return content
+    raise OSError(errno.EFBIG, f"it holds more than {most / 2**20:.0f} MB", str(path))
+
+
+def open_new(path: Path) -> BinaryIO:
+    """Open a file that is made anew for writing; what had its name, a link too, is removed and not followed."""
+    path.unlink(missing_ok=True)
+    return path.open("xb")
+
+
+def remedy(error: Exception) -> str:
+    """Say what mends a file that could not be read or written.
+
+    >>> remedy(OSError(errno.EIO, "")), remedy(PermissionError(errno.EACCES, ""))
+    ('check the disk and its cable', 'permit reading and writing there')
+    """
+    if isinstance(error, sqlite3.Error):
+        code: int | None = getattr(error, "sqlite_errorcode", None)  # none where Python itself found the fault
+        return _DAMAGED if code is None else _BY_SQLITE.get(code & 0xFF, _DAMAGED)  # the low byte is the kind
+    number: int | None = getattr(error, "errno", None)
+    if number is None and (named := re.search(r"errno = (\d+)", str(error))):  # as HDF5 tells it
+        number = int(named.group(1))
+    return _BY_ERRNO.get(number or 0, _OTHER)
