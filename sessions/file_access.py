@@ -16,6 +16,7 @@ _FAILING = "check the disk and its cable"
 _BUSY = "end the program that uses it"
 _DAMAGED = "restore it from a copy"
 _TOO_LARGE = "give the file that was meant"
+_MISSING = "restore it from a copy, or give another name"
 _OTHER = "check its name, its disk and who may use it"
 _BY_ERRNO = {
     errno.ENOSPC: _FULL,
@@ -26,6 +27,7 @@ _BY_ERRNO = {
     errno.EIO: _FAILING,
     errno.EBUSY: _BUSY,
     errno.EFBIG: _TOO_LARGE,
+    errno.ENOENT: _MISSING,
 }
 _BY_SQLITE = {
     sqlite3.SQLITE_FULL: _FULL,
@@ -51,6 +53,18 @@ def open_new(path: Path) -> BinaryIO:
     """Open a file that is made anew for writing; what had its name, a link too, is removed and not followed."""
     path.unlink(missing_ok=True)
     return path.open("xb")
+
+
+def bounded(connection: sqlite3.Connection) -> sqlite3.Connection:
+    """Return a connection whose values are of a bounded size, and whose texts come even where they are no UTF-8."""
+    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_DOCUMENT)
+    connection.text_factory = _text
+    return connection
+
+
+def _text(content: bytes) -> str:
+    """Return a text that no check sum fits where its bytes are damaged, instead of failing with its whole table."""
+    return content.decode(errors="surrogateescape")
 
 
 def remedy(error: Exception) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from sessions.file_access import read_limited, remedy
+from sessions.json_document import json_value
 from sessions.recording.atomic_file import put_in_place, write_whole
 from sessions.recording.description import description
 from sessions.recording.disk_space import release_reserve
@@ -83,8 +84,8 @@ def _otherwise_described(recording: Recording) -> Iterator[str]:
     if not path.is_file():
         return  # the manifest tells
     try:
-        told = json.loads(read_limited(path))
-    except (OSError, ValueError, RecursionError) as error:
+        told = json_value(read_limited(path))
+    except (OSError, ValueError) as error:
         yield f"{DESCRIPTION_FILE} cannot be read ({error})"
         return
     expected: dict[str, Any] = json.loads(json.dumps(description(recording)))

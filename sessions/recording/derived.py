@@ -4,9 +4,10 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from sessions.file_access import read_limited, remedy
+from sessions.json_document import json_object
 from sessions.recording.atomic_file import write_whole
 from sessions.recording.errors import RecordingError
 from sessions.recording.manifest import is_sealed, list_in_manifest
@@ -40,16 +41,11 @@ def load_derived(folder: Path, name: str) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        found = json.loads(read_limited(path), parse_constant=_no_number)
-    except (ValueError, RecursionError) as error:
+        return json_object(read_limited(path))
+    except ValueError as error:
         raise RecordingError(f"{path} is damaged ({error}); make it anew from the recording") from error
-    if not isinstance(found, dict):
-        raise RecordingError(f"{path} is damaged (it holds no names); make it anew from the recording")
-    return cast("dict[str, Any]", found)
-
-
-def _no_number(name: str) -> None:
-    raise ValueError(f"{name} is no number that this program stores")
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read ({error.strerror}); {remedy(error)}") from error
 
 
 def bytes_of(path: Path) -> bytes:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from sessions.file_access import read_limited, remedy
+from sessions.json_document import json_object
 from sessions.recording.atomic_file import write_whole
 from sessions.recording.errors import RecordingError
 from sessions.recording.schema import FORMAT, FORMAT_VERSION, MANIFEST_FILE
@@ -60,7 +61,7 @@ def _simulated(sentence: str | None) -> dict[str, Any]:
 
 def _head_of(folder: Path) -> dict[str, Any]:
     """Return what stands before the files in a manifest that can be read."""
-    document = json.loads(read_limited(folder / MANIFEST_FILE))
+    document = json_object(read_limited(folder / MANIFEST_FILE))
     return {name: value for name, value in document.items() if name != "files"}
 
 
@@ -68,11 +69,11 @@ def _files(folder: Path) -> dict[str, Any]:
     """Return what the manifest lists. Raises RecordingError when it cannot be read."""
     path = folder / MANIFEST_FILE
     try:
-        files = json.loads(read_limited(path))["files"]
+        files = json_object(read_limited(path))["files"]
         return {str(name): {"sha256": str(told["sha256"]), "bytes": told["bytes"]} for name, told in files.items()}
     except OSError as error:
         raise RecordingError(f"{path} cannot be read ({error.strerror}); {remedy(error)}") from error
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise RecordingError(f"{path} cannot be read ({error}); restore the folder from a copy") from error
 
 
