@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 
-from sessions.file_access import bounded, read_limited, remedy
+from sessions.file_access import DATABASE_FAILURES, bounded, read_limited, remedy
 from sessions.json_document import json_object
 from sessions.plan.blinding import Key
 from sessions.plan.orders import opaque_codes
@@ -187,7 +187,7 @@ def _reading(folder: Path) -> Generator[sqlite3.Connection]:
         address = f"{path.resolve().as_uri()}?mode=ro"
         with closing(bounded(sqlite3.connect(address, uri=True, timeout=PATIENCE))) as connection:
             yield connection
-    except (sqlite3.Error, OSError) as error:
+    except DATABASE_FAILURES as error:
         raise StudyError(f"{path} cannot be read ({error}); {remedy(error)}") from error
 
 

@@ -24,12 +24,12 @@ class _Discarded(_Take):
 
 
 class _Scored(msgspec.Struct):
-    score: Annotated[float, msgspec.Meta(ge=0.0, le=100.0)] | None
+    score: float | None
     positions: list[tuple[float, float]] | None = None
 
 
 class _Number(msgspec.Struct):
-    number: Annotated[float, msgspec.Meta(gt=0.0)] | None
+    number: float | None
 
 
 class _Chosen(msgspec.Struct):

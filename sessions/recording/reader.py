@@ -16,7 +16,7 @@ import numpy as np
 
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.file_access import bounded, remedy
+from sessions.file_access import DATABASE_FAILURES, bounded, remedy
 from sessions.json_document import json_value
 from sessions.plan.plan import SessionPlan
 from sessions.recording.errors import RecordingError
@@ -78,7 +78,7 @@ class Recording:
             with _connected(path) as connection:
                 head = _head(path, connection)
                 events = _events(connection, losses)
-        except (sqlite3.Error, OSError) as error:
+        except DATABASE_FAILURES as error:
             raise RecordingError(f"{path} cannot be read ({error}); {remedy(error)}") from error
         losses += [event.data["sentence"] for event in events if event.kind in TELL_LOSSES]
         if _end(events) is None:
@@ -167,7 +167,7 @@ class Recording:
         try:
             with _connected(self.folder / LIVE_FILE) as connection:
                 (size,) = connection.execute("SELECT coalesce(sum(length(sequence)), 0) FROM blocks").fetchone()
-        except (sqlite3.DatabaseError, OSError):
+        except DATABASE_FAILURES:
             return sum(len(block) for block in self.blocks())
         return size // np.dtype(COLUMNS["sequence"]).itemsize
 
@@ -203,7 +203,7 @@ class Recording:
         try:
             with _connected(path) as connection:
                 yield from _blocks(connection, damaged, between)
-        except (sqlite3.DatabaseError, OSError) as error:
+        except DATABASE_FAILURES as error:
             damaged.append(f"{LIVE_FILE} cannot be read to its end ({error})")
 
 
