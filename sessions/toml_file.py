@@ -14,6 +14,8 @@ from typing import Any, Literal, TypeVar, cast, get_args, get_origin, get_type_h
 
 import msgspec
 
+from sessions.file_access import LARGEST_TEXT, read_limited, remedy
+
 T = TypeVar("T")
 
 
@@ -46,9 +48,13 @@ def text_of(path: Path) -> str:
         found = "this is a folder" if path.is_dir() else "there is no such file"
         raise FileNotFoundError(f"{path}: {found}; give the path of a TOML file")
     try:
-        return path.read_bytes().decode("utf-8-sig")  # some editors begin a file with a mark that is no part of it
+        return read_limited(path, LARGEST_TEXT).decode(
+            "utf-8-sig"
+        )  # some editors begin a file with a mark that is no part of it
     except UnicodeDecodeError as error:
         raise SettingsError(f"{path}: byte {error.start} is no UTF-8 text; save the file as UTF-8") from error
+    except OSError as error:
+        raise SettingsError(f"{path} cannot be read ({error.strerror}); {remedy(error)}") from error
 
 
 def from_toml(text: str, cls: type[T], where: str, instead: Mapping[str, Any] | None = None) -> T:

@@ -9,6 +9,7 @@ from typing import NoReturn
 
 from daq_app.cli.console import Console, harmless, takes_all
 
+LONGEST = 1500  # of the sentence a failure is told in [characters]: half a page of a terminal
 DONE, FAILED, WRONG, FLAWED, STOPPED = 0, 1, 2, 3, 130
 
 # Verb to module and to what it does. A verb's module is imported only when it is the one asked for.
@@ -149,7 +150,7 @@ def _parser(name: str, verb: ModuleType) -> argparse.ArgumentParser:
 
 def _failure(error: Exception) -> tuple[str, int]:
     """Return the sentence and the exit code for what went wrong."""
-    sentence = " ".join(str(error).split())
+    sentence = _shortened(" ".join(str(error).split()))
     if isinstance(error, (WrongValue, *_loaded(_WRONG))):
         return sentence, WRONG
     if isinstance(error, _loaded(_FAILED)):
@@ -162,6 +163,11 @@ def _failure(error: Exception) -> tuple[str, int]:
         package = error.name.partition(".")[0]
         return f"the Python package {package} is not installed; 'pip install daq-app' brings all that is needed", FAILED
     return f"unexpected {type(error).__name__} ({sentence}); run again with --debug and report what it shows", FAILED
+
+
+def _shortened(sentence: str) -> str:
+    """Return a sentence without the middle of what a damaged file put into it."""
+    return sentence if len(sentence) <= LONGEST else f"{sentence[: LONGEST // 2]} … {sentence[-LONGEST // 2 :]}"
 
 
 def _loaded(names: tuple[str, ...]) -> tuple[type[Exception], ...]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sessions.file_access import remedy
 from sessions.recording import Recording
 
 Progress = Callable[[float], None]  # part done, 0 to 1
@@ -54,7 +55,7 @@ def export(source: ExportSource, name: str, folder: Path, progress: Progress | N
         part.replace(folder)
     except OSError as error:
         raise ExportError(
-            f"{folder} cannot be written ({error.strerror or error}); free space or give another"
+            f"{folder} cannot be written ({error.strerror or error}); {remedy(error)}, or give another"
         ) from error
     finally:
         shutil.rmtree(part, ignore_errors=True)

@@ -7,7 +7,6 @@ arrived is a row of n/a, so that row and sampling rate agree. The last column te
 
 import gzip
 import io
-import json
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -23,10 +22,13 @@ from sessions.exchange.csv_text import write_rows
 from sessions.exchange.exported import ExportedSession, head_of
 from sessions.exchange.readings_text import MISSING, columns, read_rows, rows
 from sessions.exchange.session_tables import Column, Table, tables
+from sessions.file_access import packed_lines, read_limited
+from sessions.json_document import json_object
 from sessions.recording import LoggedEvent, Recording
 from sessions.recording.atomic_file import write_json
 from sessions.recording.calibration_uncertainty import GAIN_ERROR, gain_error_content
 from sessions.recording.description import description
+from sessions.recording.event_shapes import event_data
 from sessions.recording.head import json_text
 from sessions.strokes.decisions import DECISIONS, content_of
 
@@ -76,8 +78,8 @@ def read(path: Path) -> ExportedSession:
     if len(tables_found) != 1:
         raise ValueError(f"it holds the events of {len(tables_found)} sessions, and one is needed")
     (events_file,) = tables_found
-    told = json.loads(events_file.with_suffix(".json").read_text(encoding="utf-8"))
-    header, *lines = events_file.read_text(encoding="utf-8").splitlines()
+    told = json_object(read_limited(events_file.with_suffix(".json")))
+    header, *lines = read_limited(events_file).decode().splitlines()
     places = {name: place for place, name in enumerate(header.split("\t"))}
     events = tuple(_event(line.split("\t"), places) for line in lines)
     parts = sorted(events_file.parent.glob("*_physio.tsv.gz"), key=lambda part: _start(part))
@@ -161,7 +163,7 @@ def _event(cells: Sequence[str], places: Mapping[str, int]) -> LoggedEvent:
         return cells[places[name]]
 
     trial = None if cell("trial") == MISSING else int(cell("trial"))
-    data = json.loads(cell("data"))
+    data = event_data(cell("trial_type"), cell("data"))
     return LoggedEvent(
         int(cell("number")), int(cell("time_ns")), cell("trial_type"), trial, int(cell("readings")), data
     )
@@ -263,13 +265,12 @@ def _start(part: Path) -> float:
 
 
 def _sidecar(part: Path) -> dict[str, Any]:
-    return json.loads((part.parent / part.name.replace(".tsv.gz", ".json")).read_text(encoding="utf-8"))
+    return json_object(read_limited(part.parent / part.name.replace(".tsv.gz", ".json")))
 
 
 def _blocks(parts: Iterable[Path]) -> Iterator[ReadingBlock]:
     for part in parts:
-        with gzip.open(part, "rt", encoding="utf-8") as lines:
-            yield from read_rows(lines, _sidecar(part)["Columns"], "\t")
+        yield from read_rows(packed_lines(part), _sidecar(part)["Columns"], "\t")
 
 
 # ---- files

@@ -1,7 +1,6 @@
 """A session as CSV: a file for each table, a README that tells every column, and the session's own description."""
 
 import csv
-import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TextIO
@@ -12,10 +11,13 @@ from sessions.exchange.csv_text import plain, write_rows
 from sessions.exchange.exported import ExportedSession, head_of
 from sessions.exchange.readings_text import columns, read_rows, rows
 from sessions.exchange.session_tables import Column, Table, tables
+from sessions.file_access import read_limited
+from sessions.json_document import json_object
 from sessions.recording import LoggedEvent, Recording
 from sessions.recording.atomic_file import write_json
 from sessions.recording.calibration_uncertainty import GAIN_ERROR, gain_error_content
 from sessions.recording.description import description
+from sessions.recording.event_shapes import event_data
 from sessions.recording.head import json_text
 from sessions.recording.schema import DESCRIPTION_FILE
 from sessions.strokes.decisions import DECISIONS, content_of
@@ -53,7 +55,7 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
 
 def read(path: Path) -> ExportedSession:
     """Return the session that `write` put into the folder `path`. Raises OSError, ValueError."""
-    told = json.loads((path / DESCRIPTION_FILE).read_text(encoding="utf-8"))
+    told = json_object(read_limited(path / DESCRIPTION_FILE))
     events = tuple(_event(row) for row in _rows_of(path / EVENTS))
     beside = content_of(path), gain_error_content(path)
     return ExportedSession("csv", path, head_of(told), events, lambda: _read_readings(path / READINGS), *beside)
@@ -83,7 +85,7 @@ def _event(row: dict[str, str]) -> LoggedEvent:
         row["kind"],
         int(trial) if trial else None,
         int(row["readings"]),
-        json.loads(row["data"]),
+        event_data(row["kind"], row["data"]),
     )
 
 
@@ -119,8 +121,8 @@ def _read_readings(path: Path) -> Iterator[ReadingBlock]:
 
 
 def _rows_of(path: Path) -> list[dict[str, str]]:
-    with path.open(encoding="utf-8", newline="") as file:
-        return [{name: plain(text) for name, text in row.items()} for row in csv.DictReader(file)]
+    lines = read_limited(path).decode().splitlines(keepends=True)
+    return [{name: plain(text) for name, text in row.items()} for row in csv.DictReader(lines)]
 
 
 def _readme(recording: Recording, told: Sequence[tuple[str, str, Sequence[Column]]]) -> str:

@@ -18,8 +18,11 @@ from drivers.readings import ReadingBlock
 from sessions.exchange import ExportSource, Progress
 from sessions.exchange.exported import ExportedSession, Head
 from sessions.exchange.session_tables import Column, tables
+from sessions.file_access import LARGEST_DOCUMENT
+from sessions.json_document import json_value
 from sessions.recording import LoggedEvent
 from sessions.recording.calibration_uncertainty import gain_error_content
+from sessions.recording.event_shapes import event_data
 from sessions.recording.schema import COLUMNS, FORMAT, FORMAT_VERSION, SEALED_FILE
 from sessions.recording.sealed_copy import DataSet, texts, write_copy
 from sessions.recording.text_column import read_texts
@@ -54,20 +57,27 @@ def read(path: Path) -> ExportedSession:
             raise ValueError(f"it holds {made[0] or 'no format'} {made[1]}; this reads '{FORMAT}' to {FORMAT_VERSION}")
         head = Head(
             _text(file.attrs["SIMULATED"]) if "SIMULATED" in file.attrs else None,
-            *(json.loads(_text(file[f"head/{name}"][0])) for name in ("plan", "transducer", "provenance")),
-            losses=tuple(map(_text, file["head/losses"][...])),
+            *(json_value(_text(_held(file, f"head/{name}")[0])) for name in ("plan", "transducer", "provenance")),
+            losses=tuple(map(_text, _held(file, "head/losses"))),
             digest=None,  # the file's own check sums guard it
         )
-        columns = [file[f"events/{name}"][...].tolist() for name in ("number", "time_ns", "trial", "readings")]
-        beside = [_text(file[name][0]).encode() if name in file else b"" for name in (DECIDED, UNCERTAIN)]
-        kinds = map(_text, file["events/kind"][...].tolist())
+        columns = [_held(file, f"events/{name}").tolist() for name in ("number", "time_ns", "trial", "readings")]
+        beside = [_text(_held(file, name)[0]).encode() if name in file else b"" for name in (DECIDED, UNCERTAIN)]
+        kinds = map(_text, _held(file, "events/kind").tolist())
         events = tuple(
-            LoggedEvent(number, time_ns, kind, trial or None, readings, json.loads(text))
+            LoggedEvent(number, time_ns, kind, trial or None, readings, event_data(kind, text.decode()))
             for number, time_ns, trial, readings, kind, text in zip(
                 *columns, kinds, read_texts(file, "events/data"), strict=True
             )
         )
     return ExportedSession("hdf5", path, head, events, lambda: _blocks(path), *beside)
+
+
+def _held(file: h5py.File, name: str) -> Any:  # noqa: ANN401  h5py brings no types
+    """Return a data set as an array. Raises ValueError where it unpacks to more than an export writes."""
+    if file[name].nbytes > LARGEST_DOCUMENT:
+        raise ValueError(f"{name} unpacks to more than {LARGEST_DOCUMENT / 2**20:.0f} MB")
+    return file[name][...]
 
 
 def _blocks(path: Path) -> Iterator[ReadingBlock]:

@@ -15,6 +15,7 @@ from drivers.clock import StillClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.exchange.csv_columns import TIME_UNITS, Columns, ColumnsUnknown, columns
+from sessions.file_access import LARGEST_TABLE, read_limited, remedy
 from sessions.plan.plan import Frame, Origin, SessionPlan
 from sessions.recording.atomic_file import write_whole
 from sessions.recording.provenance import Setting, provenance
@@ -79,9 +80,9 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
     """
     stated = options or ImportOptions()
     try:
-        content = path.read_bytes()
+        content = read_limited(path, LARGEST_TABLE)
     except OSError as error:
-        raise ImportRefused(f"{path} cannot be read ({error.strerror}); give the path of a CSV file") from error
+        raise ImportRefused(f"{path} cannot be read ({error.strerror}); {remedy(error)}, a CSV file") from error
     told, rows, lines = _table(path, content, stated)
     time, rate, rate_origin = _times(path, told, rows, lines, stated)
     raw = rows[:, list(told.axes)]

@@ -1,6 +1,9 @@
 """An export of this program becomes a session again: which export it is, and what came of it."""
 
+import csv
+import errno
 import shutil
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,10 +12,14 @@ import msgspec
 from sessions.exchange import bids, csv_folder, hdf5
 from sessions.exchange.exported import ExportedSession, restore
 from sessions.exchange.import_csv import ImportRefused
+from sessions.file_access import remedy
 from sessions.recording import Recording, RecordingError
 from sessions.recording.schema import DESCRIPTION_FILE, LIVE_FILE, SEALED_FILE
 
-_DAMAGED = (OSError, EOFError, ValueError, KeyError, TypeError, msgspec.ValidationError)
+_DAMAGED = (
+    *(OSError, EOFError, ValueError, LookupError, TypeError, AttributeError, RuntimeError, MemoryError),
+    *(csv.Error, zlib.error, msgspec.ValidationError),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +51,7 @@ def exported(path: Path) -> ExportedSession | None:
     try:
         return reader(file)
     except _DAMAGED as error:
-        raise ImportRefused(f"{path} cannot be read as an export ({_said(error)}); export the session anew") from error
+        raise ImportRefused(f"{path} cannot be read as an export ({_said(error)}); {_mended(error)}") from error
 
 
 def import_session(source: ExportedSession, folder: Path) -> Restored:
@@ -57,16 +64,22 @@ def import_session(source: ExportedSession, folder: Path) -> Restored:
     part = folder.with_name(f".{folder.name}.part")
     try:
         shutil.rmtree(part, ignore_errors=True)
+        part.mkdir(parents=True)  # fails where a link stands there, which would lead elsewhere
         differences = restore(source, part)
         if folder.exists():
             folder.rmdir()
         part.replace(folder)
     except _DAMAGED as error:
-        raise ImportRefused(f"{source.path} is damaged ({_said(error)}); export the session anew") from error
+        raise ImportRefused(f"{source.path} is damaged ({_said(error)}); {_mended(error)}") from error
     finally:
         shutil.rmtree(part, ignore_errors=True)
     made = Recording.open(folder)
     return Restored(sum(len(block) for block in made.blocks()), len(made.events), differences)
+
+
+def _mended(error: Exception) -> str:
+    told = isinstance(error, OSError) and error.errno not in (None, errno.ENOENT)
+    return remedy(error) if told else "export the session anew"
 
 
 def _said(error: Exception) -> str:

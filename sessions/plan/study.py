@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
@@ -34,7 +34,7 @@ class Member:
     """One subject of a study."""
 
     subject: str  # a code, never a name
-    slot: int  # reserved, from 0; given back on withdrawal
+    slot: Annotated[int, msgspec.Meta(ge=0)]  # reserved, from 0; given back on withdrawal
     body: Body  # what is the subject's own
     withdrawn: str | None = None  # why; None while enrolled
 
@@ -55,11 +55,11 @@ class Study:
         found: dict[str, Member] = {}
         for event in self.events:
             if event.kind == "enrolled":
-                body = msgspec.convert(event.data["body"], Body)
-                found[event.subject] = Member(event.subject, event.data["slot"], body)
+                held = {"subject": event.subject, "slot": event.data["slot"], "body": event.data["body"]}
+                found[event.subject] = msgspec.convert(held, Member)
             elif event.kind == "withdrawn":
                 before = found[event.subject]
-                found[event.subject] = Member(before.subject, before.slot, before.body, event.data["reason"])
+                found[event.subject] = Member(before.subject, before.slot, before.body, str(event.data["reason"]))
         return found
 
     @property

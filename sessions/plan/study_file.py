@@ -14,6 +14,8 @@ from typing import Any
 
 import msgspec
 
+from sessions.file_access import DATABASE_FAILURES, bounded, read_limited, remedy
+from sessions.json_document import json_object
 from sessions.plan.blinding import Key
 from sessions.plan.orders import opaque_codes
 from sessions.plan.protocols import Body, Protocol
@@ -116,8 +118,10 @@ def study_key(folder: Path) -> Key | None:
         return None
     path = folder / KEY_FILE
     try:
-        key = Key.opened(json.loads(path.read_bytes())["sealed"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        key = Key.opened(json_object(read_limited(path))["sealed"])
+    except OSError as error:
+        raise StudyError(f"{path} cannot be read ({error.strerror}); {remedy(error)}") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise StudyError(f"{path} cannot be read ({error}); restore it from a copy") from error
     if key.sha256 != expected:
         raise StudyError(f"{path} is not the key that was sealed: its SHA-256 differs; restore it from a copy")
@@ -152,17 +156,26 @@ def _tell(connection: sqlite3.Connection, kind: str, subject: str, data: Mapping
 
 def _study(connection: sqlite3.Connection, folder: Path) -> Study:
     """Return the study that a file holds."""
+    path = folder / STUDY_FILE
     head = dict(connection.execute("SELECT name, value FROM head").fetchall())
-    if int(head.get("version", 0)) != VERSION:
-        raise StudyError(f"{folder / STUDY_FILE} is of version {head.get('version')}; this program reads {VERSION}")
+    if head.get("version") != str(VERSION):
+        raise StudyError(f"{path} is of version {head.get('version')}; this program reads {VERSION}")
     events = connection.execute("SELECT number, utc, kind, subject, data FROM events ORDER BY number").fetchall()
-    return Study(
-        name=folder.resolve().name,
-        protocol=from_toml(head["protocol"], Protocol, f"{folder / STUDY_FILE}: the protocol"),
-        seed=int(head["seed"]),
-        key_sha256=head["key_sha256"] or None,
-        events=tuple(StudyEvent(n, utc, kind, subject, json.loads(data)) for n, utc, kind, subject, data in events),
-    )
+    try:
+        study = Study(
+            name=folder.resolve().name,
+            protocol=from_toml(str(head["protocol"]), Protocol, f"{path}: the protocol"),
+            seed=int(head["seed"]),
+            key_sha256=head["key_sha256"] or None,
+            events=tuple(
+                StudyEvent(*msgspec.convert((*row, json_object(data)), tuple[int, str, str, str, dict[str, Any]]))
+                for *row, data in events
+            ),
+        )
+        _ = study.members, study.unblinded  # whatever their events lack is told here, and not where they are used
+    except (ValueError, KeyError, TypeError, msgspec.ValidationError) as error:
+        raise StudyError(f"{path} is damaged ({error}); restore it from a copy") from error
+    return study
 
 
 @contextmanager
@@ -170,10 +183,12 @@ def _reading(folder: Path) -> Generator[sqlite3.Connection]:
     """Lend a connection that changes nothing."""
     path = folder / STUDY_FILE
     try:
-        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, timeout=PATIENCE)) as connection:
+        path.open("rb").close()  # says why it cannot be read, which SQLite does not
+        address = f"{path.resolve().as_uri()}?mode=ro"
+        with closing(bounded(sqlite3.connect(address, uri=True, timeout=PATIENCE))) as connection:
             yield connection
-    except sqlite3.Error as error:
-        raise StudyError(f"{path} cannot be read ({error}); restore it from a copy") from error
+    except DATABASE_FAILURES as error:
+        raise StudyError(f"{path} cannot be read ({error}); {remedy(error)}") from error
 
 
 @contextmanager
@@ -181,7 +196,7 @@ def _changing(folder: Path) -> Generator[sqlite3.Connection]:
     """Lend a connection in a transaction of its own, which is kept as a whole or not at all."""
     path = folder / STUDY_FILE
     try:
-        with closing(sqlite3.connect(path, timeout=PATIENCE, isolation_level=None)) as connection:
+        with closing(bounded(sqlite3.connect(path, timeout=PATIENCE, isolation_level=None))) as connection:
             connection.execute("PRAGMA synchronous=FULL")
             connection.execute("BEGIN IMMEDIATE")
             try:
@@ -191,6 +206,4 @@ def _changing(folder: Path) -> Generator[sqlite3.Connection]:
                 raise
             connection.execute("COMMIT")
     except sqlite3.Error as error:
-        raise StudyError(
-            f"{path} cannot be changed ({error}); free space, permit writing, or wait and repeat"
-        ) from error
+        raise StudyError(f"{path} cannot be changed ({error}); {remedy(error)}, and repeat") from error

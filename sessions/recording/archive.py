@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, cast
 
+from sessions.file_access import read_limited, remedy
+from sessions.json_document import json_value
 from sessions.recording.atomic_file import put_in_place, write_whole
 from sessions.recording.description import description
 from sessions.recording.disk_space import release_reserve
@@ -37,11 +39,15 @@ def seal(folder: Path) -> None:
     new = folder / f".{SEALED_FILE}.part"
     try:
         _clear_unfinished(folder)
+        new.unlink(missing_ok=True)
         write_copy(recording, new)
         put_in_place(new, folder / SEALED_FILE)
         unequal = next(differences(recording), None)
         if unequal is not None:
-            raise RecordingError(f"{folder} could not be sealed: {unequal}; the live file is untouched, seal it again")
+            raise RecordingError(
+                f"{folder} could not be sealed: {unequal}; the live file is untouched, "
+                "'daq-app resume --end' seals it again"
+            )
         write_whole(folder / DESCRIPTION_FILE, json.dumps(description(recording), indent=1).encode() + b"\n")
         for name in SEALED:
             (folder / name).chmod(0o444)
@@ -49,7 +55,8 @@ def seal(folder: Path) -> None:
     except (OSError, RuntimeError) as error:  # h5py raises either when the disk is full
         new.unlink(missing_ok=True)
         raise RecordingError(
-            f"{folder} could not be sealed ({error}); the live file is untouched: free space on the disk, seal it again"
+            f"{folder} could not be sealed ({error}); the live file is untouched: {remedy(error)}, and seal it again "
+            "with 'daq-app resume --end'"
         ) from error
 
 
@@ -77,7 +84,7 @@ def _otherwise_described(recording: Recording) -> Iterator[str]:
     if not path.is_file():
         return  # the manifest tells
     try:
-        told = json.loads(path.read_bytes())
+        told = json_value(read_limited(path))
     except (OSError, ValueError) as error:
         yield f"{DESCRIPTION_FILE} cannot be read ({error})"
         return

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from sessions.file_access import open_new
+
 
 def write_json(path: Path, document: Mapping[str, Any]) -> None:
     """Write a JSON text of people's size: indented, UTF-8. Raises ValueError for nan and infinities: JSON has none."""
@@ -21,7 +23,7 @@ def write_whole(path: Path, content: bytes) -> None:
     """Put `content` into the file at `path` in place of what it held: a reader sees the old or the new."""
     new = path.with_name(f".{path.name}.part")
     try:
-        with new.open("wb") as file:
+        with open_new(new) as file:
             file.write(content)
     except OSError:  # a full disk, on which a part of the file would only take room
         new.unlink(missing_ok=True)

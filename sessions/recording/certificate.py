@@ -4,6 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from sessions.file_access import read_limited
+from sessions.json_document import json_object
 from sessions.recording.atomic_file import write_whole
 from sessions.recording.provenance import software_versions
 
@@ -28,7 +30,7 @@ def certificate_for(folder: Path) -> dict[str, Any] | None:
     for place in places:
         path = place / CERTIFICATE_FILE
         try:
-            certificate = json.loads(path.read_bytes())
+            certificate = json_object(read_limited(path))
             if certificate["format"] != FORMAT or path.stat().st_dev != disk:
                 continue
             return {**certificate, "same_program": certificate["software"] == software_versions()}

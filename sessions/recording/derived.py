@@ -4,8 +4,10 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
+from sessions.file_access import read_limited, remedy
+from sessions.json_document import json_object
 from sessions.recording.atomic_file import write_whole
 from sessions.recording.errors import RecordingError
 from sessions.recording.manifest import is_sealed, list_in_manifest
@@ -39,24 +41,19 @@ def load_derived(folder: Path, name: str) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        found = json.loads(path.read_bytes(), parse_constant=_no_number)
-    except (ValueError, RecursionError) as error:
+        return json_object(read_limited(path))
+    except ValueError as error:
         raise RecordingError(f"{path} is damaged ({error}); make it anew from the recording") from error
-    if not isinstance(found, dict):
-        raise RecordingError(f"{path} is damaged (it holds no names); make it anew from the recording")
-    return cast("dict[str, Any]", found)
-
-
-def _no_number(name: str) -> None:
-    raise ValueError(f"{name} is no number that this program stores")
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read ({error.strerror}); {remedy(error)}") from error
 
 
 def bytes_of(path: Path) -> bytes:
     """Return the bytes of a file, none where there is no file. Raises RecordingError where it cannot be read."""
     try:
-        return path.read_bytes() if path.is_file() else b""
+        return read_limited(path) if path.is_file() else b""
     except OSError as error:
-        raise RecordingError(f"{path} cannot be read ({error.strerror}); permit reading, or copy the folder") from error
+        raise RecordingError(f"{path} cannot be read ({error.strerror}); {remedy(error)}") from error
 
 
 def _store(folder: Path, name: str, content: bytes, simulated: str | None) -> Path:
@@ -68,5 +65,5 @@ def _store(folder: Path, name: str, content: bytes, simulated: str | None) -> Pa
         if is_sealed(folder):
             list_in_manifest(folder, (name,), simulated)
     except OSError as error:
-        raise RecordingError(f"{path} cannot be written ({error.strerror}); free space or permit writing") from error
+        raise RecordingError(f"{path} cannot be written ({error.strerror}); {remedy(error)}") from error
     return path

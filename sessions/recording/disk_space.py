@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
+from sessions.file_access import open_new
 from sessions.plan.plan import SessionPlan
 from sessions.recording.errors import RecordingError
 from sessions.recording.schema import BYTES_A_READING
@@ -61,7 +62,7 @@ class Reserve:
     def __init__(self, folder: Path, size: int = RESERVE) -> None:
         """Take it. Raises OSError where there is no such room, a quota's limit included."""
         self._path = folder / RESERVE_FILE
-        with self._path.open("wb") as file:
+        with open_new(self._path) as file:
             if hasattr(os, "posix_fallocate"):
                 os.posix_fallocate(file.fileno(), 0, size)
             else:

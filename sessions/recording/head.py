@@ -5,7 +5,8 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any
+from datetime import datetime
+from typing import Annotated, Any, TypeAlias
 
 import msgspec
 import numpy as np
@@ -14,6 +15,63 @@ from drivers.calibration import Calibration
 from drivers.status import StatusBit, StatusTable, bit
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan
+
+_Row: TypeAlias = tuple[float, float, float, float, float, float]
+_Word: TypeAlias = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]  # a status word as `ReadingBlock` holds it
+
+
+class _Calibration(msgspec.Struct):
+    """A calibration as the head holds it."""
+
+    serial: str
+    raw_unit: str
+    matrix: tuple[_Row, _Row, _Row, _Row, _Row, _Row]
+    rated: Annotated[tuple[float | None, ...], msgspec.Meta(min_length=6, max_length=6)]
+    source: str
+    sha256: str
+    tool: tuple[float, ...] = ()
+
+
+class _Info(msgspec.Struct):
+    """A transducer as the head holds it."""
+
+    uri: str
+    driver: str
+    model: str
+    serial: str
+    simulated: bool
+    rate: float | None
+    counter_rate: float | None
+    calibration: _Calibration
+    settings: dict[str, str]
+    harmless: _Word = 0
+    summary: _Word = 0
+    status_bits: list[StatusBit] | None = None
+
+
+class _Clock(msgspec.Struct):
+    factor: Annotated[float, msgspec.Meta(gt=0.0)]
+    now_ns: _Word
+
+
+class _Setting(msgspec.Struct):
+    value: Any
+
+
+class _Provenance(msgspec.Struct):
+    """The parts of a provenance that the program itself uses."""
+
+    created_utc: datetime
+    software: dict[str, str]
+    clock: _Clock
+    machine: dict[str, Any] = {}
+    settings: dict[str, _Setting] = {}
+    restored_from: list[Any] = []
+
+
+def check_provenance(data: object) -> None:
+    """Raise msgspec.ValidationError where a provenance is of another shape than this program writes."""
+    msgspec.convert(data, _Provenance)
 
 
 def simulated_sentence(info: TransducerInfo | None, subject_simulated: bool) -> str | None:
@@ -76,42 +134,42 @@ def info_to_dict(info: TransducerInfo) -> dict[str, Any]:
 def info_from_dict(data: Mapping[str, Any]) -> TransducerInfo:
     """Return the transducer that `info_to_dict` gave `data` for.
 
-    Raises ValueError when the matrix is not the one its hash was taken of.
+    Raises msgspec.ValidationError for another shape, ValueError when the matrix is not the one its hash was taken of.
     """
-    told = data["calibration"]
+    info = msgspec.convert(data, _Info)
+    told = info.calibration
+    if len(told.tool) not in (0, 6):
+        raise ValueError("the tool transform is no list of six numbers")
     calibration = Calibration(
-        serial=told["serial"],
-        raw_unit=told["raw_unit"],
-        matrix=np.array(told["matrix"], np.float64),
-        rated=np.array([_number(value) for value in told["rated"]]),
-        source=told["source"],
-        tool=tuple(told.get("tool", ())),
+        serial=told.serial,
+        raw_unit=told.raw_unit,
+        matrix=np.array(told.matrix, np.float64),
+        rated=np.array([_number(value) for value in told.rated]),
+        source=told.source,
+        tool=told.tool,
     )
-    if calibration_hash(calibration) != told["sha256"]:
+    if calibration_hash(calibration) != told.sha256:
         raise ValueError("the calibration matrix is not the one its SHA-256 was taken of")
     return TransducerInfo(
-        uri=data["uri"],
-        driver=data["driver"],
-        model=data["model"],
-        serial=data["serial"],
-        simulated=data["simulated"],
-        rate=_number(data["rate"]),
-        counter_rate=_number(data["counter_rate"]),
+        uri=info.uri,
+        driver=info.driver,
+        model=info.model,
+        serial=info.serial,
+        simulated=info.simulated,
+        rate=_number(info.rate),
+        counter_rate=_number(info.counter_rate),
         calibration=calibration,
-        settings=dict(data["settings"]),
-        status=_status_table(data),
+        settings=info.settings,
+        status=_status_table(info),
     )
 
 
-def _status_table(data: Mapping[str, Any]) -> StatusTable:
-    """Return what the bits of a status mean; early recordings only tell which are harmless."""
-    told = data.get("status_bits")
-    if told is None:
-        harmless = int(data.get("harmless", 0))
-        bits = tuple(bit(n, f"bit {n}", "note") for n in range(harmless.bit_length()) if harmless >> n & 1)
-    else:
-        bits = tuple(msgspec.convert(entry, StatusBit) for entry in told)
-    return StatusTable(bits, int(data.get("summary", 0)))
+def _status_table(info: _Info) -> StatusTable:
+    """Return what the bits of a status mean; early recordings only say which are harmless."""
+    if info.status_bits is not None:
+        return StatusTable(tuple(info.status_bits), info.summary)
+    harmless = range(info.harmless.bit_length())
+    return StatusTable(tuple(bit(n, f"bit {n}", "note") for n in harmless if info.harmless >> n & 1), info.summary)
 
 
 def calibration_hash(calibration: Calibration) -> str:

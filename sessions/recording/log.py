@@ -82,7 +82,7 @@ def _record(trial: Trial, events: Sequence[LoggedEvent]) -> TrialRecord:
             case "contact_onset" | "stroke_done" if takes:
                 last = max(takes)
                 takes[last] = replace(takes[last], strokes=takes[last].strokes + 1)
-            case "scored" | "number_given" | "chosen":
+            case "scored" | "number_given" | "chosen" if event.kind == _ANSWERED.get(trial.answer):
                 answer = event.data[ANSWERS[event.kind]]
             case "take_kept" if number in takes:
                 takes[number] = replace(takes[number], stop_ns=event.time_ns)
@@ -111,6 +111,7 @@ def _record(trial: Trial, events: Sequence[LoggedEvent]) -> TrialRecord:
 
 
 ANSWERS = {"scored": "score", "number_given": "number", "chosen": "choice"}
+_ANSWERED: Mapping[Answer, str] = {"line": "scored", "number": "number_given", "choice": "chosen"}
 _OUTCOMES: Mapping[Answer, Outcome] = {
     "line": "scored",
     "number": "numbered",

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from sessions.file_access import read_limited, remedy
+from sessions.json_document import json_object
 from sessions.recording.atomic_file import write_whole
 from sessions.recording.errors import RecordingError
 from sessions.recording.schema import MANIFEST_FILE
@@ -62,7 +64,7 @@ def _simulated(sentence: str | None) -> dict[str, Any]:
 
 def _head_of(folder: Path) -> dict[str, Any]:
     """Return what stands before the files in a manifest that can be read."""
-    document = json.loads((folder / MANIFEST_FILE).read_bytes())
+    document = json_object(read_limited(folder / MANIFEST_FILE))
     return {name: value for name, value in document.items() if name != "files"}
 
 
@@ -70,9 +72,11 @@ def _files(folder: Path) -> dict[str, Any]:
     """Return what the manifest lists. Raises RecordingError when it cannot be read."""
     path = folder / MANIFEST_FILE
     try:
-        files = json.loads(path.read_bytes())["files"]
+        files = json_object(read_limited(path))["files"]
         return {str(name): {"sha256": str(told["sha256"]), "bytes": told["bytes"]} for name, told in files.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read ({error.strerror}); {remedy(error)}") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise RecordingError(f"{path} cannot be read ({error}); restore the folder from a copy") from error
 
 

@@ -1,16 +1,16 @@
 """A recording as it lies on the disk, read without altering it, whole or torn."""
 
-import json
+import errno
 import shutil
 import sqlite3
 import tempfile
 from collections import Counter
-from collections.abc import Generator, Iterable, Iterator, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import msgspec
 import numpy as np
@@ -18,9 +18,12 @@ import numpy as np
 from drivers.readings import ReadingBlock
 from drivers.status import flagged_words
 from drivers.transducer import TransducerInfo
+from sessions.file_access import DATABASE_FAILURES, bounded, remedy
+from sessions.json_document import json_value
 from sessions.plan.plan import SessionPlan
 from sessions.recording.errors import RecordingError
-from sessions.recording.head import info_from_dict, plan_from_dict
+from sessions.recording.event_shapes import event_data
+from sessions.recording.head import check_provenance, info_from_dict, plan_from_dict
 from sessions.recording.log import LoggedEvent, TrialRecord, trial_records
 from sessions.recording.schema import (
     BYTES_A_READING,
@@ -74,21 +77,23 @@ class Recording:
         path = folder / LIVE_FILE
         if not path.is_file():
             raise RecordingError(f"{folder} holds no recording: there is no {LIVE_FILE}; give a session folder")
-        losses = list(torn_log(path))
+        losses: list[str] = []
         try:
+            losses += torn_log(path)
             with _connected(path) as connection:
                 head = _head(path, connection)
                 events = _events(connection, losses)
-        except sqlite3.Error as error:
-            raise RecordingError(f"{path} cannot be read ({error}); restore the folder from a copy") from error
+        except DATABASE_FAILURES as error:
+            raise RecordingError(f"{path} cannot be read ({error}); {remedy(error)}") from error
         losses += [event.data["sentence"] for event in events if event.kind in TELL_LOSSES]
         if _end(events) is None:
             losses.append("the session has no end: it was cut short, or is still running")
         try:
             plan, transducer = plan_from_dict(head["plan"]), head["transducer"]
             info = info_from_dict(transducer) if transducer else None
+            check_provenance(head["provenance"])
         except (ValueError, KeyError, TypeError, msgspec.ValidationError) as error:
-            raise RecordingError(f"{path}: its head is damaged ({error}); restore the folder from a copy") from error
+            raise RecordingError(f"{path}: its head is damaged ({error}); restore it from a copy") from error
         simulated = None if head["simulated"] == "no" else head["simulated"]
         trials = trial_records(plan, events)
         return Recording(folder, plan, info, simulated, head["provenance"], events, trials, head, tuple(losses))
@@ -154,15 +159,26 @@ class Recording:
         """Return the readings of all blocks, each put where it stays as it comes: joining would hold an hour twice."""
         path = self.folder / LIVE_FILE
         bytes_held = sum(side.stat().st_size for side in (path, _beside(path, "-wal")) if side.is_file())
-        most = bytes_held // BYTES_A_READING
+        most = min(bytes_held // BYTES_A_READING, self._stored())
         room = {name: np.empty((most, 6) if name == "raw" else most, kind) for name, kind in COLUMNS.items()}
         count = 0
         for block in self.blocks():
+            if count + len(block) > most:  # committed since it was counted
+                break
             for name, column in room.items():
                 column[count : count + len(block)] = getattr(block, name)
             count += len(block)
         columns: Any = {name: column[:count] for name, column in room.items()}
         return ReadingBlock(**columns)
+
+    def _stored(self) -> int:
+        """Return how many readings the rows have room for, without reading them; a damaged row may claim too much."""
+        try:
+            with _connected(self.folder / LIVE_FILE) as connection:
+                (size,) = connection.execute("SELECT coalesce(sum(length(sequence)), 0) FROM blocks").fetchone()
+        except DATABASE_FAILURES:
+            return sum(len(block) for block in self.blocks())
+        return size // np.dtype(COLUMNS["sequence"]).itemsize
 
     def readings_between(self, start_ns: int, stop_ns: int | None) -> ReadingBlock:
         """Return the readings received from `start_ns` up to, not including, `stop_ns` (None: to the end) [ns]."""
@@ -181,7 +197,7 @@ class Recording:
             with _connected(path) as connection:
                 (last,) = connection.execute("SELECT max(number) FROM blocks").fetchone()
                 return ReadingBlock.empty() if last is None else _block(connection, last)
-        except (ValueError, TypeError, sqlite3.DatabaseError) as error:
+        except (ValueError, TypeError, OSError, sqlite3.DatabaseError) as error:
             raise RecordingError(f"{path}: the last block of readings is damaged ({error})") from error
 
     def blocks(
@@ -196,7 +212,7 @@ class Recording:
         try:
             with _connected(path) as connection:
                 yield from _blocks(connection, damaged, between)
-        except sqlite3.DatabaseError as error:
+        except DATABASE_FAILURES as error:
             damaged.append(f"{LIVE_FILE} cannot be read to its end ({error})")
 
 
@@ -251,14 +267,17 @@ def _block(connection: sqlite3.Connection, number: int) -> ReadingBlock:
 def _head(path: Path, connection: sqlite3.Connection) -> dict[str, Any]:
     """Return the head's values by name, JSON already read. Raises RecordingError when it is not ours or damaged."""
     rows = connection.execute("SELECT name, value, crc32 FROM head ORDER BY number").fetchall()
+    head: dict[str, Any] = {"simulated": "no", "transducer": None}
     for name, value, crc in rows:
-        if text_crc(value) != crc:
-            raise RecordingError(
-                f"{path}: {name} in its head is damaged (CRC-32 differs); restore the folder from a copy"
-            )
-    head = {name: value if name == "simulated" else json.loads(value) for name, value, _ in rows}
-    made = head.get("format", {})
-    if made.get("name") != FORMAT or made.get("version", 0) > FORMAT_VERSION:
+        try:
+            sound = text_crc(value) == crc
+            head[name] = value if name == "simulated" else json_value(value)
+        except (ValueError, TypeError, AttributeError):
+            sound = False
+        if not sound:
+            raise RecordingError(f"{path}: {name} in its head is damaged (CRC-32 differs); restore it from a copy")
+    made: Any = head.get("format")
+    if not _readable(made):
         raise RecordingError(
             f"{path} holds {made or 'no format'}; this program reads '{FORMAT}' up to version {FORMAT_VERSION}:"
             " use a later program"
@@ -266,28 +285,45 @@ def _head(path: Path, connection: sqlite3.Connection) -> dict[str, Any]:
     return head
 
 
+def _readable(made: Any) -> bool:  # noqa: ANN401  any JSON value
+    """Say whether the head's `format` is one that this program reads."""
+    if not isinstance(made, dict):
+        return False
+    form = cast("dict[str, Any]", made)
+    version = form.get("version", 0)
+    return form.get("name") == FORMAT and isinstance(version, int) and version <= FORMAT_VERSION
+
+
 def _events(connection: sqlite3.Connection, losses: list[str]) -> tuple[LoggedEvent, ...]:
     """Return the undamaged events, and name the others in `losses`."""
     found: list[LoggedEvent] = []
     expected = 1
     rows = connection.execute("SELECT number, time_ns, kind, trial, readings, data, crc32 FROM events ORDER BY number")
-    for number, time_ns, kind, trial, readings, data, crc in rows:
+    for number, *row in rows:
         if number != expected:
             losses.append(f"events {expected} to {number - 1} are missing")
         expected = number + 1
-        event = LoggedEvent(number, time_ns, kind, trial, readings, {})
-        if event_crc(event, data) != crc:
-            losses.append(f"event {number} is damaged and left out (CRC-32 differs)")
-        else:
-            found.append(LoggedEvent(number, time_ns, kind, trial, readings, json.loads(data)))
+        try:
+            found.append(_event(number, row))
+        except (ValueError, msgspec.ValidationError) as error:
+            losses.append(f"event {number} is damaged and left out ({error})")
     return tuple(found)
+
+
+def _event(number: int, row: Sequence[object]) -> LoggedEvent:
+    """Return an event from its row. Raises ValueError, msgspec.ValidationError where it is damaged or oddly shaped."""
+    time_ns, kind, trial, readings, text, crc = msgspec.convert(row, tuple[int, str, int | None, int, str, int])
+    if event_crc(LoggedEvent(number, time_ns, kind, trial, readings, {}), text) != crc:
+        raise ValueError("CRC-32 differs")
+    return LoggedEvent(number, time_ns, kind, trial, readings, event_data(kind, text))
 
 
 def torn_log(path: Path) -> Iterator[str]:
     """Name what a crash tore off the end of the live file's write-ahead log."""
     log = _beside(path, "-wal")
     if log.is_file():
-        torn = log_tail(log.read_bytes()).torn_bytes
+        with log.open("rb", buffering=0) as file:
+            torn = log_tail(file).torn_bytes
         if torn:
             yield (
                 f"the last {torn} bytes of the write-ahead log hold no whole commit and are left out:"
@@ -301,18 +337,22 @@ def _connected(path: Path) -> Generator[sqlite3.Connection]:
     sides = (_beside(path, "-wal"), _beside(path, "-journal"))
     left_over = [side for side in sides if side.is_file() and side.stat().st_size]
     address = f"{path.resolve().as_uri()}?mode=ro"
+    path.open("rb").close()  # says why it cannot be read, which SQLite does not
     if not left_over:
-        with closing(sqlite3.connect(address + "&immutable=1", uri=True)) as connection:
+        with closing(bounded(sqlite3.connect(address + "&immutable=1", uri=True))) as connection:
             yield connection
         return
-    with closing(sqlite3.connect(address, uri=True)) as connection:
+    with closing(bounded(sqlite3.connect(address, uri=True))) as connection:
         if _answers(connection):
             yield connection
             return
     with tempfile.TemporaryDirectory() as room:
-        for file in (path, *left_over):
+        files = (path, *left_over)
+        if sum(file.stat().st_size for file in files) > shutil.disk_usage(room).free:
+            raise OSError(errno.ENOSPC, f"the copy that is read has no room in {room}")
+        for file in files:
             shutil.copy(file, room)
-        with closing(sqlite3.connect(Path(room) / path.name)) as connection:
+        with closing(bounded(sqlite3.connect(Path(room) / path.name))) as connection:
             yield connection
 
 

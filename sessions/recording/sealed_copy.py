@@ -53,7 +53,7 @@ def write_copy(
 ) -> None:
     """Write the copy of a recording, and what else belongs in it, to a new file at `path`. Raises OSError."""
     expected = max((event.readings for event in recording.events), default=0) or 1
-    with h5py.File(path, "w", libver=LIBVER) as file:
+    with h5py.File(path, "x", libver=LIBVER) as file:
         if recording.simulated_sentence:
             file.attrs["SIMULATED"] = _attribute(recording.simulated_sentence)
         file.attrs["format"] = _attribute(FORMAT)

@@ -10,6 +10,7 @@ from typing import Any, NoReturn, Self
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
+from sessions.file_access import remedy
 from sessions.plan.plan import SessionPlan
 from sessions.recording.atomic_file import sync_folder
 from sessions.recording.disk_space import Reserve, release_reserve
@@ -104,7 +105,7 @@ class SessionWriter:
         except OSError as error:
             release_reserve(folder)
             raise RecordingError(
-                f"{folder} cannot hold a recording ({error.strerror}); give a folder that can be written"
+                f"{folder} cannot hold a recording ({error.strerror}); {remedy(error)}, or give another folder"
             ) from error
         connection = sqlite3.connect(path, isolation_level=None)
         try:
@@ -113,7 +114,7 @@ class SessionWriter:
             connection.close()
             release_reserve(folder)
             raise RecordingError(
-                f"{path} cannot be begun ({error}); free space, or give a folder on a local disk"
+                f"{path} cannot be begun ({error}); {remedy(error)}, or give a folder on a local disk"
             ) from error
         sync_folder(folder)
         writer = cls(connection, path, clock or RealClock())
@@ -133,9 +134,7 @@ class SessionWriter:
         try:
             kept_back = Reserve(folder, reserve) if reserve else None
         except OSError as error:
-            raise RecordingError(
-                f"{folder} has no room to go on in ({error.strerror}); free space on the disk"
-            ) from error
+            raise RecordingError(f"{folder} cannot be gone on in ({error.strerror}); {remedy(error)}") from error
         connection = sqlite3.connect(path, isolation_level=None, timeout=0.5)
         try:
             _make_durable(connection)
@@ -147,7 +146,7 @@ class SessionWriter:
         except sqlite3.Error as error:
             connection.close()
             release_reserve(folder)
-            raise RecordingError(f"{path} cannot be gone on with ({error}); end whatever else uses it") from error
+            raise RecordingError(f"{path} cannot be gone on with ({error}); {remedy(error)}") from error
         writer._acknowledged = Acknowledged(writer._readings, writer._event_count, clock.now_ns())
         writer._reserve = kept_back
         return writer
@@ -255,7 +254,7 @@ class SessionWriter:
             self._fail(error)
         else:
             self.must_end = (
-                f"the disk took no more ({error}); all that was measured is safe: free space on the disk, and resume"
+                f"the disk took no more ({error}); all that was measured is safe: {remedy(error)}, and resume"
             )
             self._give_back()
         try:
@@ -314,7 +313,7 @@ class SessionWriter:
         safe = self._acknowledged
         self._failure = (
             f"the disk took no more ({error}): the first {safe.readings} readings and {safe.events} events are safe; "
-            "free space on the disk and resume"
+            f"{remedy(error)} and resume"
         )
         raise RecordingError(f"{self._path}: {self._failure}") from error
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from markupsafe import Markup
 
 from sessions.exchange.csv_text import write_rows
+from sessions.file_access import open_new, remedy
 from sessions.report import Report
 from sessions.report import tables as report_tables
 from sessions.report.figures import Panel, Plate, plates
@@ -147,8 +148,8 @@ def swap_in(path: Path, text: str) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            with beside.open("w", encoding="utf-8", newline="\n") as file:
-                file.write(text)
+            with open_new(beside) as file:
+                file.write(text.encode())
                 file.flush()
                 os.fsync(file.fileno())
             beside.replace(path)
@@ -156,5 +157,5 @@ def swap_in(path: Path, text: str) -> None:
             beside.unlink(missing_ok=True)
     except OSError as error:
         raise ReportError(
-            f"{path} cannot be written ({error.strerror}): choose a folder you may write to, with room on its disk"
+            f"{path} cannot be written ({error.strerror}): {remedy(error)}, or choose another folder"
         ) from error

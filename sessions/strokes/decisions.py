@@ -13,6 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from sessions.file_access import remedy
 from sessions.recording.derived import bytes_of
 from sessions.recording.errors import RecordingError
 from sessions.recording.head import json_text
@@ -259,7 +260,7 @@ def append(recording: "Recording", decision: Decision) -> Decision:
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:
-        raise RecordingError(f"{path} cannot be written ({error.strerror}); free space or permit writing") from error
+        raise RecordingError(f"{path} cannot be written ({error.strerror}); {remedy(error)}") from error
     return made
 
 

@@ -25,6 +25,7 @@ from sessions.exchange import FORMATS, ExportError, ExportSource, export
 from sessions.exchange.import_csv import ImportRefused
 from sessions.exchange.import_session import exported, import_session
 from sessions.exchange.session_tables import tables
+from sessions.file_access import packed_lines
 from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems, seal
 from sessions.recording.calibration_uncertainty import gain_error_set
@@ -429,3 +430,14 @@ def test_a_blinded_session_is_exported_without_the_indices_and_comes_back_blinde
     if form in AGAIN:
         import_session(exported(out), tmp_path / "again")
         assert Recording.open(tmp_path / "again").plan == plan
+
+
+@pytest.mark.parametrize("line", [b"0" * 2**20, b"n/a\n" * 2**18])
+def test_a_packed_table_that_unpacks_without_end_is_refused(tmp_path, line):
+    path = tmp_path / "x_physio.tsv.gz"
+    with gzip.open(path, "wb") as file:
+        for _ in range(40):
+            file.write(line)
+    with pytest.raises(ValueError, match="unpacks to more than readings can"):
+        for _ in packed_lines(path):
+            pass

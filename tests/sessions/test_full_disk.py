@@ -17,7 +17,7 @@ def test_one_failed_write_loses_nothing_acknowledged_and_ends_the_session_so_tha
     recording = ran.check()
     if ran.end is not None and not ran.end.complete:
         assert recording.end["cause"] == "disk"
-        assert "free space on the disk, and resume" in recording.end["reason"]
+        assert "check the disk and its cable, and resume" in recording.end["reason"]
 
 
 @pytest.mark.parametrize("number", [3, 60, 140, 260])
@@ -25,7 +25,7 @@ def test_a_disk_that_takes_nothing_more_gives_one_sentence_and_keeps_what_was_ac
     ran = OnADisk(tmp_path / "s", failing_from(number))
     ran.check()
     assert ran.end is None
-    assert "free space" in ran.error
+    assert "free space on the disk" in ran.error
     assert not (tmp_path / "s" / "session.reserve").exists()
 
 

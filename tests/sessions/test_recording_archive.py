@@ -240,7 +240,10 @@ def test_a_disk_that_is_full_while_sealing_leaves_the_live_file_whole(tmp_path, 
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(archive, "write_copy", full)
-    with pytest.raises(RecordingError, match=r"No space left on device.*free space on the disk, seal it again"):
+    with pytest.raises(
+        RecordingError,
+        match=r"No space left on device.*free space on the disk, and seal it again with 'daq-app resume --end'",
+    ):
         seal(folder)
     assert [path.name for path in folder.iterdir()] == ["session.sqlite"]
     assert (folder / "session.sqlite").read_bytes() == before

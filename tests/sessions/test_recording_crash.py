@@ -4,6 +4,7 @@ import os
 import random
 import shutil
 from functools import partial
+from io import BytesIO
 
 import numpy as np
 import pytest
@@ -54,7 +55,7 @@ def test_nothing_acknowledged_is_lost_when_the_writer_is_killed_and_when_its_log
         if cut.exists():
             content = cut.read_bytes()
             cut.write_bytes(content[: len(content) - min(chance.randrange(1, 200_000), len(content))])
-            if log_tail(cut.read_bytes()).commits == 0 and (folder / "session.sqlite").stat().st_size < 8192:
+            if log_tail(BytesIO(cut.read_bytes())).commits == 0 and (folder / "session.sqlite").stat().st_size < 8192:
                 continue  # the cut reached back to before the tables were there
             left = Recording.open(folder)
             sequence = left.readings().sequence.tolist()

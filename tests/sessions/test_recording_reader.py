@@ -1,13 +1,16 @@
 import hashlib
 import shutil
 import sqlite3
+import tracemalloc
+import zlib
 from contextlib import closing
 from dataclasses import replace
+from io import BytesIO
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recordings import PLAN, begun, change, ended, readings
+from recordings import PLAN, begun, change, ended, readings, rows
 
 from sessions.recording import LoggedEvent, Recording, RecordingError
 from sessions.recording.log import trial_records
@@ -159,7 +162,7 @@ def test_a_log_whose_tail_was_cut_gives_its_whole_commits_and_names_the_rest(cra
     kept = set()
     for cut in range(0, len(whole) - 32, 509):
         log.write_bytes(whole[: len(whole) - cut])
-        tail = log_tail(log.read_bytes())
+        tail = log_tail(BytesIO(log.read_bytes()))
         try:
             recording = Recording.open(crashed)
         except RecordingError:
@@ -208,11 +211,11 @@ def test_a_damaged_salt_makes_no_frame_one_of_an_earlier_run(written):
     log = bytearray((written / "session.sqlite-wal").read_bytes())
     page = int.from_bytes(log[8:12], "big")
     frames = range(32, len(log), 24 + page)
-    assert log_tail(bytes(log)).torn_bytes == 0
+    assert log_tail(BytesIO(bytes(log))).torn_bytes == 0
     for frame in frames:
         for salt in (8, 15):
             log[frame + salt] ^= 4
-            tail = log_tail(bytes(log))
+            tail = log_tail(BytesIO(bytes(log)))
             log[frame + salt] ^= 4
             assert tail.commits < 4  # the tables, and three of readings
             assert tail.torn_bytes > 0
@@ -226,16 +229,16 @@ def test_frames_left_over_from_an_earlier_run_of_the_log_are_no_loss(tmp_path):
     writer._connection.execute("PRAGMA wal_checkpoint(RESTART)")  # the next commit begins the log anew, at its head
     writer.readings(readings(3000, 100))
     writer.commit()
-    tail = log_tail((tmp_path / "s" / "session.sqlite-wal").read_bytes())
+    tail = log_tail(BytesIO((tmp_path / "s" / "session.sqlite-wal").read_bytes()))
     assert (tail.commits, tail.torn_bytes) == (1, 0)
     assert Recording.open(tmp_path / "s").losses == (UNENDED,)
     writer.close()
 
 
 def test_a_log_shorter_than_its_head_holds_nothing():
-    assert log_tail(b"") == log_tail(b"") == type(log_tail(b""))(0, 0)
-    assert log_tail(bytes(31)).torn_bytes == 31
-    assert log_tail(bytes(5000)).torn_bytes == 5000
+    assert log_tail(BytesIO(b"")) == log_tail(BytesIO(b"")) == type(log_tail(BytesIO(b"")))(0, 0)
+    assert log_tail(BytesIO(bytes(31))).torn_bytes == 31
+    assert log_tail(BytesIO(bytes(5000))).torn_bytes == 5000
 
 
 def test_a_change_that_a_crash_cut_short_is_undone_in_a_copy_and_the_file_stays_as_it_is(tmp_path):
@@ -282,3 +285,62 @@ def test_a_take_that_was_kept_and_then_discarded_keeps_its_own_end():
 
 def test_a_recording_without_a_plan_of_trials_has_none():
     assert trial_records(replace(PLAN, blocks=()), told(("started", None, {}))) == ()
+
+
+@pytest.mark.parametrize(
+    ("kind", "data"),
+    [
+        ("take_kept", "[]"),
+        ("take_started", '{"take": [1]}'),
+        ("take_discarded", '{"take": 1}'),
+        ("scored", '{"score": "much"}'),
+        ("scored", '{"score": 5, "positions": 7}'),
+        ("zeroed", '{"mean": null}'),
+        ("losses", '{"lost": "many"}'),
+        ("not_restored", "{}"),
+        ("note", '"a text"'),
+        ("note", "NaN"),
+        ("note", "[" * 5000),
+        ("resumed", '{"last_ns": %s}' % (10**30)),
+    ],
+)
+def test_an_event_of_odd_shape_with_a_right_check_sum_is_named_and_the_rest_is_read(tmp_path, kind, data):
+    folder = ended(tmp_path / "s")
+    crc = zlib.crc32(f"3\n90\n{kind}\n1\n0\n{data}".encode())
+    before = Recording.open(folder).events
+    change(
+        folder,
+        "UPDATE events SET time_ns=90, kind=?, trial=1, readings=0, data=?, crc32=? WHERE number=3",
+        (kind, data, crc),
+    )
+    recording = Recording.open(folder)
+    assert recording.losses[0].startswith("event 3 is damaged and left out (")
+    assert recording.events == tuple(event for event in before if event.number != 3)
+    assert len(recording.readings()) == 300
+    assert rows(folder, "SELECT data FROM events WHERE number=3") == [(data,)]
+
+
+def test_a_log_of_twenty_gigabytes_of_nothing_is_named_in_little_memory(tmp_path):
+    folder = ended(tmp_path / "s")
+    with (folder / "session.sqlite-wal").open("wb") as log:
+        log.truncate(20 * 2**30)
+    tracemalloc.start()
+    try:
+        recording = Recording.open(folder)
+        assert "the last 21474836480 bytes of the write-ahead log hold no whole commit" in recording.losses[0]
+        assert len(recording.readings()) == 300
+        assert tracemalloc.get_traced_memory()[1] < 50e6
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_live_file_with_twenty_gigabytes_of_nothing_behind_it_is_read_in_little_memory(tmp_path):
+    folder = ended(tmp_path / "s")
+    with (folder / "session.sqlite").open("r+b") as live:
+        live.truncate(20 * 2**30)
+    tracemalloc.start()
+    try:
+        assert len(Recording.open(folder).readings()) == 300
+        assert tracemalloc.get_traced_memory()[1] < 50e6
+    finally:
+        tracemalloc.stop()

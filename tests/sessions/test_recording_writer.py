@@ -255,7 +255,9 @@ def test_a_failing_write_is_told_with_what_is_safe_and_nothing_safe_is_lost(tmp_
 
         def execute(self, statement, *_):
             if statement.startswith("INSERT"):
-                raise sqlite3.OperationalError("database or disk is full")
+                full = sqlite3.OperationalError("database or disk is full")
+                full.sqlite_errorcode = sqlite3.SQLITE_FULL
+                raise full
 
         def close(self):
             pass

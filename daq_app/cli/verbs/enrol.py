@@ -16,6 +16,7 @@ from sessions.plan.protocols import protocol_file
 from sessions.plan.study import Member, Study, StudyError
 from sessions.plan.study_file import create_study, enrol, is_study, note, open_study, study_key, withdraw
 from sessions.recording.atomic_file import write_whole
+from sessions.toml_file import text_of
 
 EXAMPLE = "daq-app enrol studies/friction --subject P07 --finger tip_radius=6.5 contact_angle=40"
 HEAD = ["subject", "row", "own finger, angle, depths", "withdrawn"]
@@ -41,7 +42,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     _refuse_mixtures(options)
     body = body_of(options)
     if options.protocol is not None:
-        text = protocol_file(options.protocol).read_text(encoding="utf-8")
+        text = text_of(protocol_file(options.protocol))
         seed = secrets.randbelow(2**31) if options.seed is None else options.seed
         create_study(folder, text, seed, blinded=options.blind)
     member = None

@@ -18,6 +18,7 @@ from daq_app.cli.area_option import add_area, area_law
 from daq_app.cli.calibration_option import add_calibration, calibration_error
 from daq_app.cli.console import Console
 from daq_app.cli.main import WrongValue
+from sessions.file_access import read_limited
 from sessions.prediction import PredictionOptions
 from sessions.recording import RecordingError
 from sessions.recording.atomic_file import json_text
@@ -108,7 +109,7 @@ def _planted(folder: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        found = checked_planted(json.loads(path.read_bytes()))
+        found = checked_planted(json.loads(read_limited(path)))
     except ValueError as damaged:
         raise RecordingError(f"{path} is damaged; delete it to pool the study without what was planted") from damaged
     return found

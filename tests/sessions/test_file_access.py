@@ -1,0 +1,100 @@
+"""Files of any size and kind: read within bounds, written over no link, and a failure names what mends it."""
+
+import errno
+import sqlite3
+from pathlib import Path
+
+import pytest
+from recordings import ended
+
+from daq_app.cli.main import run
+from sessions.file_access import read_limited, remedy
+from sessions.recording import RecordingError, archive
+from sessions.recording.archive import seal
+from sessions.recording.atomic_file import write_whole
+from sessions.recording.derived import bytes_of, store_derived
+from sessions.recording.disk_space import Reserve
+
+HUGE = 20 * 2**30  # [bytes]
+
+
+def test_a_failing_disk_a_denied_permission_and_a_full_disk_have_each_their_own_advice():
+    assert "free space" not in remedy(OSError(errno.EIO, "Input/output error"))
+    assert remedy(OSError(errno.EIO, "")) == "check the disk and its cable"
+    assert remedy(PermissionError(errno.EACCES, "")) == "permit reading and writing there"
+    assert remedy(OSError(errno.ENOSPC, "")) == "free space on the disk"
+    assert remedy(OSError("Can't write data (file write failed: errno = 28, error message = 'x')")) == remedy(
+        OSError(errno.ENOSPC, "")
+    )
+
+
+@pytest.mark.parametrize(
+    ("code", "advice"),
+    [
+        (sqlite3.SQLITE_FULL, "free space on the disk"),
+        (sqlite3.SQLITE_IOERR | 3 << 8, "check the disk and its cable"),
+        (sqlite3.SQLITE_READONLY, "permit reading and writing there"),
+        (sqlite3.SQLITE_CORRUPT, "restore it from a copy"),
+    ],
+)
+def test_a_failure_of_the_database_is_advised_by_its_code(code, advice):
+    error = sqlite3.OperationalError("x")
+    error.sqlite_errorcode = code
+    assert remedy(error) == advice
+
+
+def test_a_link_at_the_place_of_the_unfinished_file_is_not_followed(tmp_path):
+    folder = ended(tmp_path / "s")
+    mine = tmp_path / "thesis.tex"
+    mine.write_text("years of work")
+    for name in (".analysis.json.part", ".session.h5.part", ".MANIFEST.json.part", "session.reserve"):
+        (folder / name).symlink_to(mine)
+    store_derived(folder, "analysis.json", {"a": 1})
+    Reserve(folder, 4096).release()
+    seal(folder)
+    assert mine.read_text() == "years of work"
+    assert not (folder / "analysis.json").is_symlink()
+
+
+def test_a_sealing_that_failed_names_the_verb_that_seals_again(tmp_path, monkeypatch):
+    folder = ended(tmp_path / "s")
+
+    def failing(*_):
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(archive, "write_copy", failing)
+    with pytest.raises(RecordingError, match=r"check the disk and its cable.*'daq-app resume --end'") as failed:
+        seal(folder)
+    assert "free space" not in str(failed.value)
+
+
+def test_a_file_of_twenty_gigabytes_is_refused_in_one_sentence_before_it_is_read(tmp_path):
+    path = tmp_path / "decisions.jsonl"
+    with path.open("wb") as file:
+        file.truncate(HUGE)
+    with pytest.raises(RecordingError, match="it holds more than 256 MB"):
+        bytes_of(path)
+    with pytest.raises(OSError, match="more than 1 MB"):
+        read_limited(path, 2**20)
+
+
+def test_a_file_without_end_is_refused():
+
+    with pytest.raises(OSError, match="more than 1 MB"):
+        read_limited(Path("/dev/zero"), 2**20)
+
+
+def test_a_latin_1_protocol_is_named_when_a_study_is_made_of_it(tmp_path, capsys):
+    path = tmp_path / "p.toml"
+    path.write_bytes('name = "Stärke"'.encode("latin-1"))
+    assert run(["enrol", str(tmp_path / "study"), "--protocol", str(path)]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1
+    assert "byte 10 is no UTF-8 text; save the file as UTF-8" in said[0]
+    assert not (tmp_path / "study").exists()
+
+
+def test_a_file_written_whole_leaves_the_permissions_of_new_files(tmp_path):
+    write_whole(tmp_path / "a", b"x")
+    (tmp_path / "b").write_bytes(b"x")
+    assert (tmp_path / "a").stat().st_mode == (tmp_path / "b").stat().st_mode
