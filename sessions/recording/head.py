@@ -50,7 +50,7 @@ class _Info(msgspec.Struct):
 
 
 class _Clock(msgspec.Struct):
-    factor: Annotated[float, msgspec.Meta(gt=0.0)]
+    factor: Annotated[float, msgspec.Meta(ge=0.0)]  # 0: the clock moves when it is waited on
     now_ns: _Word
 
 

@@ -65,7 +65,7 @@ def resumption(plan: SessionPlan, events: Sequence[LoggedEvent]) -> Resumption:
 
 
 def check_resumable(recording: Recording) -> None:
-    """Raise RecordingError unless the session was cut short and its log is whole."""
+    """Raise RecordingError unless the session was cut short, its log is whole and its clock can go on."""
     numbers = [event.number for event in recording.events]
     if numbers != list(range(1, len(numbers) + 1)):
         raise RecordingError(f"{recording.folder} cannot be resumed: its log is damaged; it can still be analysed")
@@ -74,6 +74,8 @@ def check_resumable(recording: Recording) -> None:
         raise RecordingError(
             f"{recording.folder} has ended ({end.get('reason')}); only one that was cut short is resumed"
         )
+    if recording.provenance["clock"]["factor"] == 0.0:
+        raise RecordingError(f"{recording.folder} ran on simulated time without a pace; begin a new session")
 
 
 def check_same_transducer(recorded: TransducerInfo | None, opened: TransducerInfo | None) -> None:

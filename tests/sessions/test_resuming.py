@@ -145,6 +145,13 @@ def test_a_session_whose_transducer_was_lost_goes_on_as_often_as_it_is_lost(tmp_
     assert [record.score for record in recording.trials] == [t.stimulus.index for t in recording.plan.trials]
 
 
+def test_a_session_on_time_that_moves_when_it_is_waited_on_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(ToldClock, "factor", 0.0)
+    Session(tmp_path / "s", link_lost_after=1000).run()
+    with pytest.raises(RecordingError, match="ran on simulated time without a pace"):
+        check_resumable(Recording.open(tmp_path / "s"))
+
+
 def test_ended_and_sealed_sessions_are_refused(tmp_path):
     recording = Session(tmp_path / "s").run()
     with pytest.raises(RecordingError, match="has ended"):

@@ -1,0 +1,90 @@
+"""Ten surfaces at small and at finite strain, from a kept session through every verb, the window and a study."""
+
+import json
+import shutil
+
+import pytest
+
+from daq_app.analyst import messages as m
+from daq_app.analyst.shown import session_pictures
+from daq_app.analyst.work import Work
+from daq_app.cli.console import Console
+from daq_app.cli.main import run
+from daq_app.simulation.synthetic import synthetic_study
+from sessions.exchange import FORMATS
+
+KINEMATICS = ("small", "finite")
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recorded") / "study"
+    synthetic_study(folder, 1, Console(as_json=True), subjects=1)
+    return folder / "S01"
+
+
+@pytest.fixture(scope="module", params=KINEMATICS)
+def predicted(request, recorded, tmp_path_factory):
+    """Return a session's folder, with the prediction kept in it, and its document."""
+    folder = tmp_path_factory.mktemp(request.param) / "S01"
+    shutil.copytree(recorded, folder)
+    code = run(["predict", str(folder), "--kinematics", request.param])
+    document = json.loads((folder / "prediction.json").read_text())
+    assert code == (3 if any(row["sed"] is None for row in document["trials"]) else 0)
+    return folder, document
+
+
+def _answers_or_reasons(rows, count=10):
+    assert len(rows) == count
+    assert len({(row["stimulus"]["descriptor"], row["stimulus"]["index"]) for row in rows}) == count
+    for row in rows:
+        assert (row["sed"] is None) == bool(row["reasons"].get("sed"))
+
+
+def test_every_surface_has_an_answer_or_its_reason(predicted):
+    _answers_or_reasons(predicted[1]["trials"])
+
+
+def test_the_report_shows_every_surface_of_the_kept_prediction(predicted):
+    folder, document = predicted
+    assert run(["report", str(folder)]) == 0
+    page = (folder / "report.html").read_text()
+    for row in document["trials"]:
+        shown = f"{1000.0 * row['sed']:.2f}" if row["sed"] is not None else row["reasons"]["sed"][:40]
+        assert shown in page
+
+
+@pytest.mark.parametrize("format_", FORMATS)
+def test_every_export_carries_the_kept_prediction(predicted, format_, tmp_path):
+    folder, _ = predicted
+    out = tmp_path / "out"
+    assert run(["export", str(folder), "--format", format_, "--out", str(out)]) == 0
+    assert any(out.rglob("*") if out.is_dir() else [out])
+
+
+def test_the_window_opens_the_session_and_draws_every_surface(predicted):
+    said = []
+    work = Work(predicted[0], said.append)
+    work.go_on()
+    report = next(one.report for one in said if isinstance(one, m.Found) and one.stage == "predicted")
+    answered = [one for one in said if isinstance(one, m.Answered)]
+    assert len(answered) == 10
+    for name, _ in session_pictures(report):
+        work.do(m.Draw(name))
+    for one in answered:
+        assert (one.finger is not None) == (one.finding.sed is not None)
+        work.do(m.Draw(f"finger {one.finding.stroke}"))
+        work.do(m.ShowHistory((one.finding.trial, one.finding.stroke)))
+    assert not [one for one in said if isinstance(one, m.Problem)]
+
+
+@pytest.mark.parametrize("kinematics", KINEMATICS)
+def test_a_study_has_a_row_for_every_surface(recorded, kinematics, tmp_path):
+    shutil.copytree(recorded, tmp_path / "S01")
+    run(["study", str(tmp_path), "--workers", "1", "--kinematics", kinematics, "--json"])
+    (visit,) = json.loads((tmp_path / "pooled" / "study.json").read_bytes())["visits"]
+    assert len(visit["rows"]) == 10
+    for row in visit["rows"]:
+        assert row["sed"] is not None or row["why"]
