@@ -17,7 +17,7 @@ from solver.failures import NoSteadyState, NotConverged
 from solver.scene import Scene
 
 FAR = 0.9  # of the friction asked for, below which a limit is beyond doubt
-DEPTHS_APART = 0.06  # of the largest depth on two meshes, each good to 3 %: so much deeper there must be no state [-]
+APART = 0.06  # of a limit, which a mesh has to 3 %: so much beyond it another path must end before it arrives [-]
 ALIKE = 0.1  # relative difference of SED and forces within which a state is that of another mesh
 
 
@@ -41,10 +41,7 @@ def steady(
         found.append(shape)
     proof = _followed(finger.scene, pull, stop)
     if proof.lost:
-        raise NotConverged(
-            f"At {pull.depth:.3g} mm of indentation settled sliding was followed up to mu = {proof.value:.3g} and lost "
-            f"there; whether there is any at mu = {pull.mu:.3g} is not known: ask for less friction or depth"
-        )
+        raise _not_known(pull, proof.value)
     if proof.limited:
         raise _refused(finger.scene, pull, proof, stop)
     for shape in found:
@@ -143,8 +140,11 @@ def _followed(scene: Scene, pull: Pull, stop: Callable[[], bool]) -> Reach:
     return proof
 
 
-def _refused(scene: Scene, pull: Pull, proof: Reach, stop: Callable[[], bool]) -> NoSteadyState:
+def _refused(scene: Scene, pull: Pull, proof: Reach, stop: Callable[[], bool]) -> NoSteadyState | NotConverged:
+    """Return why there is no state: with both limits, each only where no state lies a little beyond it."""
     largest, depth = proof.value, None
+    if not _none_at(scene, pull._replace(mu=(1.0 + APART) * largest), pull, stop):
+        return _not_known(pull, largest)
     ends = (
         "the skin behind the contact folds"
         if proof.near or all(tissue.law != "ogden" for tissue in scene.materials.by_region)
@@ -153,7 +153,8 @@ def _refused(scene: Scene, pull: Pull, proof: Reach, stop: Callable[[], bool]) -
     beyond = ""
     with suppress(NotConverged):
         deepest = reach.of_depth(scene, pull, stop)
-        if deepest.limited and not deepest.lost and _none_beyond(scene, pull, deepest.value, stop):
+        further = pull._replace(depth=(1.0 + APART) * deepest.value)
+        if deepest.limited and not deepest.lost and _none_at(scene, further, pull, stop):
             depth = deepest.value
             beyond = f", and with this friction up to {depth:.4g} mm"
     return NoSteadyState(
@@ -164,12 +165,25 @@ def _refused(scene: Scene, pull: Pull, proof: Reach, stop: Callable[[], bool]) -
     )
 
 
-def _none_beyond(scene: Scene, pull: Pull, depth: float, stop: Callable[[], bool]) -> bool:
-    """Return whether a little below `depth` [mm] friction as `pull` has it is not reached either, at that depth."""
-    further = (1.0 + DEPTHS_APART) * depth
-    if further >= pull.depth:
-        return True  # `pull` itself is what has no state
-    proof = reach.of_friction(scene, pull._replace(depth=further), pull.mu, stop)
+def _not_known(pull: Pull, largest: float) -> NotConverged:
+    return NotConverged(
+        f"At {pull.depth:.3g} mm of indentation settled sliding was followed up to mu = {largest:.3g} and lost "
+        f"there; whether there is any at mu = {pull.mu:.3g} is not known: ask for less friction or depth"
+    )
+
+
+def _none_at(scene: Scene, further: Pull, pull: Pull, stop: Callable[[], bool]) -> bool:
+    """Return whether `further`, a little beyond a limit, has no state by the path that did not find the limit.
+
+    A limit of depth is looked at along friction, one of friction along depth. Beyond `pull` nothing is looked at: it is
+    what has no state.
+    """
+    if further.depth >= pull.depth and further.mu >= pull.mu:
+        return True
+    if further.depth < pull.depth:
+        proof = reach.of_friction(scene, further, pull.mu, stop)
+    else:
+        proof = reach.of_depth(scene, further, stop)
     return proof.limited and not proof.lost
 
 

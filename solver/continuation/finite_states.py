@@ -8,7 +8,7 @@ import numpy as np
 
 from solver._kernels import STICK
 from solver.continuation import limit_point as reach
-from solver.continuation.existence import DEPTHS_APART, all_at_the_bound, stands, steady, steep
+from solver.continuation.existence import APART, all_at_the_bound, stands, steady, steep
 from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium import full_slip as sliding
 from solver.equilibrium.finite_finger import FiniteFinger
@@ -206,7 +206,7 @@ def _risen_to(finger: FiniteFinger, shape: Shape, proof: reach.Reach, force: flo
     while most < force:
         tell("trying whether the finger slides deeper than it was followed to", most / force)
         try:
-            shape = steady(finger, shape.pull._replace(depth=(1.0 + DEPTHS_APART) * depth), start=shape, stop=stop)
+            shape = steady(finger, shape.pull._replace(depth=(1.0 + APART) * depth), start=shape, stop=stop)
         except NoSteadyState as failure:
             raise NoSteadyState("There is none so deep.", limit_indentation=depth, limit_normal_force=most) from failure
         depth, most = shape.pull.depth, float(shape.force[1])

@@ -1,13 +1,15 @@
 """Where settled sliding ends at finite strain."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from solver.body.finite import FiniteBody
 from solver.body.tissues import finite_laws
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
+from solver.continuation import existence, own_existence
 from solver.continuation import limit_point as reach
-from solver.continuation import own_existence
 from solver.continuation.arc_length import follow
 from solver.continuation.surface_instability import folds_at
 from solver.equilibrium.finite_finger import FiniteFinger
@@ -129,3 +131,22 @@ def test_what_is_crushed_beside_a_rigid_core_is_told_as_not_known_whatever_the_m
     newton = Newton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]))
     with pytest.raises(NotConverged, match="is not known"):
         own_existence.steady(newton, Pull(1.0, 1.5, sense=TOWARDS_TIP), NeoHooke(0.08, 0.48))
+
+
+def test_no_limit_of_friction_is_told_where_growing_depth_arrives_beyond_it(monkeypatch):
+    scene = Scene(friction=Friction(0.6), loading=Loading(2.0, "-x"), solve=Solve("finite"))
+    pull = Pull(2.0, 0.6, np.inf, TOWARDS_TIP)
+    ends = reach.Reach(0.373, limited=True, lost=False, least=0.55, folds=0.54, numbers=np.ones(3))
+
+    def by_depth(_scene, asked, _stop):
+        return replace(ends, value=1.5, limited=asked.mu == pull.mu)  # with a little less friction 2 mm are reached
+
+    monkeypatch.setattr(existence, "_tried", lambda *_: iter(()))
+    monkeypatch.setattr(reach, "of_friction", lambda *_: ends)
+    monkeypatch.setattr(reach, "of_depth", by_depth)
+    with pytest.raises(NotConverged, match=r"followed up to mu = 0\.373 and lost there"):
+        existence.steady(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), pull)
+    monkeypatch.setattr(reach, "of_depth", lambda *_: replace(ends, value=1.5))
+    with pytest.raises(NoSteadyState) as refused:
+        existence.steady(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), pull)
+    assert (refused.value.limit_mu, refused.value.limit_indentation) == (0.373, 1.5)
