@@ -1,5 +1,5 @@
 # ruff: noqa: C901 - a compiled loop is flat: calls inside it would cost more than they explain
-"""The skin that may touch: lengths, contact rows and states of its k nodes."""
+"""The skin that may touch: lengths and contact rows of its k nodes, and the solution of their system."""
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from solver._kernels.compiling import CAP, HELD_X, HELD_Y, OPEN, SLIP, STICK, Ar
 _LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
 
 COLUMNS = 4  # of the right-hand side
+ZERO = 1e-15  # pivot, by the largest number on the diagonal, that is nothing but round-off
 STEEP = 1.0  # coefficient of friction from which skin that comes to touch is first thought to slip at the bound
 
 
@@ -147,12 +148,15 @@ def impose(
 
 @compiled
 def solve(matrix: Array, right: Array, size: int) -> bool:
-    """Solve the system of contact, `matrix` (size size,), in place for `right` (size, 4); False where a pivot is zero.
+    """Solve the system of contact, `matrix` (size size,), in place for `right` (size, 4); False if a pivot is noise.
 
     No pivoting: the rows of contact and friction sit in a matrix that is otherwise the tangent of a stable body.
     """
     a = matrix[: size * size].reshape(size, size)
     over = np.empty(size)  # one over the pivots
+    least = 0.0
+    for r in range(size):
+        least = max(least, ZERO * abs(a[r, r]))
     for r in range(size):
         row = a[r]
         p = 0
@@ -176,7 +180,7 @@ def solve(matrix: Array, right: Array, size: int) -> bool:
             for s in range(COLUMNS):
                 right[r, s] -= factor * right[p, s]
             p += 1
-        if row[r] == 0.0:
+        if abs(row[r]) <= least:
             return False
         over[r] = 1.0 / row[r]
     for r in range(size - 1, -1, -1):
@@ -186,127 +190,3 @@ def solve(matrix: Array, right: Array, size: int) -> bool:
         for s in range(COLUMNS):
             right[r, s] *= over[r]
     return True
-
-
-@compiled
-def restate(
-    state: Narrow,
-    sense: Narrow,
-    reaction: Array,
-    above: Array,
-    slid: Array,
-    length: Array,
-    mu: float,
-    tau: float,
-    direction: int,
-) -> int:
-    """Change `state` and `sense` (k,) in place where the solution contradicts them; return how many were changed.
-
-    `reaction` (k, 2) forces on the skin, `above` (k,) heights over the surface, `slid` (k,) how far each node went
-    along +x relative to the surface since the last step. With `direction` -1 or +1 every touching node slips, the
-    friction force pointing there; with 0 nodes stick, slip and turn round. Where friction is steep, slip is a bad guess
-    of a node that comes to touch: its own drag may lift it off by more than it is pressed, and open it goes through.
-    """
-    changed = 0
-    size = state.shape[0]
-    force = reach = 0.0
-    for i in range(size):
-        force = max(force, abs(reaction[i, 1]))
-        reach = max(reach, abs(above[i]))
-    slack, small = 1e-12 * force, 1e-13 * reach
-    for i in range(size):
-        was, turned = state[i], sense[i]
-        now = was
-        if was == OPEN:
-            if above[i] < -small:
-                now = STICK if direction == 0 and mu > 0.0 and tau > 0.0 else SLIP
-                if direction != 0 and mu > STEEP and tau < np.inf:
-                    now = CAP
-                turned = direction if direction != 0 else turned
-        elif reaction[i, 1] < -slack:
-            now = OPEN
-        else:
-            coulomb, bound = mu * max(reaction[i, 1], 0.0), tau * max(length[i], 0.0)
-            most = min(coulomb, bound)
-            if direction != 0:
-                turned = direction
-                now = CAP if bound < coulomb - slack or (was == CAP and bound <= coulomb + slack) else SLIP
-            elif was == STICK:
-                if abs(reaction[i, 0]) > most + slack:
-                    turned = 1 if reaction[i, 0] > 0.0 else -1
-                    now = CAP if bound < coulomb else SLIP
-            elif slid[i] * sense[i] > small and most > 0.0:
-                now = STICK
-            else:
-                now = CAP if bound < coulomb - slack or (was == CAP and bound <= coulomb + slack) else SLIP
-        if now != was or (now >= SLIP and turned != sense[i]):
-            changed += 1
-        state[i], sense[i] = now, turned
-    return changed
-
-
-@compiled
-def settle(
-    stiffness: Array,
-    force: Array,
-    held: Narrow,
-    at: Narrow,
-    state: Narrow,
-    sense: Narrow,
-    mu: float,
-    tau: float,
-    direction: int,
-    x: Array,
-    above: Array,
-    anchor: Array,
-    rounds: int,
-    length: Array,
-    free: Narrow,
-    matrix: Array,
-    right: Array,
-    steps: Array,
-    reaction: Array,
-) -> bool:
-    """Solve the skin's system of contact for `steps`, changing states up to `rounds` times until none contradicts it.
-
-    That is the contact of the linearised body, exact where the rounds suffice. `x` (k,) are positions along the
-    surface, `anchor` (k,) those where nodes stick; filled beside `steps`: `reaction` (k, 2). For the rest see
-    `impose` and `restate`. A node that comes to touch at the bound again and again slips every other time. False where
-    a system cannot be solved.
-    """
-    size = state.shape[0]
-    entered = np.zeros(size, np.int32)  # how often each node came to touch
-    before = np.empty_like(state)
-    for turn in range(rounds + 1):
-        before[:] = state
-        rubbed(x, at, state, mu, length)
-        count = impose(
-            stiffness, force, held, at, state, sense, mu, tau, above, x - anchor, length, free, matrix, right, steps
-        )
-        if not solve(matrix, right[:count], count):
-            return False
-        for r in range(count):
-            steps[free[r]] = right[r]
-        for i in range(2 * size):
-            total = force[i]
-            for c in range(2 * size):
-                total += stiffness[i, c] * steps[c, 0]
-            reaction[i // 2, i % 2] = total
-        if turn == rounds:
-            break
-        ahead = x + steps[::2, 0]
-        reached, lengths = above + steps[1::2, 0], _lengths(ahead, at, state, mu)
-        if restate(state, sense, reaction, reached, ahead - anchor, lengths, mu, tau, direction) == 0:
-            break
-        for i in range(size):
-            if before[i] == OPEN and state[i] == CAP:
-                entered[i] += 1
-                state[i] = CAP if entered[i] % 2 == 1 else SLIP
-    return True
-
-
-@compiled
-def _lengths(x: Array, at: Narrow, state: Narrow, mu: float) -> Array:
-    out = np.empty_like(x)
-    rubbed(x, at, state, mu, out)
-    return out

@@ -7,6 +7,7 @@ matrix. The work grows like unknowns^1.5. Only dense LAPACK is used, no pivoting
 an elastic body whose skin is kept is positive definite.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -205,20 +206,24 @@ class Reduced:
             out[part.inner] = inner + self._own[number].sum(axis=1, keepdims=True) if loaded else inner
         return out
 
-    def under(self, loads: Array, compliance: Array) -> Array:
-        """Return all unknowns (size, c) under `loads` (size, c) alone, which need not be those it was made with.
+    def condensed(self, load: Array) -> tuple[Array, Callable[[Array], Array]]:
+        """Return what the kept unknowns feel (m,) of a `load` (size,), and what makes all unknowns of them.
 
-        `compliance` (m, m) is the inverse of `stiffness`, which the caller has.
+        Those (size,) are then under that load.
         """
-        passed = loads.copy()
+        passed = load.copy()
         for part, follow in zip(self.tree.parts, self._follow, strict=True):
             passed[part.border] -= follow.T @ passed[part.inner]
-        out = np.zeros(loads.shape)
-        out[self.tree.kept] = compliance @ passed[self.tree.kept]
+        return passed[self.tree.kept], lambda kept: self._recovered(kept, passed)
+
+    def _recovered(self, kept: Array, passed: Array) -> Array:
+        """Return all unknowns (size,) for the kept ones (m,), under the load that was condensed to `passed`."""
+        out = np.zeros(self.tree.size)
+        out[self.tree.kept] = kept
         for number in range(len(self.tree.parts) - 1, -1, -1):
             part, factor = self.tree.parts[number], self._factors[number]
             if len(part.inner):
-                own = dpotrs(factor, passed[part.inner])[0]
+                own = dpotrs(factor, passed[part.inner][:, None])[0][:, 0]
                 out[part.inner] = own - self._follow[number] @ out[part.border]
         return out
 

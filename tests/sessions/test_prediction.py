@@ -49,7 +49,7 @@ def test_the_trial_that_is_wanted_first_is_told_first_and_each_as_it_stays(watch
 
 def test_the_pictures_of_the_way_end_at_the_settled_finger_and_show_the_history(watched):
     _, row, way = watched[1][0]
-    instants = [way.march.instants[at] for at in (5, 30, -1)]
+    instants = [way.march[at] for at in (5, 30, -1)]
     pressed, dragged, last = stills(way.finger, instants, Sketch.of(way.finger.geometry.mesh, way.scene))
     history = row.history
     for still, at in ((pressed, 5), (dragged, 30), (last, -1)):

@@ -178,7 +178,7 @@ def relaxing_block(distortion=0.06):
 
 def whole(newton, u, pressure):
     """Forces (e, 18) and tangents (e, 18, 18) in plain NumPy."""
-    body, T = newton.body, newton._tensor
+    body, T = newton.body, newton.relaxing.tensor
     force, tangent = kernels_numpy.forces_and_tangents(body, u, pressure)
     gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
     bend = overstress.tangent(T, kernels_numpy.deformation(body, u))
@@ -193,7 +193,7 @@ def test_compiled_forces_and_tangents_agree_with_the_plain_ones_and_with_differe
     body, pressure = newton.body, np.zeros((len(newton.body.nodes), 3))
     u = start.u + 0.3 * start.u[::-1]
     u[body.mesh.held] = 0.0
-    assert newton._assembled(replace(start, u=u, pressure=pressure)) > 0.0
+    assert newton.relaxing.assemble(u, pressure) > 0.0
     force, tangent = whole(newton, u, pressure)
     inside = np.linalg.inv(tangent[:, 16:, 16:])
     across = tangent[:, :16, 16:] @ inside
@@ -201,15 +201,15 @@ def test_compiled_forces_and_tangents_agree_with_the_plain_ones_and_with_differe
     expected = np.zeros(body.size + 1)
     np.add.at(expected, body.unknown.reshape(-1, 16), force[:, :16] - (across @ force[:, 16:, None])[:, :, 0])
     scale = np.abs(tangent).max()
-    np.testing.assert_allclose(np.tril(newton.tangent), np.tril(outer), atol=1e-12 * scale)
-    np.testing.assert_allclose(newton.force, expected[:-1], atol=1e-13 * scale)
+    np.testing.assert_allclose(np.tril(newton.relaxing.tangent), np.tril(outer), atol=1e-12 * scale)
+    np.testing.assert_allclose(newton.relaxing.all_forces, expected[:-1], atol=1e-13 * scale)
     # the same forces for a tangent kept from there
     other = 0.7 * u
-    assert newton._resisted(replace(start, u=other)) > 0.0
+    assert newton.relaxing.resist(other) > 0.0
     force, _ = whole(newton, other, pressure)
     expected[:] = 0.0
     np.add.at(expected, body.unknown.reshape(-1, 16), force[:, :16] - (across @ force[:, 16:, None])[:, :, 0])
-    np.testing.assert_allclose(newton.force, expected[:-1], atol=1e-13 * scale)
+    np.testing.assert_allclose(newton.relaxing.all_forces, expected[:-1], atol=1e-13 * scale)
     way, h = rng.normal(size=u.shape), 1e-6
     local = way[body.nodes].reshape(len(body.nodes), 18)
     ahead, behind = (newton.excess(replace(start, u=u + sign * h * way)) for sign in (1.0, -1.0))

@@ -9,13 +9,15 @@ import pytest
 from solver import _kernels as kernels
 from solver import kernels_numpy
 from solver.body.finite import FiniteBody
+from solver.body.linear import CondensedLinear
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.contact import law as friction
-from solver.contact.active_set import Contact, Course, Touchable, untouched
 from solver.contact.law import CAP, LAWS, NAMES, OPEN, SLIP, STICK, FrictionLaw
-from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, BY_TRAVEL, Newton, Pull, Shape
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, BY_TRAVEL, FiniteNewton, Newton, Pull, Shape
 from solver.mesh.blocks import block
 from solver.response.small_stepper import Condensed, SmallStepper
+from tests.solver.oracle.active_set import Course, touchable, untouched
 
 FREE, BOUND = FrictionLaw(0.5, np.inf), FrictionLaw(0.5, 0.02)
 STEEP, NEVER_FELT = FrictionLaw(1000.0, 0.02), FrictionLaw(0.5, 1e9)
@@ -44,61 +46,64 @@ class Told:
     length: np.ndarray
 
 
-def springs(*, in_loops=False):
+def springs(across=COMPLIANCE[1]):
     """Five points that do not feel each other, the outer two above any depth."""
-    one, zero = np.eye(5), np.zeros(5)
-    along_y, across, along_x = COMPLIANCE
-    return Touchable(
-        np.array([9.0, 0.0, 0.02, 0.15, 9.0]), LENGTH, along_y * one, across * one, along_x * one, zero, zero,
-        np.zeros((10, 0)), np.zeros(0), in_loops,
-    )  # fmt: skip
+    along_y, _, along_x = COMPLIANCE
+    rest = np.stack([np.linspace(-1.0, 1.0, 5), [9.0, 0.0, 0.02, 0.15, 9.0]], axis=1)
+    stiffness = np.kron(np.eye(5), np.linalg.inv([[along_x, across], [across, along_y]]))
+    return CondensedLinear(rest, stiffness, np.zeros(10), LENGTH, np.zeros(5, np.int32))
 
 
-def told(found: Contact, before: Contact):
-    return Told(found.state, found.sense, found.normal, found.tangential, found.gap, found.shift - before.shift, LENGTH)
+def told(body, now, before):
+    place, moved = now.place(body), now.pull.travel - before.pull.travel
+    slid = place[:, 0] - before.place(body)[:, 0] - moved
+    gap = place[:, 1] - now.pull.depth
+    return Told(now.state, now.sense.astype(float), now.normal, now.tangential, gap, slid, LENGTH)
 
 
-def driven(law, *, in_loops=False):
-    body = springs(in_loops=in_loops)
+def driven(law):
+    body = springs()
+    newton, states = Newton(body), [Shape.undeformed(body)]
+    for depth, travel in DRIVES:
+        states.append(newton.settle(states[-1], Pull(depth, law.mu, law.tau_max, travel=-travel)))
+    return [told(body, now, before) for before, now in pairwise(states)]
+
+
+def driven_plainly(law):
+    body = touchable(springs())
     course, states = Course(body, law), [untouched(body)]
     for depth, travel in DRIVES:
         states.append(course.step(states[-1], depth, travel))
-    return [told(now, before) for before, now in pairwise(states)]
-
-
-def driven_in_loops(law):
-    return driven(law, in_loops=True)
+    return [
+        Told(now.state, now.sense, now.normal, now.tangential, now.gap, now.shift - before.shift, LENGTH)
+        for before, now in pairwise(states)
+    ]
 
 
 def slid_at_once(law):
     """Settled slides either way, which know no way there: what slips does so against its force."""
-    rubbed = []
-    for in_loops in (False, True):
-        for direction in (1, -1):
-            found = Course(springs(in_loops=in_loops), law).sliding(0.3, direction)
-            rubbed.append(replace(told(found, found), slid=np.full(5, 100.0 * direction)))
+    body, rubbed = springs(), []
+    for direction in (1, -1):
+        found = settled(Newton(body), Pull(0.3, law.mu, law.tau_max, -direction))
+        rubbed.append(replace(told(body, found, found), slid=np.full(5, 100.0 * direction)))
     return rubbed
 
 
 def pressed_by_forces(law):
     """Forces given, the drag up to 0.9 of what the law allows: something always sticks where friction is."""
-    along_y, across, along_x = COMPLIANCE
-    one, nothing = np.eye(5), np.zeros((1, 10))
-    compliance = np.block([[along_y * one, across * one], [across * one, along_x * one]])
-    body = Condensed(
-        springs().gap, LENGTH, compliance, nothing, nothing, np.zeros(1, np.int64), np.zeros(1, bool), np.zeros((1, 2)),
-        np.zeros((2, 10)),
-    )  # fmt: skip
-    points, out = SmallStepper(body, law.mu, law.tau_max), []
+    nothing = np.zeros((1, 10))
+    finger = Condensed(
+        springs(), nothing, nothing, np.zeros(1, np.int64), np.zeros(1, bool), np.zeros((1, 2)), np.zeros((2, 10))
+    )
+    points, out = SmallStepper(finger, law.mu, law.tau_max), []
     for normal, part in [(0.02, 0.0), (0.1, 0.0), (0.1, 0.5), (0.1, 0.9), (0.1, -0.9), (0.05, -0.8), (0.15, 0.0)]:
-        before = points._anchor.copy()
-        most = law.limit(points.forces()[:, 1] * normal / max(points.forces()[:, 1].sum(), 1e-300), LENGTH).sum()
+        before = points.state
+        most = law.limit(before.normal * normal / max(before.normal.sum(), 1e-300), LENGTH).sum()
         assert np.isfinite(points.step(normal, part * most if part else 0.0))
-        drag, push = points.forces().T
-        gap = body.gap + points._moved[:5] - points.depth
+        now = told(finger.skin, points.state, before)
         # what slides does so against its force, and how far forces do not tell
-        slid = points._anchor - before if STICK in points.state else np.full(5, -np.sign(drag.sum()))
-        out.append(Told(points.state.copy(), points._sense.copy(), push, drag, gap, slid, LENGTH))
+        sliding = STICK not in points.state.state
+        out.append(replace(now, slid=np.full(5, -np.sign(now.tangential.sum()))) if sliding else now)
     return out
 
 
@@ -107,7 +112,7 @@ def cushion():
     """A round cushion of skin at finite strain."""
     across = np.array([0.0, 0.1, 0.2, 0.35, 0.6, 1.2])
     mesh = block(np.r_[-across[:0:-1], across], np.array([0.0, 0.2, 0.5, 1.0]), 2.0)
-    return Newton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]))
+    return FiniteNewton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]))
 
 
 def dragged(newton, law, drives=((0.02, 0.0), (0.06, 0.0), (0.06, 0.004), (0.06, 0.015), (0.06, 0.1), (0.06, 0.098),
@@ -131,7 +136,7 @@ def finite(law, newton):
     return out
 
 
-WAYS = [driven, driven_in_loops, slid_at_once, pressed_by_forces, finite]
+WAYS = [driven, driven_plainly, slid_at_once, pressed_by_forces, finite]
 
 
 @pytest.fixture(params=WAYS, ids=lambda way: way.__name__)
@@ -176,7 +181,7 @@ def test_wherever_contact_is_looked_for_what_is_found_is_what_the_law_says(cours
 
 
 def test_every_state_is_met_in_every_course(cushion):
-    courses = [driven(BOUND), driven_in_loops(BOUND), pressed_by_forces(BOUND), finite(BOUND_OF_CUSHION, cushion)]
+    courses = [driven(BOUND), driven(BOUND), pressed_by_forces(BOUND), finite(BOUND_OF_CUSHION, cushion)]
     for points in courses:
         assert {NAMES[int(state)] for at in points for state in at.state} == set(NAMES.values())
 
@@ -195,22 +200,20 @@ def test_friction_that_vanishes_is_none_and_a_bound_that_is_never_felt_is_none(c
 @pytest.mark.parametrize("law", MEMBERS, ids=str)
 def test_points_on_springs_carry_what_their_springs_and_the_law_say(law):
     """No point feels another, and without coupling N = (d - g)/a; T is the springs' pull, cut off."""
-    body = replace(springs(), normal_by_tangential=np.zeros((5, 5)))
-    for in_loops in (False, True):
-        course = Course(replace(body, in_loops=in_loops), law)
-        before = untouched(body)
-        for depth, travel in DRIVES:
-            normal = np.maximum(depth - body.gap, 0.0) / COMPLIANCE[0]
-            limit = np.minimum(law.mu * normal, law.tau_max * LENGTH if law.tau_max < np.inf else np.inf)
-            drag = np.clip((before.shift - travel) / COMPLIANCE[2], -limit, limit)
-            before = course.step(before, depth, travel)
-            np.testing.assert_allclose(before.normal, normal, atol=1e-11 * 0.1)  # round-off, by the largest force
-            np.testing.assert_allclose(before.tangential, drag, atol=1e-11 * 0.1)
+    body = springs(across=0.0)
+    newton, before = Newton(body), Shape.undeformed(body)
+    for depth, travel in DRIVES:
+        normal = np.maximum(depth - body.rest[:, 1], 0.0) / COMPLIANCE[0]
+        limit = np.minimum(law.mu * normal, law.tau_max * LENGTH if law.tau_max < np.inf else np.inf)
+        drag = np.clip((before.u[:, 0] - before.pull.travel - travel) / COMPLIANCE[2], -limit, limit)
+        before = newton.settle(before, Pull(depth, law.mu, law.tau_max, travel=-travel))
+        np.testing.assert_allclose(before.normal, normal, atol=1e-11 * 0.1)  # round-off, by the largest force
+        np.testing.assert_allclose(before.tangential, drag, atol=1e-11 * 0.1)
 
 
 @pytest.mark.parametrize("law", MEMBERS, ids=str)
 def test_compiled_loops_find_the_states_and_forces_that_plain_numpy_finds(law):
-    for plain, found in zip(driven(law), driven_in_loops(law), strict=True):
+    for plain, found in zip(driven_plainly(law), driven(law), strict=True):
         np.testing.assert_array_equal(found.state, plain.state)
         for name in ("normal", "tangential", "gap", "slid"):
             np.testing.assert_allclose(getattr(found, name), getattr(plain, name), atol=1e-13)

@@ -11,25 +11,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dgetrf, dgetrs
 
+from solver.body.linear import CondensedLinear
 from solver.body.validation import finite
 from solver.contact.law import CAP, OPEN, SLIP, STICK, FrictionLaw
-from solver.linalg.lapack import dgesv, dgetrf, dgetrs
+from solver.failures import ContactLost
 
 Array = NDArray[np.float64]
 States = NDArray[np.int8]
 Flags = NDArray[np.bool_]
 SMALL = 1e-11  # a contradiction smaller than this, relative to the largest of its kind, is round-off
-ROUNDS = 12  # systems after which the short way to settled sliding is given up
 FIRST = (0.3, 0.1, 0.03, 0.01, 0.6, 1.0)  # parts of the skin's height tried as what touches under a force, in turn
-HERTZ = 0.5  # part of the depth below which skin is first thought to touch: half as deep is half the overlap's square
 
 AMBIGUOUS = "the touching points have no unique forces"
 CONTRADICTORY = "the states of the touching points still contradicted each other after {} corrections"
-
-
-class ContactLost(Exception):
-    """No set of states was found that contradicts nothing; the message says what was tried."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +44,6 @@ class Touchable:
     tangential_free: Array  # (k,)
     motions: Array  # (2 k, r) displacement of the points, normal ones first, by each free motion
     resultants: Array  # (r,) what the surface's forces must amount to along each free motion [N/mm]
-    in_loops: bool = False  # whether compiled loops find its contact, `solver._kernels.rubbing`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +63,17 @@ class Contact:
     def touching(self) -> NDArray[np.bool_]:
         """Return which points touch, (k,)."""
         return self.state != OPEN
+
+
+def touchable(body: CondensedLinear) -> Touchable:
+    """Return what the surface feels of a held body: the inverse of its skin's stiffness."""
+    compliance = np.linalg.inv(body.stiffness)
+    free = (compliance @ body.load).reshape(-1, 2)
+    nothing = np.zeros((2 * len(free), 0))
+    return Touchable(
+        body.rest[:, 1], body.fixed_length, compliance[1::2, 1::2], compliance[1::2, ::2], compliance[::2, ::2],
+        free[:, 1], free[:, 0], nothing, np.zeros(0),
+    )  # fmt: skip
 
 
 class System:
@@ -135,10 +141,6 @@ class Course:
             guesses += [np.where(self.body.gap <= height, SLIP, OPEN) for height in self._heights()]
         if guess is None and np.isfinite(self.law.tau_max):
             guesses.append(np.where(low, CAP, OPEN))
-        if guess is None and not self.body.motions.shape[1]:
-            found = self._slid(depth, -float(direction))
-            if found is not None:
-                return found
         for number, first in enumerate(guesses):
             try:
                 return self._consistent(depth, 0.0, np.zeros(count), first.astype(np.int8), sense, free=False)
@@ -151,51 +153,6 @@ class Course:
         """Return heights [mm] below which skin may first be thought to touch where a force finds the depth."""
         low, high = float(self.body.gap.min()), float(self.body.gap.max())
         return low + np.array(FIRST) * (high - low)
-
-    def _slid(self, depth: float, sense: float) -> Contact | None:
-        """Return what `_consistent` does where all that touches slips one way; None where that takes many rounds.
-
-        Points are then open, slipping or slipping at the bound, and the drag follows from the pressure.
-        """
-        if self.body.in_loops:
-            from solver.contact.active_set_compiled import slid
-
-            return slid(self.body, self.law, depth, sense, ROUNDS, HERTZ)
-        body, mu = self.body, self.law.mu
-        slips = body.normal_by_normal + sense * mu * body.normal_by_tangential
-        above, bound = body.gap + body.normal_free - depth, self.law.bound(body.length)
-        on: Flags = above < -HERTZ * depth
-        none: Array = np.zeros(len(on))
-        capped: Flags = np.zeros(len(on), bool)
-        for iteration in range(1, ROUNDS + 1):
-            matrix, lifted, pull = slips, above, none
-            if capped.any():
-                pull = np.where(capped, sense * bound, 0.0)
-                matrix = np.where(capped, body.normal_by_normal, slips)
-                lifted = above + body.normal_by_tangential @ pull
-            at = on.nonzero()[0]
-            if not len(at):
-                return None
-            columns = matrix.take(at, 1)
-            found = dgesv(columns.take(at, 0), -lifted[at])
-            pressing: Array = found[2]
-            if found[3]:  # no unique forces
-                return None
-            normal = none.copy()
-            normal[at] = pressing
-            gap = lifted + columns @ pressing
-            slack = SMALL * max(float(pressing.max()), -float(pressing.min()))
-            low = -SMALL * max(float(body.gap.max()), float(gap.max()))
-            now: Flags = (on & (normal >= -slack)) | (~on & (gap < low))
-            over: Flags = now & on & (mu * normal > bound + np.where(capped, -slack, slack))
-            if (now == on).all() and (over == capped).all():
-                tangential = np.where(on & ~capped, sense * mu * normal, pull)
-                shift = body.tangential_free + body.tangential_by_tangential @ tangential
-                shift += body.normal_by_tangential.T @ normal
-                state = np.where(capped, CAP, np.where(on, SLIP, OPEN)).astype(np.int8)
-                return Contact(state, np.full(len(on), sense), normal, tangential, shift, gap, np.zeros(0), iteration)
-            on, capped = now, over
-        return None
 
     def step(self, before: Contact, depth: float, travel: float, resultants: Array | None = None) -> Contact:
         """Return the state after the body was driven to `depth` and `travel` along +x [mm], coming from `before`.
@@ -220,14 +177,6 @@ class Course:
         self, depth: float, travel: float, anchor: Array, state: States, sense: Array, *, free: bool
     ) -> Contact:
         """Change states until none contradicts the solution; with `free`, points may stick and turn round."""
-        if self.body.in_loops:
-            from solver.contact.active_set_compiled import consistent
-
-            entering = self._entering if free else None
-            guess = state, sense
-            return consistent(
-                self.body, self.law, (depth, travel), self._resultants, anchor, guess, entering, self._patience
-            )
         seen: set[bytes] = set()
         one_by_one = resticked = False
         for iteration in range(1, self._patience + 1):
