@@ -57,7 +57,7 @@ class CondensedLinear:
         # surface's forces balance the loads along every motion.
         spring = self.stiffness.trace() / max(len(free), 1)
         inside = (self.stiffness + spring * self.springs @ self.springs.T)[np.ix_(free, free)]
-        inverse = np.linalg.inv(inside)
+        inverse = np.asarray(np.linalg.inv(inside), np.float64)
         if not np.abs(inside).max(initial=0.0) * np.abs(inverse).max(initial=0.0) < UNHELD:
             raise LinAlgError("the body is neither held nor balanced")
         out = np.zeros(self.stiffness.shape)
