@@ -222,7 +222,7 @@ def test_a_pressed_block_is_in_equilibrium_with_what_it_holds_of_the_past():
     newton, _, _ = relaxing_block(distortion=0.0)
     body = newton.body
     shape = Shape.undeformed(body)
-    newton.past = Past.at_rest(newton.past.shear, newton.past.tau)
+    newton.relaxing.past = Past.at_rest(newton.relaxing.past.shear, newton.relaxing.past.tau)
     pushes = []
     for depth, step in ((0.1, 0.1), (0.2, 0.1), (0.2, 0.5), (0.2, 5.0)):
         newton.ready(step)
@@ -242,7 +242,7 @@ def test_what_a_pressed_block_keeps_and_friction_does_not_take_is_what_its_tissu
     """Lost: g G/(2 tau) times the sum of a + 1/a - 2 over the eigenvalues of A B^-1, over the block and in time."""
     newton, _, _ = relaxing_block(distortion=0.0)
     body, weight = newton.body, newton.body.weight.ravel()
-    newton.past = Past.at_rest(newton.past.shear, newton.past.tau)
+    newton.relaxing.past = Past.at_rest(newton.relaxing.past.shear, newton.relaxing.past.tau)
     shape, way, rates, steps, time = Shape.undeformed(body), [], [0.0], 24, 0.5
     for number in range(1, steps + 1):
         newton.ready(time / steps)
@@ -250,10 +250,15 @@ def test_what_a_pressed_block_keeps_and_friction_does_not_take_is_what_its_tissu
         newton.took(shape, time / steps)
         way.append(shape)
         whole_of = [
-            np.array([_whole(t) for t in tensors]) for tensors in (newton.past.metric[:, 0], newton.past.before)
+            np.array([_whole(t) for t in tensors])
+            for tensors in (newton.relaxing.past.metric[:, 0], newton.relaxing.past.before)
         ]
         eigen = np.linalg.eigvals(whole_of[0] @ np.linalg.inv(whole_of[1])).real
-        rate = newton.past.shear[:, 0] / (2.0 * newton.past.tau[:, 0]) * np.sum(eigen + 1.0 / eigen - 2.0, axis=1)
+        rate = (
+            newton.relaxing.past.shear[:, 0]
+            / (2.0 * newton.relaxing.past.tau[:, 0])
+            * np.sum(eigen + 1.0 / eigen - 2.0, axis=1)
+        )
         rates.append(float(rate @ weight))
     lost = float(np.trapezoid(rates, dx=time / steps))
     found = course_audits(newton, way)
