@@ -28,7 +28,6 @@ import numpy as np
 
 from solver.accuracy.adaptivity import ascended
 from solver.accuracy.contrasts import told
-from solver.contact.active_set import ContactLost
 from solver.continuation.small_states import numbers_on, settled
 from solver.continuation.wedging import WIDE
 from solver.equilibrium.finger import FingerModel
@@ -104,7 +103,7 @@ def measured(number: int, kinematics: Literal["small", "finite"]) -> dict[str, A
             truth = [on_mesh(scenes, *mesh) for mesh in OVERKILL]
         else:
             truth = [climbed(scenes, fineness) for fineness in CLIMBED]
-    except (SolveFailure, ContactLost):
+    except SolveFailure:
         return {"number": number, "kinematics": kinematics}
     return {"number": number, "kinematics": kinematics, "answers": answers, "truth": truth}
 

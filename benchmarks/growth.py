@@ -19,7 +19,7 @@ from time import thread_time
 
 import numpy as np
 
-from solver.body.linear import Body
+from solver.body.linear import LinearBody
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
@@ -66,7 +66,7 @@ def small(fineness: float, repeats: int = 5) -> tuple[int, float, float]:
     spans: list[float] = []
     for _ in range(repeats):
         begin = thread_time()
-        Body.of(mesh, materials)
+        LinearBody.of(mesh, materials)
         spans.append(thread_time() - begin)
     return models[0].body.dofs, 1e3 * median(spans), held
 

@@ -31,7 +31,6 @@ import numpy as np
 from benchmarks.error_estimate import on_mesh, random_scene
 from daq_app.accuracy.methods import overkill
 from solver.accuracy.adaptivity import MARGIN, sized
-from solver.contact.active_set import ContactLost
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh import Array
 from solver.mesh.mesher import Sizing
@@ -105,7 +104,7 @@ def truths(scene: Scene) -> list[list[float]]:
     if scene.solve.kinematics == "small":
         solves: list[list[float]] = []
         for fineness, moved in product(FINEST, (False, True)):
-            with suppress(SolveFailure, ContactLost):
+            with suppress(SolveFailure):
                 solves.append(on_mesh(scene, fineness, moved))
         if len(solves) < ENOUGH:
             raise NotConverged("Fewer than three fine meshes have a state.")

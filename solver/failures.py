@@ -74,6 +74,10 @@ class NotConverged(SolveFailure):
     kind = "not_converged"
 
 
+class ContactLost(NotConverged):
+    """No set of contact states was found that contradicts nothing; the message says what was tried."""
+
+
 def followed_to(depth: float, travel: float, reason: object) -> NotConverged:
     """Return the failure of a course that could be followed to a `depth` after a `travel` [mm] and not beyond.
 

@@ -13,7 +13,6 @@ from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, within
 from daq_app.accuracy.methods import Kinematics
 from daq_app.accuracy.random_scenes import random_scene
 from daq_app.accuracy.truth import KINEMATICS, NUMBERS, cases, judged, known, overkill
-from solver.contact.active_set import ContactLost
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
 from solver.response.solution import answers
@@ -125,7 +124,7 @@ def _truth(scene: Scene) -> tuple[np.ndarray, np.ndarray] | None:
     """Return the true numbers (3,) of a scene and their doubts (3,), relative; None where a mesh has no state."""
     try:
         solves, _ = overkill(scene, quick=True)(scene)
-    except (SolveFailure, ContactLost):
+    except SolveFailure:
         return None
     return judged(solves)
 

@@ -24,7 +24,6 @@ from daq_app.accuracy.subjects import SUBJECTS, Subject
 from daq_app.accuracy.targets import Target
 from daq_app.accuracy.truth import Truth, cases
 from daq_app.accuracy.warm import Warm
-from solver.contact.active_set import ContactLost
 from solver.failures import SolveFailure
 from solver.response.solution import solve
 from solver.response.stepper import stepper
@@ -124,7 +123,7 @@ def measured(
         except KeyboardInterrupt:
             stopped = True
             left_out.append(f"Stopped during: {subject.told}.")
-        except (SolveFailure, ContactLost, ArithmeticError, ValueError) as failure:
+        except (SolveFailure, ArithmeticError, ValueError) as failure:
             left_out.append(f"{subject.told.capitalize()} broke off: {failure}")
         rows[subject.name], took[subject.name] = tuple(mine), clock() - now
     return Measured(begun, quick, stopped, took, rows, tuple(left_out))

@@ -10,15 +10,15 @@ import numpy as np
 
 from daq_app.accuracy.asked import clock
 from solver.accuracy.adaptivity import MARGIN, Ascent, Climbed, climbed, foot, risen, sized, sized_together
-from solver.body.linear import Body
+from solver.body.linear import LinearBody
 from solver.body.tissues import settled_moduli
 from solver.continuation.existence import steady
 from solver.continuation.finite_states import nearby
-from solver.continuation.small_states import numbers_on, settled
+from solver.continuation.small_states import settled
 from solver.element import Q2P1
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.newton import Newton, Pull, Shape
+from solver.equilibrium.newton import FiniteNewton, Pull, Shape
 from solver.mesh import Array
 from solver.mesh.mesher import AT_CUT, Sizing
 from solver.response.finite_solution import alike
@@ -42,7 +42,7 @@ class Meshed(Protocol):
     def solve(self, scene: Scene, before: State | None = None) -> State:
         """Return the settled state of `scene`, from the undeformed finger or from a state of a similar surface.
 
-        Raises SolveFailure or ContactLost where there is none.
+        Raises SolveFailure where there is none.
         """
         ...
 
@@ -103,13 +103,13 @@ class SmallMeshed:
 
     def numbers_together(self, states: Sequence[State]) -> Array:
         """Return them for several states (n, 3)."""
-        return np.abs(numbers_on(self.finger, states))
+        return np.abs(self.finger.numbers(states))
 
     def floor(self) -> float:
         """Return what assembling, eliminating and unfolding once took."""
-        skin = np.ones((2 * len(self.finger.body.touchable.gap), 1))
+        skin = np.ones(self.finger.body.condensed.rest.shape)
         begun = clock()
-        Body.of(self.finger.geometry.mesh, self._moduli).displacement(skin)
+        LinearBody.of(self.finger.geometry.mesh, self._moduli).displacement(skin)
         return clock() - begun
 
 
@@ -257,7 +257,7 @@ def climbed_twice(scene: Scene, finenesses: tuple[float, float, float]) -> tuple
     return np.abs([over.numbers for over in found]), tuple(over.at.finger.newton.body.dofs for over in found)
 
 
-def _system(newton: Newton) -> float:
+def _system(newton: FiniteNewton) -> float:
     shape = Shape.undeformed(newton.body)
     begun = clock()
     newton.linearise(shape, Pull(0.1, 0.0), newton.skin_x)

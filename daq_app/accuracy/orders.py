@@ -9,7 +9,7 @@ import numpy as np
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, within
 from daq_app.accuracy.published import contacts, locking
 from solver.continuation.finite_states import settled as finite_settled
-from solver.continuation.small_states import numbers_on, settled
+from solver.continuation.small_states import settled
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.mesh.mesher import Sizing
@@ -113,7 +113,7 @@ def small_finger(quick: bool) -> Iterator[Order]:
 
     def sed(asked: Scene, fineness: float, shift: bool) -> float:
         model = FingerModel.of(asked, Sizing(fineness, 2.0, shift))
-        return float(numbers_on(model, [settled(asked, model)])[0, 0])
+        return float(model.numbers([settled(asked, model)])[0, 0])
 
     overkill, finenesses = (14.0, (3.0, 4.0, 5.0, 7.0)) if quick else (20.0, (3.0, 4.0, 5.0, 7.0, 10.0))
     for surface in (STICKINESS[0], STICKINESS[4]):

@@ -9,7 +9,6 @@ import numpy as np
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, timed, within
 from daq_app.accuracy.methods import FINITE, METHODS, PLAIN, SMALL, Meshed, Method
 from daq_app.accuracy.truth import JUDGED, Truth, cases, known
-from solver.contact.active_set import ContactLost
 from solver.failures import SolveFailure
 from solver.response.finite_solution import alike
 from solver.scene import Scene
@@ -85,7 +84,7 @@ def _row(method: Method, fineness: float, truths: dict[str, Truth], patience: fl
     for scene in chosen:
         try:
             state = mesh.solve(scene)
-        except (SolveFailure, ContactLost) as failure:
+        except SolveFailure as failure:
             failed[scene.title] = str(failure)
             continue
         true = np.array(truths[scene.title].numbers)

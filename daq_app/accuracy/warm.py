@@ -14,8 +14,6 @@ import numpy as np
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock, within
 from daq_app.accuracy.methods import FiniteMeshed, Kinematics, SmallMeshed
 from daq_app.accuracy.truth import cases
-from solver.contact.active_set import Course, untouched
-from solver.contact.law import FrictionLaw
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.march import march, press_and_slide
 from solver.equilibrium.newton import Pull
@@ -88,16 +86,13 @@ def timed_passes(follows: Stepper, readings: list[Reading], passes: int = PASSES
 
 def _small(scene: Scene) -> Iterator[Reading]:
     finger = SmallMeshed(scene, FINER["small"], False).finger
-    course = Course(finger.body.touchable, FrictionLaw(scene.friction.mu, np.inf))
-    state = untouched(finger.body.touchable)
     depth, direction = scene.loading.depth, scene.loading.direction
-    press = [(depth * (n + 1) / PRESS, 0.0) for n in range(PRESS)]
-    slide = [(depth, direction * DISTANCE * (n + 1) / SLIDES) for n in range(SLIDES)]
-    lift = [(down, direction * (DISTANCE + depth * (n + 1))) for n, down in enumerate(_lifts(depth))]
-    for down, along in press + slide + lift:
-        state = course.step(state, down, along)
+    course = press_and_slide(depth, scene.friction.mu, np.inf, direction, press=PRESS, slides=SLIDES, distance=DISTANCE)
+    lifts = [(down, DISTANCE + depth * (n + 1)) for n, down in enumerate(_lifts(depth))]
+    course += [Pull(down, scene.friction.mu, travel=-direction * along) for down, along in lifts]
+    for state in march(finger.newton, course):
         sed = finger.sed_ending(finger.displacement(state))
-        yield float(state.normal.sum()), float(state.tangential.sum()), sed
+        yield float(state.force[1]), float(state.force[0]), sed
 
 
 def _finite(scene: Scene) -> Iterator[Reading]:

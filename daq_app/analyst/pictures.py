@@ -45,7 +45,7 @@ def lost_film(way: Way, sketch: Sketch, told: Told) -> tuple[Film, str]:
     if failure is None:
         return film, ""
     last = instants[-1]
-    lost = most_squeezed(way.finger, last.contact, last.depth)
+    lost = most_squeezed(way.finger, last.state, last.depth)
     return Film(film.parts, film.frames, film.instants, film.arcs, lost), str(failure.in_a_sentence())
 
 
@@ -78,15 +78,15 @@ def _frame(drawn: Fields, skin: Skin, row: "np.ndarray[tuple[int], np.dtype[np.f
 
 
 def _instant(still: Still) -> Instant:
-    at, contact = still.instant, still.instant.contact
+    at, force = still.instant, still.instant.state.force
     states = still.skin.state
     return Instant(
         at.time,
         at.depth,
         at.travel,
         still.sed,
-        float(contact.normal.sum()),
-        float(contact.tangential.sum()),
+        float(force[1]),
+        float(force[0]),
         sum(state == "stick" for state in states),
         sum(state in ("slip", "cap") for state in states),
     )

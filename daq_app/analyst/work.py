@@ -224,8 +224,8 @@ class Work:
             raise NothingToShow("The model has no way to show for this trial: it was not solved.")
         prediction, way = found
         if way.march is not None:
-            told = self.timed("drawing the history", len(way.march.instants))
-            self._filmed = m.Filmed(key, film_of(way, way.march.instants, self._sketch(way), told))
+            told = self.timed("drawing the history", len(way.march))
+            self._filmed = m.Filmed(key, film_of(way, way.march, self._sketch(way), told))
             self._say(self._filmed)
             return
         if prediction.prediction is not None or way.scene.materials.relax:

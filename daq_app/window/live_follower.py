@@ -172,9 +172,9 @@ class Follower:
         """Return what is drawn, and where its nodes are while nothing touches (n, 2) [mm]."""
         if self._finite is not None and self._reached:
             return Picture(*self._finite.drawn(), self._finite.outline()), self._finite.rest
-        forces = self._small.forces()
-        nodes = self._drawn.nodes(forces, self._small.depth)
-        return Picture(nodes, self._drawn.faces, self._drawn.sed(forces), self._small.outline()), self._drawn.rest
+        state = self._small.state
+        sed = self._drawn.sed(state)
+        return Picture(self._drawn.nodes(state), self._drawn.faces, sed, self._small.outline()), self._drawn.rest
 
 
 def _settled(asked: Settle, kinematics: Kinematics, provisional: float | None, seen: _Seen | None) -> Settled:

@@ -11,7 +11,7 @@ from sessions.prediction.stored import SessionPrediction, TrialPrediction
 from sessions.strokes import Analysis
 from solver.equilibrium.expected_depth import matching_depths
 from solver.equilibrium.finger import FingerModel
-from solver.equilibrium.load_path import March
+from solver.equilibrium.load_path import Instant
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
 from solver.response.solution import answers
@@ -24,7 +24,7 @@ class Way:
 
     scene: Scene
     finger: FingerModel
-    march: March | None  # None where it has none that can be drawn
+    march: tuple[Instant, ...] | None  # None where it has none that can be drawn
 
 
 Watch = Callable[[int, TrialPrediction, Way | None], None]  # position of the row, the row, how it was found
@@ -66,7 +66,9 @@ def predict(
     def known(at: int) -> TrialPrediction:
         return _filled(prepared[solved[at]], found[2 * at], found[2 * at + 1], depths[at])
 
-    def seen(number: int, answer: Prediction | SolveFailure, finger: FingerModel, march: March | None) -> None:
+    def seen(
+        number: int, answer: Prediction | SolveFailure, finger: FingerModel, march: tuple[Instant, ...] | None
+    ) -> None:
         found[number] = answer
         at, back = divmod(number, 2)
         if not back:

@@ -3,21 +3,21 @@
 The tests hold a plain twin of them in NumPy, and compare the two.
 """
 
+from solver._kernels.active_set import meet, solve_active_set, update_contact_states
 from solver._kernels.carrying import carry
 from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, bind_arguments
 from solver._kernels.elements import assemble, energies, forces
-from solver._kernels.iterating import condense_forces, meet, move
+from solver._kernels.iterating import condense_forces, move
 from solver._kernels.multifrontal import back_substitute, condense, eliminate
 from solver._kernels.outline import crosses, pinched
 from solver._kernels.overstress import add_overstress
 from solver._kernels.skin import (
     STEEP,
     assemble_contact_system,
+    bounded_length,
     rubbed,
     solve,
-    solve_active_set,
     tributary,
-    update_contact_states,
 )
 
 __all__ = [
@@ -33,6 +33,7 @@ __all__ = [
     "assemble_contact_system",
     "back_substitute",
     "bind_arguments",
+    "bounded_length",
     "carry",
     "condense",
     "condense_forces",

@@ -119,12 +119,30 @@ class Factors(NamedTuple):
     near: Array  # (k + b,) memory for the largest part
 
 
+class CondensedArrays(NamedTuple):
+    """A linearised body as its skin of k nodes feels it: x, y of one node, x, y of the next."""
+
+    stiffness: Array  # (2 k, 2 k) [N/mm per mm]
+    force: Array  # (2 k,) of the skin on the surface, were there no surface [N/mm]
+    compliance: Array  # (2 k, 2 k) inverse of the stiffness where that is known, else (0, 0) [mm per N/mm]
+    motions: Array  # (2 k, m) of the body as a whole that cost no energy, along which forces balance
+
+
 class Skin(NamedTuple):
     """The skin that may touch: k nodes."""
 
-    nodes: Wide  # (k,)
     held: Narrow  # (k,) whether a node is held: along x HELD_X, along y HELD_Y, both their sum
-    middle: Narrow  # (k,) 1 at the middle of an edge, 0 at its ends
+    middle: Narrow  # (k,) 1 at the middle of an edge whose length follows the deformed skin, else 0
+    fixed_length: Array  # (k,) skin that each node stands for whatever the state [mm]
+
+
+class ForceControl(NamedTuple):
+    """Which of depth and travel follow from forces, in one linear system."""
+
+    kind: int  # DEPTH_GIVEN, PUSH_GIVEN or DRAG_GIVEN
+    drag: float  # of the surface along +x [N/mm]
+    push: float  # and along +y
+    stride: float  # largest change of depth or travel [mm]
 
 
 class LoadState(NamedTuple):
@@ -153,13 +171,22 @@ class ContactStates(NamedTuple):
 
 
 class ContactSystem(NamedTuple):
-    """The linear system of the skin's contact, and memory for it."""
+    """The linear system of the skin's contact, and memory for it: n = 2 k + 3 unknowns at most."""
 
     length: Array  # (k,) length of skin on which a bound acts that each node stands for [mm]
-    free: Narrow  # (2 k,) the unknown displacements
-    matrix: Array  # (4 k k,)
-    right: Array  # (2 k, 4)
+    free: Narrow  # (n,) the unknowns, displacements or forces
+    matrix: Array  # (n n,)
+    right: Array  # (n, 4)
     steps: Array  # (2 k, 4) of the skin: to equilibrium, and by depth, mu and travel of the surface along +x
+    motion: Array  # (2,) change of depth and travel in the first of them, where forces are given [mm]
+
+
+class StateChanges(NamedTuple):
+    """States of the skin's k nodes that a solution calls for."""
+
+    state: Narrow  # (k,)
+    sense: Narrow  # (k,)
+    badness: Array  # (k,) how badly each node contradicts its own [N/mm]; -1 where it does not
 
 
 class MeshTransferArrays(NamedTuple):

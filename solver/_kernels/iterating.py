@@ -5,20 +5,10 @@ There are n unknowns and k nodes of skin.
 
 import numpy as np
 
-from solver._kernels.arguments import (
-    BodyState,
-    ContactStates,
-    ElementArrays,
-    ElementSystem,
-    Factors,
-    LoadState,
-    Skin,
-    SkinPosition,
-)
+from solver._kernels.arguments import BodyState, ElementArrays, ElementSystem, Factors
 from solver._kernels.compiling import Array, compiled
 from solver._kernels.elements import advance
 from solver._kernels.multifrontal import back_substitute, condense
-from solver._kernels.skin import rubbed, update_contact_states
 
 
 @compiled
@@ -48,13 +38,3 @@ def move(
     every = np.empty(carried.shape[0])
     back_substitute(carried, step, factors, every)
     return advance(before, every, scale, after, elements, system)
-
-
-@compiled
-def meet(states: ContactStates, position: SkinPosition, load: LoadState, skin: Skin, length: Array) -> int:
-    """Change `states` where the forces on the skin, or its position, contradict them; return how many were changed.
-
-    Filled: `length` (k,), of skin on which a bound acts.
-    """
-    rubbed(position.x, skin.middle, states.state, load.mu, length)
-    return update_contact_states(states, position.x, position.above, position.anchor, length, load)

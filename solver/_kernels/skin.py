@@ -1,15 +1,16 @@
 # ruff: noqa: C901 - a compiled loop is flat: calls inside it would cost more than they explain
-"""The skin that may touch: lengths, contact rows and states of its k nodes."""
+"""The skin that may touch: lengths and contact rows of its k nodes, and the solution of their system."""
 
 import numpy as np
 
-from solver._kernels.arguments import ContactStates, ContactSystem, LoadState, Skin, SkinPosition
+from solver._kernels.arguments import CondensedArrays, ContactStates, ContactSystem, LoadState, Skin, SkinPosition
 from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, Array, Narrow, compiled
 
 # how the length of skin of an edge's first, middle and last node grows with the positions of the three: Simpson's rule
 _LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
 
 COLUMNS = 4  # of the right-hand side
+ZERO = 1e-15  # pivot, by the largest number on the diagonal, that is nothing but round-off
 STEEP = 1.0  # coefficient of friction from which skin that comes to touch is first thought to slip at the bound
 
 
@@ -43,6 +44,14 @@ def rubbed(x: Array, at: Narrow, state: Narrow, mu: float, out: Array) -> None:
 
 
 @compiled
+def bounded_length(x: Array, skin: Skin, state: Narrow, mu: float, out: Array) -> None:
+    """Fill `out` (k,) with the length of skin on which a bound acts: that of `rubbed`, and what is fixed."""
+    rubbed(x, skin.middle, state, mu, out)
+    for i in range(out.shape[0]):
+        out[i] += skin.fixed_length[i]
+
+
+@compiled
 def rubs(state: Narrow, edge: int, node: int, mu: float) -> bool:
     """Return whether a bound acts on the part of an edge, told by its middle, that one of its nodes stands for.
 
@@ -56,8 +65,7 @@ def rubs(state: Narrow, edge: int, node: int, mu: float) -> bool:
 
 @compiled
 def assemble_contact_system(
-    stiffness: Array,
-    force: Array,
+    body: CondensedArrays,
     skin: Skin,
     states: ContactStates,
     load: LoadState,
@@ -66,16 +74,15 @@ def assemble_contact_system(
 ) -> int:
     """Write down the skin's system of contact: return its size f, and fill its `matrix` (f f,) and `right` (f, 4).
 
-    `stiffness` (2 k, 2 k) and `force` (2 k,) are the body's as its skin feels them: x, y of one node, x, y of the next.
-    `length` is that of `rubbed`. The columns of `right` are the step to equilibrium, and its derivatives with respect
-    to depth, mu and travel of the surface along +x. `steps` (2 k, 4) is filled where the contact's conditions prescribe
-    displacements; what is unknown is listed in `free` (f,).
+    `length` is that of `bounded_length`. The columns of `right` are the step to equilibrium, and its derivatives
+    with respect to depth, mu and travel of the surface along +x. `steps` (2 k, 4) is filled where the contact's
+    conditions prescribe displacements; what is unknown is listed in `free` (f,).
     """
-    held, at = skin.held, skin.middle
+    stiffness, force, held, at = body.stiffness, body.force, skin.held, skin.middle
     state, sense = states.state, states.sense
     mu, tau = load.mu, load.tau
     x_now, above, anchor = position
-    length, free, matrix, right, steps = system
+    length, free, matrix, right, steps, _ = system
     size = state.shape[0]
     for i in range(2 * size):
         for c in range(COLUMNS):
@@ -147,12 +154,15 @@ def assemble_contact_system(
 
 @compiled
 def solve(matrix: Array, right: Array, size: int) -> bool:
-    """Solve the system of contact, `matrix` (size size,), in place for `right` (size, 4); False where a pivot is zero.
+    """Solve the system of contact, `matrix` (size size,), in place for `right` (size, 4); False if a pivot is noise.
 
     No pivoting: the rows of contact and friction sit in a matrix that is otherwise the tangent of a stable body.
     """
     a = matrix[: size * size].reshape(size, size)
     over = np.empty(size)  # one over the pivots
+    least = 0.0
+    for r in range(size):
+        least = max(least, ZERO * abs(a[r, r]))
     for r in range(size):
         row = a[r]
         p = 0
@@ -176,7 +186,7 @@ def solve(matrix: Array, right: Array, size: int) -> bool:
             for s in range(COLUMNS):
                 right[r, s] -= factor * right[p, s]
             p += 1
-        if row[r] == 0.0:
+        if abs(row[r]) <= least:
             return False
         over[r] = 1.0 / row[r]
     for r in range(size - 1, -1, -1):
@@ -185,116 +195,4 @@ def solve(matrix: Array, right: Array, size: int) -> bool:
                 right[r, s] -= a[r, c] * right[c, s]
         for s in range(COLUMNS):
             right[r, s] *= over[r]
-    return True
-
-
-@compiled
-def update_contact_states(
-    states: ContactStates, x: Array, above: Array, anchor: Array, length: Array, load: LoadState
-) -> int:
-    """Change `states` in place where the solution contradicts them; return how many were changed.
-
-    `x`, `above` (k,) are where the nodes are and `anchor` (k,) where they were along the surface at the last step,
-    `length` (k,) as in `rubbed`. Where the load has a sense every touching node slips, the friction force pointing
-    there; else nodes stick, slip and turn round. Where friction is steep, slip is a bad guess of a node that comes to
-    touch: its own drag may lift it off by more than it is pressed, and open it goes through.
-    """
-    state, sense, reaction = states.state, states.sense, states.reaction
-    mu, tau, direction = load.mu, load.tau, load.sense
-    changed = 0
-    size = state.shape[0]
-    force = reach = 0.0
-    for i in range(size):
-        force = max(force, abs(reaction[i, 1]))
-        reach = max(reach, abs(above[i]))
-    slack, small = 1e-12 * force, 1e-13 * reach
-    for i in range(size):
-        was, turned = state[i], sense[i]
-        now = was
-        if was == OPEN:
-            if above[i] < -small:
-                now = STICK if direction == 0 and mu > 0.0 and tau > 0.0 else SLIP
-                if direction != 0 and mu > STEEP and tau < np.inf:
-                    now = SHEAR_LIMITED
-                turned = direction if direction != 0 else turned
-        elif reaction[i, 1] < -slack:
-            now = OPEN
-        else:
-            coulomb, bound = mu * max(reaction[i, 1], 0.0), tau * max(length[i], 0.0)
-            most = min(coulomb, bound)
-            if direction != 0:
-                turned = direction
-                now = (
-                    SHEAR_LIMITED
-                    if bound < coulomb - slack or (was == SHEAR_LIMITED and bound <= coulomb + slack)
-                    else SLIP
-                )
-            elif was == STICK:
-                if abs(reaction[i, 0]) > most + slack:
-                    turned = 1 if reaction[i, 0] > 0.0 else -1
-                    now = SHEAR_LIMITED if bound < coulomb else SLIP
-            elif (x[i] - anchor[i]) * sense[i] > small and most > 0.0:
-                now = STICK
-            else:
-                now = (
-                    SHEAR_LIMITED
-                    if bound < coulomb - slack or (was == SHEAR_LIMITED and bound <= coulomb + slack)
-                    else SLIP
-                )
-        if now != was or (now >= SLIP and turned != sense[i]):
-            changed += 1
-        state[i], sense[i] = now, turned
-    return changed
-
-
-@compiled
-def solve_active_set(
-    stiffness: Array,
-    force: Array,
-    skin: Skin,
-    states: ContactStates,
-    load: LoadState,
-    position: SkinPosition,
-    rounds: int,
-    system: ContactSystem,
-) -> bool:
-    """Solve the skin's system of contact for `steps`, changing states up to `rounds` times until none contradicts it.
-
-    That is the contact of the linearised body, exact where the rounds suffice. Filled beside `steps`: the reactions of
-    `states`. A node that comes to touch at the shear limit again and again slips every other time. False where a system
-    cannot be solved.
-    """
-    state, reaction = states.state, states.reaction
-    x, above, anchor = position
-    length, free, matrix, right, steps = system
-    size = state.shape[0]
-    entered = np.zeros(size, np.int32)  # how often each node came to touch
-    before = np.empty(size, np.int32)
-    ahead, reached = np.empty(size), np.empty(size)
-    for turn in range(rounds + 1):
-        rubbed(x, skin.middle, state, load.mu, length)
-        count = assemble_contact_system(stiffness, force, skin, states, load, position, system)
-        if not solve(matrix, right, count):
-            return False
-        for r in range(count):
-            for c in range(COLUMNS):
-                steps[free[r], c] = right[r, c]
-        for i in range(2 * size):
-            total = force[i]
-            for c in range(2 * size):
-                total += stiffness[i, c] * steps[c, 0]
-            reaction[i // 2, i % 2] = total
-        if turn == rounds:
-            break
-        for i in range(size):
-            before[i] = state[i]
-            ahead[i], reached[i] = x[i] + steps[2 * i, 0], above[i] + steps[2 * i + 1, 0]
-        rubbed(ahead, skin.middle, state, load.mu, length)
-        if update_contact_states(states, ahead, reached, anchor, length, load) == 0:
-            break
-        for i in range(size):
-            if before[i] == OPEN and state[i] == SHEAR_LIMITED:
-                entered[i] += 1
-                state[i] = SHEAR_LIMITED if entered[i] % 2 == 1 else SLIP
-    rubbed(x, skin.middle, state, load.mu, length)
     return True

@@ -15,9 +15,10 @@ from solver.accuracy.finite_ends import steps_asked
 from solver.accuracy.step_error import Steps
 from solver.body.tissues import strains_the_cut
 from solver.continuation.existence import refuse_far_beyond, steep
-from solver.continuation.finite_states import course, nearby, pull_sliding, roughly, settled
+from solver.continuation.finite_states import course, nearby, roughly, settled
 from solver.continuation.limit_point import folded, sound
 from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.loads import sliding_pull
 from solver.equilibrium.newton import Shape
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.mesh.mesher import AT_CUT, SHORT_AT_CUT, Sizing, sharing, still_sharing
@@ -109,7 +110,7 @@ def foot(
     except SolveFailure:
         pass
     if beyond and scene.normal_force is None and scene.loading.direction != 0:
-        refuse_far_beyond(scene, pull_sliding(scene), stop)
+        refuse_far_beyond(scene, sliding_pull(scene), stop)
     sizing = Sizing(fineness, depth, margin=margin, at_cut=_usual_at_cut(scene))
     try:
         return _plain(scene, sizing, stop, make)
@@ -246,7 +247,7 @@ def climbed(
     try:
         return replace(begun, shape=settled(begun.finger, scene, stop, begun.shape, times))
     except NotConverged:
-        if not steep(pull_sliding(scene)):
+        if not steep(sliding_pull(scene)):
             raise
     begun = _begun(scene, replace(sized(BESIDE * fineness, below), at_cut=sizing.at_cut), below, make, None)
     return replace(begun, shape=settled(begun.finger, scene, stop, begun.shape, times))

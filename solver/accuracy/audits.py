@@ -1,13 +1,13 @@
 """Checks that a result carries with it: what must balance, and what must not be exceeded. Perfect is 0."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from solver.contact.active_set import Contact
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.finger import FingerModel
-from solver.equilibrium.load_path import March
+from solver.equilibrium.load_path import Instant
+from solver.equilibrium.newton import Shape
 from solver.failures import NotConverged
 from solver.mesh import Array
 from solver.scene import Scene
@@ -19,9 +19,7 @@ PIERCED = 1e-7  # part of the indentation by which skin may lie too low without 
 MIXED = "nearly incompressible tissues, or ones whose stiffnesses differ by many orders of magnitude,"
 
 
-def audits(
-    model: FingerModel, law: FrictionLaw, contact: Contact, depth: float, displacement: Array
-) -> dict[str, float]:
+def audits(model: FingerModel, law: FrictionLaw, contact: Shape, depth: float, displacement: Array) -> dict[str, float]:
     """Return the checks of one state of contact; `displacement` (nodes, 2) relative to the bone [mm].
 
     `equilibrium_x`, `equilibrium_y`: bone reaction plus contact force, by the contact force.
@@ -44,7 +42,7 @@ def audits(
     whole = model.geometry.whole
     height = mesh.nodes[whole, 1] + displacement[whole, 1] - depth
     push = max(float(contact.normal.max(initial=0.0)), np.finfo(float).tiny)
-    beyond = np.abs(contact.tangential) - law.limit(contact.normal, body.touchable.length)
+    beyond = np.abs(contact.tangential) - law.limit(contact.normal, body.condensed.fixed_length)
     return {
         "equilibrium_x": abs(float(bone[0] + contact.tangential.sum())) / total,
         "equilibrium_y": abs(float(bone[1] + contact.normal.sum())) / total,
@@ -111,31 +109,27 @@ def inside_out(checks: Mapping[str, float]) -> str:
     )
 
 
-def course_audits(model: FingerModel, way: March) -> dict[str, float]:
+def course_audits(model: FingerModel, way: Sequence[Instant]) -> dict[str, float]:
     """Return the checks of a whole march, relative to the bone's work.
 
     `course_work_balance`: bone work less stored energy less dissipation. `course_step_work`: the part of it that points
     did on their way to the surface within a step, which vanishes with the step. `course_least_dissipation`: the least
     work that friction took in a step (never negative).
     """
-    touch = model.body.touchable
-    normal = np.array([i.contact.normal for i in way.instants])
-    tangential = np.array([i.contact.tangential for i in way.instants])
-    gap = np.array([i.contact.gap for i in way.instants])
-    shift = np.array([i.contact.shift for i in way.instants])
-    depth = np.array([i.depth for i in way.instants])
-    travel = np.array([i.travel for i in way.instants])
-    last = np.concatenate([normal[-1], tangential[-1]])
-    k = len(touch.gap)
-    skin = model.body.skin_displacement(last[:, None])[:, 0]
-    stored = 0.5 * float(last @ skin)
+    normal = np.array([i.state.normal for i in way])
+    tangential = np.array([i.state.tangential for i in way])
+    depth = np.array([i.depth for i in way])
+    travel = np.array([i.travel for i in way])
+    u = np.array([i.state.u for i in way])
+    gap = u[:, :, 1] - depth[:, None]  # but for what does not change
+    shift = u[:, :, 0] + travel[:, None]
+    stored = 0.5 * float(np.sum(way[-1].state.reaction * model.relaxed(way[-1].state).u))
     mean_n, mean_t = (normal[1:] + normal[:-1]) / 2.0, (tangential[1:] + tangential[:-1]) / 2.0
     bone = float(np.sum(mean_n.sum(axis=1) * np.diff(depth)) - np.sum(mean_t.sum(axis=1) * np.diff(travel)))
     lost = -float(np.sum(mean_t * np.diff(shift, axis=0)))
     closing = -float(np.sum(mean_n * np.diff(gap, axis=0)))
     friction = -np.sum(tangential[1:] * np.diff(shift, axis=0), axis=1)
     scale = max(abs(bone), np.finfo(float).tiny)
-    assert len(skin) == 2 * k
     return {
         "course_work_balance": abs(bone - stored - lost - closing) / scale,
         "course_step_work": abs(closing) / scale,

@@ -10,11 +10,11 @@ from solver.body.finite_measures import deformation, element_forces, energy, ene
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.finite_relaxation import RelaxingNewton
-from solver.equilibrium.newton import Newton, Shape
+from solver.equilibrium.newton import FiniteNewton, Shape
 from solver.scene import Scene
 
 
-def audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: Newton) -> dict[str, float]:
+def audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: FiniteNewton) -> dict[str, float]:
     """Return the checks of one state. Perfect is 0, save for `smallest_det_F` (of displacement at quadrature points).
 
     `newton` is the finger's own, or that of its tissues as they relax.
@@ -61,7 +61,7 @@ def audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: Newton) -> 
     }
 
 
-def course_audits(newton: Newton, way: Sequence[Shape]) -> dict[str, float]:
+def course_audits(newton: FiniteNewton, way: Sequence[Shape]) -> dict[str, float]:
     """Return the checks of a whole march from first touch on, relative to the bone's work.
 
     The bone's work and friction's take the mean of the forces at both ends of a step.

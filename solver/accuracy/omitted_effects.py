@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from solver._kernels import STICK
 from solver.constitutive.hyperelastic import HUMAN_SKIN
-from solver.contact.active_set import STICK, Contact
 from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.newton import Shape
 from solver.mesh import Array
 from solver.scene import Material, Scene
 
@@ -44,18 +45,18 @@ def _held(scene: Scene) -> str:
     return said + (f"; a nail plate of {finger.nail_length:g} mm is fixed to it" if finger.nail_length else "; no nail")
 
 
-def model(scene: Scene, finger: FingerModel, contact: Contact, displacement: Array) -> dict[str, Any]:
+def model(scene: Scene, finger: FingerModel, contact: Shape, displacement: Array) -> dict[str, Any]:
     """Return what was modelled and what was left out, as plain data.
 
     Every entry of `left_out` has `estimate`, the relative change of the SED (or a lower bound of it) that leaving it
     out may have caused, `from`, the numbers of this scene that it rests on, and `how` they make the estimate.
     """
     force = finger.body.reactions(displacement[:, :, None])[finger.geometry.mesh.held, :, 0].sum(axis=0)
-    length = float(finger.body.touchable.length[contact.touching].sum())
+    length = float(finger.body.condensed.fixed_length[contact.touching].sum())
     touching = int(contact.touching.sum())
     sticking = int((contact.state == STICK).sum()) / touching if touching else 0.0
     slide = _elastic_slide(finger, displacement)
-    width = finger.contact_width(contact, finger.skin_displacement(contact)[:, 0])
+    width = finger.contact_width(contact)
     return {
         "kinematics": "small strain, plane strain",
         "material": _laws(scene),

@@ -15,10 +15,10 @@ import numpy as np
 
 from solver.accuracy.omitted_effects import RELAXATION, warnings
 from solver.body.tissues import relaxing_laws
-from solver.contact.active_set import ContactLost
-from solver.continuation.small_states import law_of, settled
+from solver.continuation.small_states import settled
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.load_path import PRESSING_TIME, Aim
+from solver.equilibrium.loads import pull_of
 from solver.equilibrium.relaxation import RelaxingBody, RelaxingWay
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
@@ -109,7 +109,7 @@ def held(found: Prediction, stop: Callable[[], bool] = lambda: False) -> Held | 
         aims += [Aim(PRESSING_TIME + lasting * part, depth, direction * slide * part) for part in along.tolist()]
     try:
         then, at_last = _small(scene, aims) if kind == "small" else _finite(scene, aims, stop)
-    except (ContactLost, SolveFailure):
+    except SolveFailure:
         return None
     return Held(abs(then / at_last - 1.0), lasting) if at_last > 0.0 else None
 
@@ -119,7 +119,7 @@ def _small(scene: Scene, aims: list[Aim]) -> tuple[float, float]:
     finger, body = _rough(scene.finger, scene.materials, scene.receptor, scene.loading.depth)
     body = copy(body)  # each course has a past of its own
     body.rest()
-    way = RelaxingWay(body, law_of(scene), scene.loading_per_mm, finger.ending, finger.point, aims[0].time)
+    way = RelaxingWay(body, pull_of(scene), scene.loading_per_mm, finger.ending, finger.point, aims[0].time)
     for aim in aims:
         way.go(aim)
     return way.sed[-1][0], finger.sed_ending(finger.displacement(settled(scene, finger)))

@@ -4,31 +4,19 @@ import numpy as np
 
 from solver.accuracy.error_estimate import Errors, errors
 from solver.accuracy.step_error import HALF, Steps
-from solver.contact.active_set import ContactLost
-from solver.continuation.small_states import (
-    NUDGE,
-    all_numbers,
-    bounded_more,
-    end,
-    felt_of_bound,
-    law_of,
-    nearest,
-    numbers_on,
-    rubbed_more,
-)
+from solver.continuation.small_states import NUDGE, bounded_more, end, felt_of_bound, nearest, rubbed_more
 from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.loads import pull_of
 from solver.failures import SolveFailure
 from solver.mesh import Array
 from solver.scene import Scene
-
-LOST = (ContactLost, SolveFailure)
 
 
 def steps_asked(scene: Scene, finger: FingerModel) -> Steps:
     """Return the load steps that a scene asks for whose end depends on its way, judged on a coarse mesh."""
     try:
-        whole, half = (all_numbers(scene, finger, end(scene, finger, times)) for times in (1.0, HALF))
-    except LOST:
+        whole, half = (finger.all_numbers(end(scene, finger, times)) for times in (1.0, HALF))
+    except SolveFailure:
         return Steps(1, np.full(6, np.nan), np.zeros(6))  # nor will there be an estimate
     return Steps.of(whole, half, scene.solve.tolerance)
 
@@ -38,7 +26,7 @@ def times_on_way(scene: Scene, finger: FingerModel) -> int:
 
     Those that a tolerance asks for at the end of its press, judged on a coarse mesh.
     """
-    if scene.solve.course == "steady" or scene.solve.tolerance is None or law_of(scene).frictionless:
+    if scene.solve.course == "steady" or scene.solve.tolerance is None or pull_of(scene).frictionless:
         return 1
     return steps_asked(scene.pressed_only(), finger).times
 
@@ -58,7 +46,7 @@ def error_estimates(
             others, felt, bounded = _settled(scene, coarse)
         else:
             others, felt = _on_way(scene, coarse, steps)
-    except LOST:
+    except SolveFailure:
         others = np.empty((0, 6))
     return errors(scene, fineness, numbers, others, felt, steps, bounded), others
 
@@ -66,26 +54,26 @@ def error_estimates(
 def others_on(scene: Scene, mesh: FingerModel, steps: Steps | None) -> Array:
     """Return the numbers of a scene on one more mesh (1, 6), or none where it has no state; `steps` as above."""
     try:
-        numbers = all_numbers(scene, mesh, nearest(scene, mesh) if steps is None else end(scene, mesh))
-    except LOST:
+        numbers = mesh.all_numbers(nearest(scene, mesh) if steps is None else end(scene, mesh))
+    except SolveFailure:
         return np.empty((0, 6))
     return (numbers if steps is None else steps.taken(numbers))[None]
 
 
 def _settled(scene: Scene, coarse: FingerModel) -> tuple[Array, Array, Array]:
     state = nearest(scene, coarse)
-    other, felt, bounded = all_numbers(scene, coarse, state), np.zeros(6), np.zeros(6)
+    other, felt, bounded = coarse.all_numbers(state), np.zeros(6), np.zeros(6)
     if (beside := rubbed_more(scene, coarse, state)) is not None:
-        felt[:3] = (numbers_on(coarse, [beside])[0] / other[:3] - 1.0) / NUDGE
+        felt[:3] = (coarse.numbers([beside])[0] / other[:3] - 1.0) / NUDGE
     if (beside := bounded_more(scene, coarse, state)) is not None:
-        bounded = (all_numbers(scene, coarse, beside) / np.where(other == 0.0, 1.0, other) - 1.0) / NUDGE
+        bounded = (coarse.all_numbers(beside) / np.where(other == 0.0, 1.0, other) - 1.0) / NUDGE
         bounded[other == 0.0] = 0.0
     return other[None], felt, bounded
 
 
 def _on_way(scene: Scene, coarse: FingerModel, steps: Steps) -> tuple[Array, Array]:
     told = np.isfinite(steps.whole).all()  # when the steps were judged
-    other = steps.taken(steps.whole if told else all_numbers(scene, coarse, nearest(scene, coarse)))
+    other = steps.taken(steps.whole if told else coarse.all_numbers(nearest(scene, coarse)))
     felt = np.zeros(6)
     if scene.friction.tau_max is not None:
         felt = felt_of_bound(scene, coarse, end(scene, coarse, HALF))

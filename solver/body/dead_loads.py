@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver.body.validation import check_loads
-from solver.equilibrium.newton import Newton, Pull, Shape
+from solver.equilibrium.newton import FiniteNewton, Pull, Shape
 from solver.failures import NotConverged
 from solver.mesh import Array
 
@@ -17,7 +17,7 @@ SMALLEST = 1.0 / 256.0  # part of the loads below which a failing step is given 
 
 
 def loaded(
-    newton: Newton,
+    newton: FiniteNewton,
     loads: Array | None = None,
     prescribed: Array | None = None,
     pull: Pull | None = None,
@@ -42,11 +42,11 @@ def loaded(
     driven = body.mesh.driven
     held_at = shape.u[driven]
     moved = 0.0 if prescribed is None else prescribed[driven] - held_at
-    before = newton.load.copy()
+    before = newton.finite.load.copy()
     done, part = 0.0, 1.0 / steps
     while done < 1.0:
         aim = min(done + part, 1.0)
-        newton.load[:] = before + aim * (vector - before)
+        newton.finite.load[:] = before + aim * (vector - before)
         u = shape.u.copy()
         u[driven] = held_at + aim * moved
         try:
@@ -60,7 +60,7 @@ def loaded(
     return shape
 
 
-def _on_unknowns(newton: Newton, loads: Array) -> Array:
+def _on_unknowns(newton: FiniteNewton, loads: Array) -> Array:
     """Return the loads (n,) in the order of the unknowns."""
     body = newton.body
     if loads[body.nodes[:, 8]].any():

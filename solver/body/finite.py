@@ -1,4 +1,4 @@
-"""A body at finite strain as the arrays that the compiled loops ask for, and the places where its energy is probed."""
+"""A body at finite strain: its elements, its tangent condensed to the skin, and probes of its energy."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver import _kernels as kernels
-from solver._kernels import HELD_X, HELD_Y
-from solver._kernels.arguments import ElementArrays, ProbeArrays, Skin, SymbolicFactorization
+from solver._kernels import HELD_X, HELD_Y, bind_arguments
+from solver._kernels.arguments import BodyState, ElementArrays, ElementSystem, ProbeArrays, SymbolicFactorization
 from solver.body.receptor import Endings
 from solver.body.validation import check_body, check_driven, check_laws
 from solver.constitutive.hyperelastic import Law
 from solver.element import Q2P1
-from solver.linalg.multifrontal import symbolic_factorization
+from solver.linalg.multifrontal import Elimination, symbolic_factorization
 from solver.mesh import Array, Indices, Mesh
 
 Narrow = NDArray[np.int32]
@@ -100,6 +100,14 @@ class FiniteBody:
         """Nodes of the skin that may touch (k,)."""
         return self.mesh.skin
 
+    def place(self, u: Array) -> Array:
+        """Return where the skin's nodes are (k, 2) for displacements `u` (nodes, 2) [mm]."""
+        return self.mesh.nodes[self.skin] + u[self.skin]
+
+    def undeformed(self) -> tuple[Array, Array]:
+        """Return displacements (nodes, 2) and pressures (e, 3) of the body at rest."""
+        return np.zeros(self.mesh.nodes.shape), np.zeros((len(self.nodes), 3))
+
     @property
     def elements(self) -> ElementArrays:
         """The elements as loops take them."""
@@ -107,11 +115,6 @@ class FiniteBody:
             self.grad_x, self.grad_y, self.weight, self.modes, self.laplace, self.shear, self.stiffening, self.lame,
             self.nodes, self.unknown,
         )  # fmt: skip
-
-    @property
-    def contact_skin(self) -> Skin:
-        """The skin as loops take it."""
-        return Skin(self.skin, self.held, self.middle)
 
     @property
     def size(self) -> int:
@@ -122,6 +125,85 @@ class FiniteBody:
     def dofs(self) -> int:
         """Number of unknown displacements, centres included."""
         return self.plan.size + 2 * len(self.nodes)
+
+
+class CondensedFinite:
+    """A body at finite strain with the memory for its tangent."""
+
+    def __init__(self, body: FiniteBody, beside: "CondensedFinite | None" = None) -> None:
+        """Set memory aside for `body`, or share that of `beside` where both are eliminated by one plan.
+
+        What is there then belongs to whichever was linearised last.
+        """
+        count = len(body.nodes)
+        self.body, self.constant = body, False
+        self.load = np.zeros(body.size)  # dead loads on the body, of `solver.body.dead_loads`
+        self.all_forces = np.zeros(body.size)  # of all unknowns, less the dead loads
+        if beside is not None and beside.body.plan is body.plan:
+            self.inside, self.system = beside.inside, beside.system._replace(force=self.all_forces)
+        else:
+            self.inside = Elimination(body.plan)
+            self.system = ElementSystem(
+                np.zeros((count, 16, 16)), self.all_forces, np.zeros((count, 2, 17)), np.zeros((count, 3)),
+                np.zeros((count, 3, 18)), np.zeros((count, 3)),
+            )  # fmt: skip
+        self.stiffness, self.force = self.inside.stiffness, self.inside.felt
+        self.compliance, self.motions = np.zeros((0, 0)), np.zeros((0, 0))
+        self.bulk = float((body.lame / body.shear).max())
+        self.held, self.middle, self.fixed_length = body.held, body.middle, np.zeros(len(body.skin))
+        elements, inside = body.elements, self.inside
+        self._assemble = bind_arguments(kernels.assemble, elements, self.system)
+        self._forces = bind_arguments(kernels.forces, elements, self.system)
+        self._condense = bind_arguments(
+            kernels.condense_forces, self.all_forces, self.load, inside.carried, inside.factors
+        )
+        self._move = bind_arguments(kernels.move, inside.carried, inside.factors, elements, self.system)
+
+    def undeformed(self) -> tuple[Array, Array]:
+        """Return displacements (nodes, 2) and pressures (e, 3) of the body at rest."""
+        return self.body.undeformed()
+
+    def place(self, u: Array) -> Array:
+        """Return where the skin's nodes are (k, 2) for displacements `u` (nodes, 2) [mm]."""
+        return self.body.place(u)
+
+    def linearise(self, u: Array, pressure: Array) -> bool:
+        """Assemble and eliminate the tangent at a state; False where it is turned inside out or has no factors."""
+        self.inside.found = None
+        if not self.assemble(u, pressure) > 0.0 or not self.inside.factorise(self.system.tangent):
+            return False
+        self._condense()
+        return True
+
+    def relinearise(self, u: Array) -> bool:
+        """Condense the forces at a state with the factors that are there; False where it is turned inside out."""
+        if not self.resist(u) > 0.0:
+            return False
+        self._condense()
+        return True
+
+    def assemble(self, u: Array, pressure: Array) -> float:
+        """Fill tangents and forces at a state and return the least det F."""
+        return self._assemble(u, pressure)
+
+    def resist(self, u: Array) -> float:
+        """Fill the forces at a state for the tangent that is there and return the least det F."""
+        return self._forces(u)
+
+    @property
+    def found(self) -> Array | None:
+        """The displacements of the equilibrium that the tangent led to, which is that of whichever shares it."""
+        return self.inside.found
+
+    @found.setter
+    def found(self, u: Array | None) -> None:
+        self.inside.found = u
+
+    def recover(self, u: Array, pressure: Array, step: Array, scale: float) -> tuple[Array, Array, float]:
+        """Return a state after `scale` times the skin's `step` (2 k,), and the largest move of the full step [mm]."""
+        after = BodyState(np.empty_like(u), np.empty_like(pressure))
+        largest = self._move(BodyState(u, pressure), step, scale, after)
+        return after.u, after.pressure, largest
 
 
 @dataclass(frozen=True, slots=True, eq=False)

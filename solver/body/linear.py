@@ -1,34 +1,106 @@
 """A body of any shape: a mesh with its materials and loads, reduced to what the surface feels of it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.linalg import LinAlgError
+from numpy.typing import NDArray
 
+from solver._kernels import HELD_X, HELD_Y
 from solver.body.linear_elimination import LinearElimination
 from solver.body.stiffness import Elastic, Isotropic
 from solver.body.validation import check_body, check_held, check_loads, loose
-from solver.contact.active_set import Touchable
 from solver.element import GAUSS_4, line
 from solver.mesh import Array, Indices, Mesh
 
 Motion = Literal["x", "y", "turn"]
+Narrow = NDArray[np.int32]
 _POINTS, _WEIGHTS = GAUSS_4
 _VALUES, _SLOPES = line(_POINTS)  # (q, 3)
-RIGID = 1e-12  # compliance of the skin where it is held along the surface, by the largest elsewhere [-]
 UNHELD = 1e14  # stiffness by its inverse, largest numbers, from which a body is taken to move freely [-]
 
 
+class CondensedLinear:
+    """A body at small strain, whose states are those of its skin: u (k, 2) [mm] are the displacements of that alone."""
+
+    def __init__(self, rest: Array, stiffness: Array, load: Array, length: Array, held: Narrow) -> None:
+        """Take skin that lies at `rest` (k, 2), of a `length` (k,) at each node, `held` as CondensedBody has it.
+
+        `stiffness` (2 k, 2 k) and dead `load` (2 k,) are those of x, y of one node, x, y of the next.
+        """
+        self.constant, self.bulk = True, 0.0
+        self.rest, self.stiffness, self.load = rest, stiffness, load
+        self.fixed_length, self.held = length, held
+        self.middle = np.zeros(len(rest), np.int32)
+        self.motions = np.zeros((2 * len(rest), 0))  # of the body as a whole that the surface alone balances
+        self.springs = self.motions  # all that nothing holds, orthonormal
+        self.force = -load
+        self.found: Array | None = None
+        self._compliance: Array | None = None
+
+    @property
+    def compliance(self) -> Array:
+        """The inverse of the stiffness (2 k, 2 k), 0 for what is held. Raises LinAlgError where that is none."""
+        if self._compliance is None:
+            self._compliance = self._inverse()
+        return self._compliance
+
+    def _inverse(self) -> Array:
+        free = np.flatnonzero(self.stiffness.diagonal() > 0.0)
+        # Rigid motions cost no energy: a spring on each makes the matrix invertible, and stays unloaded, since the
+        # surface's forces balance the loads along every motion.
+        spring = self.stiffness.trace() / max(len(free), 1)
+        inside = (self.stiffness + spring * self.springs @ self.springs.T)[np.ix_(free, free)]
+        inverse = np.asarray(np.linalg.inv(inside), np.float64)
+        if not np.abs(inside).max(initial=0.0) * np.abs(inverse).max(initial=0.0) < UNHELD:
+            raise LinAlgError("the body is neither held nor balanced")
+        out = np.zeros(self.stiffness.shape)
+        out[np.ix_(free, free)] = (inverse + inverse.T) / 2.0
+        return out
+
+    def loaded(self, load: Array) -> "CondensedLinear":
+        """Return the same body under another dead `load` (2 k,) [N/mm]."""
+        other = copy(self)
+        other.load, other.force, other._compliance = load, -load, self.compliance  # noqa: SLF001 - of its own kind
+        return other
+
+    def undeformed(self) -> tuple[Array, Array]:
+        """Return displacements (k, 2) of the skin at rest, and no pressures."""
+        return np.zeros(self.rest.shape), np.zeros((0, 3))
+
+    def untouched(self) -> Array:
+        """Return the displacements (k, 2) under the dead loads alone, motions left out that nothing holds."""
+        return (self.compliance @ self.load).reshape(-1, 2)
+
+    def place(self, u: Array) -> Array:
+        """Return where the skin's nodes are (k, 2) for displacements `u` (k, 2) [mm]."""
+        return self.rest + u
+
+    def linearise(self, u: Array, pressure: Array) -> bool:  # noqa: ARG002 - as every body is asked
+        """Set the `force` at a state."""
+        return self.relinearise(u)
+
+    def relinearise(self, u: Array) -> bool:
+        """Do the same: the stiffness is that of every state."""
+        self.force = self.stiffness @ u.ravel() - self.load if u.any() else -self.load
+        return True
+
+    def recover(self, u: Array, pressure: Array, step: Array, scale: float) -> tuple[Array, Array, float]:
+        """Return a state after `scale` times the skin's `step` (2 k,), and the largest move of the full step [mm]."""
+        return u + scale * step.reshape(u.shape), pressure, float(np.abs(step).max(initial=0.0))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class Body:
+class LinearBody:
     """An elastic body whose skin may touch a flat rigid surface that lies below it along y = 0."""
 
     mesh: Mesh
     elastic: Elastic
     reduced: LinearElimination
-    touchable: Touchable
+    condensed: CondensedLinear
     prescribed: Array  # (nodes, 2) displacement of what is held relative to the drive, 0 elsewhere [mm]
 
     @staticmethod
@@ -40,7 +112,7 @@ class Body:
         free: Sequence[Motion] = (),
         *,
         checked: bool = False,
-    ) -> "Body":
+    ) -> "LinearBody":
         """Reduce a body of `materials` by region under dead `loads` (nodes, 2) [N/mm].
 
         What is held moves with the drive, and by `prescribed` (nodes, 2) [mm] relative to it. A body that nothing holds
@@ -59,49 +131,59 @@ class Body:
             pushed = whole.elastic.stiffness @ moved.ravel()[unknowns][:, :, None]
             np.subtract.at(force, unknowns.ravel(), pushed.ravel())
         reduced = whole.loaded(force) if force.any() else whole
-        touchable = _touchable(mesh, reduced.stiffness, reduced.load, free)
-        return Body(mesh, reduced.elastic, reduced, touchable, moved)
+        condensed = _condensed(mesh, reduced.stiffness, reduced.load, free)
+        if not checked and len(mesh.skin):
+            _ = condensed.compliance  # which is none where the body can move
+        return LinearBody(mesh, reduced.elastic, reduced, condensed, moved)
 
     @property
     def dofs(self) -> int:
         """Return the number of unknown displacements."""
         return 2 * len(self.mesh.nodes) - len(self.mesh.fixed)
 
-    def skin_displacement(self, forces: Array) -> Array:
-        """Return the displacement (2 k, c) of the skin, normal first, by surface forces (2 k, c); held bodies only."""
-        k = len(self.mesh.skin)
-        t = self.touchable
-        up = t.normal_by_normal @ forces[:k] + t.normal_by_tangential @ forces[k:] + t.normal_free[:, None]
-        along = t.normal_by_tangential.T @ forces[:k] + t.tangential_by_tangential @ forces[k:]
-        return np.concatenate([up, along + t.tangential_free[:, None]])
-
-    def displacement(self, skin: Array, only: Indices | None = None) -> Array:
-        """Return the displacement (nodes, 2, c) of all nodes for that of the skin (2 k, c), normal first.
+    def displacement(self, u: Array, only: Indices | None = None) -> Array:
+        """Return the displacement (nodes, 2, ...) of all nodes for that of the skin `u` (k, 2, ...), one or several.
 
         With `only` (node numbers), other nodes may be left at 0.
         """
+        if u.ndim == 2:
+            return self.displacement(u[:, :, None], only)[:, :, 0]
         unknowns = None if only is None else np.concatenate([2 * only, 2 * only + 1])
         loaded = self.reduced.load.shape[1] > 0
+        skin = np.concatenate([u[:, 1], u[:, 0]])
         out = self.reduced.all_unknowns(skin, loaded, unknowns).reshape(*self.mesh.nodes.shape, -1)
         out += self.prescribed[:, :, None]
         return out
 
-    def balanced(self, displacement: Array, forces: Array) -> Array:
-        """Return `displacement` (nodes, 2, c) under surface forces (2 k, c), normal first, with less round-off in it.
+    def every_step(self) -> Array:
+        """Return the displacements (nodes, 2, 2 k) that one of the skin's unknowns after the other makes."""
+        k = len(self.mesh.skin)
+        return self.displacement(np.eye(2 * k).reshape(k, 2, 2 * k)) - self.displacement(np.zeros((k, 2, 1)))
 
-        One step of iterative refinement (Wilkinson 1963): the forces that are left over are put on the body, and what
-        they do is added. For held bodies without dead loads.
+    def linearised(self, displacement: Array) -> tuple[CondensedLinear, Callable[[Array], Array]]:
+        """Return the body about a `displacement` (nodes, 2), and what makes displacements of its skin's steps (k, 2).
+
+        The forces it leaves over are those of the elements, so that a step from it takes round-off out of a state: one
+        step of iterative refinement (Wilkinson 1963). For held bodies without dead loads.
         """
-        k, t = len(self.mesh.skin), self.touchable
-        left = -self.reactions(displacement)
-        left[self.mesh.skin, 1] += forces[:k]
-        left[self.mesh.skin, 0] += forces[k:]
-        left[self.mesh.driven] = 0.0
-        compliance = np.block(
-            [[t.normal_by_normal, t.normal_by_tangential], [t.normal_by_tangential.T, t.tangential_by_tangential]]
-        )
-        more = self.reduced.under(left.reshape(-1, left.shape[2]), compliance)
-        return displacement + more.reshape(displacement.shape)
+        inner = self.reactions(displacement[:, :, None])[:, :, 0]
+        inner[self.mesh.driven] = 0.0
+        about, recover = self.under(-inner)
+        about.rest = self.mesh.nodes[self.mesh.skin] + displacement[self.mesh.skin]
+        return about, lambda step: displacement + recover(step)
+
+    def under(self, loads: Array) -> tuple[CondensedLinear, Callable[[Array], Array]]:
+        """Return the body under dead `loads` (nodes, 2) in place of its own, and what recovers displacements there.
+
+        That makes those of all nodes (nodes, 2) of the skin's (k, 2) [mm], what is held staying where it is.
+        """
+        felt, recovered = self.reduced.condensed(loads.ravel())
+
+        def recover(u: Array) -> Array:
+            return recovered(np.concatenate([u[:, 1], u[:, 0]])).reshape(self.mesh.nodes.shape)
+
+        felt = np.where(self.mesh.driven[self.mesh.skin].ravel(), 0.0, _interleaved(felt))
+        return self.condensed.loaded(felt), recover
 
     def reactions(self, displacement: Array) -> Array:
         """Return the forces (nodes, 2, c) that hold all nodes where they are: the elements' inner forces [N/mm]."""
@@ -119,42 +201,25 @@ def _unknowns(mesh: Mesh) -> Indices:
     return (2 * mesh.elements[:, :, None] + np.arange(2)).reshape(len(mesh.elements), 18)
 
 
-def _touchable(mesh: Mesh, stiffness: Array, loads: Array, free: Sequence[Motion]) -> Touchable:
-    """Turn the skin's `stiffness` (2 k, 2 k) into its compliance, split by direction; `loads` (2 k, l) it feels."""
+def _interleaved(normal_first: Array) -> Array:
+    """Return what belongs to the skin's unknowns (2 k,), normal ones first, as x, y of one node, x, y of the next."""
+    return normal_first.reshape(2, -1)[::-1].T.ravel()
+
+
+def _condensed(mesh: Mesh, stiffness: Array, loads: Array, free: Sequence[Motion]) -> CondensedLinear:
+    """Return the skin of a body by its `stiffness` (2 k, 2 k) and `loads` (2 k, l), normal unknowns first."""
     k = len(mesh.skin)
-    x, y = mesh.nodes[mesh.skin].T
-    one, zero = np.ones(k), np.zeros(k)
-    rigid = np.stack([np.r_[zero, one], np.r_[one, zero], np.r_[x, -y]], axis=1) @ loose(mesh)
-    if rigid.shape[1]:
-        # Rigid motions cost no energy: a spring on each makes the matrix invertible, and stays unloaded, since the
-        # surface's forces are asked to balance the loads along every motion that anything drives.
-        rigid = np.linalg.qr(rigid)[0]
-        stiffness = stiffness + np.trace(stiffness) / (2 * k) * rigid @ rigid.T
-    load = loads.sum(axis=1)
-    kept = np.flatnonzero(~np.r_[mesh.driven[mesh.skin, 1], mesh.driven[mesh.skin, 0]])
-    compliance = np.linalg.inv(stiffness[np.ix_(kept, kept)])
-    if k and not np.abs(stiffness).max() * np.abs(compliance).max() < UNHELD:
-        raise LinAlgError("the body is neither held nor balanced")
-    compliance = (compliance + compliance.T) / 2.0
-    if len(kept) < 2 * k:  # what is held along the surface carries there whatever is asked of it, and hardly moves
-        inside, compliance = compliance, RIGID * float(compliance.diagonal().max()) * np.eye(2 * k)
-        compliance[np.ix_(kept, kept)] = inside
-        load = np.where(np.isin(np.arange(2 * k), kept), load, 0.0)
-    moved = compliance @ load
-    shapes = {"x": np.r_[zero, one], "y": np.r_[one, zero], "turn": np.r_[x, -y]}
-    motions = np.stack([shapes[name] for name in free], axis=1) if free else np.zeros((2 * k, 0))
-    return Touchable(
-        gap=y.copy(),
-        length=skin_lengths(mesh),
-        normal_by_normal=compliance[:k, :k].copy(),
-        normal_by_tangential=compliance[:k, k:].copy(),
-        tangential_by_tangential=compliance[k:, k:].copy(),
-        normal_free=moved[:k],
-        tangential_free=moved[k:],
-        motions=motions,
-        resultants=-motions.T @ load,
-        carried=bool(free),
-    )
+    order = np.stack([np.arange(k, 2 * k), np.arange(k)], axis=1).ravel()
+    held = (mesh.driven[mesh.skin] @ np.array([HELD_X, HELD_Y])).astype(np.int32)
+    load = np.where(mesh.driven[mesh.skin].ravel(), 0.0, loads.sum(axis=1)[order])
+    place = mesh.nodes[mesh.skin]
+    (x, y), one, zero = place.T, np.ones(k), np.zeros(k)
+    shapes = {"x": np.c_[one, zero].ravel(), "y": np.c_[zero, one].ravel(), "turn": np.c_[-y, x].ravel()}
+    rigid = np.stack(list(shapes.values()), axis=1) @ loose(mesh)
+    skin = CondensedLinear(place, stiffness[np.ix_(order, order)], load, skin_lengths(mesh), held)
+    skin.springs = np.linalg.qr(rigid)[0] if rigid.shape[1] else rigid
+    skin.motions = np.stack([shapes[name] for name in free], axis=1) if free else np.zeros((2 * k, 0))
+    return skin
 
 
 def skin_lengths(mesh: Mesh) -> Array:

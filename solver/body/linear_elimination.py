@@ -1,6 +1,6 @@
 """A body at small strain reduced to its skin: assembled and eliminated by the compiled loops."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from functools import lru_cache
 from threading import Lock
@@ -59,16 +59,13 @@ class LinearElimination:
         """
         return self._unfolded(kept, self._loaded if loaded else self._still, only)
 
-    def under(self, loads: Array, compliance: Array) -> Array:
-        """Return all unknowns (size, c) under `loads` (size, c) alone, which need not be those it was made with.
+    def condensed(self, load: Array) -> tuple[Array, Callable[[Array], Array]]:
+        """Return what the skin feels (m,) of a `load` (size,), and what makes all unknowns (size,) of the skin's (m,).
 
-        `compliance` (m, m) is the inverse of `stiffness`, which the caller has.
+        Those are then under that load.
         """
-        out: list[Array] = []
-        for load in loads.T:
-            under = self._condensed(load)
-            out.append(self._unfolded(compliance @ self._felt(under[0])[:, None], under, None))
-        return np.concatenate(out, axis=1)
+        under = self._condensed(load)
+        return self._felt(under[0]), lambda kept: self._unfolded(kept[:, None], under, None)[:, 0]
 
     def _condensed(self, load: Array) -> tuple[Array, Array]:
         """Return a load (size,) condensed on the unknowns (n,), and the moves (e, 2) of the centres under it alone."""

@@ -18,9 +18,8 @@ A point is in one of four states, s = +1 or -1 being the sense of the friction f
     slip    g = 0, T = s mu N         until N < 0, mu N > tau_max L or s v > 0
     cap     g = 0, T = s tau_max L    until N < 0, mu N < tau_max L or s v > 0
 
-Who looks for the states that contradict nothing: `solver.contact.active_set` in NumPy, and the compiled loops
-`solver._kernels.rubbing` (the same), `solver._kernels.following` (forces given) and `solver._kernels.skin` (at finite
-strain, where L is that of the deformed skin). The list of laws is at the foot; one test holds each way to each law.
+`solver._kernels.active_set` looks for the states that contradict nothing, at both kinematics; at finite strain L is
+that of the deformed skin. The list of laws is at the foot; one test holds each way to each law.
 """
 
 from dataclasses import dataclass

@@ -12,9 +12,10 @@ from solver.continuation.existence import APART, all_at_the_bound, stands, stead
 from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium import full_slip as sliding
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.force_control import Given, balanced
+from solver.equilibrium.force_control import balanced
+from solver.equilibrium.loads import pull_of, sliding_pull
 from solver.equilibrium.march import march
-from solver.equilibrium.newton import BY_DEPTH, Newton, Pull, Shape
+from solver.equilibrium.newton import BY_DEPTH, Given, Newton, Pull, Shape
 from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.progress import tell
 from solver.scene import Scene
@@ -45,7 +46,7 @@ def settled(
         return _settled_under(finger, scene, scene.normal_force, stop, start, times)
     if scene.loading.direction == 0 and scene.friction.mu > 0.0:
         return course(scene, finger, stop, times)[-1]
-    return steady(finger, pull_sliding(scene), start=start, stop=stop)
+    return steady(finger, sliding_pull(scene), start=start, stop=stop)
 
 
 def nearby(finger: FiniteFinger, scene: Scene, start: Shape, stop: Callable[[], bool] = lambda: False) -> Shape | None:
@@ -56,9 +57,9 @@ def nearby(finger: FiniteFinger, scene: Scene, start: Shape, stop: Callable[[], 
     newton, force = finger.newton, scene.normal_force
     try:
         if force is None:
-            shape = newton.settle(start, pull_sliding(scene), limit=FEW)
+            shape = newton.settle(start, sliding_pull(scene), limit=FEW)
         else:
-            near = replace(start, pull=pull_sliding(scene)._replace(depth=start.pull.depth, travel=start.pull.travel))
+            near = replace(start, pull=sliding_pull(scene)._replace(depth=start.pull.depth, travel=start.pull.travel))
             found = balanced(newton, near, Given(force, None), limit=FEW)
             shape = newton.settle(found, found.pull, limit=FEW)
         return shape if stands(finger, shape, stop) else None
@@ -76,7 +77,7 @@ def roughly(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: 
         near = replace(near, iterations=0) if alike else None
     if scene.normal_force is not None or (scene.loading.direction == 0 and scene.friction.mu > 0.0):
         return settled(finger, scene, stop, near)
-    pull = pull_sliding(scene)
+    pull = sliding_pull(scene)
     for begin in dict.fromkeys((near, None)):
         try:
             return sliding.settled(finger.newton, pull, begin, LEADING, stop)
@@ -134,7 +135,7 @@ def _sliding_under(
 ) -> Shape:
     """Return settled sliding under the normal force of a scene, from `start` or reached as the force grows."""
     newton = finger.newton
-    pull = pull_sliding(scene)
+    pull = sliding_pull(scene)
     capped = steep(pull)
     if start is not None:
         near = replace(start, pull=pull._replace(depth=start.pull.depth, travel=start.pull.travel))
@@ -211,16 +212,6 @@ def _risen_to(finger: FiniteFinger, shape: Shape, proof: reach.Reach, force: flo
             raise NoSteadyState("There is none so deep.", limit_indentation=depth, limit_normal_force=most) from failure
         depth, most = shape.pull.depth, float(shape.force[1])
     return shape
-
-
-def pull_sliding(scene: Scene) -> Pull:
-    """Return what the surface does while it slides as a scene has it."""
-    return pull_of(scene)._replace(sense=-(scene.loading.direction or 1))
-
-
-def pull_of(scene: Scene) -> Pull:
-    """Return depth, friction and bound of a scene as what the surface does; depth 0 where a force is to find it."""
-    return Pull(scene.loading.indentation or 0.0, float(scene.friction.mu), scene.friction.cap)
 
 
 def presses(times: float) -> int:

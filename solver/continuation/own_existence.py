@@ -12,14 +12,14 @@ from solver.contact.skin_compression import Pinch
 from solver.continuation.arc_length import LARGEST_MU, followed, leapt
 from solver.continuation.surface_instability import folds_at
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import BY_FRICTION, Newton, Pull, Shape
+from solver.equilibrium.newton import BY_FRICTION, FiniteNewton, Pull, Shape
 from solver.failures import NoSteadyState, NotConverged
 
 CRUSHED = 0.3  # det F in a corner of what is held, below which the mesh ends the branch and not the body
 
 
 def steady(
-    newton: Newton, pull: Pull, skin: Law, start: Shape | None = None, stop: Callable[[], bool] = lambda: False
+    newton: FiniteNewton, pull: Pull, skin: Law, start: Shape | None = None, stop: Callable[[], bool] = lambda: False
 ) -> Shape:
     """Return the settled sliding state under `pull`, followed on this mesh from the one without friction.
 
@@ -46,7 +46,7 @@ def steady(
 class _OwnBody:
     """A body of which all skin is looked at that may touch."""
 
-    newton: Newton
+    newton: FiniteNewton
 
     def pinch(self, shape: Shape) -> Pinch:
         """Return how far the skin is squeezed, and whether it has a crease."""

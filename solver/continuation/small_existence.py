@@ -5,15 +5,17 @@ from contextlib import suppress
 import numpy as np
 from numpy.linalg import LinAlgError
 
-from solver.contact.active_set import STICK, Contact, ContactLost
-from solver.continuation.small_states import followed_under, law_of, settled
+from solver._kernels import STICK
+from solver.continuation.small_states import followed_under, settled
 from solver.continuation.wedging import followed, limits
 from solver.equilibrium.finger import FingerModel
-from solver.failures import NoSteadyState, NotConverged
+from solver.equilibrium.loads import sliding_pull
+from solver.equilibrium.newton import Shape
+from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.scene import Scene
 
 
-def direct(scene: Scene, finger: FingerModel, times: float = 1.0, *, widest: bool) -> Contact | None:
+def direct(scene: Scene, finger: FingerModel, times: float = 1.0, *, widest: bool) -> Shape | None:
     """Return the settled state; None where contact must be looked for on more of the skin than this, not the `widest`.
 
     Where it depends on its way, that takes so many `times` the usual load steps. Near a limit, or beyond it, guesses
@@ -21,12 +23,12 @@ def direct(scene: Scene, finger: FingerModel, times: float = 1.0, *, widest: boo
     following the state from mu = 0 counts. Raises NoSteadyState, NotConverged.
     """
     direction = scene.loading.direction
-    contact: Contact | None = None
+    state: Shape | None = None
     try:
-        contact = settled(scene, finger, times)
-        on_way = direction == 0 or bool((contact.state == STICK).any())
-        if on_way or not _folded(finger, contact):
-            return contact
+        state = settled(scene, finger, times)
+        on_way = direction == 0 or bool((state.state == STICK).any())
+        if on_way or not _folded(finger, state):
+            return state
         why = "the state found is folded"
     except ContactLost as lost:
         why = str(lost)
@@ -35,7 +37,7 @@ def direct(scene: Scene, finger: FingerModel, times: float = 1.0, *, widest: boo
     if direction == 0:
         raise _no_answer(scene, why, 0.0)
     if scene.normal_force is None:
-        reached, limit = followed(finger.body.touchable, law_of(scene), scene.loading.depth, direction)
+        reached, limit = followed(finger.newton, sliding_pull(scene))
     else:
         reached, limit = followed_under(scene, finger)
     if reached is None:
@@ -43,9 +45,9 @@ def direct(scene: Scene, finger: FingerModel, times: float = 1.0, *, widest: boo
     return reached
 
 
-def _folded(finger: FingerModel, contact: Contact) -> bool:
+def _folded(finger: FingerModel, state: Shape) -> bool:
     """Return whether tissue is turned inside out somewhere, as in states that no sliding leads to."""
-    return bool(np.prod(finger.stretches(finger.displacement(contact)), axis=0).min() <= 0.0)
+    return bool(np.prod(finger.stretches(finger.displacement(state)), axis=0).min() <= 0.0)
 
 
 def _pressed(scene: Scene) -> str:
@@ -66,7 +68,7 @@ def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotCo
         )
     limit_force = limit_depth = None
     with suppress(LinAlgError, ContactLost):  # of stiffnesses that a mesh for less depth does not stand
-        limit_force, limit_depth = limits(scene, law_of(scene))
+        limit_force, limit_depth = limits(scene, sliding_pull(scene))
     known = ((limit_force, "N/mm"), (limit_depth, "mm"))
     others = " and ".join(f"{limit:.3g} {unit}" for limit, unit in known if limit is not None)
     along = "+x" if scene.loading.direction > 0 else "-x"

@@ -7,16 +7,13 @@ it there is no settled state. The limit is reached by following the state as the
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
 from math import log2, sqrt
 
-import numpy as np
-
-from solver.body.linear import Body
+from solver.body.linear import LinearBody
 from solver.body.tissues import settled_moduli
-from solver.contact.active_set import Contact, ContactLost, Course, Touchable, forced
-from solver.contact.law import FrictionLaw
-from solver.equilibrium.pressing import depth_of, sliding_under
+from solver.equilibrium.full_slip import settled, slide_beside, slide_under
+from solver.equilibrium.newton import Newton, Pull, Shape
+from solver.failures import ContactLost
 from solver.mesh.mesher import Sizing, finger_mesh
 from solver.scene import Scene
 
@@ -30,33 +27,33 @@ CLOSE = 0.005  # relative step of mu below which a limit is taken as found
 
 
 def followed(
-    body: Touchable, law: FrictionLaw, depth: float, direction: int, first: Contact | None = None
-) -> tuple[Contact | None, float]:
-    """Return the settled sliding state reached by following it from mu = 0, and the largest mu that has one.
+    newton: Newton, pull: Pull, force: float | None = None, first: Shape | None = None
+) -> tuple[Shape | None, float]:
+    """Return the settled sliding state under `pull` reached by following it from mu = 0, and the largest mu with one.
 
-    The state is None where that mu falls short of the law's. Under a given force, with `body` free to move up, `first`
-    is the state at mu = 0; the mu is then 0 where contact grew beyond the skin that may touch: nothing is known.
+    The state is None where that mu falls short of the pull's. Under a normal `force`, `first` is the state at mu = 0;
+    the mu is then 0 where contact grew beyond the skin that may touch: nothing is known.
     """
-    reached, step, unknown = 0.0, law.mu, False
+    reached, step, unknown = 0.0, pull.mu, False
     try:
-        state = Course(body, replace(law, mu=0.0)).sliding(depth, direction) if first is None else first
+        state = settled(newton, pull._replace(mu=0.0)) if first is None else first
     except ContactLost:
         return None, 0.0
-    while reached < law.mu and step > CLOSE * max(reached, min(0.01, law.mu)):
-        aim = min(reached + step, law.mu)
+    while reached < pull.mu and step > CLOSE * max(reached, min(0.01, pull.mu)):
+        aim = min(reached + step, pull.mu)
         try:
-            found = Course(body, replace(law, mu=aim), PATIENCE).sliding(depth, direction, state.state)
+            found = slide_beside(newton, pull._replace(mu=aim), state.state, force, PATIENCE)
         except ContactLost:
             step /= 2.0
             continue
         if found.touching[0] or found.touching[-1]:  # the skin that may touch ends: what lies beyond is not known
             step, unknown = step / 2.0, first is not None
             continue
-        if first is not None and not depth_of(found) > 0.0:  # pressed by a surface that it does not reach
+        if first is not None and not found.pull.depth > 0.0:  # pressed by a surface that it does not reach
             step /= 2.0
             continue
         state, reached, step = found, aim, 2.0 * step
-    if reached == law.mu:
+    if reached == pull.mu:
         return state, reached
     return None, 0.0 if unknown else reached
 
@@ -67,45 +64,44 @@ class Bodies:
     def __init__(self, scene: Scene) -> None:
         """Make none yet."""
         self._scene = scene
-        self._made: dict[int, Touchable] = {}
+        self._made: dict[int, Newton] = {}
 
-    def at(self, depth: float) -> Touchable:
+    def at(self, depth: float) -> Newton:
         """Return a body whose mesh serves `depth` [mm], from 0.7 to 1.4 times the one it was made for."""
         power = round(log2(depth))
         if power not in self._made:
             self._made[power] = self.made_for(2.0**power, FINENESS)
         return self._made[power]
 
-    def made_for(self, depth: float, fineness: float) -> Touchable:
+    def made_for(self, depth: float, fineness: float) -> Newton:
         """Return a body with a mesh of its own."""
         scene = self._scene
         mesh = finger_mesh(scene.finger, scene.receptor, Sizing(fineness, depth, margin=WIDE)).mesh
-        return Body.of(mesh, settled_moduli(scene.materials), checked=True).touchable
+        return Newton(LinearBody.of(mesh, settled_moduli(scene.materials), checked=True).condensed)
 
 
-def limits(scene: Scene, law: FrictionLaw) -> tuple[float | None, float | None]:
-    """Return the largest normal force [N/mm] and depth [mm] with settled sliding under `law`, each to 3 %.
+def limits(scene: Scene, pull: Pull) -> tuple[float | None, float | None]:
+    """Return the largest normal force [N/mm] and depth [mm] with settled sliding under `pull`, each to 3 %.
 
     Below those of the scene; the force is None where the scene gives none, and either where it is not known.
     """
     bodies = Bodies(scene)
     if scene.normal_force is None:
-        return None, _deepest(bodies, scene, law, scene.loading.depth)
-    found = _strongest(bodies, scene, scene.normal_force, law)
+        return None, _deepest(bodies, pull, scene.loading.depth)
+    found = _strongest(bodies, scene, scene.normal_force, pull)
     if found is None:
         return None, None
-    return found[0], _deepest(bodies, scene, law, BEYOND * found[1], found[1])
+    return found[0], _deepest(bodies, pull, BEYOND * found[1], found[1])
 
 
-def _deepest(bodies: Bodies, scene: Scene, law: FrictionLaw, high: float, low: float | None = None) -> float | None:
+def _deepest(bodies: Bodies, pull: Pull, high: float, low: float | None = None) -> float | None:
     """Return the largest indentation [mm] below `high`, and above `low` where that is known, with settled sliding.
 
     None where there is none, or where a finer mesh puts it elsewhere, as it does at coefficients far beyond the limit.
     """
-    direction = scene.loading.direction
 
     def slides(depth: float) -> bool:
-        return followed(bodies.at(depth), law, depth, direction)[0] is not None
+        return followed(bodies.at(depth), pull._replace(depth=depth))[0] is not None
 
     least = LEAST * high
     while low is None:
@@ -114,30 +110,29 @@ def _deepest(bodies: Bodies, scene: Scene, law: FrictionLaw, high: float, low: f
         low, high = (high / 2.0, high) if slides(high / 2.0) else (None, high / 2.0)
     found = _largest(slides, low, high)
     finer = bodies.made_for(found, FINER * FINENESS)
-    ends = [followed(finer, law, part * found, direction)[0] is None for part in (0.97, 1.03)]
+    ends = [followed(finer, pull._replace(depth=part * found))[0] is None for part in (0.97, 1.03)]
     return found if ends == [False, True] else None
 
 
-def _strongest(bodies: Bodies, scene: Scene, force: float, law: FrictionLaw) -> tuple[float | None, float] | None:
+def _strongest(bodies: Bodies, scene: Scene, force: float, pull: Pull) -> tuple[float | None, float] | None:
     """Return the largest normal force [N/mm] below `force` with settled sliding, and the largest depth [mm] on the way.
 
     The force is None where a finer mesh puts it elsewhere; all is None where there is no sliding.
     """
-    direction, depths = scene.loading.direction, [0.0]
-    bare, bone = FrictionLaw(0.0, np.inf), scene.finger.pulp_thickness()
+    depths, bone = [0.0], scene.finger.pulp_thickness()
+    bare = pull._replace(mu=0.0)
 
-    def reached(body: Touchable, force: float) -> Contact | None:
-        first = sliding_under(body, bare, force, direction, bone)
-        return followed(forced(body, force), law, 0.0, direction, first)[0]
+    def reached(newton: Newton, force: float) -> Shape | None:
+        return followed(newton, pull, force, slide_under(newton, bare, force, bone))[0]
 
     def rubless(force: float) -> float:
-        return depth_of(sliding_under(bodies.at(bone / 2.0), bare, force, direction, bone))
+        return slide_under(bodies.at(bone / 2.0), bare, force, bone).pull.depth
 
     def slides(force: float) -> bool:
         with suppress(ContactLost):
             found = reached(bodies.at(rubless(force)), force)
             if found is not None:
-                depths.append(depth_of(found))
+                depths.append(found.pull.depth)
             return found is not None
         return False
 

@@ -6,11 +6,11 @@ from functools import lru_cache
 
 from numpy.linalg import LinAlgError
 
-from solver.contact.active_set import Contact, ContactLost
-from solver.contact.law import FrictionLaw
 from solver.equilibrium.finger import FingerModel
-from solver.equilibrium.pressing import depth_of, sliding_under
-from solver.failures import NoSteadyState, NotConverged
+from solver.equilibrium.full_slip import slide_under
+from solver.equilibrium.loads import sliding_pull
+from solver.equilibrium.newton import Shape
+from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.mesh.grid import MeshError
 from solver.mesh.mesher import Sizing
 from solver.scene import SHALLOW, Friction, Loading, Scene, Solve
@@ -32,7 +32,7 @@ def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> 
     deepest = DEEPEST * scenes[0].finger.pulp_thickness()
     finger = _finger(_bare(scenes[0], deepest))
     pressed = [_pressed(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True)]
-    return tuple(None if found is None else depth_of(found) for found in pressed)
+    return tuple(None if found is None else found.pull.depth for found in pressed)
 
 
 def expected_depth(scene: Scene) -> float:
@@ -48,15 +48,15 @@ def expected_depth(scene: Scene) -> float:
     found = _pressed(finger, scene, force, deepest)
     drag = scene.tangential_force or 0.0
     held = scene.loading.direction == 0 or scene.loading.dragged
-    if held and (found is None or drag < NEARLY * abs(found.tangential.sum())):
+    if held and (found is None or drag < NEARLY * abs(found.force[0])):
         # Then it goes about as deep as one that slides with so much drag and no more.
         friction = Friction(min(drag / force, float(scene.friction.mu)), scene.friction.tau_max)
         found = _pressed(finger, replace(scene, friction=friction), force, deepest)
     if found is None:
         return deepest
     # A strong drag lifts the bone while it lays ever more skin on the surface, which the mesh must be made for.
-    highest = float(finger.body.touchable.gap[found.touching].max())
-    return max(depth_of(found), COVERED * highest, SHALLOW)
+    highest = float(finger.body.condensed.rest[found.touching, 1].max())
+    return max(found.pull.depth, COVERED * highest, SHALLOW)
 
 
 def within_reach(scene: Scene, depth: float, most: float | None = None) -> None:
@@ -96,12 +96,11 @@ def _finger(bare: Scene) -> FingerModel:
     return FingerModel.of(bare, Sizing(FINENESS, bare.loading.depth))
 
 
-def _pressed(finger: FingerModel, scene: Scene, normal_force: float, deepest: float) -> Contact | None:
+def _pressed(finger: FingerModel, scene: Scene, normal_force: float, deepest: float) -> Shape | None:
     """Return the settled slide under a normal force [N/mm], None where none is less deep than `deepest` [mm]."""
-    law = FrictionLaw(float(scene.friction.mu), scene.friction.cap)
     try:
-        found = sliding_under(finger.body.touchable, law, normal_force, scene.loading.direction or 1, deepest)
+        found = slide_under(finger.newton, sliding_pull(scene), normal_force, deepest)
     except ContactLost:
         return None
     inside = not (found.touching[0] or found.touching[-1])
-    return found if inside and depth_of(found) <= deepest else None
+    return found if inside and found.pull.depth <= deepest else None

@@ -1,19 +1,19 @@
 """The finger as the solver sees it: meshed, reduced to its skin, with its endings placed. One serves many surfaces."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
 
 import numpy as np
 
-from solver.body.linear import Body
+from solver.body.linear import LinearBody
 from solver.body.receptor import Endings, endings, middle
 from solver.body.stiffness import Probes
 from solver.body.tissues import settled_moduli
-from solver.contact.active_set import Contact
 from solver.contact.edges import arcs_of, width
 from solver.element import Q2P1
+from solver.equilibrium.newton import Newton, Shape
 from solver.mesh import Array, distinct
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
 from solver.prediction import ROW
@@ -26,7 +26,7 @@ class FingerModel:
 
     receptor: Receptor
     geometry: FingerMesh
-    body: Body
+    body: LinearBody
     ending: Endings  # the reference ending alone
     solve_s: float  # what assembling and reducing took, beside mesh and tables [s]
 
@@ -42,7 +42,7 @@ class FingerModel:
     def on(scene: Scene, geometry: FingerMesh) -> "FingerModel":
         """Do the same on a mesh of the finger that was made before."""
         begun = perf_counter()
-        body = Body.of(geometry.mesh, settled_moduli(scene.materials), checked=True)
+        body = LinearBody.of(geometry.mesh, settled_moduli(scene.materials), checked=True)
         took = perf_counter() - begun
         at_touch = endings(geometry, body.elastic, scene.receptor, np.zeros(1))
         return FingerModel(scene.receptor, geometry, body, at_touch, took)
@@ -64,43 +64,46 @@ class FingerModel:
         element = np.repeat(np.arange(count), 4)
         return Probes.at(self.geometry.mesh, self.body.elastic, element, np.tile(Q2P1.corners, (count, 1)))
 
-    def skin_displacement(self, contact: Contact) -> Array:
-        """Return the displacement (2 k, 1) of the skin that may touch, normal first [mm]."""
-        return self.body.skin_displacement(np.concatenate([contact.normal, contact.tangential])[:, None])
+    @cached_property
+    def newton(self) -> Newton:
+        """The iterations on its body."""
+        return Newton(self.body.condensed)
 
-    def skin_compliance(self) -> Array:
-        """Return the skin's displacement (2 k, 2 k) by forces on it, normal ones first [mm per N/mm]."""
-        touch = self.body.touchable
-        across = touch.normal_by_tangential
-        return np.block([[touch.normal_by_normal, across], [across.T, touch.tangential_by_tangential]])
+    def relaxed(self, state: Shape) -> Shape:
+        """Return a state of tissues that relax with the displacements that its forces hold once they have."""
+        skin = self.body.condensed
+        free = np.flatnonzero(skin.stiffness.diagonal() > 0.0)  # what is held along the surface has none
+        u = np.zeros(len(skin.load))
+        u[free] = np.linalg.solve(skin.stiffness[np.ix_(free, free)], (skin.load + state.reaction.ravel())[free])
+        return replace(state, u=u.reshape(-1, 2))
 
-    def displacement(self, contact: Contact) -> Array:
+    def displacement(self, state: Shape) -> Array:
         """Return the displacement (nodes, 2) of all nodes relative to the bone [mm]."""
-        return self.body.displacement(self.skin_displacement(contact))[:, :, 0]
-
-    def balanced(self, contact: Contact, displacement: Array) -> Array:
-        """Return `displacement` (nodes, 2) of a state of contact with less round-off in it, as `Body.balanced`."""
-        forces = np.concatenate([contact.normal, contact.tangential])[:, None]
-        return self.body.balanced(displacement[:, :, None], forces)[:, :, 0]
+        return self.body.displacement(state.u)
 
     def sed_ending(self, displacement: Array) -> float:
         """Return the SED averaged over the reference ending [MPa] for displacements (nodes, 2)."""
         return float(self.ending.average(self.geometry.mesh, self.body.elastic, displacement[:, :, None])[0, 0])
 
-    def sed_endings(self, contacts: Sequence[Contact]) -> Array:
-        """Return the SED averaged over the reference ending (c,) [MPa] of several states, unfolded together there."""
-        return self._averaged(contacts, self.ending)[:, 0]
-
-    def seds(self, contacts: Sequence[Contact]) -> Array:
+    def seds(self, states: Sequence[Shape]) -> Array:
         """Return the SED of the reference ending and in its middle (c, 2) [MPa] of several states."""
-        return self._averaged(contacts, self.ending, self.point)
+        return self._averaged(states, self.ending, self.point)
 
-    def _averaged(self, contacts: Sequence[Contact], *patches: Endings) -> Array:
-        """Return the SED averaged over the first ending of each of the patches (c, p) [MPa], unfolded there alone."""
+    def numbers(self, states: Sequence[Shape]) -> Array:
+        """Return what errors are estimated of (c, 3): SED of the ending, normal and tangential force along +x."""
+        forces = [(state.normal.sum(), state.tangential.sum()) for state in states]
+        return np.column_stack([self._averaged(states, self.ending)[:, 0], forces])
+
+    def all_numbers(self, state: Shape) -> Array:
+        """Return them, the depth, the bone's shift along +x and the contact width (6,)."""
+        found = state.pull.depth, 0.0 - state.pull.travel, self.contact_width(state)
+        return np.concatenate([self.numbers([state])[0], found])
+
+    def _averaged(self, states: Sequence[Shape], *patches: Endings) -> Array:
+        """Return the SED averaged over the first ending of each of the patches (c, p) [MPa], recovered there alone."""
         mesh, elastic = self.geometry.mesh, self.body.elastic
-        forces = np.array([(*c.normal, *c.tangential) for c in contacts]).T
         nodes = distinct(np.concatenate([patch.nodes(mesh) for patch in patches]))
-        displacement = self.body.displacement(self.body.skin_displacement(forces), only=nodes)
+        displacement = self.body.displacement(np.stack([state.u for state in states], axis=2), only=nodes)
         return np.stack([patch.average(mesh, elastic, displacement)[0] for patch in patches], axis=1)
 
     def sed_point(self, displacement: Array) -> float:
@@ -122,17 +125,17 @@ class FingerModel:
         plus, minus = np.sqrt(total + 2.0 * det), np.sqrt(np.maximum(total - 2.0 * det, 0.0))
         return np.stack([(plus - minus) / 2.0, (plus + minus) / 2.0])
 
-    def contact_width(self, contact: Contact, skin: Array) -> float:
-        """Return how long the contact is along the surface [mm]; `skin` (2 k,) its displacement, normal first [mm]."""
-        mesh, k = self.geometry.mesh, len(contact.state)
-        return width(arcs_of(self.geometry), mesh.nodes[mesh.skin, 0] + skin[k:], contact.normal, contact.touching)
+    def contact_width(self, state: Shape) -> float:
+        """Return how long the contact is along the surface [mm]."""
+        x = state.place(self.body.condensed)[:, 0]
+        return width(arcs_of(self.geometry), x, state.normal, state.touching)
 
-    def reaches_out(self, contact: Contact, displacement: Array, indentation: float) -> bool:
+    def reaches_out(self, state: Shape, displacement: Array, indentation: float) -> bool:
         """Return whether skin outside the part that may touch would, so that the part must be made larger."""
         whole = self.geometry.whole
         below = self.geometry.mesh.nodes[whole, 1] + displacement[whole, 1] < indentation * (1.0 - 1e-9)
         may = np.zeros(len(displacement), bool)
         may[self.geometry.mesh.skin] = True
         may = may[whole]
-        ends = bool(contact.touching[0] and may[0] == 0) or bool(contact.touching[-1] and may[-1] == 0)
+        ends = bool(state.touching[0] and may[0] == 0) or bool(state.touching[-1] and may[-1] == 0)
         return ends or bool((below & ~may).any())

@@ -15,7 +15,7 @@ from solver.body.tissues import finite_laws
 from solver.contact.edges import edges, width
 from solver.contact.skin_compression import Pinch
 from solver.equilibrium.mesh_transfer import Bridge, Places
-from solver.equilibrium.newton import Newton, Shape
+from solver.equilibrium.newton import FiniteNewton, Shape
 from solver.mesh import Array
 from solver.mesh.grid import MeshError
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
@@ -31,7 +31,7 @@ class FiniteFinger:
 
     scene: Scene  # whose finger it is; its friction and load may be those of another surface
     geometry: FingerMesh
-    newton: Newton
+    newton: FiniteNewton
     ending: FiniteProbes  # the reference ending alone
 
     @staticmethod
@@ -50,7 +50,7 @@ class FiniteFinger:
         """Do the same on a mesh of the finger that was made before."""
         body = FiniteBody.of(geometry.mesh, finite_laws(scene.materials), checked=True)
         at_touch = FiniteProbes.of(body, endings(geometry, body, scene.receptor, np.zeros(1)))
-        newton = Newton(body, None if beside is None else beside.newton)
+        newton = FiniteNewton(body, None if beside is None else beside.newton)
         return FiniteFinger(scene, geometry, newton, at_touch)
 
     @cached_property

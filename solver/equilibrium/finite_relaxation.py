@@ -11,7 +11,7 @@ import numpy as np
 
 from solver import _kernels as kernels
 from solver._kernels import STICK
-from solver.body.finite import FiniteBody, FiniteProbes
+from solver.body.finite import CondensedFinite, FiniteBody, FiniteProbes
 from solver.body.finite_measures import deformation
 from solver.body.tissues import relaxing_laws
 from solver.body.validation import check_moduli, check_terms
@@ -20,7 +20,6 @@ from solver.constitutive.linear import Prony
 from solver.constitutive.overstress import Past
 from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.force_control import Given
 from solver.equilibrium.load_path import (
     DRAGGING_STEPS,
     DRAGGING_TIME,
@@ -30,7 +29,7 @@ from solver.equilibrium.load_path import (
     PRESSING_TIME,
     Aim,
 )
-from solver.equilibrium.newton import Newton, Shape
+from solver.equilibrium.newton import FiniteNewton, Given, Newton, Shape, lowered
 from solver.equilibrium.relaxation import RELAXED, wait
 from solver.failures import Cancelled, NotConverged, followed_to
 from solver.mesh import Array, Indices
@@ -41,52 +40,65 @@ FIRST, LARGEST = 0.02, 0.1  # steps of a slide, by the indentation; each a fifth
 GOOD, CLOSE = 1e-8, 1e-7  # tolerance of displacements [mm], and by the indentation where that is less
 
 
-class RelaxingNewton(Newton):
-    """The iterations on a body that relaxes, whose own laws are the relaxed ones."""
+class CondensedRelaxing(CondensedFinite):
+    """A body that relaxes, whose own laws are the relaxed ones."""
 
     def __init__(self, body: FiniteBody, laws: Sequence[Prony]) -> None:
         """Start at rest; `laws` by region, of which the terms and moduli at once are used. Raises BodyError."""
         super().__init__(body)
         check_moduli(body.mesh, laws)
         check_terms(laws)
-        region = body.mesh.region
-        self.past = Past.at_rest(*_terms(laws, np.repeat(region, body.weight.shape[1])))
-        self._tensor = np.zeros((*body.weight.shape, 4))
+        self.past = Past.at_rest(*_terms(laws, np.repeat(body.mesh.region, body.weight.shape[1])))
+        self.tensor = np.zeros((*body.weight.shape, 4))
+
+    def assemble(self, u: Array, pressure: Array) -> float:
+        """Fill tangents and forces at a state and return the least det F."""
+        least = super().assemble(u, pressure)
+        if least > 0.0:
+            self._add(u, anew=True)
+        return least
+
+    def resist(self, u: Array) -> float:
+        """Fill the forces at a state for the tangent that is there and return the least det F."""
+        least = super().resist(u)
+        if least > 0.0:
+            self._add(u, anew=False)
+        return least
+
+    def _add(self, u: Array, *, anew: bool) -> None:
+        kernels.add_overstress(u, self.tensor, self.body.elements, self.system, anew)
+
+
+class RelaxingNewton(FiniteNewton):
+    """The iterations on a body that relaxes."""
+
+    def __init__(self, body: FiniteBody, laws: Sequence[Prony]) -> None:
+        """Start at rest; `laws` by region, of which the terms and moduli at once are used. Raises BodyError."""
+        self.body = body
+        self.finite = self.relaxing = CondensedRelaxing(body, laws)
+        Newton.__init__(self, self.relaxing)
 
     def ready(self, step: float) -> None:
         """Prepare a step in time [s]."""
-        self._tensor = self.past.over(step).reshape(self._tensor.shape)
-        self.inside.found = None
+        body = self.relaxing
+        body.tensor = body.past.over(step).reshape(body.tensor.shape)
+        body.found = None
 
     def took(self, shape: Shape, step: float) -> None:
         """Remember the step that was made ready and led to `shape`."""
-        self.past = self.past.after(deformation(self.body, shape.u).reshape(-1, 2, 2), step)
+        body = self.relaxing
+        body.past = body.past.after(deformation(self.body, shape.u).reshape(-1, 2, 2), step)
 
     def excess(self, shape: Shape) -> Array:
         """Return the forces (e, 18) of the overstress on the nodes of the elements at `shape`."""
         body = self.body
-        stress = overstress.stress(self._tensor, deformation(body, shape.u))
+        stress = overstress.stress(self.relaxing.tensor, deformation(body, shape.u))
         gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
         return np.einsum("eq,eqaA,eqiA->eia", body.weight, stress, gradient).reshape(len(body.nodes), 18)
 
     def excess_energy(self) -> float:
         """Return the energy [N mm per mm] that the terms hold at the last instant remembered."""
-        return float(self.past.energy() @ self.body.weight.ravel())
-
-    def _assembled(self, shape: Shape) -> float:
-        least = super()._assembled(shape)
-        if least > 0.0:
-            self._add(shape, anew=True)
-        return least
-
-    def _resisted(self, shape: Shape) -> float:
-        least = super()._resisted(shape)
-        if least > 0.0:
-            self._add(shape, anew=False)
-        return least
-
-    def _add(self, shape: Shape, *, anew: bool) -> None:
-        kernels.add_overstress(shape.u, self._tensor, self.body.elements, self.system, anew)
+        return float(self.relaxing.past.energy() @ self.body.weight.ravel())
 
 
 def _terms(laws: Sequence[Prony], region: Indices) -> tuple[Array, Array]:
@@ -223,4 +235,4 @@ class RelaxingCourse:
             good = min(GOOD, CLOSE * self._scene.loading.depth)
             return self.newton.settle(last, last.pull._replace(depth=aim.press, travel=-aim.along), good)
         given = Given(aim.press, aim.along) if self._scene.loading.dragged else Given(aim.press, None, -aim.along)
-        return finite_forced.balanced(self.newton, finite_forced.lowered(self.newton, last), given)
+        return finite_forced.balanced(self.newton, lowered(self.newton.condensed, last), given)

@@ -6,43 +6,15 @@ and from them follows which change of both makes up for the forces that are miss
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from math import isfinite
-from typing import NamedTuple
 
-import numpy as np
-
-from solver._kernels import SLIP, STICK
-from solver.body.validation import finite
-from solver.equilibrium.newton import BY_DEPTH, BY_TRAVEL, EQUILIBRIUM, Newton, Pull, Shape
+from solver._kernels import STICK
+from solver.equilibrium.newton import EQUILIBRIUM, Given, Newton, Pull, Shape, lowered
 from solver.equilibrium.root import UNMET, met
-from solver.failures import Cancelled, NotConverged, followed_to
+from solver.failures import Cancelled, ContactLost, NotConverged, followed_to
 from solver.mesh import Array
 from solver.progress import tell
 
-STRIDE = 0.3  # largest change of depth or travel in one iteration [mm]
 HALVINGS = 8  # how often a step that failed is cut in two before it is given up
-
-
-class Given(NamedTuple):
-    """What drives the bone: the normal force, and the surface's pull along +x or the surface's travel."""
-
-    normal: float  # [N/mm]
-    tangential: float | None  # [N/mm]; None: `travel` is given instead
-    travel: float = 0.0  # of the surface along +x relative to the bone [mm]
-
-    def checked(self) -> "Given":
-        """Return the same of floats alone, as loops take them. Raises ValueError for what is not finite."""
-        drag = None if self.tangential is None else finite("tangential", self.tangential)
-        return Given(finite("normal", self.normal), drag, finite("travel", self.travel))
-
-    def towards(self, other: "Given", part: float) -> "Given":
-        """Return what lies `part` of the way to `other`, which gives the same kind of thing."""
-        tangential = other.tangential
-        if tangential is not None:
-            begun = 0.0 if self.tangential is None else self.tangential
-            tangential = begun + part * (tangential - begun)
-        normal = self.normal + part * (other.normal - self.normal)
-        return Given(normal, tangential, self.travel + part * (other.travel - self.travel))
 
 
 def corrected(
@@ -57,30 +29,11 @@ def corrected(
     if given.tangential is None:
         pull = pull._replace(travel=given.travel)
     linearise = newton.relinearise if kept else newton.linearise
-    if not linearise(shape, pull, origin + pull.travel - before, 0):
+    if not linearise(shape, pull, origin + pull.travel - before, 0, given):
         return None
-    steps = newton.steps
-    drag, push = newton.follows(steps).tolist()
-    felt_drag, felt_push = newton.inside.felt.reshape(-1, 2).sum(axis=0).tolist()
-    missing = given.normal - felt_push - push[EQUILIBRIUM]
-    deeper = along = 0.0
-    if given.tangential is not None and (shape.state == STICK).any():
-        missing_drag = given.tangential - felt_drag - drag[EQUILIBRIUM]
-        det = push[BY_DEPTH] * drag[BY_TRAVEL] - push[BY_TRAVEL] * drag[BY_DEPTH]
-        if det == 0.0:
-            return None
-        deeper = (missing * drag[BY_TRAVEL] - missing_drag * push[BY_TRAVEL]) / det
-        along = (push[BY_DEPTH] * missing_drag - drag[BY_DEPTH] * missing) / det
-    elif push[BY_DEPTH] != 0.0:
-        deeper = missing / push[BY_DEPTH]
-    most = max(abs(deeper), abs(along))
-    if not isfinite(most):
-        return None
-    if most > STRIDE:
-        deeper, along = deeper * STRIDE / most, along * STRIDE / most
-    step = steps[:, EQUILIBRIUM] + deeper * steps[:, BY_DEPTH] + along * steps[:, BY_TRAVEL]
+    deeper, along = newton.system.motion.tolist()
     pull = pull._replace(depth=pull.depth + deeper, travel=pull.travel + along)
-    after, largest, changed = newton.moved(shape, pull, step, origin + pull.travel - before)
+    after, largest, changed = newton.moved(shape, pull, newton.steps[:, EQUILIBRIUM], origin + pull.travel - before)
     return after, max(largest, abs(deeper), abs(along)), changed
 
 
@@ -89,14 +42,23 @@ def balanced(newton: Newton, start: Shape, given: Given, tolerance: float = 1e-8
 
     Raises NotConverged where `limit` iterations do not do it.
     """
-    shape = _iterated(newton, start, start, given, tolerance, limit)
+    try:
+        shape = _iterated(newton, start, start, given, tolerance, limit)
+    except ContactLost:  # as where friction is so small that all but one node slip
+        if given.tangential is None:
+            raise
+        return _met_by_travel(newton, start, start, given, tolerance, limit)
     return _met_by_travel(newton, start, shape, given, tolerance, limit) if _slips_freely(shape, given) else shape
 
 
 def _iterated(newton: Newton, start: Shape, begin: Shape, given: Given, tolerance: float, limit: int) -> Shape:
     """Return the equilibrium one step from `start`, sought from `begin` on. Raises NotConverged."""
-    origin, before = start.place(newton.body)[:, 0], start.pull.travel
+    origin, before = start.place(newton.condensed)[:, 0], start.pull.travel
     shape = begin
+    if newton.condensed.constant:
+        if given.tangential is None:
+            shape = replace(shape, pull=shape.pull._replace(travel=given.travel))
+        return newton.solved(shape, shape.pull, origin + shape.pull.travel - before, given)
     for _ in range(limit):
         done = corrected(newton, shape, given, origin, before)
         if done is None:
@@ -152,7 +114,7 @@ def march(
                 raise Cancelled
             try:
                 there = min(done + part, 1.0)
-                shape = balanced(newton, lowered(newton, shape), begin.towards(aim, there))
+                shape = balanced(newton, lowered(newton.condensed, shape), begin.towards(aim, there))
             except NotConverged as reason:
                 part /= 2.0
                 if part < 0.5**HALVINGS:
@@ -165,14 +127,4 @@ def march(
 
 def untouched(newton: Newton, mu: float, tau: float) -> Shape:
     """Return the undeformed body over a surface with this friction."""
-    return replace(Shape.undeformed(newton.body), pull=Pull(0.0, mu, tau).checked())
-
-
-def lowered(newton: Newton, shape: Shape) -> Shape:
-    """Return the shape with its lowest node on the surface, where nothing touches yet."""
-    if shape.touching.any():
-        return shape
-    state = shape.state.copy()
-    lowest = int(np.argmin(shape.place(newton.body)[:, 1]))
-    state[lowest] = STICK if shape.pull.mu > 0.0 and shape.pull.tau > 0.0 else SLIP
-    return replace(shape, state=state)
+    return replace(Shape.undeformed(newton.condensed), pull=Pull(0.0, mu, tau).checked())

@@ -1,11 +1,20 @@
 """The settled sliding state directly: every touching point slips, so nothing is left of how it came there."""
 
 from collections.abc import Callable
+from dataclasses import replace
+from math import isfinite
 
-from solver.equilibrium.newton import Newton, Pull, Shape
-from solver.failures import Cancelled, NotConverged
+import numpy as np
+from numpy.typing import NDArray
+
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
+from solver.equilibrium.newton import Given, Newton, Pull, Shape
+from solver.failures import Cancelled, ContactLost, NotConverged
 from solver.progress import tell
 
+HERTZ = 0.5  # part of the depth below which skin is first thought to touch: half as deep is half the overlap's square
+SHORT = 12  # systems after which that guess is given up
+GUESSES = (0.3, 0.6, 0.1, 0.9, 0.03, 0.01)  # parts of the depth in which skin is first thought to touch, in turn
 FIRST_TOLERANCE = 1e-3  # of the steps that only lead to the last one [mm]; looser ones go astray near nu = 0.5
 WORK = 80  # tangents after which no more steps are halved: a state that is there takes 5 to 30
 SMALLEST = 1.0 / 64.0  # part of the way below which a failing step is given up
@@ -24,7 +33,9 @@ def settled(
     Cancelled where `stop` says so, ValueError for a pull that is none.
     """
     pull = pull.checked()
-    shape = Shape.undeformed(newton.body) if start is None else start
+    if newton.condensed.constant:
+        return _at_once(newton, pull, start)
+    shape = Shape.undeformed(newton.condensed) if start is None else start
     begin = shape.pull if start is not None else Pull(0.0, pull.mu, pull.tau, pull.sense)
     done, part = 0.0, 1.0
     used, most = 0, newton.systems + WORK
@@ -47,6 +58,73 @@ def settled(
         else:
             done = aim
     return shape
+
+
+def _at_once(newton: Newton, pull: Pull, start: Shape | None) -> Shape:
+    """Return the sliding state of a body of constant stiffness, which is one step from any. Raises ContactLost.
+
+    What differs is the contact that is thought of first: that of `start`, or skin that would lie deep in the surface.
+    """
+    if pull.sense == 0:
+        raise ValueError("sense = 0 is not allowed: friction on what slides points along +1 or -1")
+    if start is not None:
+        return slide_beside(newton, pull, start.state)
+    height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
+    if newton.condensed.motions.shape[1]:  # how deep it lies, or a part of it, is found
+        return _first_of(newton, pull, float(np.ptp(height)), None)
+    above = height - pull.depth
+    guesses = [(above < -HERTZ * pull.depth, SLIP, SHORT), (above < 0.0, SLIP, None)]
+    if isfinite(pull.tau):
+        guesses.append((above < 0.0, SHEAR_LIMITED, None))
+    for number, (low, slips, rounds) in enumerate(guesses):
+        try:
+            return slide_beside(newton, pull, np.where(low, slips, OPEN), rounds=rounds)
+        except ContactLost:
+            if number == len(guesses) - 1:
+                raise
+    raise AssertionError  # there is always a guess
+
+
+def slide_beside(
+    newton: Newton, pull: Pull, guess: NDArray[np.integer], force: float | None = None, rounds: int | None = None
+) -> Shape:
+    """Return the slide of a body of constant stiffness whose contact states are sought from a `guess` (k,) of them.
+
+    Under a normal `force` [N/mm] the depth of `pull` is found. Raises ContactLost, after so many `rounds` of changes.
+    """
+    rest = Shape.undeformed(newton.condensed)
+    states = guess.astype(np.int32)
+    begin = replace(rest, state=states, sense=np.full(len(states), pull.sense, np.int32))
+    given = None if force is None else Given(force, None)
+    return newton.solved(begin, pull, newton.skin_x, given, rounds)
+
+
+def slide_under(newton: Newton, pull: Pull, force: float, deepest: float | None = None) -> Shape:
+    """Return the slide of a body of constant stiffness under a normal `force` [N/mm], its depth found.
+
+    `deepest` [mm] is the scale of the first guesses, by default the height of the skin. Raises ContactLost.
+    """
+    height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
+    found = _first_of(newton, pull, float(np.ptp(height)) if deepest is None else deepest, force)
+    if deepest is None or found.pull.depth > 0.0:
+        return found
+    raise ContactLost("the touching points have no forces that amount to the normal force")
+
+
+def _first_of(newton: Newton, pull: Pull, scale: float, force: float | None) -> Shape:
+    """Return the first slide that touching skin leads to which reaches up to parts of a `scale` [mm]."""
+    height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
+    for number, part in enumerate(GUESSES):
+        guess = np.where(height <= float(height.min()) + part * scale, SLIP, OPEN)
+        try:
+            found = slide_beside(newton, pull, guess, force)
+        except ContactLost:
+            if number == len(GUESSES) - 1:
+                raise
+            continue
+        if force is None or found.pull.depth > 0.0 or number == len(GUESSES) - 1:
+            return found
+    raise AssertionError  # there is always a guess
 
 
 def _between(begin: Pull, end: Pull, part: float) -> Pull:

@@ -1,4 +1,4 @@
-"""The course in time: the bone comes down over 1 s, then slides until nothing changes any more, or is dragged."""
+"""The way of a finger in time: the bone comes down over 1 s, then slides until nothing changes, or is dragged."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -6,19 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.contact.active_set import (
-    SHEAR_LIMITED,
-    SLIP,
-    Contact,
-    ContactLost,
-    Course,
-    Touchable,
-    forced,
-    lowered,
-    untouched,
-)
-from solver.contact.law import FrictionLaw
-from solver.equilibrium.root import UNMET, met
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
+from solver.equilibrium.force_control import balanced
+from solver.equilibrium.newton import Given, Newton, Pull, Shape, lowered
 from solver.failures import Cancelled, NotConverged, followed_to
 from solver.scene import Loading
 
@@ -36,17 +26,17 @@ class Instant:
     """One state on the way."""
 
     time: float  # [s]
-    depth: float  # of the bone's indentation [mm]
-    travel: float  # of the bone along +x [mm]
-    contact: Contact
+    state: Shape
 
+    @property
+    def depth(self) -> float:
+        """The bone's indentation [mm]."""
+        return self.state.pull.depth
 
-@dataclass(frozen=True, slots=True, eq=False)
-class March:
-    """The way from first touch to the last state."""
-
-    instants: tuple[Instant, ...]
-    iterations: int
+    @property
+    def travel(self) -> float:
+        """How far the bone has moved along +x [mm]."""
+        return 0.0 - self.state.pull.travel
 
 
 class Aim(NamedTuple):
@@ -65,17 +55,17 @@ Progress = Callable[[float], bool]  # told the part done, 0 to 1; False asks to 
 
 
 def march(
-    body: Touchable, law: FrictionLaw, loading: Loading, progress: Progress | None = None, times: float = 1.0
-) -> March:
-    """Drive `body` down and along, step by step (backward Euler), until every slide of `loading` has settled.
+    newton: Newton, friction: Pull, loading: Loading, progress: Progress | None = None, times: float = 1.0
+) -> tuple[Instant, ...]:
+    """Drive a body down and along, step by step (backward Euler), until every slide of `loading` has settled.
 
     So many `times` the usual steps are taken. Forces of `loading` are per mm. A given drag must be less than what
     friction carries. Raises NotConverged where a step cannot be made or sliding does not settle, Cancelled where
     `progress` says so.
     """
-    way = Way(body, law, loading)
+    way = Way(newton, friction, loading)
     course(way, loading, progress, times)
-    return way.march()
+    return tuple(way.instants)
 
 
 def course(way: "Way", loading: Loading, progress: Progress | None = None, times: float = 1.0) -> None:
@@ -105,69 +95,37 @@ def _report(progress: Progress | None, part: float) -> None:
 class Way:
     """The states so far, and how the next one is found."""
 
-    def __init__(self, body: Touchable, law: FrictionLaw, loading: Loading) -> None:
-        """Start at rest, untouched; `loading` says what is driven and what is found."""
+    def __init__(self, newton: Newton, friction: Pull, loading: Loading) -> None:
+        """Start untouched, with mu and bound of `friction`; `loading` says what is driven and what is found."""
+        self.newton = newton
+        self.frictionless = friction.frictionless
         self.by_force = loading.normal_force is not None
         # without friction there is no drag to speak of, and nothing that it could hold
-        self.by_drag = loading.tangential_force is not None and not law.frictionless
-        start = untouched(body)
-        self._body = body
-        if self.by_force:
-            body = forced(body, 0.0, 0.0 if self.by_drag else None)
-            start = replace(lowered(law, start), motion=np.zeros(len(body.resultants)))
-        self.course = Course(body, law)
-        self.instants = [Instant(0.0, 0.0, 0.0, start)]
+        self.by_drag = loading.tangential_force is not None and not self.frictionless
+        rest = replace(Shape.undeformed(newton.condensed), pull=Pull(0.0, friction.mu, friction.tau).checked())
+        self.instants = [Instant(0.0, rest)]
         self.aim = Aim(0.0, 0.0, 0.0)
-
-    def march(self) -> March:
-        """Return the way so far."""
-        return March(tuple(self.instants), sum(i.contact.iterations for i in self.instants))
 
     def go(self, aim: Aim, halvings: int = HALVINGS) -> None:
         """Append the state at `aim`, in smaller steps where one of that size fails."""
-        before = self.instants[-1].contact
+        before = self.instants[-1].state
         try:
-            contact = self.found(before, aim)
-        except ContactLost as lost:
+            state = self.found(before, aim)
+        except NotConverged as lost:
             if halvings == 0:
-                raise followed_to(self.instants[-1].depth, self.instants[-1].travel, lost) from lost
+                raise followed_to(before.pull.depth, before.pull.travel, lost) from lost
             self.go(self.aim.towards(aim, 0.5), halvings - 1)
             self.go(aim, halvings - 1)
             return
-        depth = -float(contact.motion[0]) if self.by_force else aim.press
-        travel = float(contact.motion[1]) if self.by_drag else aim.along
-        self.instants.append(Instant(aim.time, depth, travel, contact))
+        self.instants.append(Instant(aim.time, state))
         self.aim = aim
 
-    def found(self, before: Contact, aim: Aim) -> Contact:
-        """Return the state at `aim`, coming from `before`. Raises ContactLost."""
+    def found(self, before: Shape, aim: Aim) -> Shape:
+        """Return the state at `aim`, coming from `before`. Raises NotConverged."""
         if not self.by_force:
-            return self.course.step(before, aim.press, aim.along)
-        if not self.by_drag:
-            return self.course.step(before, 0.0, aim.along, np.array([aim.press]))
-        try:
-            return self.course.step(before, 0.0, 0.0, np.array([aim.press, aim.along]))
-        except ContactLost:  # as where friction is so small that all but one point slip
-            found = self._met_by_travel(before, aim)
-            if found is None:
-                raise
-            return found
-
-    def _met_by_travel(self, before: Contact, aim: Aim) -> Contact | None:
-        """Return the state at `aim` by search for the travel, which holds what nothing else does; None where none is.
-
-        The drag falls as the bone moves along +x.
-        """
-        course = Course(forced(self._body, 0.0), self.course.law)
-        near = before
-
-        def at(travel: float) -> tuple[float, Contact]:
-            nonlocal near
-            guess = replace(before, state=near.state, sense=near.sense)
-            near = course.step(guess, 0.0, -travel, np.array([aim.press]))
-            return float(near.tangential.sum()) - aim.along, replace(near, motion=np.append(near.motion, -travel))
-
-        return met(at, -float(before.motion[1]), UNMET * self.course.law.mu * aim.press)
+            return self.newton.settle(before, before.pull._replace(depth=aim.press, travel=-aim.along))
+        given = Given(aim.press, aim.along) if self.by_drag else Given(aim.press, None, -aim.along)
+        return balanced(self.newton, lowered(self.newton.condensed, before), given)
 
 
 def slide(way: Way, direction: int, speed: float, progress: Progress | None, times: float) -> None:
@@ -180,7 +138,7 @@ def slide(way: Way, direction: int, speed: float, progress: Progress | None, tim
         return Aim(begun.time + distance / speed, begun.press, begun.along + direction * distance)
 
     while distance < FURTHEST * depth:
-        if _settled(way.instants[-1].contact, direction, way.course.law):
+        if _settled(way.instants[-1].state, direction, frictionless=way.frictionless):
             plateau = max(1.3 * distance, distance + depth)
             for part in np.linspace(distance, plateau, 5)[1:]:
                 way.go(at(float(part)))
@@ -195,8 +153,8 @@ def slide(way: Way, direction: int, speed: float, progress: Progress | None, tim
     )
 
 
-def _settled(contact: Contact, direction: int, law: FrictionLaw) -> bool:
+def _settled(state: Shape, direction: int, *, frictionless: bool) -> bool:
     """Return whether every touching point slips against the slide, so that further sliding changes nothing."""
-    slips = (contact.state == SLIP) | (contact.state == SHEAR_LIMITED)
-    along = contact.sense == -direction
-    return bool((~contact.touching | (slips & (along | law.frictionless))).all())
+    slips = (state.state == SLIP) | (state.state == SHEAR_LIMITED)
+    along = state.sense == -direction
+    return bool(((state.state == OPEN) | (slips & (along | frictionless))).all())

@@ -36,7 +36,7 @@ def march(
     Backward Euler: within a step a point sticks where it was or slips from there. Raises NotConverged, saying where,
     Cancelled where `stop` says so, and ValueError for a pull that is none.
     """
-    shape = Shape.undeformed(newton.body) if start is None else start
+    shape = Shape.undeformed(newton.condensed) if start is None else start
     for number, pull in enumerate(pulls := [pull.checked() for pull in course]):
         if len(pulls) > 1:
             tell("pressing and sliding step by step", number / len(pulls))

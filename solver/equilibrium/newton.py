@@ -6,36 +6,40 @@ pressure in the geometric stiffness is the linearised prediction of the iteratio
 Magisano, Leonetti and Garcea 2017), which lets a nearly incompressible body take the whole depth in a step or two.
 """
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver import _kernels as kernels
-from solver._kernels import OPEN, bind_arguments
+from solver._kernels import OPEN, SLIP, STICK, bind_arguments
+from solver._kernels.active_set import DEPTH_GIVEN, DRAG_GIVEN, PUSH_GIVEN, SINGULAR, UNSETTLED
 from solver._kernels.arguments import (
-    BodyState,
+    CondensedArrays,
     ContactStates,
     ContactSystem,
-    ElementSystem,
+    ForceControl,
     LoadState,
+    Skin,
     SkinPosition,
 )
-from solver.body.finite import FiniteBody
+from solver.body.condensed import CondensedBody
+from solver.body.finite import CondensedFinite, FiniteBody
 from solver.body.validation import finite
 from solver.contact.law import FrictionLaw
-from solver.failures import NotConverged
-from solver.linalg.multifrontal import Elimination
+from solver.failures import ContactLost, NotConverged
 from solver.mesh import Array
 
 States = NDArray[np.int32]
 SHORTEST = 1.0 / 16.0  # part of a Newton step below which a body that turns inside out is given up
+STRIDE = 0.3  # largest change of depth or travel in one iteration where forces are given [mm]
 ROUNDS = 12  # of changes of contact states within one linear system: dense, of the skin alone, and so cheap
 NEAR = 0.1  # step below which the tangent of the state before is tried again [mm]
 FAST = 0.02  # fall of the steps' size, below which a new tangent is kept
 SLOW = 0.5  # the same, above which a kept one is given up
 TURNED = 0.01  # step times bulk over shear stiffness, above which no tangent is kept [mm]
+PATIENCE = 20  # systems, and four for each node, after which contact states of a linear body are given up
 MARGIN = 0.5  # part of the tolerance that the step still missing, as judged, may take
 SAME, AGAIN = 1e-3, 4  # relative difference of steps that are the same, and how many in a row are a circle
 EQUILIBRIUM, BY_DEPTH, BY_FRICTION, BY_TRAVEL = 0, 1, 2, 3  # columns of Newton.steps
@@ -52,6 +56,11 @@ class Pull(NamedTuple):
     )
     travel: float = 0.0  # of the surface along +x relative to the bone [mm]
 
+    @property
+    def frictionless(self) -> bool:
+        """Whether no tangential force is possible."""
+        return self.mu == 0.0 or self.tau == 0.0
+
     def checked(self) -> "Pull":
         """Return the same of floats alone, as loops take them. Raises ValueError for friction or ways that are none."""
         law = FrictionLaw(float(self.mu), float(self.tau))
@@ -59,6 +68,45 @@ class Pull(NamedTuple):
             raise ValueError(f"sense = {self.sense} is not allowed: friction points along +1 or -1, or is found by 0")
         depth, travel = finite("depth", self.depth), finite("travel", self.travel)
         return Pull(depth, law.mu, law.tau_max, int(self.sense), travel)
+
+
+class Given(NamedTuple):
+    """What drives the bone: the normal force, and the surface's pull along +x or the surface's travel."""
+
+    normal: float  # [N/mm]
+    tangential: float | None  # [N/mm]; None: `travel` is given instead
+    travel: float = 0.0  # of the surface along +x relative to the bone [mm]
+
+    def checked(self) -> "Given":
+        """Return the same of floats alone, as loops take them. Raises ValueError for what is not finite."""
+        drag = None if self.tangential is None else finite("tangential", self.tangential)
+        return Given(finite("normal", self.normal), drag, finite("travel", self.travel))
+
+    def towards(self, other: "Given", part: float) -> "Given":
+        """Return what lies `part` of the way to `other`, which gives the same kind of thing."""
+        tangential = other.tangential
+        if tangential is not None:
+            begun = 0.0 if self.tangential is None else self.tangential
+            tangential = begun + part * (tangential - begun)
+        normal = self.normal + part * (other.normal - self.normal)
+        return Given(normal, tangential, self.travel + part * (other.travel - self.travel))
+
+
+class Deformable(Protocol):
+    """What a state is asked about: a body, or what Newton sees of it."""
+
+    @property
+    def held(self) -> States:
+        """Which nodes of the skin are held (k,)."""
+        ...
+
+    def undeformed(self) -> tuple[Array, Array]:
+        """Return displacements and pressures of the body at rest."""
+        ...
+
+    def place(self, u: Array) -> Array:
+        """Return where the skin's nodes are (k, 2) for displacements `u` [mm]."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,21 +122,30 @@ class Shape:
     iterations: int  # linear systems solved on the way here, from undeformed
 
     @staticmethod
-    def undeformed(body: FiniteBody) -> "Shape":
+    def undeformed(body: Deformable) -> "Shape":
         """Return the body before anything touches it."""
-        count = len(body.skin)
-        zero = np.zeros(count, np.int32)
-        u, pressure = np.zeros(body.mesh.nodes.shape), np.zeros((len(body.nodes), 3))
-        return Shape(u, pressure, zero, zero, np.zeros((count, 2)), Pull(0.0, 0.0), 0)
+        u, pressure = body.undeformed()
+        zero = np.zeros(len(body.held), np.int32)
+        return Shape(u, pressure, zero, zero, np.zeros((len(zero), 2)), Pull(0.0, 0.0), 0)
 
-    def place(self, body: FiniteBody) -> Array:
+    def place(self, body: Deformable) -> Array:
         """Return the deformed positions of the skin's nodes (k, 2) [mm]."""
-        return body.mesh.nodes[body.mesh.skin] + self.u[body.mesh.skin]
+        return body.place(self.u)
 
     @property
     def touching(self) -> NDArray[np.bool_]:
         """Which nodes touch, (k,)."""
         return self.state != OPEN
+
+    @property
+    def normal(self) -> Array:
+        """Push of the surface on each node along +y, (k,) [N/mm]."""
+        return self.reaction[:, 1]
+
+    @property
+    def tangential(self) -> Array:
+        """Pull of the surface on each node along +x, (k,) [N/mm]."""
+        return self.reaction[:, 0]
 
     @property
     def force(self) -> Array:
@@ -99,94 +156,80 @@ class Shape:
 class Newton:
     """The iterations on one body, with the memory they need."""
 
-    def __init__(self, body: FiniteBody, beside: "Newton | None" = None) -> None:
-        """Set memory aside for `body`, or share that of `beside` where both are eliminated by one plan.
-
-        What is there then belongs to whichever was linearised last.
-        """
-        count, skin = len(body.nodes), len(body.skin)
-        self.body = body
+    def __init__(self, condensed: CondensedBody) -> None:
+        """Set memory aside for the skin of a body."""
+        skin = len(condensed.held)
+        self.condensed = condensed
         self.systems = 0  # tangents assembled, or tried
-        self.load = np.zeros(body.size)  # dead loads on the body, of `solver.body.dead_loads`
-        self.force = np.zeros(body.size)
-        if beside is not None and beside.body.plan is body.plan:
-            self.inside, self.system = beside.inside, beside.system._replace(force=self.force)
-        else:
-            self.inside = Elimination(body.plan)
-            self.system = ElementSystem(
-                np.zeros((count, 16, 16)), self.force, np.zeros((count, 2, 17)), np.zeros((count, 3)),
-                np.zeros((count, 3, 18)), np.zeros((count, 3)),
-            )  # fmt: skip
-        self.steps = np.zeros((2 * skin, 4))  # of the skin
-        self.bulk = float((body.lame / body.shear).max())  # how much stiffer the body is to a change of volume [-]
-        self.skin_x, self._skin_y = body.mesh.nodes[body.skin, 0], body.mesh.nodes[body.skin, 1]
+        unknowns = 2 * skin + 3
+        self.system = ContactSystem(
+            np.zeros(skin), np.zeros(unknowns, np.int32), np.zeros(unknowns**2), np.zeros((unknowns, 4)),
+            np.zeros((2 * skin, 4)), np.zeros(2),
+        )  # fmt: skip
+        self.steps = self.system.steps  # (2 k, 4) of the skin, as the loops fill them
+        self.bulk = condensed.bulk
+        self.skin = Skin(condensed.held, condensed.middle, condensed.fixed_length)
+        self._rest = condensed.undeformed()[0]
+        self.skin_x = condensed.place(self._rest)[:, 0].copy()
         zero = np.zeros(skin, np.int32)
         self._states = ContactStates(zero, zero.copy(), np.zeros((skin, 2)))
-        self._contact = ContactSystem(
-            np.zeros(skin), np.zeros(2 * skin, np.int32), np.zeros(4 * skin * skin), np.zeros((2 * skin, 4)), self.steps
-        )
-        elements, inside = body.elements, self.inside
-        self._assemble = bind_arguments(kernels.assemble, elements, self.system)
-        self._forces = bind_arguments(kernels.forces, elements, self.system)
-        self._condense = bind_arguments(kernels.condense_forces, self.force, self.load, inside.carried, inside.factors)
-        self._solve_contact = bind_arguments(kernels.solve_active_set, self._contact)
-        self._meet_skin = bind_arguments(kernels.meet, body.contact_skin, self._contact.length)
-        self._move = bind_arguments(kernels.move, inside.carried, inside.factors, elements, self.system)
+        self._solve_contact = bind_arguments(kernels.solve_active_set, self.system)
+        self._meet = bind_arguments(kernels.meet, self.skin, self.system.length)
 
-    def linearise(self, shape: Shape, pull: Pull, anchor: Array, rounds: int = 0) -> bool:
+    def linearise(self, shape: Shape, pull: Pull, anchor: Array, rounds: int = 0, given: Given | None = None) -> bool:
         """Set up the system at `shape` under `pull`, solve it for the skin's `steps` (2 k, 4); False where it fails.
 
         `anchor` (k,) are the positions along x where nodes stick [mm]. The states of contact are changed up to `rounds`
-        times until none contradicts the linearised body.
+        times until none contradicts the linearised body. Where forces are `given`, the first step meets them too.
         """
-        self.inside.found = None
         self.systems += 1
-        if not self._assembled(shape) > 0.0 or not self.inside.factorise(self.system.tangent):
+        if not self.condensed.linearise(shape.u, shape.pressure):
             return False
-        return self._touch(shape, pull, anchor, rounds)
+        return self._touch(shape, pull, anchor, rounds, given) != SINGULAR
 
-    def relinearise(self, shape: Shape, pull: Pull, anchor: Array, rounds: int) -> bool:
+    def relinearise(self, shape: Shape, pull: Pull, anchor: Array, rounds: int, given: Given | None = None) -> bool:
         """Do the same with the forces at `shape`, but the tangent and its factors that are there already."""
-        return self._resisted(shape) > 0.0 and self._touch(shape, pull, anchor, rounds)
+        if not self.condensed.relinearise(shape.u):
+            return False
+        return self._touch(shape, pull, anchor, rounds, given) != SINGULAR
 
-    def _assembled(self, shape: Shape) -> float:
-        """Fill tangents and forces at `shape` and return the least det F."""
-        return self._assemble(shape.u, shape.pressure)
-
-    def _resisted(self, shape: Shape) -> float:
-        """Fill the forces at `shape` for the tangent that is there and return the least det F."""
-        return self._forces(shape.u)
-
-    def _touch(self, shape: Shape, pull: Pull, anchor: Array, rounds: int) -> bool:
+    def _touch(self, shape: Shape, pull: Pull, anchor: Array, rounds: int, given: Given | None) -> int:
+        """Solve the contact of the linearised body at `shape`; return what `solve_active_set` does."""
+        body = self.condensed
         self._states.state[:], self._states.sense[:] = shape.state, shape.sense
-        self._condense()
-        inside, body = self.inside, self.body
-        solved = self._solve_contact(
-            inside.stiffness, inside.felt, body.contact_skin, self._states, load_state(pull),
-            self._position(shape.u, pull, anchor), rounds,
+        kind, drag, push = DEPTH_GIVEN, 0.0, 0.0
+        if given is not None:
+            kind = PUSH_GIVEN if given.tangential is None else DRAG_GIVEN
+            drag, push = given.tangential or 0.0, given.normal
+        return self._solve_contact(
+            self.arrays(), self.skin, self._states, load_state(pull), self._position(shape.u, pull, anchor),
+            ForceControl(kind, float(drag), float(push), np.inf if body.constant else STRIDE), rounds,
         )  # fmt: skip
-        return solved and bool(np.isfinite(self.steps[:, EQUILIBRIUM]).all())
+
+    def arrays(self) -> CondensedArrays:
+        """Return the linearised body as loops take it."""
+        body = self.condensed
+        return CondensedArrays(body.stiffness, body.force, body.compliance, body.motions)
 
     def _position(self, u: Array, pull: Pull, anchor: Array) -> SkinPosition:
-        """Return where the skin lies for displacements `u` (nodes, 2), relative to the surface."""
-        skin = self.body.skin
-        return SkinPosition(self.skin_x + u[skin, 0], self._skin_y + u[skin, 1] - pull.depth, anchor)
+        """Return where the skin lies for displacements `u`, relative to the surface."""
+        place = self.condensed.place(u)
+        return SkinPosition(place[:, 0].copy(), place[:, 1] - pull.depth, anchor)
 
     def follows(self, steps: Array) -> Array:
         """Return how the force of the surface along x and y (2, c) changes with `steps` of the skin (2 k, c)."""
-        return self.inside.stiffness.reshape(-1, 2, len(steps)).sum(axis=0) @ steps
+        return self.condensed.stiffness.reshape(-1, 2, len(steps)).sum(axis=0) @ steps
 
     def moved(
         self, shape: Shape, pull: Pull, skin: Array, anchor: Array, scale: float = 1.0
     ) -> tuple[Shape, float, int]:
         """Return the shape after the skin's step (2 k,), its largest move [mm], and how many states it changed."""
-        after = BodyState(np.empty_like(shape.u), np.empty_like(shape.pressure))
-        skin = np.ascontiguousarray(skin)
-        reaction = (self.inside.felt + self.inside.stiffness @ skin).reshape(-1, 2)
+        body, skin = self.condensed, np.ascontiguousarray(skin)
+        reaction = (body.force + body.stiffness @ skin).reshape(-1, 2)
+        u, pressure, largest = body.recover(shape.u, shape.pressure, skin, scale)
         states = ContactStates(self._states.state.copy(), self._states.sense.copy(), reaction)
-        largest = self._move(BodyState(shape.u, shape.pressure), skin, scale, after)
-        changed = self._meet_skin(states, self._position(after.u, pull, anchor), load_state(pull))
-        return Shape(*after, *states, pull, shape.iterations + 1), largest, changed
+        changed = self._meet(states, self._position(u, pull, anchor), load_state(pull))
+        return Shape(u, pressure, *states, pull, shape.iterations + 1), largest, changed
 
     def settle(self, start: Shape, pull: Pull, tolerance: float = 1e-10, limit: int = 25) -> Shape:
         """Return the equilibrium under `pull`, from `start`, its displacements good to `tolerance` [mm].
@@ -195,10 +238,19 @@ class Newton:
         the steps fall: with a new tangent as the square, with a kept one in proportion. Raises NotConverged where
         `limit` iterations do not do it or the body would turn inside out.
         """
-        x = self.skin_x + start.u[self.body.skin, 0]
+        x = start.place(self.condensed)[:, 0]
         anchor = x + (pull.travel - start.pull.travel)
-        shape = before = self._entered(start, pull, x)
-        kept = self.inside.found is start.u
+        begin = self._entered(start, pull, x)
+        if self.condensed.constant:
+            if self.condensed.motions.shape[1]:
+                begin = lowered(self.condensed, replace(begin, pull=pull))
+            return self.solved(begin, pull, anchor)
+        return self._iterated(begin, pull, anchor, tolerance, limit)
+
+    def _iterated(self, start: Shape, pull: Pull, anchor: Array, tolerance: float, limit: int) -> Shape:
+        """Do as `settle` from `start`, whose states are those that `pull` brings at once, `anchor` (k,) being known."""
+        shape = before = start
+        kept = self.condensed.found is start.u
         scale, last, new, alike = 1.0, 0.0, False, 0
         for _ in range(limit):
             if kept:
@@ -222,7 +274,7 @@ class Newton:
                 raise NotConverged("states of contact come again and again")
             left = min((2.0 * fall) ** 2 if not kept else 4.0 * fall if new else 2.0 * fall, 1.0)
             if largest * left < MARGIN * tolerance and not changed and scale == 1.0:
-                self.inside.found = shape.u
+                self.condensed.found = shape.u
                 return shape
             new = not kept
             still = largest < NEAR if last == 0.0 else fall < SLOW
@@ -231,14 +283,57 @@ class Newton:
             last = largest
         raise NotConverged(f"no equilibrium within {limit} iterations")
 
+    def solved(
+        self, shape: Shape, pull: Pull, anchor: Array, given: Given | None = None, rounds: int | None = None
+    ) -> Shape:
+        """Return the equilibrium of a body of constant stiffness, its contact states sought from those of `shape`.
+
+        Under `given` forces depth and travel are found. Raises ContactLost, after so many `rounds` of changes.
+        """
+        self.systems += 1
+        self.condensed.relinearise(self._rest)  # from which all is one step
+        rounds = PATIENCE + 4 * len(self.skin_x) if rounds is None else rounds
+        used = self._touch(replace(shape, u=self._rest), pull, anchor, rounds, given)
+        if used == SINGULAR:
+            raise ContactLost("the touching points have no unique forces")
+        if used == UNSETTLED:
+            raise ContactLost(f"the states of the touching points still contradicted each other after {rounds} systems")
+        u = self.steps[:, EQUILIBRIUM].reshape(-1, 2).copy()
+        deeper, along = self.system.motion.tolist()
+        pull = pull._replace(depth=pull.depth + deeper, travel=pull.travel + along)
+        iterations = shape.iterations + used
+        found = self._states
+        return Shape(u, shape.pressure, found.state.copy(), found.sense.copy(), found.reaction.copy(), pull, iterations)
+
     def _entered(self, start: Shape, pull: Pull, x: Array) -> Shape:
         """Return `start`, whose skin lies at `x` (k,) along the surface, with the states that `pull` brings at once."""
         states = ContactStates(start.state.copy(), start.sense.copy(), start.reaction)
-        position = SkinPosition(x, self._skin_y + start.u[self.body.skin, 1] - pull.depth, x)
-        self._meet_skin(states, position, load_state(pull))
-        return Shape(start.u, start.pressure, *states, start.pull, start.iterations)
+        self._meet(states, self._position(start.u, pull, x), load_state(pull))
+        return replace(start, state=states.state, sense=states.sense)
+
+
+def lowered(body: CondensedBody, shape: Shape) -> Shape:
+    """Return the shape with its lowest node on the surface where nothing touches: forces need one that does.
+
+    A body that nothing holds needs as many nodes as it has motions.
+    """
+    if shape.touching.any():
+        return shape
+    state, count = shape.state.copy(), max(body.motions.shape[1], 1)
+    lowest = np.argsort(shape.place(body)[:, 1], kind="stable")[:count]
+    state[lowest] = SLIP if shape.pull.frictionless else STICK
+    return replace(shape, state=state)
 
 
 def load_state(pull: Pull) -> LoadState:
     """Return `pull` as loops take it."""
     return LoadState(float(pull.depth), float(pull.mu), float(pull.tau), int(pull.sense))
+
+
+class FiniteNewton(Newton):
+    """The iterations on a body at finite strain."""
+
+    def __init__(self, body: FiniteBody, beside: "FiniteNewton | None" = None) -> None:
+        """Set memory aside for `body`, or share that of `beside` where both are eliminated by one plan."""
+        self.body, self.finite = body, CondensedFinite(body, None if beside is None else beside.finite)
+        super().__init__(self.finite)

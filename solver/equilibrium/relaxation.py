@@ -12,19 +12,17 @@ stored in all springs of the solid, G (1 - sum g) e:e + sum g G h:h + K/2 theta^
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
 
-from solver.body.linear import Body
+from solver.body.linear import CondensedLinear, LinearBody
 from solver.body.receptor import Endings
 from solver.body.stiffness import Elastic, Probes
 from solver.body.validation import check_body, check_driven, check_held, check_terms
 from solver.constitutive.linear import Moduli, Prony, kept
-from solver.contact.active_set import Contact, Course, Touchable, forced
-from solver.contact.law import FrictionLaw
 from solver.equilibrium.load_path import PRESSING_STEPS, PRESSING_TIME, Aim, Progress, Way, course
+from solver.equilibrium.newton import Newton, Pull, Shape
 from solver.mesh import Array, Mesh
 from solver.scene import Loading
 
@@ -33,14 +31,6 @@ RELAXED = 14.0  # times of the slowest tissue after which a body may count as re
 EQUAL_STEPS = 6  # steps of equal length while nothing but relaxation goes on, before they are doubled
 STILL = 1e-6  # change of the SED over such steps from which on it counts as relaxed [-]
 DOUBLINGS = 60  # of the steps at most
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Ready:
-    """The body as one length of step sees it."""
-
-    body: Body
-    compliance: Array  # (2 k, 2 k) of the skin, normal ones first [mm per N/mm]
 
 
 class RelaxingBody:
@@ -68,16 +58,16 @@ class RelaxingBody:
         self._relaxed = Elastic.of(mesh, [law.relaxed for law in laws])
         self.displacement = np.zeros(mesh.nodes.shape)
         self._left = np.zeros((count, 18, most))  # h of each term, as displacements of the elements' nodes
-        self._steps: dict[str, _Ready] = {}
-        self._next: tuple[_Ready, Array, float] | None = None
+        self._steps: dict[str, LinearBody] = {}
+        self._next: tuple[Callable[[Array], Array], float] | None = None
 
     def rest(self) -> None:
         """Come to rest for another course; what was made ready for steps of the same lengths still serves."""
         self.displacement, self._left = np.zeros_like(self.displacement), np.zeros_like(self._left)
         self._steps, self._next = dict(self._steps), None
 
-    def ready(self, step: float, prescribed: Array | None = None) -> Touchable:
-        """Return what the surface will feel of the body at the end of a `step` [s], its past as a displacement.
+    def ready(self, step: float, prescribed: Array | None = None) -> CondensedLinear:
+        """Return the body as its skin feels it at the end of a `step` [s], its past as a load.
 
         What is held is then displaced by `prescribed` (nodes, 2) [mm] relative to the drive.
         """
@@ -88,21 +78,19 @@ class RelaxingBody:
         if prescribed is not None:
             moved[self.mesh.driven] = prescribed[self.mesh.driven]
             local = moved[self.mesh.elements].reshape(len(load), 18)
-            load -= np.einsum("eij,ej->ei", form.body.elastic.stiffness, local)
+            load -= np.einsum("eij,ej->ei", form.elastic.stiffness, local)
         nodes = np.zeros(self.mesh.nodes.shape)
         np.add.at(nodes, self.mesh.elements, load.reshape(-1, 9, 2))
         nodes[self.mesh.driven] = 0.0
-        free = form.body.reduced.under(nodes.reshape(-1, 1), form.compliance).reshape(nodes.shape) + moved
-        self._next = form, free, step
-        skin = free[self.mesh.skin]
-        return replace(form.body.touchable, normal_free=skin[:, 1], tangential_free=skin[:, 0])
+        body, recover = form.under(nodes)
+        self._next = lambda u: recover(u) + moved, step
+        return body
 
-    def advance(self, normal: Array, tangential: Array) -> None:
-        """Take the step that was made ready, under the surface's forces (k,) [N/mm]."""
+    def advance(self, u: Array) -> None:
+        """Take the step that was made ready, which displaced the skin by `u` (k, 2) [mm]."""
         assert self._next is not None
-        form, free, step = self._next
-        skin = form.compliance @ np.concatenate([normal, tangential])
-        after = free + form.body.reduced.all_unknowns(skin[:, None]).reshape(free.shape)
+        recover, step = self._next
+        after = recover(u)
         grown = (after - self.displacement)[self.mesh.elements].reshape(len(self._left), 18)
         ages = step / self._tau
         self._left *= np.exp(-ages)[:, None, :]
@@ -163,20 +151,13 @@ class RelaxingBody:
         left = np.einsum("eim,em->ei", self._left, self._g * np.exp(-ages))
         return left - local * np.sum(self._g * kept(ages), axis=1)[:, None]
 
-    def _form(self, step: float) -> _Ready:
+    def _form(self, step: float) -> LinearBody:
+        """Return the body as a length of step sees it [s]."""
         key = f"{step:.9e}"
         if key not in self._steps:
             while len(self._steps) >= KEPT:
                 del self._steps[next(iter(self._steps))]  # the one asked for longest ago
-            body = Body.of(
-                self.mesh,
-                [law.within(step) for law in self._laws],
-                checked=True,
-            )
-            t = body.touchable
-            across = t.normal_by_tangential
-            whole = np.block([[t.normal_by_normal, across], [across.T, t.tangential_by_tangential]])
-            self._steps[key] = _Ready(body, whole)
+            self._steps[key] = LinearBody.of(self.mesh, [law.within(step) for law in self._laws], checked=True)
         self._steps[key] = self._steps.pop(key)
         return self._steps[key]
 
@@ -187,28 +168,25 @@ class RelaxingWay(Way):
     def __init__(
         self,
         body: RelaxingBody,
-        law: FrictionLaw,
+        friction: Pull,
         loading: Loading,
         ending: Endings,
         point: Endings,
         first: float = PRESSING_TIME / PRESSING_STEPS,
     ) -> None:
         """Start at rest; `first` is the length of the first step [s]."""
-        self.body, self._law = body, law
+        self.body = body
         self._ending, self._point = ending, point
-        super().__init__(body.ready(first), law, loading)
+        super().__init__(Newton(body.ready(first)), friction, loading)
         self.sed: list[tuple[float, float]] = [(0.0, 0.0)]
 
-    def found(self, before: Contact, aim: Aim) -> Contact:
-        """Return the state at `aim`, and let the body come to it. Raises ContactLost."""
-        touch = self._body = self.body.ready(aim.time - self.aim.time)
-        if self.by_force:
-            touch = forced(touch, 0.0, 0.0 if self.by_drag else None)
-        self.course = Course(touch, self._law)
-        contact = super().found(before, aim)
-        self.body.advance(contact.normal, contact.tangential)
+    def found(self, before: Shape, aim: Aim) -> Shape:
+        """Return the state at `aim`, and let the body come to it. Raises NotConverged."""
+        self.newton = Newton(self.body.ready(aim.time - self.aim.time))
+        state = super().found(before, aim)
+        self.body.advance(state.u)
         self.sed.append((float(self.body.average(self._ending)[0]), float(self.body.average(self._point)[0])))
-        return contact
+        return state
 
 
 def march_relaxing(

@@ -13,12 +13,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.contact.active_set import SHEAR_LIMITED, SLIP, STICK, Contact, System, Touchable
-from solver.contact.law import FrictionLaw
-from solver.continuation.small_states import law_of
+from solver import _kernels as kernels
+from solver._kernels import SHEAR_LIMITED, STICK
+from solver._kernels.arguments import ContactStates, SkinPosition
 from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, Newton, Shape, load_state
 from solver.mesh import Array
 from solver.scene import Scene
+
+MU, TAU_MAX, DEPTH = range(3)
 
 
 class By(NamedTuple):
@@ -40,35 +43,46 @@ class Derivatives:
     indentation: By  # [mm]
 
 
-def of_contact(finger: FingerModel, scene: Scene, contact: Contact) -> Derivatives:
+def of_contact(finger: FingerModel, scene: Scene, state: Shape) -> Derivatives:
     """Return the derivatives at a settled slide at small strain, whatever drives it.
 
     Raises ValueError where points stick: such a state depends on the way to it, and so do its derivatives.
     """
-    normal, tangential = of_forces(finger.body.touchable, law_of(scene), contact)
-    here = np.concatenate([contact.normal, contact.tangential])[:, None]
-    skin = finger.body.skin_displacement(np.concatenate([here, np.concatenate([normal, tangential])], axis=1))
-    u, *steps = np.moveaxis(finger.body.displacement(skin, only=finger.ending.nodes(finger.geometry.mesh)), 2, 0)
+    skin = of_skin(finger.newton, state)
+    along, up = finger.newton.follows(skin)
+    moved = np.concatenate([state.u.reshape(-1, 1), skin], axis=1).reshape(*state.u.shape, -1)
+    u, *steps = np.moveaxis(finger.body.displacement(moved, only=finger.ending.nodes(finger.geometry.mesh)), 2, 0)
     sed = [_bent(finger, u, step) for step in steps]
-    return driven(scene, sed, normal.sum(axis=0), drag_along(scene) * tangential.sum(axis=0))
+    return driven(scene, sed, up, drag_along(scene) * along)
 
 
-def of_forces(body: Touchable, law: FrictionLaw, contact: Contact) -> tuple[Array, Array]:
-    """Return how normal and tangential forces (k, 3) at the points of a slide change with mu, tau_max and depth.
+def of_skin(newton: Newton, state: Shape) -> Array:
+    """Return how the skin (2 k, 3) of a slide follows mu, tau_max and depth, its contact linearised as Newton does.
 
-    Raises ValueError where points stick.
+    Raises ValueError where a state is no slide, or has no tangent: it lies at a limit.
     """
-    if (contact.state == STICK).any():
+    pull, size = state.pull, len(state.state)
+    if pull.sense == 0 or (state.state == STICK).any():
         raise ValueError("a state with sticking points depends on the way to it, which its tangent does not know")
-    slips, capped = contact.state == SLIP, contact.state == SHEAR_LIMITED
-    normal, tangential = np.zeros((2, len(contact.state), 3))
-    tangential[slips, 0] = (contact.sense * contact.normal)[slips]  # what friction changes by itself
-    tangential[capped, 1] = (contact.sense * body.length)[capped]
-    lifted = body.normal_by_tangential @ tangential - [0.0, 0.0, 1.0]
-    system = System(replace(body, motions=np.zeros((2 * len(normal), 0))), law, contact.state, contact.sense)
-    normal[system.on] = system.solve(-lifted[system.on])
-    tangential[system.on] += system.drag[:, None] * normal[system.on]
-    return normal, tangential
+    if not newton.linearise(state, pull, newton.skin_x):
+        raise ValueError("the state has no tangent")
+    x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
+    position = SkinPosition(x, np.zeros(size), x)  # on the surface, and nowhere else than where it sticks
+    system = newton.system
+    kernels.bounded_length(x, newton.skin, state.state, pull.mu, system.length)
+    count = kernels.assemble_contact_system(
+        newton.arrays(), newton.skin, ContactStates(state.state, state.sense, state.reaction), load_state(pull),
+        position, system,
+    )  # fmt: skip
+    free, by = system.free[:count], np.zeros((count, 3))
+    by[:, MU], by[:, DEPTH] = system.right[:count, BY_FRICTION], system.right[:count, BY_DEPTH]
+    at, along = np.divmod(free, 2)
+    capped = (state.state[at] == SHEAR_LIMITED) & (along == 0)
+    by[:, TAU_MAX] = np.where(capped, state.sense[at] * system.length[at], 0.0)
+    out = np.zeros((2 * size, 3))
+    out[:, DEPTH] = newton.steps[:, BY_DEPTH]
+    out[free] = np.linalg.solve(system.matrix[: count * count].reshape(count, count), by)
+    return out
 
 
 def _bent(finger: FingerModel, u: Array, step: Array) -> float:

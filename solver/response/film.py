@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.contact.active_set import Contact
-from solver.contact.law import FrictionLaw
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.load_path import Instant, Progress, Way, course
+from solver.equilibrium.loads import pull_of
+from solver.equilibrium.newton import Shape
 from solver.failures import SolveFailure
 from solver.mesh import Array
 from solver.prediction import Skin
@@ -31,9 +31,7 @@ class Still:
 
 def stills(finger: FingerModel, instants: Sequence[Instant], sketch: Sketch) -> tuple[Still, ...]:
     """Return the pictures of states that `finger` was in; tissues at rest, so for ways on which nothing relaxes."""
-    forces = np.stack([np.concatenate([i.contact.normal, i.contact.tangential]) for i in instants], axis=1)
-    skins = finger.body.skin_displacement(forces)
-    displacement = finger.body.displacement(skins)
+    displacement = finger.body.displacement(np.stack([instant.state.u for instant in instants], axis=2))
     energies = sketch.energies(displacement)
     mesh, elastic = finger.geometry.mesh, finger.body.elastic
     rows = finger.row.average(mesh, elastic, displacement)
@@ -42,7 +40,7 @@ def stills(finger: FingerModel, instants: Sequence[Instant], sketch: Sketch) -> 
         Still(
             instant,
             sketch.fields(displacement[:, :, number], instant.depth, energies[:, number]),
-            skin_of(finger, instant.contact, skins[:, number]),
+            skin_of(finger, instant.state),
             rows[:, number],
             float(ending[number]),
         )
@@ -58,8 +56,7 @@ def way_until(
     They end before tissue folds: states beyond solve the equations of small strain and are none of a finger's. Raises
     Cancelled where `progress` says so.
     """
-    law = FrictionLaw(float(scene.friction.mu), scene.friction.cap)
-    way = Way(finger.body.touchable, law, scene.loading_per_mm)
+    way = Way(finger.newton, pull_of(scene), scene.loading_per_mm)
     try:
         course(way, scene.loading_per_mm, progress)
     except SolveFailure as failure:
@@ -71,14 +68,14 @@ def _unfolded(finger: FingerModel, instants: Sequence[Instant]) -> tuple[Instant
     """Return the states before the first in which tissue is turned inside out; what folds stays folded."""
 
     def folds(instant: Instant) -> bool:
-        return bool(np.prod(finger.stretches(finger.displacement(instant.contact)), axis=0).min() <= 0.0)
+        return bool(np.prod(finger.stretches(finger.displacement(instant.state)), axis=0).min() <= 0.0)
 
     return tuple(instants[: max(bisect_left(instants, True, key=folds), 1)])
 
 
-def most_squeezed(finger: FingerModel, contact: Contact, depth: float) -> tuple[float, float]:
+def most_squeezed(finger: FingerModel, state: Shape, depth: float) -> tuple[float, float]:
     """Return the place [mm] in the world where tissue is squeezed most: the corner that stretches least."""
-    displacement = finger.displacement(contact)
+    displacement = finger.displacement(state)
     mesh = finger.geometry.mesh
     corner = int(np.argmin(finger.stretches(displacement)[0]))
     node = mesh.elements[corner // 4, corner % 4]

@@ -12,8 +12,7 @@ from solver.continuation.limit_point import sound
 from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium import full_slip as sliding
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.force_control import Given
-from solver.equilibrium.newton import Pull, Shape
+from solver.equilibrium.newton import Given, Pull, Shape
 from solver.failures import NotConverged
 from solver.mesh import Array
 from solver.prediction import Prediction

@@ -26,7 +26,7 @@ from solver.continuation.finite_states import course, presses
 from solver.equilibrium.expected_depth import within_reach
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.finite_relaxation import RelaxingCourse
-from solver.equilibrium.newton import EQUILIBRIUM, Newton, Shape
+from solver.equilibrium.newton import EQUILIBRIUM, FiniteNewton, Shape
 from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.mesh import Array
 from solver.mesh.mesher import Sizing
@@ -203,7 +203,7 @@ def _skin(finger: FiniteFinger, shape: Shape) -> Skin:
 
 
 def _balanced(
-    newton: Newton, shape: Shape, audits: Callable[[Shape], dict[str, float]]
+    newton: FiniteNewton, shape: Shape, audits: Callable[[Shape], dict[str, float]]
 ) -> tuple[Shape, dict[str, float]]:
     """Return a state and its checks, its displacements so good that no force is left over but by round-off.
 

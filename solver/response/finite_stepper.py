@@ -12,8 +12,8 @@ import numpy as np
 
 from solver._kernels import OPEN, SLIP, STICK
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.force_control import Given, corrected
-from solver.equilibrium.newton import BY_DEPTH, Pull, Shape
+from solver.equilibrium.force_control import corrected
+from solver.equilibrium.newton import BY_DEPTH, Given, Pull, Shape
 from solver.mesh import Array
 
 SLIDING = 0.995  # part of the friction limit beyond which the tangential force means sliding

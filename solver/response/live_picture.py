@@ -10,6 +10,7 @@ import numpy as np
 
 from solver.body.stiffness import Probes
 from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.newton import Shape
 from solver.mesh import Array, Indices
 
 # A nine-node element as four quadrilaterals, and the middle of each in its coordinates.
@@ -19,12 +20,12 @@ MIDDLES = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LivePicture:
-    """A finger as its contact forces (2 k,) see it, those along y first."""
+    """A finger as the displacements (2 k,) of its skin see it."""
 
     faces: Indices  # (f, 4) nodes of the quadrilaterals that are drawn
     rest: Array  # (n, 2) undeformed nodes [mm]
-    _moved: Array  # (2 n, 2 k) displacements, x and y in turn [mm per N/mm]
-    _strain: Array  # (3, f, 2 k) exx, eyy and 2 exy in the middle of each face [1 per N/mm]
+    _moved: Array  # (2 n, 2 k) displacements, x and y in turn [mm per mm]
+    _strain: Array  # (3, f, 2 k) exx, eyy and 2 exy in the middle of each face [1/mm]
     _theta: Array  # (f, 2 k) volume strain there
     _shear: Array  # (f,) [MPa]
     _lame: Array  # (f,) [MPa]
@@ -33,7 +34,7 @@ class LivePicture:
     def of(cls, finger: FingerModel) -> Self:
         """Make the matrices of `finger`."""
         mesh, elastic = finger.geometry.mesh, finger.body.elastic
-        everywhere = finger.body.displacement(finger.skin_compliance())  # (nodes, 2, 2 k)
+        everywhere = finger.body.every_step()  # (nodes, 2, 2 k)
         count = len(mesh.elements)
         element = np.repeat(np.arange(count), len(MIDDLES))
         probes = Probes.at(mesh, elastic, element, np.tile(MIDDLES, (count, 1)))
@@ -48,18 +49,14 @@ class LivePicture:
             elastic.lame[element],
         )
 
-    def nodes(self, forces: Array, depth: float) -> Array:
-        """Return where the nodes are (n, 2) [mm] under contact forces (k, 2) [N/mm], the surface being y = 0."""
-        return self.rest + (self._moved @ _stacked(forces)).reshape(-1, 2) - [0.0, depth]
+    def nodes(self, state: Shape) -> Array:
+        """Return where the nodes are (n, 2) [mm], the surface being y = 0."""
+        return self.rest + (self._moved @ state.u.ravel()).reshape(-1, 2) - [0.0, state.pull.depth]
 
-    def sed(self, forces: Array) -> Array:
-        """Return the SED in the middle of each face (f,) [MPa] under contact forces (k, 2) along x and y [N/mm]."""
-        stacked = _stacked(forces)
-        xx, yy, xy = self._strain @ stacked
-        theta = self._theta @ stacked
+    def sed(self, state: Shape) -> Array:
+        """Return the SED in the middle of each face (f,) [MPa]."""
+        skin = state.u.ravel()
+        xx, yy, xy = self._strain @ skin
+        theta = self._theta @ skin
         # W = G (exx^2 + eyy^2 + 2 exy^2) + lambda/2 theta^2
         return self._shear * (xx**2 + yy**2 + xy**2 / 2.0) + self._lame / 2.0 * theta**2
-
-
-def _stacked(forces: Array) -> Array:
-    return np.concatenate([forces[:, 1], forces[:, 0]])

@@ -11,10 +11,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.contact.active_set import SLIP, Contact, ContactLost, Course, States, forced
+from solver._kernels import SLIP
 from solver.contact.law import NAMES
-from solver.continuation.small_states import law_of
 from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.full_slip import slide_beside
+from solver.equilibrium.loads import sliding_pull
+from solver.equilibrium.newton import Shape
+from solver.failures import ContactLost
 from solver.mesh import Array
 from solver.prediction import Prediction, Skin
 from solver.response.derivatives import Derivatives, of_contact
@@ -59,7 +62,7 @@ def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
             continue
         if model is None or model.geometry is not found.geometry:
             model = FingerModel.on(scene, found.geometry)
-        guess = states(found.skin).astype(np.int8)
+        guess = states(found.skin)
         try:
             yield _SmallNearby(scene, model, _slide(model, scene, guess))
         except ContactLost:
@@ -70,14 +73,14 @@ def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
 class _SmallNearby:
     scene: Scene
     finger: FingerModel
-    here: Contact
+    here: Shape
 
     def derivatives(self) -> Derivatives:
         return of_contact(self.finger, self.scene, self.here)
 
     def seds(self, scenes: Sequence[Scene]) -> Array:
         out = np.full((len(scenes), 2), np.nan)
-        held: list[tuple[int, Contact]] = []
+        held: list[tuple[int, Shape]] = []
         for number, scene in enumerate(scenes):
             try:
                 contact = _slide(self.finger, scene, self.here.state)
@@ -95,9 +98,6 @@ def states(skin: Skin) -> NDArray[np.int64]:
     return np.array([SLIP if state == "stick" else NUMBERS[state] for state in skin.state])
 
 
-def _slide(finger: FingerModel, scene: Scene, guess: States) -> Contact:
+def _slide(finger: FingerModel, scene: Scene, guess: NDArray[np.integer]) -> Shape:
     """Return the settled slide of a scene that a guess of its states leads to. Raises ContactLost."""
-    touch, law, direction = finger.body.touchable, law_of(scene), scene.loading.direction
-    if scene.normal_force is None:
-        return Course(touch, law).sliding(scene.loading.depth, direction, guess)
-    return Course(forced(touch, scene.normal_force), law).sliding(0.0, direction, guess)
+    return slide_beside(finger.newton, sliding_pull(scene), guess, scene.normal_force)

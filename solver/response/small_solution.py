@@ -4,13 +4,14 @@ Settled sliding is found directly and refused where it does not exist (`wedging`
 where tissues relax, in time (`solver.equilibrium.relaxation`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
 from numpy.linalg import LinAlgError
 
+from solver._kernels import SLIP, STICK
 from solver.accuracy.audits import (
     MIXED,
     audits,
@@ -25,23 +26,13 @@ from solver.accuracy.contrasts import those_of, together
 from solver.accuracy.omitted_effects import model, warnings
 from solver.accuracy.small_errors import error_estimates, others_on, steps_asked, times_on_way
 from solver.accuracy.step_error import Steps
-from solver.contact.active_set import SLIP, STICK, Contact
 from solver.contact.law import NAMES, FrictionLaw
 from solver.continuation.small_existence import direct
-from solver.continuation.small_states import (
-    all_numbers,
-    depends_on_way,
-    gives_way,
-    in_tissue,
-    indentation,
-    laid,
-    law_of,
-    marched,
-    shift_of,
-)
+from solver.continuation.small_states import depends_on_way, gives_way, in_tissue, marched, refined, shift_of
 from solver.continuation.wedging import WIDE
 from solver.equilibrium.finger import FingerModel
-from solver.equilibrium.load_path import March
+from solver.equilibrium.load_path import Instant
+from solver.equilibrium.newton import Shape
 from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.mesh import Array
 from solver.mesh.grid import MeshError
@@ -57,7 +48,8 @@ YIELDS = (
 )
 
 Answer = Prediction | SolveFailure
-Watch = Callable[[int, Answer, FingerModel, March | None], None]  # told each answer as it is found, and how
+Way = tuple[Instant, ...]
+Watch = Callable[[int, Answer, FingerModel, Way | None], None]  # told each answer as it is found, and how
 Progress = Callable[[float], bool]  # told the part done, 0 to 1; returns False to stop the work (Cancelled is raised)
 
 
@@ -149,7 +141,7 @@ def _of_all(progress: Progress | None, number: int, count: int) -> Progress | No
     return None if progress is None else lambda part: progress((number + part) / count)
 
 
-def _answer(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[Answer | None, March | None]:
+def _answer(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[Answer | None, Way | None]:
     """Return the answer, None where contact must be looked for on more of the skin; and the way where it has one."""
     try:
         return _predicted(scene, shared, progress) or (None, None)
@@ -171,7 +163,7 @@ def _meshed(scene: Scene, sizing: Sizing) -> FingerModel:
         raise NotConverged(f"Round-off has swallowed the finger's stiffness ({bad}): {MIXED} do that.") from bad
 
 
-def _in_steps(scene: Scene, shared: _Shared) -> tuple[Contact | None, Steps | None]:
+def _in_steps(scene: Scene, shared: _Shared) -> tuple[Shape | None, Steps | None]:
     """Return the settled state as `direct` does, and the load steps it took where it depends on its way.
 
     Where the course is asked for, an earlier slide that never settles is refused as the last one is, with its limits.
@@ -186,31 +178,33 @@ def _in_steps(scene: Scene, shared: _Shared) -> tuple[Contact | None, Steps | No
     return (contact if steps.times == 1 else direct(scene, shared.fine, steps.times, widest=shared.widest)), steps
 
 
-def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[Prediction, March | None] | None:
+def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[Prediction, Way | None] | None:
     """Return the prediction of one scene, and its way where it has one that can be drawn from forces alone.
 
     None where contact must be looked for on more of the skin.
     """
-    finger, law = shared.fine, law_of(scene)
+    finger = shared.fine
     begun = perf_counter()
     contact, steps = _in_steps(scene, shared)
     if contact is None:
         return None
     times = times_on_way(scene, shared.coarse) if steps is None else steps.times
-    way: March | None = None
+    way: Way | None = None
     over_time: Array | None = None
     direct = contact
     if scene.solve.course == "history":
         way, over_time = marched(scene, finger, progress, times)
-        contact = way.instants[-1].contact
-    skin = finger.skin_displacement(contact)
-    displacement = finger.body.displacement(skin)[:, :, 0]
-    depth = indentation(scene, contact)
+        contact = way[-1].state if over_time is None else finger.relaxed(way[-1].state)
+    displacement = finger.displacement(contact)
+    depth = contact.pull.depth
     in_tissue(scene, finger, depth)
     if finger.reaches_out(contact, displacement, depth):
         return None
     free = way is None and scene.normal_force is None and not (contact.state == STICK).any()
-    contact, displacement, checks = _balanced(finger, law, contact, depth, displacement, slides=free)
+    relaxed = over_time is not None
+    contact, displacement, checks = _balanced(
+        scene, finger, contact, displacement, at_once=free, where_seen=not relaxed
+    )
     sed = finger.sed_ending(displacement)
     refuse_unsound(checks, depth)
     checks |= forces_missed(scene, float(contact.normal.sum()), float(contact.tangential.sum()))
@@ -224,8 +218,8 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
     history = None if way is None else _history(scene, finger, way, over_time)
     row = Row(ROW, finger.sed_row(displacement))
     solved = perf_counter()
-    numbers, shift = all_numbers(scene, finger, contact), shift_of(scene, contact)
-    numbers[0] = sed
+    numbers, shift = finger.all_numbers(contact), shift_of(scene, contact)
+    numbers[0], numbers[4] = sed, shift or 0.0
     off, others = error_estimates(scene, shared.fineness, shared.coarse, numbers, steps)
     if shared.plain is not None:
         others = np.vstack([others, others_on(scene, shared.plain, steps)])
@@ -246,14 +240,14 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
         contact_width_error=off.width,
         beside=those_of(others),
         dofs=finger.body.dofs,
-        newton_iterations=contact.iterations if way is None else way.iterations,
+        newton_iterations=contact.iterations,
         wall_s=solved - begun + shared.solve_s,
         setup_s=shared.setup_s,
         estimate_s=perf_counter() - solved + shared.estimate_s,
         row=row,
         model=left,
         audits=checks,
-        skin=skin_of(finger, contact, skin[:, 0]),
+        skin=skin_of(finger, contact),
         geometry=finger.geometry,
         displacement=displacement,
         history=history,
@@ -268,48 +262,45 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
 
 
 def _balanced(
-    finger: FingerModel, law: FrictionLaw, contact: Contact, depth: float, displacement: Array, *, slides: bool
-) -> tuple[Contact, Array, dict[str, float]]:
-    """Return a state, its displacement and their audits with less round-off; `slides` at a given depth, all of it."""
-    if slides:
-        contact, displacement = laid(finger, law, contact, depth, displacement)
-    checks = audits(finger, law, contact, depth, displacement)
-    if unbalanced(checks) > ROUGH:
-        if slides:
-            contact, displacement = laid(finger, law, contact, depth, displacement)
-        else:
-            displacement = finger.balanced(contact, displacement)
-        checks = audits(finger, law, contact, depth, displacement)
-    return contact, displacement, checks
+    scene: Scene, finger: FingerModel, state: Shape, displacement: Array, *, at_once: bool, where_seen: bool
+) -> tuple[Shape, Array, dict[str, float]]:
+    """Return a state, its displacement and their audits with less round-off, taken out `at_once` or where it shows."""
+    law, depth = FrictionLaw(state.pull.mu, state.pull.tau), state.pull.depth
+    if at_once:
+        state, displacement = refined(scene, finger, state, displacement)
+    checks = audits(finger, law, state, depth, displacement)
+    if where_seen and unbalanced(checks) > ROUGH:
+        state, displacement = refined(scene, finger, state, displacement)
+        checks = audits(finger, law, state, depth, displacement)
+    return state, displacement, checks
 
 
-def skin_of(finger: FingerModel, contact: Contact, skin: Array) -> Skin:
-    """Return the skin that may touch, in a state of contact with its displacement (2 k,), normal first [mm]."""
-    mesh, k = finger.geometry.mesh, len(contact.state)
-    length = finger.body.touchable.length
+def skin_of(finger: FingerModel, state: Shape) -> Skin:
+    """Return the skin that may touch in a state of contact."""
+    place, length = state.place(finger.body.condensed), finger.body.condensed.fixed_length
     return Skin(
-        x=mesh.nodes[mesh.skin, 0] + skin[k:],
-        gap=np.where(contact.touching, 0.0, contact.gap),
-        pressure=contact.normal / length,
-        traction=contact.tangential / length,
-        state=tuple(NAMES[int(s)] for s in contact.state),
+        x=place[:, 0],
+        gap=np.where(state.touching, 0.0, place[:, 1] - state.pull.depth),
+        pressure=state.normal / length,
+        traction=state.tangential / length,
+        state=tuple(NAMES[int(s)] for s in state.state),
     )
 
 
-def _history(scene: Scene, finger: FingerModel, way: March, over_time: Array | None) -> History:
+def _history(scene: Scene, finger: FingerModel, way: Sequence[Instant], over_time: Array | None) -> History:
     """Return the course as arrays."""
-    contacts = [instant.contact for instant in way.instants]
-    sed = finger.seds(contacts) if over_time is None else over_time
-    touching = np.array([c.touching.sum() for c in contacts])
-    slipping = np.array([(c.state >= SLIP).sum() for c in contacts])
+    states = [instant.state for instant in way]
+    sed = finger.seds(states) if over_time is None else over_time
+    touching = np.array([s.touching.sum() for s in states])
+    slipping = np.array([(s.state >= SLIP).sum() for s in states])
     return History(
-        time=np.array([i.time for i in way.instants]),
-        bone_x=np.array([i.travel for i in way.instants]),
-        bone_y=np.array([-i.depth for i in way.instants]),
+        time=np.array([i.time for i in way]),
+        bone_x=np.array([i.travel for i in way]),
+        bone_y=np.array([-i.depth for i in way]),
         sed_ending=sed[:, 0],
         sed_point=sed[:, 1],
-        normal_force=np.array([c.normal.sum() for c in contacts]),
-        tangential_force=np.array([drag(scene, float(c.tangential.sum())) for c in contacts]),
-        contact_width=np.array([finger.contact_width(c, np.concatenate([c.gap, c.shift])) for c in contacts]),
+        normal_force=np.array([s.normal.sum() for s in states]),
+        tangential_force=np.array([drag(scene, float(s.tangential.sum())) for s in states]),
+        contact_width=np.array([finger.contact_width(s) for s in states]),
         slipping=slipping / np.maximum(touching, 1),
     )

@@ -49,7 +49,7 @@ def test_the_trial_that_is_wanted_first_is_told_first_and_each_as_it_stays(watch
 
 def test_the_pictures_of_the_way_end_at_the_settled_finger_and_show_the_history(watched):
     _, row, way = watched[1][0]
-    instants = [way.march.instants[at] for at in (5, 30, -1)]
+    instants = [way.march[at] for at in (5, 30, -1)]
     pressed, dragged, last = stills(way.finger, instants, Sketch.of(way.finger.geometry.mesh, way.scene))
     history = row.history
     for still, at in ((pressed, 5), (dragged, 30), (last, -1)):
@@ -73,9 +73,9 @@ def test_a_solve_without_an_answer_is_followed_to_its_last_good_state(watched):
     assert times == sorted(times)
     assert times[-1] >= 1.0  # it was pressed, and lost while it slid
     last = instants[-1]
-    assert np.prod(way.finger.stretches(way.finger.displacement(last.contact)), axis=0).min() > 0.0  # nothing folds
-    x, y = most_squeezed(way.finger, last.contact, last.depth)
-    nodes = way.finger.geometry.mesh.nodes + way.finger.displacement(last.contact)
+    assert np.prod(way.finger.stretches(way.finger.displacement(last.state)), axis=0).min() > 0.0  # nothing folds
+    x, y = most_squeezed(way.finger, last.state, last.depth)
+    nodes = way.finger.geometry.mesh.nodes + way.finger.displacement(last.state)
     assert nodes[:, 0].min() <= x <= nodes[:, 0].max()
     assert y <= nodes[:, 1].max()
 

@@ -10,7 +10,7 @@ from solver.body.stiffness import Elastic
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.newton import Newton
+from solver.equilibrium.newton import FiniteNewton
 from solver.mesh import Mesh
 from solver.mesh.mesher import Sizing, finger_mesh
 from solver.scene import Finger, Friction, Loading, Materials, Receptor, Scene, Solve
@@ -25,7 +25,7 @@ def finger(fineness, indentation=2.0, margin=2.0, nu=0.48):
     body = FiniteBody.of(made.mesh, [NeoHooke(E, nu) for E in moduli])
     elastic = Elastic.of(made.mesh, [Hooke(E, nu) for E in moduli])
     probes = FiniteProbes.of(body, endings(made, elastic, Receptor(), np.zeros(1)))
-    return Newton(body), probes, made.whole
+    return FiniteNewton(body), probes, made.whole
 
 
 @cache

@@ -9,7 +9,7 @@ import pytest
 from daq_app.accuracy.published import contacts
 from daq_app.accuracy.published.contacts import ELEMENT
 from daq_app.accuracy.published.problems import BELOW, CAPPED, HERTZ, PARTS
-from solver.contact.active_set import OPEN, SHEAR_LIMITED, SLIP
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
 from solver.contact.law import FrictionLaw
 
 

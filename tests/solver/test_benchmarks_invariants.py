@@ -1,15 +1,17 @@
 """What must hold in the finger's own scene, whatever its numbers: balance, work, mirror, rate, scale, mesh."""
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from solver.contact.active_set import SHEAR_LIMITED, SLIP, Contact, Course
+from solver._kernels import SHEAR_LIMITED, SLIP
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.full_slip import settled
 from solver.equilibrium.load_path import march
+from solver.equilibrium.loads import sliding_pull
+from solver.equilibrium.newton import Pull, Shape
 from solver.mesh.mesher import Sizing
 from solver.scene import Friction, Loading, Material, Materials, Scene
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
@@ -26,18 +28,22 @@ def finger():
 @pytest.fixture(scope="module")
 def ways(finger):
     loadings = {1: Loading(1.5, "+x"), -1: Loading(1.5, "-x")}
-    return {(law, way): march(finger.body.touchable, LAWS[law], loadings[way]) for law, way in WAYS}
+    return {(law, way): march(finger.newton, pull_of(LAWS[law]), loadings[way]) for law, way in WAYS}
 
 
-def bone_force(finger, contact: Contact):
+def pull_of(law):
+    return Pull(0.0, law.mu, law.tau_max)
+
+
+def bone_force(finger, contact: Shape):
     inner = finger.body.reactions(finger.displacement(contact)[:, :, None])[:, :, 0]
     return inner[finger.geometry.mesh.held].sum(axis=0)
 
 
 @pytest.mark.parametrize("way", WAYS)
 def test_at_every_step_the_bone_bears_what_the_surface_presses(finger, ways, way):
-    for instant in ways[way].instants[1:]:
-        contact = instant.contact
+    for instant in ways[way][1:]:
+        contact = instant.state
         bone, total = bone_force(finger, contact), contact.normal.sum()
         assert abs(bone[0] + contact.tangential.sum()) < 1e-11 * total
         assert abs(bone[1] + total) < 1e-11 * total
@@ -45,42 +51,41 @@ def test_at_every_step_the_bone_bears_what_the_surface_presses(finger, ways, way
 
 @pytest.mark.parametrize("way", WAYS)
 def test_at_every_step_nothing_lies_below_the_surface_pulls_or_drags_beyond_the_law(finger, ways, way):
-    law, length = LAWS[way[0]], finger.body.touchable.length
-    for instant in ways[way].instants[1:]:
-        contact = instant.contact
+    law, length = LAWS[way[0]], finger.body.condensed.fixed_length
+    for instant in ways[way][1:]:
+        contact = instant.state
         push = contact.normal.max()
-        assert contact.gap.min() > -1e-9 * instant.depth
+        assert contact.place(finger.body.condensed)[:, 1].min() - instant.depth > -1e-9 * instant.depth
         assert contact.normal.min() >= -1e-10 * push
         assert (np.abs(contact.tangential) - law.limit(contact.normal, length)).max() < 1e-10 * push
 
 
 @pytest.mark.parametrize("way", WAYS)
 def test_in_steady_sliding_the_drag_is_the_law_s(finger, ways, way):
-    law, contact = LAWS[way[0]], ways[way].instants[-1].contact
+    law, contact = LAWS[way[0]], ways[way][-1].state
     assert set(contact.state[contact.touching].tolist()) <= {SLIP, SHEAR_LIMITED}
     drag, force = -way[1] * contact.tangential.sum(), contact.normal.sum()
     if law.tau_max == np.inf:
         assert drag / force == pytest.approx(law.mu, rel=1e-12)
     else:
-        length = finger.body.touchable.length[contact.touching].sum()
+        length = finger.body.condensed.fixed_length[contact.touching].sum()
         assert drag <= min(law.mu * force, law.tau_max * length)
         assert (contact.state == SHEAR_LIMITED).any()
         assert (contact.state == SLIP).any()
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_at_every_step_the_bone_s_work_is_stored_or_rubbed_away(finger, ways, way):
+def test_at_every_step_the_bone_s_work_is_stored_or_rubbed_away(ways, way):
     """Trapezoidal work of each step; gaps that close within a step are the rest, told as its own part."""
-    instants = ways[way].instants
+    instants = ways[way]
     stored, scale = 0.0, None
     for before, after in pairwise(instants):
-        one, other = before.contact, after.contact
+        one, other = before.state, after.state
         normal, along = (one.normal + other.normal) / 2, (one.tangential + other.tangential) / 2
         bone = normal.sum() * (after.depth - before.depth) - along.sum() * (after.travel - before.travel)
-        moved = finger.skin_displacement(other)[:, 0]
-        now = 0.5 * np.concatenate([other.normal, other.tangential]) @ moved
-        rubbed = -along @ (other.shift - one.shift)
-        closed = -normal @ (other.gap - one.gap)
+        moved = other.u - one.u - [before.travel - after.travel, after.depth - before.depth]  # over the surface
+        now = 0.5 * np.sum(other.reaction * other.u)
+        rubbed, closed = -along @ moved[:, 0], -normal @ moved[:, 1]
         scale = max(now, scale or 0.0)
         assert abs(bone - (now - stored) - rubbed - closed) < 1e-12 * scale
         assert rubbed > -1e-12 * scale
@@ -90,26 +95,25 @@ def test_at_every_step_the_bone_s_work_is_stored_or_rubbed_away(finger, ways, wa
 @pytest.mark.parametrize("way", WAYS)
 def test_in_steady_sliding_all_the_bone_s_work_is_the_drag_s(ways, way):
     """Dissipation rate = T V: over the last step nothing more is stored."""
-    before, after = ways[way].instants[-2:]
+    before, after = ways[way][-2:]
     distance = after.travel - before.travel
-    rubbed = -after.contact.tangential @ (after.contact.shift - before.contact.shift)
-    assert rubbed == pytest.approx(-after.contact.tangential.sum() * distance, rel=1e-10)
+    rubbed = -after.state.tangential @ (after.state.u - before.state.u + distance)[:, 0]
+    assert rubbed == pytest.approx(-after.state.tangential.sum() * distance, rel=1e-10)
 
 
 def test_speed_only_rescales_time(finger):
-    law = LAWS["bound"]
-    slow, fast = (march(finger.body.touchable, law, Loading(1.5, "+x", speed)) for speed in (1.0, 40.0))
-    for one, other in zip(slow.instants, fast.instants, strict=True):
+    pull = pull_of(LAWS["bound"])
+    slow, fast = (march(finger.newton, pull, Loading(1.5, "+x", speed)) for speed in (1.0, 40.0))
+    for one, other in zip(slow, fast, strict=True):
         assert one.travel == other.travel
-        assert np.array_equal(one.contact.normal, other.contact.normal)
+        assert np.array_equal(one.state.normal, other.state.normal)
         assert (one.time - 1.0) == pytest.approx(40.0 * (other.time - 1.0), rel=1e-9) or one.time <= 1.0
 
 
 def test_without_friction_either_way_is_the_static_answer(finger):
-    course = Course(finger.body.touchable, FrictionLaw(0.0, np.inf))
-    there, back = course.sliding(1.5, 1), course.sliding(1.5, -1)
+    there, back = (settled(finger.newton, Pull(1.5, 0.0, sense=way)) for way in (-1, 1))
     assert np.array_equal(there.normal, back.normal)
-    static = march(finger.body.touchable, FrictionLaw(0.0, np.inf), Loading(1.5, "none")).instants[-1].contact
+    static = march(finger.newton, Pull(0.0, 0.0), Loading(1.5, "none"))[-1].state
     assert np.abs(static.normal - there.normal).max() < 1e-13 * there.normal.max()
 
 
@@ -119,9 +123,8 @@ def test_stiffer_everything_scales_forces_and_energy_and_moves_nothing(finger, f
     stiff = Materials(*(Material(factor * t.E, t.nu) for t in (m.epidermis, m.dermis, m.fat, m.bone)))
     asked = Scene(friction=Friction(0.0), loading=Loading(1.5), materials=stiff)
     other = FingerModel.of(asked, Sizing(8, 1.5))
-    law = LAWS["bound"]
-    one = Course(finger.body.touchable, law).sliding(1.5, 1)
-    two = Course(other.body.touchable, replace(law, tau_max=factor * law.tau_max)).sliding(1.5, 1)
+    pull = pull_of(LAWS["bound"])._replace(depth=1.5, sense=-1)
+    one, two = settled(finger.newton, pull), settled(other.newton, pull._replace(tau=factor * pull.tau))
     assert np.array_equal(one.state, two.state)
     assert np.abs(two.normal / factor - one.normal).max() < 1e-11 * one.normal.max()
     moved, same = finger.displacement(one), other.displacement(two)
@@ -133,11 +136,10 @@ def test_stiffer_everything_scales_forces_and_energy_and_moves_nothing(finger, f
 def test_three_meshes_come_closer_and_closer_to_one_answer(surface):
     """Each mesh has elements half as long; the last two differ by less than a third of a percent."""
     asked = scene(surface)
-    law = FrictionLaw(asked.friction.mu, asked.friction.cap)
     seds = []
     for fineness in (6, 12, 24):
         model = FingerModel.of(asked, Sizing(fineness, asked.loading.indentation))
-        contact = Course(model.body.touchable, law).sliding(asked.loading.indentation, asked.loading.direction)
+        contact = settled(model.newton, sliding_pull(asked))
         seds.append(model.sed_ending(model.displacement(contact)))
     first, last = abs(seds[1] - seds[0]), abs(seds[2] - seds[1])
     assert last < 0.003 * seds[2]

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from daq_app.accuracy.published.bodies import distorted
-from solver.body.linear import Body, edge_load
+from solver._kernels import SHEAR_LIMITED, SLIP, STICK
+from solver.body.linear import LinearBody, edge_load
 from solver.body.stiffness import Probes
 from solver.constitutive.linear import Hooke
-from solver.contact.active_set import SHEAR_LIMITED, SLIP, STICK, Course, untouched
-from solver.contact.law import FrictionLaw
 from solver.element import Q2P1
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.newton import Newton, Pull, Shape
 from solver.mesh import Mesh
 from solver.mesh.blocks import block
 from solver.mesh.grid import quality
@@ -42,8 +43,8 @@ def sheet(kind: str) -> Mesh:
 def test_a_linear_field_on_the_boundary_is_linear_inside_and_its_stress_constant(kind, nu, round_off):
     mesh = sheet(kind)
     exact = mesh.nodes @ GRADIENT.T
-    body = Body.of(mesh, [Hooke(1.0, nu)], prescribed=exact * mesh.driven)
-    found = body.displacement(np.zeros((0, 1)))[:, :, 0]
+    body = LinearBody.of(mesh, [Hooke(1.0, nu)], prescribed=exact * mesh.driven)
+    found = body.displacement(np.zeros((0, 2)))
     assert np.abs(found - exact).max() < round_off
     everywhere = np.repeat(np.arange(len(mesh.elements)), 4), np.tile(Q2P1.corners, (len(mesh.elements), 1))
     probes = Probes.at(mesh, body.elastic, *everywhere)
@@ -68,20 +69,21 @@ def pressed(nu: float, shear: float, seed: int):
 @pytest.mark.parametrize(("nu", "round_off"), [(0.0, 1e-12), (0.48, 1e-12), (0.4999999, 1e-7)])
 def test_a_uniform_pressure_comes_through_a_distorted_block_unchanged(seed, nu, round_off):
     mesh, loads = pressed(nu, 0.0, seed)
-    body = Body.of(mesh, [Hooke(0.08, nu)], loads, free=("y", "turn"))
-    found = Course(body.touchable, FrictionLaw(0.0, np.inf)).sliding(0.0, 1)
-    assert np.abs(found.normal / body.touchable.length / 1e-3 - 1.0).max() < round_off
+    body = LinearBody.of(mesh, [Hooke(0.08, nu)], loads, free=("y", "turn"))
+    found = settled(Newton(body.condensed), Pull(0.0, 0.0, np.inf, -1))
+    assert np.abs(found.normal / body.condensed.fixed_length / 1e-3 - 1.0).max() < round_off
 
 
 @pytest.mark.parametrize("part", [0.0, 0.1, 0.5, 0.9, 0.999999])
 def test_a_block_sheared_below_mu_p_sticks_at_every_point(part):
     mu = 0.4
     mesh, loads = pressed(0.48, part * mu * 1e-3, 1)
-    body = Body.of(mesh, [Hooke(0.08, 0.48)], loads, free=("x", "y", "turn"))
-    still = replace(untouched(body.touchable), state=np.full(len(mesh.skin), STICK, np.int8))
-    found = Course(body.touchable, FrictionLaw(mu, np.inf)).step(still, 0.0, 0.0)
+    body = LinearBody.of(mesh, [Hooke(0.08, 0.48)], loads, free=("x", "y", "turn"))
+    newton = Newton(body.condensed)
+    still = replace(Shape.undeformed(body.condensed), state=np.full(len(mesh.skin), STICK, np.int32))
+    found = newton.solved(still, Pull(0.0, mu), newton.skin_x)
     assert (found.state == STICK).all()
-    assert np.abs(found.tangential / body.touchable.length + part * mu * 1e-3).max() < 1e-15
+    assert np.abs(found.tangential / body.condensed.fixed_length + part * mu * 1e-3).max() < 1e-15
 
 
 @pytest.mark.parametrize("bound", [0.0, 1e-9, 1e-4, 3.999e-4, 4.001e-4, 1e9])
@@ -90,8 +92,8 @@ def test_a_uniform_patch_drags_by_the_smaller_of_mu_p_and_the_bound_exactly(boun
     mu = 0.4
     shear = min(mu * 1e-3, bound)
     mesh, loads = pressed(0.48, shear, 1)
-    body = Body.of(mesh, [Hooke(0.08, 0.48)], loads, free=("y", "turn"))
-    found = Course(body.touchable, FrictionLaw(mu, bound)).sliding(0.0, 1)
+    body = LinearBody.of(mesh, [Hooke(0.08, 0.48)], loads, free=("y", "turn"))
+    found = settled(Newton(body.condensed), Pull(0.0, mu, bound, -1))
     assert (found.state == (SLIP if bound > mu * 1e-3 else SHEAR_LIMITED)).all()
-    assert np.abs(found.tangential / body.touchable.length + shear).max() < 1e-15
+    assert np.abs(found.tangential / body.condensed.fixed_length + shear).max() < 1e-15
     assert -found.tangential.sum() == pytest.approx(min(mu * 2e-3, bound * 2.0), rel=1e-12, abs=1e-18)

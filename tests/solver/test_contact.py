@@ -5,16 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.body.linear import Body
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
+from solver.body.linear import LinearBody
 from solver.constitutive.linear import Hooke
-from solver.contact.active_set import OPEN, SHEAR_LIMITED, SLIP, STICK, ContactLost, Course, forced, untouched
-from solver.contact.law import FrictionLaw
+from solver.equilibrium.force_control import balanced
+from solver.equilibrium.full_slip import settled, slide_beside, slide_under
+from solver.equilibrium.newton import Given, Newton, Pull, Shape
+from solver.failures import ContactLost
 from solver.mesh.blocks import block
 
 RADIUS = 5.0
 
 
-def cylinder(half_width: float, finest: float, nu: float = 0.48, zone: float = 0.9) -> Body:
+def cylinder(half_width: float, finest: float, nu: float = 0.48, zone: float = 0.9) -> LinearBody:
     """A soft round body, wide and deep against its contact, fine where it touches."""
     steps = [0.0]
     while steps[-1] < half_width:
@@ -24,19 +27,18 @@ def cylinder(half_width: float, finest: float, nu: float = 0.48, zone: float = 0
     up = [0.0]
     while up[-1] < 14.0:
         up.append(up[-1] + finest + 0.25 * up[-1])
-    return Body.of(block(lines, np.array(up) * 14.0 / up[-1], RADIUS), [Hooke(0.08, nu)])
+    return LinearBody.of(block(lines, np.array(up) * 14.0 / up[-1], RADIUS), [Hooke(0.08, nu)])
 
 
 @pytest.fixture(scope="module")
 def pressed():
     """P = 0.01 N/mm on R = 5, E = 0.08, nu = 0.48: a = 0.782578 mm, p0 = 0.008135 MPa (Johnson 1985, ch. 4)."""
     body = cylinder(4.5, 0.06)
-    found = Course(forced(body.touchable, 0.01), FrictionLaw(0.0, np.inf)).sliding(0.0, 1)
-    return body, found
+    return body, slide_under(Newton(body.condensed), Pull(0.0, 0.0, sense=-1), 0.01)
 
 
 def start_state(body, half_width=0.7):
-    return np.where(np.abs(body.mesh.nodes[body.mesh.skin, 0]) < half_width, SLIP, OPEN).astype(np.int8)
+    return np.where(np.abs(body.mesh.nodes[body.mesh.skin, 0]) < half_width, SLIP, OPEN)
 
 
 def test_a_pressed_cylinder_touches_and_presses_as_hertz_says(pressed):
@@ -45,7 +47,7 @@ def test_a_pressed_cylinder_touches_and_presses_as_hertz_says(pressed):
     assert found.normal.sum() == pytest.approx(0.01, rel=1e-12)
     touching = x[found.touching]
     assert np.ptp(touching) / 2 == pytest.approx(0.782578, abs=0.031)  # half an element
-    pressure = found.normal / body.touchable.length
+    pressure = found.normal / body.condensed.fixed_length
     inside = np.abs(x) < 0.7
     hertz = 0.008135 * np.sqrt(1 - (x[inside] / 0.782578) ** 2)
     assert np.abs(pressure[inside] - hertz).max() < 0.02 * 0.008135
@@ -57,8 +59,8 @@ def test_friction_with_a_bound_on_a_hertz_pressure_carries_the_closed_form(press
     """t = min(mu p, tau_max), k = tau_max/(mu p0): Q/(mu P) = 0.895912, 0.715243, 0.495368."""
     body, frictionless = pressed
     mu = 0.02  # so small that the drag does not move the pressure
-    law = FrictionLaw(mu, k * mu * 0.008135)
-    found = Course(forced(body.touchable, 0.01), law).sliding(0.0, 1, frictionless.state)
+    pull = Pull(0.0, mu, k * mu * 0.008135, -1)
+    found = slide_beside(Newton(body.condensed), pull, frictionless.state, 0.01)
     exact = {0.8: 0.895912, 0.6: 0.715243, 0.4: 0.495368}[k]
     assert -found.tangential.sum() / (mu * 0.01) == pytest.approx(exact, rel=0.005)
     x = body.mesh.nodes[body.mesh.skin, 0]
@@ -68,13 +70,12 @@ def test_friction_with_a_bound_on_a_hertz_pressure_carries_the_closed_form(press
 
 @pytest.mark.parametrize("tau_max", [np.inf, 1e-4, 0.0])
 def test_the_short_way_to_settled_sliding_ends_where_steps_from_another_guess_do(pressed, tau_max):
-    touch = pressed[0].touchable
-    course = Course(touch, FrictionLaw(0.4, tau_max))
-    far = np.where(touch.gap < 0.02, SLIP, OPEN).astype(np.int8)
-    short, long = course.sliding(0.01, +1), course.sliding(0.01, +1, far)
+    newton, pull = Newton(pressed[0].condensed), Pull(0.01, 0.4, tau_max, -1)
+    far = np.where(pressed[0].condensed.rest[:, 1] < 0.02, SLIP, OPEN)
+    short, long = settled(newton, pull), slide_beside(newton, pull, far)
     assert np.array_equal(short.state, long.state)
     assert (short.state == SHEAR_LIMITED).any() == (tau_max < np.inf)
-    for name in ("normal", "tangential", "gap", "shift"):
+    for name in ("normal", "tangential", "u"):
         mine, other = getattr(short, name), getattr(long, name)
         np.testing.assert_allclose(mine, other, rtol=0.0, atol=1e-12 * np.abs(other).max() + 1e-300)
 
@@ -82,14 +83,14 @@ def test_the_short_way_to_settled_sliding_ends_where_steps_from_another_guess_do
 @pytest.mark.parametrize("mu", [0.1, 0.4])
 def test_what_slides_without_a_bound_drags_by_mu_times_the_normal_force(mu):
     body = cylinder(4.5, 0.2)
-    found = Course(body.touchable, FrictionLaw(mu, np.inf)).sliding(0.1, 1)
+    found = settled(Newton(body.condensed), Pull(0.1, mu, sense=-1))
     assert -found.tangential.sum() / found.normal.sum() == pytest.approx(mu, rel=1e-13)
 
 
 def test_sliding_the_other_way_mirrors_the_forces_of_a_mirrored_body():
     body = cylinder(4.5, 0.2)
-    one = Course(body.touchable, FrictionLaw(0.3, np.inf)).sliding(0.1, 1)
-    other = Course(body.touchable, FrictionLaw(0.3, np.inf)).sliding(0.1, -1)
+    one = settled(Newton(body.condensed), Pull(0.1, 0.3, sense=-1))
+    other = settled(Newton(body.condensed), Pull(0.1, 0.3, sense=1))
     assert np.allclose(one.normal, other.normal[::-1], atol=1e-15)
     assert np.allclose(one.tangential, -other.tangential[::-1], atol=1e-15)
 
@@ -105,30 +106,29 @@ def test_partial_slip_sticks_inside_as_cattaneo_and_mindlin_say(part):
     a = np.sqrt(4 * load * RADIUS / (np.pi * stiffness))
     p0 = 2 * load / (np.pi * a)
     body = cylinder(4.5, 0.02, nu, zone=0.3)
-    free = forced(body.touchable, load)
-    law = FrictionLaw(mu, np.inf)
-    now = Course(free, FrictionLaw(0.0, np.inf)).sliding(0.0, 1, start_state(body, 0.2))
+    newton = Newton(body.condensed)
+    now = slide_beside(newton, Pull(0.0, 0.0, sense=-1), start_state(body, 0.2), load)
     # all that touches sticks where it is; then the drive moves along until the drag is the part asked for
-    now = replace(now, state=np.where(now.touching, STICK, OPEN).astype(np.int8))
-    course, travel = Course(free, law), 0.0
-    while -now.tangential.sum() < part * mu * load:
-        travel += 2e-6
-        now = course.step(now, 0.0, travel)
+    now = replace(now, state=np.where(now.touching, STICK, OPEN).astype(np.int32), pull=Pull(now.pull.depth, mu))
+    travel = 0.0
+    while -now.force[0] < part * mu * load:
+        travel -= 2e-6
+        now = balanced(newton, now, Given(load, None, travel))
     reached = -now.tangential.sum() / (mu * load)
     x = body.mesh.nodes[body.mesh.skin, 0]
     assert np.ptp(x[now.state == STICK]) / 2 == pytest.approx(a * np.sqrt(1 - reached), abs=0.02)
-    traction = -(now.tangential / body.touchable.length)[np.abs(x) < 0.03].mean()
+    traction = -(now.tangential / body.condensed.fixed_length)[np.abs(x) < 0.03].mean()
     assert traction == pytest.approx(mu * p0 * (1 - np.sqrt(1 - reached)), rel=0.02)
 
 
 def test_a_tyre_that_cannot_slide_is_reported_lost():
     body = cylinder(4.5, 0.4)
     with pytest.raises(ContactLost):
-        Course(body.touchable, FrictionLaw(50.0, np.inf)).sliding(0.2, 1)
+        settled(Newton(body.condensed), Pull(0.2, 50.0, sense=-1))
 
 
 def test_before_first_touch_nothing_is_felt():
     body = cylinder(4.5, 0.4)
-    before = untouched(body.touchable)
+    before = Newton(body.condensed).settle(Shape.undeformed(body.condensed), Pull(-0.01, 0.3))
     assert not before.normal.any()
-    assert before.gap.min() == pytest.approx(0.0, abs=1e-12)
+    assert before.place(body.condensed)[:, 1].min() == pytest.approx(0.0, abs=1e-12)

@@ -6,22 +6,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.finite import FiniteBody, FiniteProbes
+from solver.body.linear import CondensedLinear
 from solver.body.receptor import Endings
 from solver.body.stiffness import Elastic, Probes
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
 from solver.constitutive.hyperelastic import shape as grown
 from solver.constitutive.linear import Hooke
-from solver.contact.active_set import OPEN, SHEAR_LIMITED, SLIP, STICK, Course, Touchable
-from solver.contact.law import FrictionLaw
-from solver.continuation.small_states import law_of, numbers_on, settled
+from solver.continuation.small_states import settled
 from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium import full_slip as sliding
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.newton import Pull
+from solver.equilibrium.newton import Newton, Pull
 from solver.mesh.mesher import Sizing
-from solver.response.derivatives import of_contact, of_forces
+from solver.response.derivatives import of_contact, of_skin
 from solver.response.finite_derivatives import of_shape, slope
 from solver.scene import Friction, Loading, Scene, Solve
 from tests.solver.finite_examples import block
@@ -74,8 +74,8 @@ def small_numbers(finger, scene, states):
     """Return SED, normal force, drag and depth of a settled slide, which must have these states."""
     contact = settled(scene, finger)
     assert (contact.state == states).all()
-    depth = scene.loading.indentation or -float(contact.motion[0])
-    sed, normal, tangential = numbers_on(finger, [contact])[0]
+    depth = contact.pull.depth
+    sed, normal, tangential = finger.numbers([contact])[0]
     return np.array([sed, normal, -scene.loading.direction * tangential, depth])
 
 
@@ -120,27 +120,24 @@ def test_a_given_force_drags_with_mu_times_it(small):
 
 def springs(coupling):
     """Two points that may touch, the second higher than any depth, of compliance 3 along y and 5 along x."""
-    ones = np.eye(2)
-    return Touchable(
-        gap=np.array([0.0, 9.0]), length=np.array([0.7, 0.7]), normal_by_normal=3.0 * ones,
-        normal_by_tangential=coupling * ones, tangential_by_tangential=5.0 * ones, normal_free=np.zeros(2),
-        tangential_free=np.zeros(2), motions=np.zeros((4, 0)), resultants=np.zeros(0),
-    )  # fmt: skip
+    stiffness = np.kron(np.eye(2), np.linalg.inv([[5.0, coupling], [coupling, 3.0]]))
+    rest = np.array([[0.0, 0.0], [1.0, 9.0]])
+    return Newton(CondensedLinear(rest, stiffness, np.zeros(4), np.array([0.7, 0.7]), np.zeros(2, np.int32)))
 
 
 def test_one_point_on_springs_answers_as_its_formula_says():
     """N = d / (3 + s mu b), and at the bound N = (d - s b tau L) / 3, with s = -1 for a slide along +x."""
     d, b, mu, tau, length = 0.6, 0.8, 0.5, 0.04, 0.7
-    slips = Course(springs(b), FrictionLaw(mu, np.inf)).sliding(d, 1)
-    normal, drag = of_forces(springs(b), FrictionLaw(mu, np.inf), slips)
+    newton, pull = springs(b), Pull(d, mu, sense=-1)
+    along, up = newton.follows(of_skin(newton, sliding.settled(newton, pull)))
     soft = 3.0 - mu * b
-    assert normal[0] == pytest.approx([b * d / soft**2, 0.0, 1.0 / soft], rel=1e-14)
-    assert drag[0] == pytest.approx([-d / soft - mu * b * d / soft**2, 0.0, -mu / soft], rel=1e-14)
-    capped = Course(springs(b), FrictionLaw(mu, tau)).sliding(d, 1)
+    assert up == pytest.approx([b * d / soft**2, 0.0, 1.0 / soft], rel=1e-13)
+    assert along == pytest.approx([-d / soft - mu * b * d / soft**2, 0.0, -mu / soft], rel=1e-13)
+    capped = sliding.settled(newton, pull._replace(tau=tau))
     assert capped.state.tolist() == [SHEAR_LIMITED, OPEN]
-    normal, drag = of_forces(springs(b), FrictionLaw(mu, tau), capped)
-    assert normal[0] == pytest.approx([0.0, b * length / 3.0, 1.0 / 3.0], rel=1e-14)
-    assert drag[0] == pytest.approx([0.0, -length, 0.0], rel=1e-14)
+    along, up = newton.follows(of_skin(newton, capped))
+    assert up == pytest.approx([0.0, b * length / 3.0, 1.0 / 3.0], rel=1e-13)
+    assert along == pytest.approx([0.0, -length, 0.0], rel=1e-13)
 
 
 def test_at_a_kink_each_side_has_the_slope_of_its_own_states(small):
@@ -157,7 +154,7 @@ def test_at_a_kink_each_side_has_the_slope_of_its_own_states(small):
         low, high = (middle, high) if at(middle).touching.sum() == at(1.2).touching.sum() else (low, middle)
     slopes = []
     for side, depth in ((-1.0, low), (1.0, high)):
-        far, near = (numbers_on(small, [at(depth + side * by)])[0, 0] for by in (1e-3, 0.0))
+        far, near = (small.numbers([at(depth + side * by)])[0, 0] for by in (1e-3, 0.0))
         begun, ended = (
             of_contact(small, moved(here, "press", one - 1.2), at(one)).sed.indentation
             for one in (depth, depth + side * 1e-3)
@@ -165,12 +162,12 @@ def test_at_a_kink_each_side_has_the_slope_of_its_own_states(small):
         assert side * (far - near) / 1e-3 == pytest.approx((begun + ended) / 2.0, rel=1e-6)  # a parabola's chord
         slopes.append(begun)
     assert abs(slopes[1] / slopes[0] - 1.0) > 1e-4
-    assert numbers_on(small, [at(low)])[0, 0] == pytest.approx(numbers_on(small, [at(high)])[0, 0], rel=1e-9)
+    assert small.numbers([at(low)])[0, 0] == pytest.approx(small.numbers([at(high)])[0, 0], rel=1e-9)
 
 
 def test_a_state_that_sticks_has_no_derivatives_of_its_own(small):
     contact = settled(SMALL["without a bound"], small)
-    stuck = replace(contact, state=np.where(contact.state == SLIP, STICK, contact.state).astype(np.int8))
+    stuck = replace(contact, state=np.where(contact.state == SLIP, STICK, contact.state).astype(np.int32))
     with pytest.raises(ValueError, match="depends on the way"):
         of_contact(small, SMALL["without a bound"], stuck)
 
@@ -184,7 +181,7 @@ def finite():
 
 
 def pull_of(scene, depth):
-    return Pull(depth, scene.friction.mu, law_of(scene).tau_max, -scene.loading.direction)
+    return Pull(depth, scene.friction.mu, scene.friction.cap, -scene.loading.direction)
 
 
 def slid(finger, scene, start=None):

@@ -179,7 +179,7 @@ def relaxing_block(distortion=0.06):
 
 def whole(newton, u, pressure):
     """Forces (e, 18) and tangents (e, 18, 18) in plain NumPy."""
-    body, T = newton.body, newton._tensor
+    body, T = newton.body, newton.relaxing.tensor
     force, tangent = oracle.forces_and_tangents(body, u, pressure)
     gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
     bend = overstress.tangent(T, oracle.deformation(body, u))
@@ -194,7 +194,7 @@ def test_compiled_forces_and_tangents_agree_with_the_plain_ones_and_with_differe
     body, pressure = newton.body, np.zeros((len(newton.body.nodes), 3))
     u = start.u + 0.3 * start.u[::-1]
     u[body.mesh.held] = 0.0
-    assert newton._assembled(replace(start, u=u, pressure=pressure)) > 0.0
+    assert newton.relaxing.assemble(u, pressure) > 0.0
     force, tangent = whole(newton, u, pressure)
     inside = np.linalg.inv(tangent[:, 16:, 16:])
     across = tangent[:, :16, 16:] @ inside
@@ -202,15 +202,15 @@ def test_compiled_forces_and_tangents_agree_with_the_plain_ones_and_with_differe
     expected = np.zeros(body.size + 1)
     np.add.at(expected, body.unknown.reshape(-1, 16), force[:, :16] - (across @ force[:, 16:, None])[:, :, 0])
     scale = np.abs(tangent).max()
-    np.testing.assert_allclose(np.tril(newton.system.tangent), np.tril(outer), atol=1e-12 * scale)
-    np.testing.assert_allclose(newton.force, expected[:-1], atol=1e-13 * scale)
+    np.testing.assert_allclose(np.tril(newton.relaxing.system.tangent), np.tril(outer), atol=1e-12 * scale)
+    np.testing.assert_allclose(newton.relaxing.all_forces, expected[:-1], atol=1e-13 * scale)
     # the same forces for a tangent kept from there
     other = 0.7 * u
-    assert newton._resisted(replace(start, u=other)) > 0.0
+    assert newton.relaxing.resist(other) > 0.0
     force, _ = whole(newton, other, pressure)
     expected[:] = 0.0
     np.add.at(expected, body.unknown.reshape(-1, 16), force[:, :16] - (across @ force[:, 16:, None])[:, :, 0])
-    np.testing.assert_allclose(newton.force, expected[:-1], atol=1e-13 * scale)
+    np.testing.assert_allclose(newton.relaxing.all_forces, expected[:-1], atol=1e-13 * scale)
     way, h = rng.normal(size=u.shape), 1e-6
     local = way[body.nodes].reshape(len(body.nodes), 18)
     ahead, behind = (newton.excess(replace(start, u=u + sign * h * way)) for sign in (1.0, -1.0))
@@ -223,7 +223,7 @@ def test_a_pressed_block_is_in_equilibrium_with_what_it_holds_of_the_past():
     newton, _, _ = relaxing_block(distortion=0.0)
     body = newton.body
     shape = Shape.undeformed(body)
-    newton.past = Past.at_rest(newton.past.shear, newton.past.tau)
+    newton.relaxing.past = Past.at_rest(newton.relaxing.past.shear, newton.relaxing.past.tau)
     pushes = []
     for depth, step in ((0.1, 0.1), (0.2, 0.1), (0.2, 0.5), (0.2, 5.0)):
         newton.ready(step)
@@ -243,7 +243,7 @@ def test_what_a_pressed_block_keeps_and_friction_does_not_take_is_what_its_tissu
     """Lost: g G/(2 tau) times the sum of a + 1/a - 2 over the eigenvalues of A B^-1, over the block and in time."""
     newton, _, _ = relaxing_block(distortion=0.0)
     body, weight = newton.body, newton.body.weight.ravel()
-    newton.past = Past.at_rest(newton.past.shear, newton.past.tau)
+    newton.relaxing.past = Past.at_rest(newton.relaxing.past.shear, newton.relaxing.past.tau)
     shape, way, rates, steps, time = Shape.undeformed(body), [], [0.0], 24, 0.5
     for number in range(1, steps + 1):
         newton.ready(time / steps)
@@ -251,10 +251,15 @@ def test_what_a_pressed_block_keeps_and_friction_does_not_take_is_what_its_tissu
         newton.took(shape, time / steps)
         way.append(shape)
         whole_of = [
-            np.array([_whole(t) for t in tensors]) for tensors in (newton.past.metric[:, 0], newton.past.before)
+            np.array([_whole(t) for t in tensors])
+            for tensors in (newton.relaxing.past.metric[:, 0], newton.relaxing.past.before)
         ]
         eigen = np.linalg.eigvals(whole_of[0] @ np.linalg.inv(whole_of[1])).real
-        rate = newton.past.shear[:, 0] / (2.0 * newton.past.tau[:, 0]) * np.sum(eigen + 1.0 / eigen - 2.0, axis=1)
+        rate = (
+            newton.relaxing.past.shear[:, 0]
+            / (2.0 * newton.relaxing.past.tau[:, 0])
+            * np.sum(eigen + 1.0 / eigen - 2.0, axis=1)
+        )
         rates.append(float(rate @ weight))
     lost = float(np.trapezoid(rates, dx=time / steps))
     found = course_audits(newton, way)

@@ -9,15 +9,16 @@ import pytest
 from solver import _kernels as kernels
 from solver._kernels.arguments import ContactStates, LoadState
 from solver.body.finite import FiniteBody
+from solver.body.linear import CondensedLinear
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.contact import law as friction
-from solver.contact.active_set import Contact, Course, Touchable, untouched
 from solver.contact.law import LAWS, NAMES, OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
-from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, BY_TRAVEL, Newton, Pull, Shape
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, BY_TRAVEL, FiniteNewton, Newton, Pull, Shape
 from solver.mesh.blocks import block
 from solver.response.small_stepper import Condensed, SmallStepper
 from tests.solver.oracle import finite as oracle
-from tests.solver.oracle.contact import Course as PlainCourse
+from tests.solver.oracle.active_set import Course, touchable, untouched
 
 FREE, BOUND = FrictionLaw(0.5, np.inf), FrictionLaw(0.5, 0.02)
 STEEP, NEVER_FELT = FrictionLaw(1000.0, 0.02), FrictionLaw(0.5, 1e9)
@@ -46,61 +47,64 @@ class Told:
     length: np.ndarray
 
 
-def springs():
+def springs(across=COMPLIANCE[1]):
     """Five points that do not feel each other, the outer two above any depth."""
-    one, zero = np.eye(5), np.zeros(5)
-    along_y, across, along_x = COMPLIANCE
-    return Touchable(
-        np.array([9.0, 0.0, 0.02, 0.15, 9.0]), LENGTH, along_y * one, across * one, along_x * one, zero, zero,
-        np.zeros((10, 0)), np.zeros(0),
-    )  # fmt: skip
+    along_y, _, along_x = COMPLIANCE
+    rest = np.stack([np.linspace(-1.0, 1.0, 5), [9.0, 0.0, 0.02, 0.15, 9.0]], axis=1)
+    stiffness = np.kron(np.eye(5), np.linalg.inv([[along_x, across], [across, along_y]]))
+    return CondensedLinear(rest, stiffness, np.zeros(10), LENGTH, np.zeros(5, np.int32))
 
 
-def told(found: Contact, before: Contact):
-    return Told(found.state, found.sense, found.normal, found.tangential, found.gap, found.shift - before.shift, LENGTH)
+def told(body, now, before):
+    place, moved = now.place(body), now.pull.travel - before.pull.travel
+    slid = place[:, 0] - before.place(body)[:, 0] - moved
+    gap = place[:, 1] - now.pull.depth
+    return Told(now.state, now.sense.astype(float), now.normal, now.tangential, gap, slid, LENGTH)
 
 
-def driven(law, search=Course):
+def driven(law):
     body = springs()
-    course, states = search(body, law), [untouched(body)]
+    newton, states = Newton(body), [Shape.undeformed(body)]
     for depth, travel in DRIVES:
-        states.append(course.step(states[-1], depth, travel))
-    return [told(now, before) for before, now in pairwise(states)]
+        states.append(newton.settle(states[-1], Pull(depth, law.mu, law.tau_max, travel=-travel)))
+    return [told(body, now, before) for before, now in pairwise(states)]
 
 
 def driven_plainly(law):
-    return driven(law, PlainCourse)
+    body = touchable(springs())
+    course, states = Course(body, law), [untouched(body)]
+    for depth, travel in DRIVES:
+        states.append(course.step(states[-1], depth, travel))
+    return [
+        Told(now.state, now.sense, now.normal, now.tangential, now.gap, now.shift - before.shift, LENGTH)
+        for before, now in pairwise(states)
+    ]
 
 
 def slid_at_once(law):
     """Settled slides either way, which know no way there: what slips does so against its force."""
-    rubbed = []
-    for search in (PlainCourse, Course):
-        for direction in (1, -1):
-            found = search(springs(), law).sliding(0.3, direction)
-            rubbed.append(replace(told(found, found), slid=np.full(5, 100.0 * direction)))
+    body, rubbed = springs(), []
+    for direction in (1, -1):
+        found = settled(Newton(body), Pull(0.3, law.mu, law.tau_max, -direction))
+        rubbed.append(replace(told(body, found, found), slid=np.full(5, 100.0 * direction)))
     return rubbed
 
 
 def pressed_by_forces(law):
     """Forces given, the drag up to 0.9 of what the law allows: something always sticks where friction is."""
-    along_y, across, along_x = COMPLIANCE
-    one, nothing = np.eye(5), np.zeros((1, 10))
-    compliance = np.block([[along_y * one, across * one], [across * one, along_x * one]])
-    body = Condensed(
-        springs().gap, LENGTH, compliance, nothing, nothing, np.zeros(1, np.int64), np.zeros(1, bool), np.zeros((1, 2)),
-        np.zeros((2, 10)),
-    )  # fmt: skip
-    points, out = SmallStepper(body, law.mu, law.tau_max), []
+    nothing = np.zeros((1, 10))
+    finger = Condensed(
+        springs(), nothing, nothing, np.zeros(1, np.int64), np.zeros(1, bool), np.zeros((1, 2)), np.zeros((2, 10))
+    )
+    points, out = SmallStepper(finger, law.mu, law.tau_max), []
     for normal, part in [(0.02, 0.0), (0.1, 0.0), (0.1, 0.5), (0.1, 0.9), (0.1, -0.9), (0.05, -0.8), (0.15, 0.0)]:
-        before = points._anchor.copy()
-        most = law.limit(points.forces()[:, 1] * normal / max(points.forces()[:, 1].sum(), 1e-300), LENGTH).sum()
+        before = points.state
+        most = law.limit(before.normal * normal / max(before.normal.sum(), 1e-300), LENGTH).sum()
         assert np.isfinite(points.step(normal, part * most if part else 0.0))
-        drag, push = points.forces().T
-        gap = body.gap + points._moved[:5] - points.depth
+        now = told(finger.skin, points.state, before)
         # what slides does so against its force, and how far forces do not tell
-        slid = points._anchor - before if STICK in points.state else np.full(5, -np.sign(drag.sum()))
-        out.append(Told(points.state.copy(), points._sense.copy(), push, drag, gap, slid, LENGTH))
+        sliding = STICK not in points.state.state
+        out.append(replace(now, slid=np.full(5, -np.sign(now.tangential.sum()))) if sliding else now)
     return out
 
 
@@ -109,7 +113,7 @@ def cushion():
     """A round cushion of skin at finite strain."""
     across = np.array([0.0, 0.1, 0.2, 0.35, 0.6, 1.2])
     mesh = block(np.r_[-across[:0:-1], across], np.array([0.0, 0.2, 0.5, 1.0]), 2.0)
-    return Newton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]))
+    return FiniteNewton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]))
 
 
 def dragged(newton, law, drives=((0.02, 0.0), (0.06, 0.0), (0.06, 0.004), (0.06, 0.015), (0.06, 0.1), (0.06, 0.098),
@@ -178,7 +182,7 @@ def test_wherever_contact_is_looked_for_what_is_found_is_what_the_law_says(cours
 
 
 def test_every_state_is_met_in_every_course(cushion):
-    courses = [driven(BOUND), driven_plainly(BOUND), pressed_by_forces(BOUND), finite(BOUND_OF_CUSHION, cushion)]
+    courses = [driven(BOUND), driven(BOUND), pressed_by_forces(BOUND), finite(BOUND_OF_CUSHION, cushion)]
     for points in courses:
         assert {NAMES[int(state)] for at in points for state in at.state} == set(NAMES.values())
 
@@ -197,17 +201,15 @@ def test_friction_that_vanishes_is_none_and_a_bound_that_is_never_felt_is_none(c
 @pytest.mark.parametrize("law", MEMBERS, ids=str)
 def test_points_on_springs_carry_what_their_springs_and_the_law_say(law):
     """No point feels another, and without coupling N = (d - g)/a; T is the springs' pull, cut off."""
-    body = replace(springs(), normal_by_tangential=np.zeros((5, 5)))
-    for search in (PlainCourse, Course):
-        course = search(body, law)
-        before = untouched(body)
-        for depth, travel in DRIVES:
-            normal = np.maximum(depth - body.gap, 0.0) / COMPLIANCE[0]
-            limit = np.minimum(law.mu * normal, law.tau_max * LENGTH if law.tau_max < np.inf else np.inf)
-            drag = np.clip((before.shift - travel) / COMPLIANCE[2], -limit, limit)
-            before = course.step(before, depth, travel)
-            np.testing.assert_allclose(before.normal, normal, atol=1e-11 * 0.1)  # round-off, by the largest force
-            np.testing.assert_allclose(before.tangential, drag, atol=1e-11 * 0.1)
+    body = springs(across=0.0)
+    newton, before = Newton(body), Shape.undeformed(body)
+    for depth, travel in DRIVES:
+        normal = np.maximum(depth - body.rest[:, 1], 0.0) / COMPLIANCE[0]
+        limit = np.minimum(law.mu * normal, law.tau_max * LENGTH if law.tau_max < np.inf else np.inf)
+        drag = np.clip((before.u[:, 0] - before.pull.travel - travel) / COMPLIANCE[2], -limit, limit)
+        before = newton.settle(before, Pull(depth, law.mu, law.tau_max, travel=-travel))
+        np.testing.assert_allclose(before.normal, normal, atol=1e-11 * 0.1)  # round-off, by the largest force
+        np.testing.assert_allclose(before.tangential, drag, atol=1e-11 * 0.1)
 
 
 @pytest.mark.parametrize("law", MEMBERS, ids=str)
@@ -231,7 +233,7 @@ def test_the_loop_of_finite_strain_changes_the_states_that_its_plain_twin_change
         expected = oracle.restated(state, sense, reaction, above, slid, length, law, direction)
         found, turned = state.copy(), sense.copy()
         states, load = ContactStates(found, turned, reaction), LoadState(0.0, law.mu, law.tau_max, direction)
-        changed = kernels.update_contact_states(states, slid, above, np.zeros(9), length, load)
+        changed = kernels.update_contact_states(states, above, slid, length, load)
         np.testing.assert_array_equal(found, expected[0])
         np.testing.assert_array_equal(turned, expected[1])
         assert changed == np.sum((found != state) | ((found >= SLIP) & (turned != sense)))

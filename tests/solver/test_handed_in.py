@@ -5,17 +5,16 @@ import pytest
 
 from solver.body.dead_loads import loaded
 from solver.body.finite import FiniteBody
-from solver.body.linear import Body
+from solver.body.linear import LinearBody
 from solver.body.validation import BodyError
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
 from solver.constitutive.linear import Hooke, Prony
-from solver.contact.active_set import Course
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.finite_relaxation import RelaxingNewton
-from solver.equilibrium.force_control import Given, untouched
+from solver.equilibrium.force_control import untouched
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.march import march
-from solver.equilibrium.newton import Newton, Pull
+from solver.equilibrium.newton import FiniteNewton, Given, Newton, Pull
 from solver.equilibrium.relaxation import RelaxingBody
 from solver.mesh import Mesh
 from solver.mesh.blocks import block
@@ -26,6 +25,9 @@ ONE = block(np.array([-1.0, 1.0]), np.array([0.0, 1.0]))
 NOT_HELD = replace(MESH, held=np.empty(0, np.int64))
 NAN = np.full(MESH.nodes.shape, np.nan)
 TISSUE, SKIN = [Hooke(0.08, 0.48)], [NeoHooke(0.08, 0.48)]
+
+
+linear = LinearBody.of
 
 
 def relaxes(g, tau):
@@ -42,30 +44,48 @@ def as_handed_in(mesh, whole, lengths):
 @pytest.mark.parametrize(
     ("make", "told"),
     [
-        (lambda: Body.of(NOT_HELD, TISSUE), "nothing holds the body"),
-        (lambda: Body.of(MESH, TISSUE, NAN), "row 0 of loads is not finite"),
-        (lambda: Body.of(MESH, TISSUE, NAN[:3]), "loads has the shape"),
-        (lambda: Body.of(MESH, TISSUE, None, np.zeros((1, 2))), "prescribed has the shape"),
-        (lambda: Body.of(MESH, [Hooke(0.08, 0.5)]), "nu = 0.5"),
+        (lambda: linear(NOT_HELD, TISSUE), "nothing holds the body"),
+        (lambda: linear(MESH, TISSUE, NAN), "row 0 of loads is not finite"),
+        (lambda: linear(MESH, TISSUE, NAN[:3]), "loads has the shape"),
+        (lambda: linear(MESH, TISSUE, None, np.zeros((1, 2))), "prescribed has the shape"),
+        (lambda: linear(MESH, [Hooke(0.08, 0.5)]), "nu = 0.5"),
         (lambda: FiniteBody.of(MESH, [NeoHooke(0.08, 0.5)]), "nu = 0.5"),
-        (lambda: Body.of(MESH, [Hooke(-0.08, 0.3)]), "E must be above 0"),
-        (lambda: Body.of(replace(MESH, region=MESH.region + 1), TISSUE), "region 1 of the mesh has no material"),
-        (lambda: Body.of(replace(MESH, nodes=NAN), TISSUE), "node 0 of the mesh has no finite position"),
-        (lambda: Body.of(replace(MESH, skin=MESH.skin + 10**6), TISSUE), "mesh.skin names a node that is not there"),
-        (lambda: Body.of(replace(MESH, skin=MESH.skin[:-1]), TISSUE), "mesh.skin has 4 nodes"),
-        (lambda: Body.of(replace(MESH, skin=MESH.skin[::-1]), TISSUE), "are no free side of an element"),
-        (lambda: Body.of(replace(MESH, skin=MESH.skin[1:4]), TISSUE), "are no free side of an element"),
-        (lambda: Body.of(replace(MESH, skin=MESH.elements[0][[3, 6, 2]]), TISSUE), "are no free side of an element"),
-        (lambda: Body.of(replace(MESH, skin=MESH.elements[0][[2, 6, 3]]), TISSUE), "are no free side of an element"),
+        (lambda: linear(MESH, [Hooke(-0.08, 0.3)]), "E must be above 0"),
+        (lambda: linear(replace(MESH, region=MESH.region + 1), TISSUE), "region 1 of the mesh has no material"),
+        (lambda: linear(replace(MESH, nodes=NAN), TISSUE), "node 0 of the mesh has no finite position"),
+        (
+            lambda: LinearBody.of(replace(MESH, skin=MESH.skin + 10**6), TISSUE),
+            "mesh.skin names a node that is not there",
+        ),
+        (lambda: linear(replace(MESH, skin=MESH.skin[:-1]), TISSUE), "mesh.skin has 4 nodes"),
+        (lambda: linear(replace(MESH, skin=MESH.skin[::-1]), TISSUE), "are no free side of an element"),
+        (lambda: linear(replace(MESH, skin=MESH.skin[1:4]), TISSUE), "are no free side of an element"),
+        (
+            lambda: LinearBody.of(replace(MESH, skin=MESH.elements[0][[3, 6, 2]]), TISSUE),
+            "are no free side of an element",
+        ),
+        (
+            lambda: LinearBody.of(replace(MESH, skin=MESH.elements[0][[2, 6, 3]]), TISSUE),
+            "are no free side of an element",
+        ),
         (lambda: FiniteBody.of(replace(MESH, skin=MESH.skin[:4]), [NeoHooke(0.08, 0.48)]), "mesh.skin has 4 nodes"),
-        (lambda: Body.of(replace(ONE, skin=ONE.elements[0][[0, 4, 1, 5, 2, 6, 3, 7, 0]]), TISSUE), "a node twice"),
-        (lambda: Body.of(replace(MESH, region=MESH.region.astype(float)), TISSUE), "mesh.region is made of float64"),
-        (lambda: Body.of(replace(MESH, held=MESH.held[:, None]), TISSUE), "mesh.held has the shape"),
-        (lambda: Body.of(replace(MESH, elements=MESH.elements[:, :8]), TISSUE), "nine nodes of each"),
-        (lambda: Body.of(replace(MESH, elements=MESH.elements[:0], region=MESH.region[:0]), TISSUE), "of one at least"),
-        (lambda: Body.of(replace(MESH, nodes=np.c_[MESH.nodes, MESH.nodes[:, 0]]), TISSUE), "every node x and y"),
-        (lambda: Body.of(replace(MESH, nodes=MESH.nodes.astype(str)), TISSUE), "every node x and y"),
-        (lambda: Body.of(MESH, TISSUE, MESH.nodes.astype(str)), "must be numbers"),
+        (
+            lambda: LinearBody.of(replace(ONE, skin=ONE.elements[0][[0, 4, 1, 5, 2, 6, 3, 7, 0]]), TISSUE),
+            "a node twice",
+        ),
+        (
+            lambda: LinearBody.of(replace(MESH, region=MESH.region.astype(float)), TISSUE),
+            "mesh.region is made of float64",
+        ),
+        (lambda: linear(replace(MESH, held=MESH.held[:, None]), TISSUE), "mesh.held has the shape"),
+        (lambda: linear(replace(MESH, elements=MESH.elements[:, :8]), TISSUE), "nine nodes of each"),
+        (
+            lambda: LinearBody.of(replace(MESH, elements=MESH.elements[:0], region=MESH.region[:0]), TISSUE),
+            "of one at least",
+        ),
+        (lambda: linear(replace(MESH, nodes=np.c_[MESH.nodes, MESH.nodes[:, 0]]), TISSUE), "every node x and y"),
+        (lambda: linear(replace(MESH, nodes=MESH.nodes.astype(str)), TISSUE), "every node x and y"),
+        (lambda: linear(MESH, TISSUE, MESH.nodes.astype(str)), "must be numbers"),
         (lambda: FiniteBody.of(MESH, TISSUE), "no law of finite strain"),
         (lambda: FiniteBody.of(MESH, [Ogden(0.08, 0.48, 0.0)]), "exponent 0; it must lie between 2 and 14"),
         (lambda: FiniteBody.of(MESH, [Ogden(0.08, 0.48, 50.0)]), "exponent 50; it must"),
@@ -78,17 +98,17 @@ def as_handed_in(mesh, whole, lengths):
         (lambda: RelaxingBody(MESH, [relaxes(-0.1, 1.0)]), "terms that cannot relax"),
         (lambda: RelaxingBody(MESH, [relaxes(0.3, -1.0)]), "terms that cannot relax"),
         (lambda: RelaxingNewton(FiniteBody.of(MESH, SKIN), [relaxes(0.3, np.nan)]), "terms that cannot relax"),
-        (lambda: settled(Newton(FiniteBody.of(MESH, SKIN)), Pull(0.1, -1.0, sense=-1)), "mu = -1.0"),
-        (lambda: settled(Newton(FiniteBody.of(MESH, SKIN)), Pull(0.1, 0.3, -1.0, sense=-1)), "tau_max = -1.0"),
-        (lambda: settled(Newton(FiniteBody.of(MESH, SKIN)), Pull(np.nan, 0.3, sense=-1)), "depth = nan"),
-        (lambda: settled(Newton(FiniteBody.of(MESH, SKIN)), Pull(0.1, 0.3, sense=2)), "sense = 2"),
-        (lambda: next(march(Newton(FiniteBody.of(MESH, SKIN)), [Pull(np.inf, 0.3)])), "depth = inf"),
-        (lambda: next(march(Newton(FiniteBody.of(MESH, SKIN)), [Pull(0.1, 0.3, travel=np.nan)])), "travel = nan"),
-        (lambda: loaded(Newton(FiniteBody.of(MESH, SKIN)), pull=Pull(0.0, -0.3)), "mu = -0.3"),
-        (lambda: untouched(Newton(FiniteBody.of(MESH, SKIN)), -0.3, np.inf), "mu = -0.3"),
+        (lambda: settled(FiniteNewton(FiniteBody.of(MESH, SKIN)), Pull(0.1, -1.0, sense=-1)), "mu = -1.0"),
+        (lambda: settled(FiniteNewton(FiniteBody.of(MESH, SKIN)), Pull(0.1, 0.3, -1.0, sense=-1)), "tau_max = -1.0"),
+        (lambda: settled(FiniteNewton(FiniteBody.of(MESH, SKIN)), Pull(np.nan, 0.3, sense=-1)), "depth = nan"),
+        (lambda: settled(FiniteNewton(FiniteBody.of(MESH, SKIN)), Pull(0.1, 0.3, sense=2)), "sense = 2"),
+        (lambda: next(march(FiniteNewton(FiniteBody.of(MESH, SKIN)), [Pull(np.inf, 0.3)])), "depth = inf"),
+        (lambda: next(march(FiniteNewton(FiniteBody.of(MESH, SKIN)), [Pull(0.1, 0.3, travel=np.nan)])), "travel = nan"),
+        (lambda: loaded(FiniteNewton(FiniteBody.of(MESH, SKIN)), pull=Pull(0.0, -0.3)), "mu = -0.3"),
+        (lambda: untouched(FiniteNewton(FiniteBody.of(MESH, SKIN)), -0.3, np.inf), "mu = -0.3"),
         (lambda: Given(0.1, np.nan).checked(), "tangential = nan"),
-        (lambda: Course(Body.of(MESH, TISSUE).touchable, FrictionLaw(0.3, np.inf)).sliding(np.nan, 1), "depth = nan"),
-        (lambda: Course(Body.of(MESH, TISSUE).touchable, FrictionLaw(0.3, np.inf)).sliding(0.1, 0), "direction = 0"),
+        (lambda: settled(Newton(LinearBody.of(MESH, TISSUE).condensed), Pull(np.nan, 0.3, sense=1)), "depth = nan"),
+        (lambda: settled(Newton(LinearBody.of(MESH, TISSUE).condensed), Pull(0.1, 0.3)), "sense = 0"),
         (lambda: FrictionLaw(-0.3, np.inf), "mu = -0.3"),
         (lambda: FrictionLaw(np.nan, np.inf), "mu = nan"),
         (lambda: FrictionLaw(0.3, np.nan), "tau_max = nan"),
@@ -101,7 +121,7 @@ def test_a_body_that_cannot_be_solved_is_refused_at_the_door_in_one_sentence(mak
 
 def test_an_element_turned_inside_out_is_refused_at_the_door():
     nodes = MESH.nodes * np.array([-1.0, 1.0])
-    for make in (lambda mesh: Body.of(mesh, TISSUE), lambda mesh: FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)])):
+    for make in (lambda mesh: linear(mesh, TISSUE), lambda mesh: FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)])):
         with pytest.raises(MeshError, match="folded"):
             make(replace(MESH, nodes=nodes))
 
@@ -114,10 +134,9 @@ def test_a_mesh_of_numbers_of_any_width_gives_the_forces_of_the_closed_form(whol
     top, middle = MESH.held, np.flatnonzero(MESH.nodes[:, 0] == 0.0)
     rolls = replace(MESH, held=top[:0], held_y=top, held_x=middle)
     mesh = as_handed_in(rolls, whole, lengths)
-    free = FrictionLaw(0, np.inf)
-    found = Course(Body.of(mesh, TISSUE).touchable, free).sliding(np.float32(0.125), 1)
-    assert found.normal.sum() == pytest.approx(2.0 * 0.125 * 0.08 / (1.0 - 0.48**2), rel=1e-6)
-    force = settled(Newton(FiniteBody.of(mesh, SKIN)), Pull(0.1, 0, sense=1)).force
+    found = settled(Newton(LinearBody.of(mesh, TISSUE).condensed), Pull(np.float32(0.125), 0, sense=1))
+    assert found.force[1] == pytest.approx(2.0 * 0.125 * 0.08 / (1.0 - 0.48**2), rel=1e-6)
+    force = settled(FiniteNewton(FiniteBody.of(mesh, SKIN)), Pull(0.1, 0, sense=1)).force
     assert force[1] == pytest.approx(2.0 * 0.012098, rel=1e-4)
 
 
@@ -129,6 +148,6 @@ def test_pulls_and_forces_of_whole_numbers_reach_the_loops_as_the_floats_they_ar
     assert type(FrictionLaw(1, 2).mu) is float
     loads = np.zeros(MESH.nodes.shape, np.int32)
     loads[MESH.skin[2], 1] = 1  # on the middle of the foot
-    one, other = (Body.of(MESH, TISSUE, of, MESH.nodes * 0.0) for of in (loads, loads.astype(float)))
-    assert np.array_equal(one.touchable.normal_free, other.touchable.normal_free)
-    assert one.touchable.normal_free[2] > 0.0
+    one, other = (LinearBody.of(MESH, TISSUE, of, MESH.nodes * 0.0) for of in (loads, loads.astype(float)))
+    assert np.array_equal(one.condensed.load, other.condensed.load)
+    assert one.condensed.untouched()[2, 1] > 0.0

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from solver import _kernels as kernels
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
-from solver.body.finite import FiniteBody
+from solver.body.finite import CondensedFinite, FiniteBody
 from solver.constitutive.hyperelastic import LAWS, NeoHooke
 from solver.contact.skin_compression import crosses_itself, pinched
-from solver.equilibrium.newton import Newton, Pull, Shape
+from solver.equilibrium.newton import FiniteNewton, Pull, Shape
 from tests.solver.finite_examples import block, finger
 from tests.solver.oracle import finite as oracle
 
@@ -27,9 +27,9 @@ def distorted(law, seed=1):
 
 
 def assembled(body, u, pressure):
-    newton = Newton(body)
-    least = kernels.assemble(u, pressure, body.elements, newton.system)
-    return newton, least
+    condensed = CondensedFinite(body)
+    least = kernels.assemble(u, pressure, body.elements, condensed.system)
+    return condensed, least
 
 
 MEMBERS = [law(0.08, nu) for law in LAWS for nu in (0.48, 0.4999)]
@@ -39,28 +39,28 @@ MEMBERS = [law(0.08, nu) for law in LAWS for nu in (0.48, 0.4999)]
 def test_compiled_forces_and_tangent_agree_with_the_plain_ones(law):
     body, u = distorted(law)
     pressure = np.random.default_rng(2).normal(0.0, 0.01, (len(body.nodes), 3))
-    newton, least = assembled(body, u, pressure)
+    condensed, least = assembled(body, u, pressure)
     force, _ = oracle.system(body, u, pressure)
     _, tangent = oracle.without_centres(body, u, pressure)
-    np.testing.assert_allclose(newton.force, force, atol=1e-13 * np.abs(tangent).max())
-    np.testing.assert_allclose(np.tril(newton.system.tangent), np.tril(tangent), atol=1e-12 * np.abs(tangent).max())
+    np.testing.assert_allclose(condensed.all_forces, force, atol=1e-13 * np.abs(tangent).max())
+    np.testing.assert_allclose(np.tril(condensed.system.tangent), np.tril(tangent), atol=1e-12 * np.abs(tangent).max())
     assert least == pytest.approx(np.linalg.det(oracle.deformation(body, u)).min(), rel=1e-12)
 
 
 @pytest.mark.parametrize("law", MEMBERS, ids=str)
 def test_forces_for_a_tangent_kept_from_another_state_agree_with_the_plain_ones(law):
     body, u = distorted(law)
-    newton, _ = assembled(body, u, newton_pressure(body, u))
+    condensed, _ = assembled(body, u, newton_pressure(body, u))
     _, tangent = oracle.forces_and_tangents(body, u, newton_pressure(body, u))
     other = distorted(law, seed=5)[1]
-    least = kernels.forces(other, body.elements, newton.system)
+    least = kernels.forces(other, body.elements, condensed.system)
     force, _ = oracle.forces_and_tangents(body, other, newton_pressure(body, other))
     centre = np.linalg.solve(tangent[:, 16:, 16:], force[:, 16:, None])
     expected, free = np.zeros(body.size), body.unknown.reshape(-1, 16) >= 0
     left = force[:, :16] - (tangent[:, :16, 16:] @ centre)[:, :, 0]
     np.add.at(expected, body.unknown.reshape(-1, 16)[free], left[free])
-    np.testing.assert_allclose(newton.force, expected, atol=1e-13 * np.abs(tangent).max())
-    np.testing.assert_allclose(newton.system.recovery_matrix[:, :, 16], centre[:, :, 0], atol=1e-12)
+    np.testing.assert_allclose(condensed.all_forces, expected, atol=1e-13 * np.abs(tangent).max())
+    np.testing.assert_allclose(condensed.system.recovery_matrix[:, :, 16], centre[:, :, 0], atol=1e-12)
     assert least == pytest.approx(np.linalg.det(oracle.deformation(body, other)).min(), rel=1e-12)
 
 
@@ -70,12 +70,12 @@ def test_forces_of_a_strain_that_is_nearly_nothing_keep_their_own_digits(law):
     body, u = distorted(law)
     small = 1e-12 * u
     _, tangent = oracle.without_centres(body, np.zeros_like(u), np.zeros((len(body.nodes), 3)))
-    newton, _ = assembled(body, small, newton_pressure(body, small))
+    condensed, _ = assembled(body, small, newton_pressure(body, small))
     at = body.unknown.reshape(-1, 16)
     moved = np.where(at >= 0, small[body.nodes[:, :8]].reshape(-1, 16), 0.0)
     expected = np.zeros(body.size)
     np.add.at(expected, at[at >= 0], (tangent @ moved[:, :, None])[:, :, 0][at >= 0])
-    np.testing.assert_allclose(newton.force, expected, atol=1e-10 * np.abs(expected).max())
+    np.testing.assert_allclose(condensed.all_forces, expected, atol=1e-10 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("law", MEMBERS, ids=str)
@@ -99,24 +99,24 @@ def test_forces_are_the_derivative_of_the_energy_and_the_tangent_that_of_the_for
 def test_the_body_eliminated_part_by_part_is_the_body_solved_at_once(columns, held):
     body = FiniteBody.of(block(columns=columns, rows=3, distortion=0.1, held=held), [NeoHooke(0.08, 0.48)])
     u = np.zeros(body.mesh.nodes.shape)
-    newton, _ = assembled(body, u, np.zeros((len(body.nodes), 3)))
+    condensed, _ = assembled(body, u, np.zeros((len(body.nodes), 3)))
     _, tangent = oracle.system(body, u, np.zeros((len(body.nodes), 3)))
     force = np.random.default_rng(0).normal(size=body.size)
     skin = np.random.default_rng(1).normal(size=2 * len(body.skin))
     felt, stiffness = oracle.reduced(force, tangent, len(skin))
-    assert newton.inside.factorise(newton.system.tangent)
-    np.testing.assert_allclose(newton.inside.condense(force), felt, rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(newton.inside.stiffness, stiffness, rtol=1e-9, atol=1e-12 * np.abs(stiffness).max())
+    assert condensed.inside.factorise(condensed.system.tangent)
+    np.testing.assert_allclose(condensed.inside.condense(force), felt, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(condensed.inside.stiffness, stiffness, rtol=1e-9, atol=1e-12 * np.abs(stiffness).max())
     inside = body.size - len(skin)
     for still, load in ((False, force), (True, np.zeros(body.size))):
         expected = np.linalg.solve(tangent[:inside, :inside], -load[:inside] - tangent[:inside, inside:] @ skin)
-        found = newton.inside.back_substitute(skin, still=still)
+        found = condensed.inside.back_substitute(skin, still=still)
         np.testing.assert_allclose(found, np.r_[expected, skin], rtol=1e-9, atol=1e-9)
 
 
 def test_a_tangent_without_stiffness_cannot_be_eliminated():
-    newton = Newton(FiniteBody.of(block(), [NeoHooke(0.08, 0.48)]))
-    assert not newton.inside.factorise(np.zeros_like(newton.system.tangent))
+    condensed = CondensedFinite(FiniteBody.of(block(), [NeoHooke(0.08, 0.48)]))
+    assert not condensed.inside.factorise(np.zeros_like(condensed.system.tangent))
 
 
 def test_the_system_of_contact_is_solved_as_a_dense_solver_solves_it():
@@ -139,7 +139,7 @@ def test_tributary_lengths_add_up_and_agree_with_the_plain_ones():
 
 def test_contact_rows_are_the_derivatives_of_their_conditions():
     body, u = distorted(NeoHooke(0.08, 0.48))
-    newton = Newton(body)
+    newton = FiniteNewton(body)
     start = Shape.undeformed(body)
     state = np.array([STICK, SLIP, SHEAR_LIMITED, SHEAR_LIMITED, SHEAR_LIMITED, SLIP, OPEN], np.int32)
     sense = np.array([1, 1, -1, -1, -1, -1, 1], np.int32)

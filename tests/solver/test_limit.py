@@ -14,7 +14,7 @@ from solver.continuation.arc_length import follow
 from solver.continuation.surface_instability import folds_at
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import BY_FRICTION, Newton, Pull
+from solver.equilibrium.newton import BY_FRICTION, FiniteNewton, Pull
 from solver.failures import NoSteadyState, NotConverged
 from solver.mesh import mesher
 from solver.mesh.grid import grid_mesh
@@ -110,7 +110,7 @@ def test_a_finger_handed_in_as_arrays_is_refused_beyond_the_friction_that_anothe
     scene = Scene(friction=Friction(0.0), loading=Loading(2.0))
     laws = finite_laws(scene.materials)
     mesh = FiniteFinger.of(scene, mesher.Sizing(11.0, 2.0, margin=6.0)).geometry.mesh
-    newton = Newton(FiniteBody.of(mesh, laws))
+    newton = FiniteNewton(FiniteBody.of(mesh, laws))
     pull = Pull(2.0, 0.5, np.inf, TOWARDS_TIP)
     with pytest.raises(NoSteadyState) as refused:
         own_existence.steady(newton, pull, laws[mesher.EPIDERMIS])
@@ -128,7 +128,7 @@ def test_what_is_crushed_beside_a_rigid_core_is_told_as_not_known_whatever_the_m
     x, y = np.sin(angle)[:, None] * part, 1.0 - np.cos(angle)[:, None] * part
     core = np.arange(len(angle)) * len(part)
     mesh = grid_mesh(5.0 * np.stack([x, y], axis=-1), np.zeros(layers, np.int64), slice(0, len(angle)), core)
-    newton = Newton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]))
+    newton = FiniteNewton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]))
     with pytest.raises(NotConverged, match="is not known"):
         own_existence.steady(newton, Pull(1.0, 1.5, sense=TOWARDS_TIP), NeoHooke(0.08, 0.48))
 

@@ -1,9 +1,12 @@
 """The picture of the live model agrees with the solver's own fields."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.newton import Pull, Shape
 from solver.mesh.mesher import Sizing
 from solver.response.live_picture import LivePicture
 from solver.scene import Friction, Loading, Scene
@@ -15,29 +18,28 @@ def finger():
 
 
 @pytest.fixture(scope="module")
-def forces(finger):
-    k = len(finger.body.touchable.gap)
-    return np.random.default_rng(1).normal(size=(k, 2)) * 1e-3
+def state(finger):
+    rest = Shape.undeformed(finger.body.condensed)
+    return replace(rest, u=np.random.default_rng(1).normal(size=rest.u.shape) * 1e-3, pull=Pull(1.5, 0.5))
 
 
-def test_nodes_and_energies_are_those_that_the_body_gives_for_the_same_forces(finger, forces):
+def test_nodes_and_energies_are_those_that_the_body_gives_for_the_same_skin(finger, state):
     picture = LivePicture.of(finger)
-    stacked = np.concatenate([forces[:, 1], forces[:, 0]])
-    moved = finger.body.displacement(finger.body.skin_displacement(stacked[:, None]))[:, :, 0]
+    moved = finger.displacement(state)
     mesh, elastic = finger.geometry.mesh, finger.body.elastic
-    assert picture.nodes(forces, 1.5) == pytest.approx(mesh.nodes + moved - [0.0, 1.5], abs=1e-9)
+    assert picture.nodes(state) == pytest.approx(mesh.nodes + moved - [0.0, 1.5], abs=1e-9)
 
     from solver.body.stiffness import Probes
 
     third = 7  # an element; its quarters' middles are probed by the solver's own energy
     probes = Probes.at(mesh, elastic, np.full(4, third), np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]))
     expected = probes.energy(mesh, elastic, moved[:, :, None])[:, 0]
-    assert picture.sed(forces)[4 * third : 4 * third + 4] == pytest.approx(expected, rel=1e-9)
+    assert picture.sed(state)[4 * third : 4 * third + 4] == pytest.approx(expected, rel=1e-9)
 
 
 def test_faces_cover_the_tissue_once(finger):
     picture = LivePicture.of(finger)
-    corners = picture.nodes(np.zeros((len(finger.body.touchable.gap), 2)), 0.0)[picture.faces]
+    corners = picture.nodes(Shape.undeformed(finger.body.condensed))[picture.faces]
     x, y = corners[..., 0], corners[..., 1]
     area = 0.5 * np.sum(x * np.roll(y, -1, 1) - np.roll(x, -1, 1) * y, axis=1)
     whole = finger.geometry.mesh.nodes[finger.geometry.mesh.elements[:, :4]]

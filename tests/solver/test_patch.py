@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.body.linear import Body, edge_load
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
+from solver.body.linear import LinearBody, edge_load
 from solver.body.stiffness import Probes
 from solver.constitutive.linear import Hooke
-from solver.contact.active_set import OPEN, SHEAR_LIMITED, SLIP, STICK, ContactLost, Course, untouched
-from solver.contact.law import FrictionLaw
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.newton import Newton, Pull, Shape
+from solver.failures import ContactLost
 from solver.mesh import Mesh
 from solver.mesh.blocks import block
 
@@ -42,8 +44,8 @@ def test_a_linear_displacement_on_the_boundary_is_linear_inside(nu, round_off):
     # at the incompressible limit a linear field must keep its volume, or its pressure swamps everything
     gradient = np.array([[0.01, 0.03], [-0.02, -0.01]])
     exact = mesh.nodes @ gradient.T
-    body = Body.of(mesh, [Hooke(1.0, nu)], prescribed=exact * mesh.driven)
-    found = body.displacement(np.zeros((0, 1)))[:, :, 0]
+    body = LinearBody.of(mesh, [Hooke(1.0, nu)], prescribed=exact * mesh.driven)
+    found = body.displacement(np.zeros((0, 2)))
     assert np.abs(found - exact).max() < round_off  # which the ratio of the moduli, 5e6 at the limit, magnifies
     probes = Probes.at(mesh, body.elastic, np.arange(len(mesh.elements)), np.full((len(mesh.elements), 2), 0.3))
     energy = probes.energy(mesh, body.elastic, found[:, :, None])[:, 0]
@@ -64,20 +66,11 @@ def pressed_block(shear: float = 0.0, *, confined: bool = False):
 
 def test_a_uniform_pressure_reaches_a_frictionless_surface_unchanged():
     mesh, loads = pressed_block()
-    body = Body.of(mesh, [DERMIS], loads, free=("y", "turn"))
-    found = Course(body.touchable, FrictionLaw(0.0, np.inf)).sliding(0.0, 1)
-    assert np.allclose(found.normal, PRESSURE * body.touchable.length, rtol=0, atol=1e-15)
+    body = LinearBody.of(mesh, [DERMIS], loads, free=("y", "turn"))
+    found = settled(Newton(body.condensed), Pull(0.0, 0.0, np.inf, -1))
+    assert np.allclose(found.normal, PRESSURE * body.condensed.fixed_length, rtol=0, atol=1e-15)
     # strains of the page: eps_yy = -p (1 - nu^2)/E, eps_xx = p nu (1 + nu)/E
-    forces = np.concatenate([found.normal, found.tangential])
-    compliance = np.block(
-        [
-            [body.touchable.normal_by_normal, body.touchable.normal_by_tangential],
-            [body.touchable.normal_by_tangential.T, body.touchable.tangential_by_tangential],
-        ]
-    )
-    free = np.concatenate([body.touchable.normal_free, body.touchable.tangential_free])
-    skin = compliance @ forces + free + body.touchable.motions @ found.motion
-    moved = body.displacement(skin[:, None])[:, :, 0]
+    moved = body.displacement(found.u)
     strain_x = np.ptp(moved[:, 0]) / 2.0
     strain_y = np.ptp(moved[:, 1]) / 1.5
     assert strain_x == pytest.approx(0.008880, rel=1e-12)
@@ -88,21 +81,23 @@ def test_a_uniform_pressure_reaches_a_frictionless_surface_unchanged():
 def test_below_the_friction_limit_every_point_sticks_and_carries_the_same_traction(part):
     mu = 0.4
     mesh, loads = pressed_block(part * mu * PRESSURE, confined=True)
-    body = Body.of(mesh, [DERMIS], loads, free=("x", "y", "turn"))
-    start = replace(untouched(body.touchable), state=np.full(len(mesh.skin), STICK, np.int8))
-    found = Course(body.touchable, FrictionLaw(mu, np.inf)).step(start, 0.0, 0.0)
+    body = LinearBody.of(mesh, [DERMIS], loads, free=("x", "y", "turn"))
+    newton = Newton(body.condensed)
+    start = replace(Shape.undeformed(body.condensed), state=np.full(len(mesh.skin), STICK, np.int32))
+    found = newton.solved(start, Pull(0.0, mu), newton.skin_x)
     assert (found.state == STICK).all()
-    assert np.allclose(found.normal, PRESSURE * body.touchable.length, rtol=0, atol=1e-15)
-    assert np.allclose(found.tangential, -part * mu * PRESSURE * body.touchable.length, rtol=0, atol=1e-15)
+    assert np.allclose(found.normal, PRESSURE * body.condensed.fixed_length, rtol=0, atol=1e-15)
+    assert np.allclose(found.tangential, -part * mu * PRESSURE * body.condensed.fixed_length, rtol=0, atol=1e-15)
 
 
 def test_no_point_sticks_alone_when_the_shear_exceeds_the_limit():
     mu = 0.4
     mesh, loads = pressed_block(1.001 * mu * PRESSURE, confined=True)
-    body = Body.of(mesh, [DERMIS], loads, free=("x", "y", "turn"))
-    start = replace(untouched(body.touchable), state=np.full(len(mesh.skin), STICK, np.int8))
+    body = LinearBody.of(mesh, [DERMIS], loads, free=("x", "y", "turn"))
+    newton = Newton(body.condensed)
+    start = replace(Shape.undeformed(body.condensed), state=np.full(len(mesh.skin), STICK, np.int32))
     with pytest.raises(ContactLost):  # the block accelerates: nothing can balance its load
-        Course(body.touchable, FrictionLaw(mu, np.inf)).step(start, 0.0, 0.0)
+        newton.solved(start, Pull(0.0, mu), newton.skin_x)
 
 
 @pytest.mark.parametrize("bound", [np.inf, 0.3 * PRESSURE])
@@ -110,16 +105,16 @@ def test_in_full_slip_every_point_carries_the_same_traction(bound):
     mu = 0.4
     shear = min(mu * PRESSURE, bound)
     mesh, loads = pressed_block(shear, confined=True)
-    body = Body.of(mesh, [DERMIS], loads, free=("y", "turn"))
-    found = Course(body.touchable, FrictionLaw(mu, bound)).sliding(0.0, 1)
+    body = LinearBody.of(mesh, [DERMIS], loads, free=("y", "turn"))
+    found = settled(Newton(body.condensed), Pull(0.0, mu, bound, -1))
     assert (found.state == (SLIP if bound == np.inf else SHEAR_LIMITED)).all()
-    assert np.allclose(found.normal, PRESSURE * body.touchable.length, rtol=0, atol=1e-15)
-    assert np.allclose(found.tangential, -shear * body.touchable.length, rtol=0, atol=1e-15)
+    assert np.allclose(found.normal, PRESSURE * body.condensed.fixed_length, rtol=0, atol=1e-15)
+    assert np.allclose(found.tangential, -shear * body.condensed.fixed_length, rtol=0, atol=1e-15)
 
 
 def test_a_block_that_is_lifted_touches_nowhere():
     mesh = block(np.linspace(-1, 1, 4), np.linspace(0, 1, 3))
-    body = Body.of(mesh, [DERMIS])
-    found = Course(body.touchable, FrictionLaw(0.3, np.inf)).sliding(-0.1, 1)
+    body = LinearBody.of(mesh, [DERMIS])
+    found = settled(Newton(body.condensed), Pull(-0.1, 0.3, np.inf, -1))
     assert (found.state == OPEN).all()
     assert not found.normal.any()

@@ -40,7 +40,7 @@ def course(law, gradient):
     before = 0.0
     for time in sorted({0.25, 0.75, *TIMES}):
         body.ready(time - before, min(time, 1.0) * places @ gradient.T)
-        body.advance(np.zeros(0), np.zeros(0))
+        body.advance(np.zeros((0, 2)))
         before = time
         forces = body.forces()
         inside = np.ones(len(forces), bool)
@@ -76,7 +76,7 @@ def test_a_body_is_kept_ready_for_the_last_few_lengths_of_steps_and_makes_the_ot
         body, probes, places = held_all_round(law)
         for number, step in enumerate(lengths):
             body.ready(step, 0.01 * number * places @ np.array([[0.0, 1.0], [0.0, 0.0]]).T)
-            body.advance(np.zeros(0), np.zeros(0))
+            body.advance(np.zeros((0, 2)))
         return body, body.energy(probes)
 
     few, energy = stepped()

@@ -8,7 +8,7 @@ from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import Newton, Pull
+from solver.equilibrium.newton import FiniteNewton, Pull
 from tests.solver.finite_examples import block, finger
 from tests.solver.oracle import finite as oracle
 
@@ -102,7 +102,7 @@ def test_scaling_all_stiffness_scales_the_answer():
     body = newton.body
     stiffer = FiniteBody.of(body.mesh, [NeoHooke(10 * E, 0.48) for E in (0.136, 0.08, 0.034)])
     one = settled(newton, Pull(1.0, 0.44, 0.02, 1))
-    ten = settled(Newton(stiffer), Pull(1.0, 0.44, 0.2, 1))
+    ten = settled(FiniteNewton(stiffer), Pull(1.0, 0.44, 0.2, 1))
     np.testing.assert_allclose(ten.u, one.u, atol=1e-9)
     assert probes.average(stiffer, ten.u)[0] == pytest.approx(10 * probes.average(body, one.u)[0], rel=1e-9)
 

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 
 from solver.accuracy.audits import audits
 from solver.body.linear import skin_lengths
-from solver.contact.active_set import Course
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.newton import Pull
 from solver.failures import Cancelled, NoSteadyState, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.response.fields import fields_of
@@ -104,14 +105,15 @@ def test_a_force_told_of_the_neighbouring_node_is_unbalanced_there():
     asked = Scene(friction=Friction(0.44, 0.02), loading=Loading(1.0, "-x"))
     finger = FingerModel.of(asked, Sizing(5, 1.0, margin=3.0))
     law = FrictionLaw(0.44, 0.02)
-    contact = Course(finger.body.touchable, law).sliding(1.0, -1)
+    contact = settled(finger.newton, Pull(1.0, 0.44, 0.02, 1))
     displacement = finger.displacement(contact)
-    normal, middle = contact.normal.copy(), int(np.argmax(contact.normal))
+    reaction, middle = contact.reaction.copy(), int(np.argmax(contact.normal))
+    normal = reaction[:, 1]
     moved = 0.2 * normal[middle]
     normal[middle] -= moved
     normal[middle + 1] += moved
     told = audits(finger, law, contact, 1.0, displacement)
-    planted = audits(finger, law, replace(contact, normal=normal), 1.0, displacement)
+    planted = audits(finger, law, replace(contact, reaction=reaction), 1.0, displacement)
     assert max(told["inner_forces"], planted["equilibrium_y"]) < 1e-10
     assert planted["inner_forces"] == pytest.approx(moved / normal.sum(), rel=1e-6)
 

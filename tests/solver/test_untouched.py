@@ -1,12 +1,14 @@
 """Partial slip under dead loads, from the state before first touch."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from solver.body.linear import Body, edge_load
+from solver._kernels import STICK
+from solver.body.linear import LinearBody, edge_load
 from solver.constitutive.linear import Hooke
-from solver.contact.active_set import STICK, Course, untouched
-from solver.contact.law import FrictionLaw
+from solver.equilibrium.newton import Newton, Pull, Shape
 from solver.mesh.grid import grid_mesh
 
 RADIUS, YOUNG, NU, MU = 5.0, 0.08, 0.4999, 0.3  # nearly incompressible: normal and shear do not couple
@@ -57,8 +59,8 @@ def test_dead_loads_below_the_friction_limit_leave_the_stick_zone_of_cattaneo_an
     """
     mesh, loads = round_foot(part, held=held)
     free = () if held else ("x", "y", "turn")
-    body = Body.of(mesh, [Hooke(YOUNG, NU), Hooke(1e-5, 0.3)], loads, free=free)
-    now = Course(body.touchable, FrictionLaw(MU, np.inf)).step(untouched(body.touchable), 0.0, 0.0)
+    body = LinearBody.of(mesh, [Hooke(YOUNG, NU), Hooke(1e-5, 0.3)], loads, free=free).condensed
+    now = Newton(body).settle(Shape.undeformed(body), Pull(0.0, MU))
     load, drag = now.normal.sum(), -now.tangential.sum()
     assert load == pytest.approx(LOAD, rel=0.01 if held else 1e-9)
     assert drag == pytest.approx(part * MU * LOAD, rel=0.01 if held else 1e-9)
@@ -66,17 +68,16 @@ def test_dead_loads_below_the_friction_limit_leave_the_stick_zone_of_cattaneo_an
     peak, stuck = 2.0 * load / (np.pi * half_width), np.sqrt(1.0 - drag / (MU * load))
     x = mesh.nodes[mesh.skin, 0]
     assert np.ptp(x[now.state == STICK]) / 2.0 == pytest.approx(half_width * stuck, abs=0.01)  # half an element
-    traction = -(now.tangential / body.touchable.length)[abs(x) < 0.03].mean()
+    traction = -(now.tangential / body.fixed_length)[abs(x) < 0.03].mean()
     assert traction == pytest.approx(MU * peak * (1.0 - stuck), rel=0.02)
 
 
 def test_skin_that_dead_loads_leave_clear_of_the_surface_sticks_where_they_have_put_it():
     mesh, loads = round_foot(0.5, held=True)
-    body = Body.of(mesh, [Hooke(YOUNG, NU), Hooke(1e-4, 0.3)], loads)
+    body = LinearBody.of(mesh, [Hooke(YOUNG, NU), Hooke(1e-4, 0.3)], loads).condensed
     high = -2.0  # mm: the loads lower the foot by a third of one
-    before = untouched(body.touchable, high)
-    np.testing.assert_array_equal(before.shift, body.touchable.tangential_free)
-    assert before.gap.min() > 0.0
-    pressed = Course(body.touchable, FrictionLaw(MU, np.inf)).step(before, 0.0, 0.0)
+    before = replace(Shape.undeformed(body), u=body.untouched(), pull=Pull(high, MU))
+    assert (before.place(body)[:, 1] - high).min() > 0.0
+    pressed = Newton(body).settle(before, Pull(0.0, MU))
     assert pressed.normal.sum() > 0.9 * LOAD
     assert abs(pressed.tangential.sum()) < 0.05 * MU * LOAD  # the pad carries the drag

@@ -12,7 +12,7 @@ from solver.constitutive.hyperelastic import NeoHooke
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.march import march
-from solver.equilibrium.newton import Newton, Pull, Shape
+from solver.equilibrium.newton import FiniteNewton, Pull, Shape
 from solver.mesh import Mesh
 from solver.mesh.blocks import block
 from solver.mesh.mesher import Sizing
@@ -27,7 +27,7 @@ def _model(fineness: float = 6.0) -> FiniteFinger:
 
 
 def _slid(mesh: Mesh, laws: Iterable[NeoHooke], pull: Pull) -> Shape:
-    return settled(Newton(FiniteBody.of(mesh, list(laws))), pull)
+    return settled(FiniteNewton(FiniteBody.of(mesh, list(laws))), pull)
 
 
 def _last(finger: FiniteFinger, course: list[Pull], start: Shape | None = None) -> Shape:

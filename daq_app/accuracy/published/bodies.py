@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.body.linear import Body
+from solver.body.linear import LinearBody
 from solver.body.stiffness import Probes, local_coordinates
-from solver.contact.active_set import OPEN, SLIP, Contact, States
+from solver.contact.law import OPEN, SLIP
+from solver.equilibrium.newton import Newton
 from solver.mesh import Array, Indices, Mesh
 from solver.mesh.grid import grid_mesh, quality
 
@@ -180,7 +181,7 @@ def placed(mesh: Mesh, points: Array) -> tuple[Indices, Array]:
     return near[rows, best], local.reshape(*near.shape, 2)[rows, best]
 
 
-def stress(body: Body, displacement: Array, points: Array) -> Array:
+def stress(body: LinearBody, displacement: Array, points: Array) -> Array:
     """Return the in-plane stress (p, 2, 2) [MPa] at `points` (p, 2) for displacements (nodes, 2)."""
     mesh, elastic = body.mesh, body.elastic
     element, local = placed(mesh, points)
@@ -193,14 +194,6 @@ def stress(body: Body, displacement: Array, points: Array) -> Array:
     return 2 * shear * strain + lame[:, None, None] * np.eye(2)
 
 
-def skin_motion(body: Body, found: Contact) -> Array:
-    """Return the displacement (2 k,) of the skin, normal first, of a body that nothing holds, in a state of contact."""
-    t = body.touchable
-    up = t.normal_by_normal @ found.normal + t.normal_by_tangential @ found.tangential + t.normal_free
-    along = t.normal_by_tangential.T @ found.normal + t.tangential_by_tangential @ found.tangential + t.tangential_free
-    return np.concatenate([up, along]) + t.motions @ found.motion
-
-
-def touching_within(body: Body, half_width: float) -> States:
+def touching_within(newton: Newton, half_width: float) -> Indices:
     """Return first states: points whose |x| is below `half_width` slip, the others are open."""
-    return np.where(np.abs(body.mesh.nodes[body.mesh.skin, 0]) < half_width, SLIP, OPEN).astype(np.int8)
+    return np.where(np.abs(newton.skin_x) < half_width, SLIP, OPEN)

@@ -15,39 +15,40 @@ from daq_app.accuracy.published.bodies import (
     graded,
     mirrored,
     mound,
-    skin_motion,
     stress,
     touching_within,
 )
 from daq_app.accuracy.published.zones import half_above, half_width
-from solver.body.linear import Body, edge_load
+from solver.body.linear import LinearBody, edge_load
 from solver.constitutive.linear import Hooke
-from solver.contact.active_set import OPEN, STICK, Contact, Course, Touchable, forced
-from solver.contact.law import FrictionLaw
+from solver.contact.law import OPEN, STICK, FrictionLaw
+from solver.equilibrium.force_control import balanced
+from solver.equilibrium.full_slip import settled, slide_beside
+from solver.equilibrium.newton import Given, Newton, Pull, Shape
 from solver.mesh import Array
 
 ELEMENT = 1 / 30  # of the half-width
 RADIUS = 1000.0  # in half-widths: the theory's limit of light loads
-NONE = FrictionLaw(0.0, np.inf)
+NONE = Pull(0.0, 0.0, sense=-1)
 
 
-def half_plane(half_width: float, radius: float, law: Hooke, wide: float = 100.0) -> Body:
+def half_plane(half_width: float, radius: float, law: Hooke, wide: float = 100.0) -> LinearBody:
     """Return a half-plane with elements of 1/30 of the half-width where it touches; radius inf: flat."""
     x = mirrored(graded(ELEMENT, 0.3, 1.2, wide)) * half_width
     y = graded(ELEMENT, 0.3, 0.0, wide) * half_width
-    return Body.of(mound(x, y, radius, 3.0 * half_width), [law])
+    return LinearBody.of(mound(x, y, radius, 3.0 * half_width), [law])
 
 
-def pressed(body: Body, load: float, half_width: float) -> Contact:
+def pressed(newton: Newton, load: float, half_width: float) -> Shape:
     """Return the contact of a body pressed by `load` [N/mm]."""
-    return Course(forced(body.touchable, load), NONE).sliding(0.0, 1, touching_within(body, 1.05 * half_width))
+    return slide_beside(newton, NONE, touching_within(newton, 1.05 * half_width), load)
 
 
 def press(finest: float, nu: float) -> float:
     """Return the force [N/mm] of a light half-plane on elements of that size, pressed by 1e-3 half-widths."""
     x, y = mirrored(graded(finest, 0.3, 1.2, 20.0)), graded(finest, 0.3, 0.0, 20.0)
-    body = Body.of(mound(x, y, RADIUS, 3.0), [Hooke(0.08, nu)])
-    return float(Course(body.touchable, NONE).sliding(1e-3, 1).normal.sum())
+    body = LinearBody.of(mound(x, y, RADIUS, 3.0), [Hooke(0.08, nu)])
+    return float(settled(Newton(body.condensed), NONE._replace(depth=1e-3)).force[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +66,9 @@ def hertz(young: float, nu: float, radius: float, load: float, half_width: float
     """Return what is found for a load whose closed form has `half_width` [mm] and `peak` [MPa]."""
     body = half_plane(half_width, np.inf, Hooke(young, nu))
     x = body.mesh.nodes[body.mesh.skin, 0]
-    body = replace(body, touchable=replace(body.touchable, gap=x**2 / (2 * radius)))
-    found = pressed(body, load, half_width)
-    pressure = found.normal / body.touchable.length
+    body.condensed.rest[:, 1] = x**2 / (2 * radius)
+    found = pressed(Newton(body.condensed), load, half_width)
+    pressure = found.normal / body.condensed.fixed_length
     inside = np.abs(x) < 0.9 * half_width
     ellipse = peak * np.sqrt(1 - (x[inside] / half_width) ** 2)
     return Hertz(
@@ -95,14 +96,15 @@ def whole_cylinder(load: float, half_width: float, peak: float) -> Cylinder:
     traction = np.zeros((len(top), 2))
     traction[:, 1] = -peak * np.sqrt(np.clip(1 - (mesh.nodes[top, 0] / half_width) ** 2, 0, None))
     loads = edge_load(mesh, top, traction)
-    body = Body.of(mesh, [Hooke(0.08, 0.48)], loads * (load / -loads.sum()), free=("y", "turn"))
-    found = Course(body.touchable, NONE).sliding(0.0, 1, touching_within(body, 0.9 * half_width))
-    moved = body.displacement(skin_motion(body, found)[:, None])[:, :, 0]
+    body = LinearBody.of(mesh, [Hooke(0.08, 0.48)], loads * (load / -loads.sum()), free=("y", "turn"))
+    newton = Newton(body.condensed)
+    found = slide_beside(newton, NONE, touching_within(newton, 0.9 * half_width))
+    moved = body.displacement(found.u)
     centre = int(np.argmin(np.hypot(x, y)))
     at = mesh.nodes[mesh.skin, 0]
     return Cylinder(
         -float(moved[centre, 1]), float(found.normal.sum()), 2 * float(np.sqrt(found.normal @ at**2 / load)),
-        float((found.normal / body.touchable.length).max()),
+        float((found.normal / body.condensed.fixed_length).max()),
     )  # fmt: skip
 
 
@@ -110,38 +112,28 @@ def whole_cylinder(load: float, half_width: float, peak: float) -> Cylinder:
 class Light:
     """A light contact of half-width 1 and the load that makes it, nearly incompressible so that nothing couples."""
 
-    body: Body
+    body: LinearBody
     load: float
     peak: float
     x: Array  # (k,) of the skin's nodes
     length: Array  # (k,)
-    free: Touchable  # the body under its load
-    found: Contact
+    newton: Newton
+    found: Shape
 
-    def displacement(self, state: Contact) -> Array:
-        """Return the displacement (nodes, 2) of the whole body."""
-        forces = np.concatenate([state.normal, state.tangential])
-        return self.body.displacement(self.body.skin_displacement(forces[:, None]))[:, :, 0]
-
-    def stress(self, state: Contact, points: Array) -> Array:
+    def stress(self, state: Shape, points: Array) -> Array:
         """Return the stress (p, 2, 2) at `points` (p, 2), by the peak pressure."""
-        return stress(self.body, self.displacement(state), points) / self.peak
+        return stress(self.body, self.body.displacement(state.u), points) / self.peak
 
-    def sheared(self, law: FrictionLaw, part: float) -> Contact:
+    def sheared(self, law: FrictionLaw, part: float) -> Shape:
         """Return the state after a tangential force `part` mu P along -x on the far side of what only pressed."""
-        count = len(self.x)
-        along = np.concatenate([np.zeros(count), np.ones(count)])[:, None]
-        body = replace(
-            self.free,
-            motions=np.hstack([self.free.motions, along]),
-            resultants=np.append(self.free.resultants, -part * law.mu * self.load),
-        )
-        before = replace(self.found, state=np.where(self.found.touching, STICK, OPEN).astype(np.int8))
-        return Course(body, law).step(before, 0.0, 0.0)
+        stuck = np.where(self.found.touching, STICK, OPEN).astype(np.int32)
+        before = replace(self.found, state=stuck, pull=Pull(self.found.pull.depth, law.mu, law.tau_max))
+        return balanced(self.newton, before, Given(self.load, -part * law.mu * self.load))
 
-    def slid(self, law: FrictionLaw, direction: int = 1) -> Contact:
+    def slid(self, law: FrictionLaw, direction: int = 1) -> Shape:
         """Return the state of full slip; the body moves along `direction` x."""
-        return Course(self.free, law).sliding(0.0, direction, self.found.state)
+        pull = Pull(0.0, law.mu, law.tau_max, -direction)
+        return slide_beside(self.newton, pull, self.found.state, self.load)
 
 
 @cache
@@ -151,16 +143,15 @@ def light(nu: float = 0.4999, wide: float = 100.0) -> Light:
     load = np.pi * plane / (4 * RADIUS)
     body = half_plane(1.0, RADIUS, Hooke(0.08, nu), wide)
     x = body.mesh.nodes[body.mesh.skin, 0]
-    return Light(
-        body, load, 2 * load / np.pi, x, body.touchable.length, forced(body.touchable, load), pressed(body, load, 1.0)
-    )
+    newton = Newton(body.condensed)
+    return Light(body, load, 2 * load / np.pi, x, body.condensed.fixed_length, newton, pressed(newton, load, 1.0))
 
 
-def stick_width(light: Light, state: Contact, mu: float) -> float:
+def stick_width(light: Light, state: Shape, mu: float) -> float:
     """Return half the width of the stick: what friction could carry and does not, mu p - q, falls to nothing there."""
     return half_width(light.x, mu * state.normal + state.tangential, state.state == STICK)
 
 
-def capped_width(light: Light, state: Contact, law: FrictionLaw) -> float:
+def capped_width(light: Light, state: Shape, law: FrictionLaw) -> float:
     """Return half the width of what slips at the bound: where mu p crosses it."""
     return half_above(light.x, law.mu * state.normal / light.length - law.tau_max)

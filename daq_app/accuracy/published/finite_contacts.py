@@ -13,7 +13,7 @@ from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.march import march
-from solver.equilibrium.newton import Newton, Pull, Shape
+from solver.equilibrium.newton import FiniteNewton, Pull, Shape
 from solver.mesh import Array
 
 ELEMENT = 1 / 10  # of the half-width expected
@@ -28,7 +28,7 @@ STEP = 5e-5  # of the surface sideways, in half-widths
 class LightFinite:
     """A half-plane at finite strain and what a light press of it gives."""
 
-    newton: Newton
+    newton: FiniteNewton
     pressed: Shape
     load: float  # [N/mm]
 
@@ -97,6 +97,6 @@ def light_finite() -> LightFinite:
     """Return the half-plane, pressed without friction."""
     x = mirrored(graded(ELEMENT, 0.3, 1.2, WIDE))
     y = graded(ELEMENT, 0.3, 0.0, WIDE)
-    newton = Newton(FiniteBody.of(mound(x, y, RADIUS, 3.0), [NeoHooke(YOUNG, NU)]))
+    newton = FiniteNewton(FiniteBody.of(mound(x, y, RADIUS, 3.0), [NeoHooke(YOUNG, NU)]))
     pressed = settled(newton, Pull(DEPTH, 0.0, np.inf, 1), tolerance=1e-12)
     return LightFinite(newton, pressed, float(pressed.force[1]))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from daq_app.accuracy.published.bodies import distorted, membrane, ring
-from solver.body.linear import Body, edge_load
+from solver.body.linear import LinearBody, edge_load
 from solver.body.stiffness import Probes
 from solver.constitutive.linear import Hooke
 from solver.element import Q2P1
@@ -27,14 +27,14 @@ def widened(nu: float, radial: int, around: int) -> float:
     """Return the displacement of the hole that is found, mean over corner nodes [mm]."""
     mesh, hole = ring(INNER, OUTER, radial, around)
     at = mesh.nodes[hole]
-    body = Body.of(mesh, [Hooke(YOUNG, nu)], edge_load(mesh, hole, at / INNER), free=("x", "y", "turn"))
+    loads = edge_load(mesh, hole, at / INNER)
+    body = LinearBody.of(mesh, [Hooke(YOUNG, nu)], loads, free=("x", "y", "turn"))
     moved = _free(body)[hole]
     return float(np.sum(moved * at, axis=1)[:-1:2].mean() / INNER)
 
 
-def _free(body: Body) -> Array:
-    skin = np.concatenate([body.touchable.normal_free, body.touchable.tangential_free])
-    return body.displacement(skin[:, None])[:, :, 0]
+def _free(body: LinearBody) -> Array:
+    return body.displacement(body.condensed.untouched())
 
 
 def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
@@ -42,7 +42,7 @@ def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
     mesh, hole = ring(INNER, OUTER, radial, 4 * radial)
     mesh = distorted(mesh, 0.2, 5)
     loads = edge_load(mesh, hole, mesh.nodes[hole] / INNER)
-    body = Body.of(mesh, [Hooke(YOUNG, nu)], loads, free=("x", "y", "turn"))
+    body = LinearBody.of(mesh, [Hooke(YOUNG, nu)], loads, free=("x", "y", "turn"))
     found = _free(body)
     x, y = mesh.nodes.T
     r2 = x * x + y * y
@@ -79,5 +79,5 @@ def cook(young: float, nu: float, force: float, count: int) -> tuple[float, floa
     """
     mesh = membrane(count, count)
     loads = edge_load(mesh, mesh.skin, np.tile([0.0, force / 16.0], (len(mesh.skin), 1)))
-    risen = Body.of(mesh, [Hooke(young, nu)], loads).touchable.normal_free
+    risen = LinearBody.of(mesh, [Hooke(young, nu)], loads).condensed.untouched()[:, 1]
     return float(risen[len(risen) // 2]), float(risen[-1])

@@ -1,26 +1,79 @@
-"""The search for contact states of a condensed body at small strain, in plain NumPy: the judge of the compiled one."""
+"""Contact of a reduced body with a flat rigid surface: which points touch, stick, slip or slip at the bound.
+
+Unknown are the normal forces of the touching points, the tangential forces of the sticking ones and, for a body that
+is free to move as a whole, its motion. For one guess of every point's state they follow from one small dense linear
+system; states that contradict its solution are changed, and again, until none does (primal-dual active set: Alart and
+Curnier 1991; Hüeber and Wohlmuth 2005). No penalty: what touches has a gap of zero, what slips has exactly the force
+of the law.
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgesv, dgetrf, dgetrs
+from scipy.linalg.lapack import dgetrf, dgetrs
 
+from solver.body.linear import CondensedLinear
 from solver.body.validation import finite
-from solver.contact.active_set import (
-    AMBIGUOUS,
-    CONTRADICTORY,
-    FIRST,
-    HERTZ,
-    ROUNDS,
-    SMALL,
-    Array,
-    Contact,
-    ContactLost,
-    Flags,
-    States,
-    Touchable,
-    lowered,
-)
 from solver.contact.law import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
+from solver.failures import ContactLost
+
+Array = NDArray[np.float64]
+States = NDArray[np.int8]
+Flags = NDArray[np.bool_]
+SMALL = 1e-11  # a contradiction smaller than this, relative to the largest of its kind, is round-off
+FIRST = (0.3, 0.1, 0.03, 0.01, 0.6, 1.0)  # parts of the skin's height tried as what touches under a force, in turn
+
+AMBIGUOUS = "the touching points have no unique forces"
+CONTRADICTORY = "the states of the touching points still contradicted each other after {} corrections"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Touchable:
+    """What the surface feels of a body: k points that may touch, and r free motions of the body as a whole.
+
+    Displacements [mm] are relative to the driven part of the body; forces [N/mm] are those of the surface on the body.
+    """
+
+    gap: Array  # (k,) height over the surface before any motion [mm]
+    length: Array  # (k,) skin each point stands for [mm]
+    normal_by_normal: Array  # (k, k) compliance: displacement along +y by forces along +y [mm per N/mm]
+    normal_by_tangential: Array  # (k, k) displacement along +y by forces along +x
+    tangential_by_tangential: Array  # (k, k) displacement along +x by forces along +x
+    normal_free: Array  # (k,) displacement along +y by the dead loads alone [mm]
+    tangential_free: Array  # (k,)
+    motions: Array  # (2 k, r) displacement of the points, normal ones first, by each free motion
+    resultants: Array  # (r,) what the surface's forces must amount to along each free motion [N/mm]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contact:
+    """A state of contact that contradicts nothing."""
+
+    state: States  # (k,)
+    sense: Array  # (k,) direction of the friction force on a slipping point: +1 along +x, -1 along -x
+    normal: Array  # (k,) force on the body along +y [N/mm]
+    tangential: Array  # (k,) along +x [N/mm]
+    shift: Array  # (k,) position along the surface relative to where it would be undeformed and not driven [mm]
+    gap: Array  # (k,) [mm]
+    motion: Array  # (r,) free motion
+    iterations: int  # linear systems solved
+
+    @property
+    def touching(self) -> NDArray[np.bool_]:
+        """Return which points touch, (k,)."""
+        return self.state != OPEN
+
+
+def touchable(body: CondensedLinear) -> Touchable:
+    """Return what the surface feels of a held body: the inverse of its skin's stiffness."""
+    compliance = np.linalg.inv(body.stiffness)
+    free = (compliance @ body.load).reshape(-1, 2)
+    nothing = np.zeros((2 * len(free), 0))
+    return Touchable(
+        body.rest[:, 1], body.fixed_length, compliance[1::2, 1::2], compliance[1::2, ::2], compliance[::2, ::2],
+        free[:, 1], free[:, 0], nothing, np.zeros(0),
+    )  # fmt: skip
 
 
 class System:
@@ -88,10 +141,6 @@ class Course:
             guesses += [np.where(self.body.gap <= height, SLIP, OPEN) for height in self._heights()]
         if guess is None and np.isfinite(self.law.tau_max):
             guesses.append(np.where(low, SHEAR_LIMITED, OPEN))
-        if guess is None and not self.body.motions.shape[1]:
-            found = self._slid(depth, -float(direction))
-            if found is not None:
-                return found
         for number, first in enumerate(guesses):
             try:
                 return self._consistent(depth, 0.0, np.zeros(count), first.astype(np.int8), sense, free=False)
@@ -104,47 +153,6 @@ class Course:
         """Return heights [mm] below which skin may first be thought to touch where a force finds the depth."""
         low, high = float(self.body.gap.min()), float(self.body.gap.max())
         return low + np.array(FIRST) * (high - low)
-
-    def _slid(self, depth: float, sense: float) -> Contact | None:
-        """Return what `_consistent` does where all that touches slips one way; None where that takes many rounds.
-
-        Points are then open, slipping or slipping at the bound, and the drag follows from the pressure.
-        """
-        body, mu = self.body, self.law.mu
-        slips = body.normal_by_normal + sense * mu * body.normal_by_tangential
-        above, bound = body.gap + body.normal_free - depth, self.law.bound(body.length)
-        on: Flags = above < -HERTZ * depth
-        none: Array = np.zeros(len(on))
-        capped: Flags = np.zeros(len(on), bool)
-        for iteration in range(1, ROUNDS + 1):
-            matrix, lifted, pull = slips, above, none
-            if capped.any():
-                pull = np.where(capped, sense * bound, 0.0)
-                matrix = np.where(capped, body.normal_by_normal, slips)
-                lifted = above + body.normal_by_tangential @ pull
-            at = on.nonzero()[0]
-            if not len(at):
-                return None
-            columns = matrix.take(at, 1)
-            found = dgesv(columns.take(at, 0), -lifted[at])
-            pressing: Array = found[2]
-            if found[3]:  # no unique forces
-                return None
-            normal = none.copy()
-            normal[at] = pressing
-            gap = lifted + columns @ pressing
-            slack = SMALL * max(float(pressing.max()), -float(pressing.min()))
-            low = -SMALL * max(float(body.gap.max()), float(gap.max()))
-            now: Flags = (on & (normal >= -slack)) | (~on & (gap < low))
-            over: Flags = now & on & (mu * normal > bound + np.where(capped, -slack, slack))
-            if (now == on).all() and (over == capped).all():
-                tangential = np.where(on & ~capped, sense * mu * normal, pull)
-                shift = body.tangential_free + body.tangential_by_tangential @ tangential
-                shift += body.normal_by_tangential.T @ normal
-                state = np.where(capped, SHEAR_LIMITED, np.where(on, SLIP, OPEN)).astype(np.int8)
-                return Contact(state, np.full(len(on), sense), normal, tangential, shift, gap, np.zeros(0), iteration)
-            on, capped = now, over
-        return None
 
     def step(self, before: Contact, depth: float, travel: float, resultants: Array | None = None) -> Contact:
         """Return the state after the body was driven to `depth` and `travel` along +x [mm], coming from `before`.
@@ -260,3 +268,35 @@ class Course:
             sense[enters] = np.where(found.shift > anchor, -1.0, 1.0)[enters]
         change(enters, self._entering, -found.gap * force / height)
         return state, sense, badness
+
+
+def untouched(body: Touchable, depth: float = 0.0) -> Contact:
+    """Return the state before first touch."""
+    count = len(body.gap)
+    zero = np.zeros(count)
+    state = np.full(count, OPEN, np.int8)
+    gap = body.gap + body.normal_free - depth
+    return Contact(state, np.ones(count), zero, zero, body.tangential_free, gap, np.zeros(0), 0)
+
+
+def lowered(law: FrictionLaw, contact: Contact) -> Contact:
+    """Return `contact` with the lowest point on the surface, where nothing touches: under a force something does."""
+    if contact.touching.any():
+        return contact
+    state = contact.state.copy()
+    state[np.argmin(contact.gap)] = SLIP if law.frictionless else STICK
+    return replace(contact, state=state)
+
+
+def forced(body: Touchable, normal_force: float, tangential_force: float | None = None) -> Touchable:
+    """Return the body free to move along y under a given normal force [N/mm] instead of being driven to a depth.
+
+    With a `tangential_force`, of the surface on the body along +x [N/mm], it is free to move along x too. Its motions
+    are the last of `Contact.motion`: up, then along +x.
+    """
+    one, zero = np.ones(len(body.gap)), np.zeros(len(body.gap))
+    motions, resultants = [body.motions, np.r_[one, zero][:, None]], [body.resultants, [normal_force]]
+    if tangential_force is not None:
+        motions.append(np.r_[zero, one][:, None])
+        resultants.append([tangential_force])
+    return replace(body, motions=np.concatenate(motions, axis=1), resultants=np.concatenate(resultants))

@@ -1,0 +1,60 @@
+"""A body as Newton sees it: linearised about a state and condensed to the skin that may touch, k nodes of it."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.mesh import Array
+
+Narrow = NDArray[np.int32]
+
+
+class CondensedBody(Protocol):
+    """A body whose stiffness and forces about the last state asked for are those of its skin alone."""
+
+    constant: bool  # whether the stiffness is that of every state, so that one linear solve is exact
+    bulk: float  # how much stiffer the body is to a change of volume than to shear, at most [-]
+    held: Narrow  # (k,) whether a node of the skin is held: along x HELD_X, along y HELD_Y, both their sum
+    middle: Narrow  # (k,) 1 at the middle of an edge whose length follows the deformed skin, else 0
+    fixed_length: Array  # (k,) skin that each node stands for whatever the state [mm]
+    stiffness: Array  # (2 k, 2 k) x, y of one node, x, y of the next [N/mm per mm]
+    force: Array  # (2 k,) of the skin on the surface, were there no surface [N/mm]
+
+    @property
+    def compliance(self) -> Array:
+        """The inverse of the stiffness (2 k, 2 k) where that is known, else (0, 0) [mm per N/mm]."""
+        ...
+
+    @property
+    def motions(self) -> Array:
+        """Motions (2 k, m) of the body as a whole that the surface alone balances."""
+        ...
+
+    @property
+    def found(self) -> Array | None:
+        """Displacements of the equilibrium that the tangent led to, where it may serve once more."""
+        ...
+
+    @found.setter
+    def found(self, u: Array | None) -> None: ...
+
+    def undeformed(self) -> tuple[Array, Array]:
+        """Return displacements and pressures of the body at rest."""
+        ...
+
+    def place(self, u: Array) -> Array:
+        """Return where the skin's nodes are (k, 2) for displacements `u` [mm]."""
+        ...
+
+    def linearise(self, u: Array, pressure: Array) -> bool:
+        """Set `stiffness` and `force` at a state; False where the body has none there."""
+        ...
+
+    def relinearise(self, u: Array) -> bool:
+        """Set the `force` at a state and leave the stiffness as it is; False where the body has none there."""
+        ...
+
+    def recover(self, u: Array, pressure: Array, step: Array, scale: float) -> tuple[Array, Array, float]:
+        """Return a state after `scale` times the skin's `step` (2 k,), and the largest move of the full step [mm]."""
+        ...

@@ -1,0 +1,98 @@
+"""The one compiled search for contact states finds what the plain one on the inverse stiffness finds, to round-off."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
+from solver.body.linear import LinearBody
+from solver.constitutive.linear import Hooke
+from solver.contact.law import FrictionLaw
+from solver.equilibrium.force_control import balanced
+from solver.equilibrium.full_slip import settled, slide_beside
+from solver.equilibrium.load_path import march
+from solver.equilibrium.newton import Given, Newton, Pull, Shape, lowered
+from solver.failures import ContactLost
+from solver.mesh.mesher import Sizing, finger_mesh
+from solver.scene import Finger, Loading, Receptor
+from tests.solver.oracle.active_set import Course, forced, touchable, untouched
+from tests.solver.oracle.active_set import lowered as lowered_plain
+
+TISSUES = [Hooke(0.136, 0.48), Hooke(0.08, 0.48), Hooke(0.034, 0.3)]
+LAWS = [FrictionLaw(0.0, np.inf), FrictionLaw(0.5, np.inf), FrictionLaw(0.9, 0.008), FrictionLaw(0.3, 0.0)]
+WAY = [(0.3, 0.0), (0.9, 0.0), (1.5, 0.0), (1.5, 0.05), (1.5, 0.2), (1.5, 1.0), (1.5, 3.0), (1.5, 2.9), (1.2, 1.0)]
+
+
+@pytest.fixture(scope="module")
+def body():
+    mesh = finger_mesh(Finger(), Receptor(), Sizing(3, 2.0)).mesh
+    return LinearBody.of(mesh, TISSUES)
+
+
+@pytest.fixture(scope="module")
+def newton(body):
+    return Newton(body.condensed)
+
+
+@pytest.fixture(scope="module")
+def plain(body):
+    return touchable(body.condensed)
+
+
+def agree(found, plain):
+    np.testing.assert_array_equal(found.state, plain.state)
+    rubs = plain.tangential != 0.0
+    np.testing.assert_array_equal(np.sign(found.tangential[rubs]), np.sign(plain.tangential[rubs]))
+    for one, other in ((found.normal, plain.normal), (found.tangential, plain.tangential)):
+        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-10 * max(plain.normal.max(), 1e-300))
+
+
+@pytest.mark.parametrize("law", LAWS, ids=str)
+@pytest.mark.parametrize("direction", [1, -1])
+def test_settled_slides_are_the_plain_ones(newton, plain, law, direction):
+    pull = Pull(1.5, law.mu, law.tau_max, -direction)
+    found = settled(newton, pull)
+    agree(found, Course(plain, law).sliding(1.5, direction))
+    agree(settled(newton, pull._replace(depth=1.4), found), Course(plain, law).sliding(1.4, direction, found.state))
+
+
+@pytest.mark.parametrize("law", LAWS, ids=str)
+def test_a_course_of_stick_slip_and_turning_round_is_the_plain_one(newton, plain, law):
+    course, before = Course(plain, law), untouched(plain)
+    state, met = Shape.undeformed(newton.condensed), set()
+    for depth, travel in WAY:
+        before = course.step(before, depth, travel)
+        state = newton.settle(state, Pull(depth, law.mu, law.tau_max, travel=-travel))
+        agree(state, before)
+        met |= set(state.state.tolist())
+    assert law.frictionless or (met >= {STICK, SLIP} and (SHEAR_LIMITED in met) == np.isfinite(law.tau_max))
+
+
+@pytest.mark.parametrize("tau", [np.inf, 0.004])
+def test_a_body_pressed_and_dragged_by_forces_is_the_plain_one(newton, plain, tau):
+    mu = 0.4
+    state, before = replace(Shape.undeformed(newton.condensed), pull=Pull(0.0, mu, tau)), untouched(plain)
+    for n in range(1, 41):
+        normal, drag = 0.002 * n, 0.0006 * max(n - 20, 0) * (1 if n < 35 else -1)
+        course = Course(forced(plain, normal, drag), FrictionLaw(mu, tau))
+        before = course.step(lowered_plain(course.law, before), 0.0, 0.0)
+        state = balanced(newton, lowered(newton.condensed, state), Given(normal, drag))
+        agree(state, before)
+        np.testing.assert_allclose([-state.pull.depth, -state.pull.travel], before.motion, atol=1e-10)
+    assert (state.state == SHEAR_LIMITED).any() == (tau < np.inf)
+
+
+def test_a_way_under_given_forces_ends_with_them(newton):
+    loading = Loading(normal_force=0.1, tangential_force=0.02)
+    last = march(newton, Pull(0.0, 0.5, 0.01), loading)[-1].state
+    np.testing.assert_allclose(last.force, [-0.02, 0.1], rtol=1e-9)
+    assert (last.state == STICK).any()
+
+
+def test_a_search_that_may_not_go_on_says_so(newton):
+    nowhere = np.full(len(newton.skin_x), OPEN)
+    with pytest.raises(ContactLost, match="after 2 systems"):
+        slide_beside(newton, Pull(1.5, 0.5, sense=-1), nowhere, rounds=2)
+    with pytest.raises(ContactLost, match="no unique forces"):
+        slide_beside(newton, Pull(0.0, 0.5, sense=-1), nowhere, force=0.1)
