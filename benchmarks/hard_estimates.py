@@ -31,8 +31,8 @@ import numpy as np
 from benchmarks.error_estimate import on_mesh, random_scene
 from daq_app.accuracy.methods import overkill
 from solver.accuracy.adaptivity import MARGIN, sized
+from solver.arrays import Array
 from solver.failures import NotConverged, SolveFailure
-from solver.mesh import Array
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
 from solver.response.solution import answers

@@ -6,9 +6,8 @@ incompressible limit (Boffi and Gastaldi 2002, Computing 69, 1-10, with the pres
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from solver.arrays import Array
 
 # Gauss's points and weights on a line from -1 to 1, in closed form: NumPy's polynomials take longer to import
 GAUSS_3 = np.array([-(0.6**0.5), 0.0, 0.6**0.5]), np.array([5.0, 8.0, 5.0]) / 9.0

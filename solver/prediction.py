@@ -5,13 +5,12 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from solver.arrays import Array
 from solver.mesh import Mesh
 from solver.mesh.mesher import FingerMesh
 from solver.scene import Scene
 
-Array = NDArray[np.float64]
 ROW: Array = 0.25 * np.arange(-32.0, 25.0)  # arc positions of the row of receptors [mm]
 
 

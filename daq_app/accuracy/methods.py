@@ -10,6 +10,7 @@ import numpy as np
 
 from daq_app.accuracy.asked import clock
 from solver.accuracy.adaptivity import MARGIN, Ascent, Climbed, climbed, foot, risen, sized, sized_together
+from solver.arrays import Array
 from solver.body.linear import LinearBody
 from solver.body.tissues import settled_moduli
 from solver.continuation.existence import steady
@@ -19,7 +20,6 @@ from solver.element import Q2P1
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.newton import FiniteNewton, Pull, Shape
-from solver.mesh import Array
 from solver.mesh.mesher import AT_CUT, Sizing
 from solver.response.finite_solution import alike
 from solver.scene import Friction, Scene

@@ -1,7 +1,7 @@
 """The live model at finite strain: as far as its warm stepper reaches, and back again once the forces have eased."""
 
+from solver.arrays import Array, Indices
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.mesh import Array, Indices
 from solver.mesh.mesher import Sizing
 from solver.response.finite_picture import FinitePicture
 from solver.response.finite_stepper import FiniteStepper

@@ -16,9 +16,9 @@ from daq_app.window.live_model import Forces, Kinematics, Picture, Provisional, 
 from sessions.plan.plan import SessionPlan
 from sessions.prediction import DEFAULT_SPEED, SLIDES, PredictionOptions, with_own_finger
 from sessions.strokes import AnalysisSettings, FrictionParameters
+from solver.arrays import Array, Indices
 from solver.equilibrium.finger import FingerModel
 from solver.failures import SolveFailure
-from solver.mesh import Array, Indices
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW
 from solver.response.fields import fields_of

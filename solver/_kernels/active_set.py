@@ -17,8 +17,9 @@ from solver._kernels.arguments import (
     SkinPosition,
     StateChanges,
 )
-from solver._kernels.compiling import HELD_X, OPEN, SHEAR_LIMITED, SLIP, STICK, Array, compiled
+from solver._kernels.compiling import HELD_X, OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
 from solver._kernels.skin import COLUMNS, STEEP, assemble_contact_system, bounded_length, solve
+from solver.arrays import Array
 
 SLACK = 1e-12  # a contradiction smaller than this, relative to the largest of its kind, is round-off
 DEPTH_GIVEN, PUSH_GIVEN, DRAG_GIVEN = 0, 1, 2  # what drives the body: its depth, its normal force, its drag too

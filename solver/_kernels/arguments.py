@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from solver._kernels.compiling import Array, Narrow, Wide
+from solver.arrays import Array, Indices, Narrow
 
 
 class ElementArrays(NamedTuple):
@@ -51,7 +51,7 @@ class LinearMesh(NamedTuple):
     """Elements of a body at small strain, and what they are made of."""
 
     place: Array  # (nodes, 2) undeformed positions [mm]
-    nodes: Wide  # (e, 9)
+    nodes: Indices  # (e, 9)
     shear: Array  # (e,) [MPa]
     lame: Array  # (e,) [MPa]
 
@@ -77,7 +77,7 @@ class LinearElements(NamedTuple):
 class RecoveryArrays(NamedTuple):
     """What recovers the centre nodes of elements at small strain."""
 
-    nodes: Wide  # (e, 9)
+    nodes: Indices  # (e, 9)
     recovery_matrix: Array  # (e, 2, 16)
 
 
@@ -97,8 +97,8 @@ class SymbolicFactorization(NamedTuple):
     numbers: Narrow  # unknowns of all borders
     place: Narrow  # where each of them stands in the front of the parent
     run: Narrow  # where in its border the run of neighbours ends that are neighbours there too
-    factor_at: Wide  # (p,) where each part's factor begins
-    wait_at: Wide  # (p,) where each part's border waits for the parent
+    factor_at: Indices  # (p,) where each part's factor begins
+    wait_at: Indices  # (p,) where each part's border waits for the parent
     leaf: Narrow  # (p, 2) range of `order` that belongs to each leaf
     order: Narrow  # (e,) elements, leaf after leaf
     at: Narrow  # (e, 16) in that order: where an element's unknowns stand in the front of its leaf, -1 where fixed
@@ -114,7 +114,7 @@ class Factors(NamedTuple):
     border: Narrow
     border_at: Narrow
     numbers: Narrow
-    factor_at: Wide
+    factor_at: Indices
     values: Array  # rows of D L^T, part after part
     near: Array  # (k + b,) memory for the largest part
 

@@ -1,7 +1,8 @@
 """A state of one mesh taken to another: displacements by the elements' own functions, pressures by their elements."""
 
 from solver._kernels.arguments import MeshTransferArrays
-from solver._kernels.compiling import Array, compiled
+from solver._kernels.compiling import compiled
+from solver.arrays import Array
 
 
 @compiled

@@ -18,10 +18,6 @@ from numpy.typing import NDArray
 
 from solver.progress import aside
 
-Array = NDArray[np.float64]
-Narrow = NDArray[np.int32]
-Wide = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 States = NDArray[np.int8]
 Loop = TypeVar("Loop", bound=Callable[..., Any])
 Result = TypeVar("Result")

@@ -4,7 +4,8 @@
 import numpy as np
 
 from solver._kernels.arguments import BodyState, ElementArrays, ElementSystem, ProbeArrays
-from solver._kernels.compiling import Array, compiled
+from solver._kernels.compiling import compiled
+from solver.arrays import Array
 
 PLAIN = 2.0  # exponent of tissue that does not stiffen
 

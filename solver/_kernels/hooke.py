@@ -11,8 +11,9 @@ from solver._kernels.arguments import (
     ShapeFunctions,
     SymbolicFactorization,
 )
-from solver._kernels.compiling import Array, Flags, compiled
+from solver._kernels.compiling import compiled
 from solver._kernels.multifrontal import back_substitute_part
+from solver.arrays import Array, Flags
 
 
 @compiled

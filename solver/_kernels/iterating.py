@@ -6,9 +6,10 @@ There are n unknowns and k nodes of skin.
 import numpy as np
 
 from solver._kernels.arguments import BodyState, ElementArrays, ElementSystem, Factors
-from solver._kernels.compiling import Array, compiled
+from solver._kernels.compiling import compiled
 from solver._kernels.elements import advance
 from solver._kernels.multifrontal import back_substitute, condense
+from solver.arrays import Array
 
 
 @compiled

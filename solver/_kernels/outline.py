@@ -2,14 +2,15 @@
 
 import numpy as np
 
-from solver._kernels.compiling import OPEN, Array, Flags, Narrow, Wide, compiled
+from solver._kernels.compiling import OPEN, compiled
+from solver.arrays import Array, Flags, Indices, Narrow
 
 SQUEEZED = 0.85  # stretch of skin, on one side at least, in which a kink is told of
 
 
 @compiled
 def pinched(
-    nodes: Array, u: Array, outline: Wide, loose: Flags, state: Narrow, first: int
+    nodes: Array, u: Array, outline: Indices, loose: Flags, state: Narrow, first: int
 ) -> tuple[float, int, float, float]:
     """Return how far the skin is squeezed where its elements are `loose` (a,), as `skin_compression.pinched` has it.
 
@@ -44,7 +45,7 @@ def pinched(
 
 
 @compiled
-def crosses(nodes: Array, u: Array, outline: Wide) -> bool:
+def crosses(nodes: Array, u: Array, outline: Indices) -> bool:
     """Return whether the deformed line meets itself other than at the nodes that join its pieces."""
     count = outline.shape[0]
     x, y = np.empty(count), np.empty(count)

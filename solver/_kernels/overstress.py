@@ -4,7 +4,8 @@
 import numpy as np
 
 from solver._kernels.arguments import ElementArrays, ElementSystem
-from solver._kernels.compiling import Array, compiled
+from solver._kernels.compiling import compiled
+from solver.arrays import Array
 
 
 @compiled

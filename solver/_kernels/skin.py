@@ -4,7 +4,8 @@
 import numpy as np
 
 from solver._kernels.arguments import CondensedArrays, ContactStates, ContactSystem, LoadState, Skin, SkinPosition
-from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, Array, Narrow, compiled
+from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
+from solver.arrays import Array, Narrow
 
 # how the length of skin of an edge's first, middle and last node grows with the positions of the three: Simpson's rule
 _LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 from solver.accuracy.finite_ends import steps_asked
-from solver.accuracy.step_error import Steps
 from solver.body.tissues import strains_the_cut
 from solver.continuation.existence import refuse_far_beyond, steep
 from solver.continuation.finite_states import course, nearby, roughly, settled
@@ -20,6 +19,7 @@ from solver.continuation.limit_point import folded, sound
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.loads import sliding_pull
 from solver.equilibrium.newton import Shape
+from solver.equilibrium.step_error import Steps
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.mesh.mesher import AT_CUT, SHORT_AT_CUT, Sizing, sharing, still_sharing
 from solver.scene import Scene

@@ -4,12 +4,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from solver.arrays import Array
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.load_path import Instant
 from solver.equilibrium.newton import Shape
 from solver.failures import NotConverged
-from solver.mesh import Array
 from solver.scene import Scene
 
 MISSED = 1e-5  # of forces that are given, by which a state may miss them

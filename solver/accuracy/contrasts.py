@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.mesh import Array
+from solver.arrays import Array
 from solver.prediction import Prediction
 from solver.scene import Scene
 

@@ -22,9 +22,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.accuracy.step_error import Steps
+from solver.arrays import Array
 from solver.contact.law import STEEP
-from solver.mesh import Array
+from solver.equilibrium.step_error import Steps
 from solver.mesh.mesher import ANYWHERE, EDGE, FINEST, POINT, SHORT
 from solver.scene import Finger, Receptor, Scene
 

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from solver._kernels import SHEAR_LIMITED
-from solver.accuracy.step_error import HALF, Steps
+from solver.arrays import Array
 from solver.continuation.finite_states import course, depends_on_way
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.finite_relaxation import RelaxingCourse
 from solver.equilibrium.newton import Shape
-from solver.mesh import Array
+from solver.equilibrium.step_error import HALF, Steps
 from solver.scene import Scene
 
 NUDGE = 1e-2  # of the traction bound, to see what it does on a whole course

@@ -8,12 +8,12 @@ import numpy as np
 from solver.accuracy import finite_ends
 from solver.accuracy.adaptivity import Ascent, Climbed, climbed
 from solver.accuracy.error_estimate import FROM_MESHES, Errors, errors
-from solver.accuracy.step_error import Steps
+from solver.arrays import Array
 from solver.body.finite_measures import deformation
 from solver.body.tissues import stiff, strains_the_cut
 from solver.continuation.finite_states import depends_on_way
+from solver.equilibrium.step_error import Steps
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
-from solver.mesh import Array
 from solver.scene import Scene
 
 COARSER = 0.6  # fineness of the mesh that the error is estimated from, by that of the answer

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from solver._kernels import STICK
+from solver.arrays import Array
 from solver.constitutive.hyperelastic import HUMAN_SKIN
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.newton import Shape
-from solver.mesh import Array
 from solver.scene import Material, Scene
 
 DENSITY = 1.1e-9  # of soft tissue [t/mm3 = N s2/mm4]

@@ -3,12 +3,12 @@
 import numpy as np
 
 from solver.accuracy.error_estimate import Errors, errors
-from solver.accuracy.step_error import HALF, Steps
+from solver.arrays import Array
 from solver.continuation.small_states import NUDGE, bounded_more, end, felt_of_bound, nearest, rubbed_more
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.loads import pull_of
+from solver.equilibrium.step_error import HALF, Steps
 from solver.failures import SolveFailure
-from solver.mesh import Array
 from solver.scene import Scene
 
 

@@ -2,12 +2,7 @@
 
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-from solver.mesh import Array
-
-Narrow = NDArray[np.int32]
+from solver.arrays import Array, Narrow
 
 
 class CondensedBody(Protocol):

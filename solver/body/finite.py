@@ -4,19 +4,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver import _kernels as kernels
 from solver._kernels import HELD_X, HELD_Y, bind_arguments
 from solver._kernels.arguments import BodyState, ElementArrays, ElementSystem, ProbeArrays, SymbolicFactorization
+from solver.arrays import Array, Indices, Narrow
 from solver.body.receptor import Endings
 from solver.body.validation import check_body, check_driven, check_laws
 from solver.constitutive.hyperelastic import Law
 from solver.element import Q2P1
 from solver.linalg.multifrontal import Elimination, symbolic_factorization
-from solver.mesh import Array, Indices, Mesh
+from solver.mesh import Mesh
 
-Narrow = NDArray[np.int32]
 VALUES, _SLOPES = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
 
 
@@ -137,7 +136,7 @@ class CondensedFinite:
         """
         count = len(body.nodes)
         self.body, self.constant = body, False
-        self.load = np.zeros(body.size)  # dead loads on the body, of `solver.body.dead_loads`
+        self.load = np.zeros(body.size)  # dead loads on the body, of `solver.equilibrium.dead_loads`
         self.all_forces = np.zeros(body.size)  # of all unknowns, less the dead loads
         if beside is not None and beside.body.plan is body.plan:
             self.inside, self.system = beside.inside, beside.system._replace(force=self.all_forces)

@@ -4,9 +4,9 @@ from typing import cast
 
 import numpy as np
 
+from solver.arrays import Array
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import shape, slopes
-from solver.mesh import Array
 
 IMAGINARY = 1e-30  # step whose square is nothing [-]
 

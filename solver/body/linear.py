@@ -7,17 +7,16 @@ from typing import Literal
 
 import numpy as np
 from numpy.linalg import LinAlgError
-from numpy.typing import NDArray
 
 from solver._kernels import HELD_X, HELD_Y
+from solver.arrays import Array, Indices, Narrow
 from solver.body.linear_elimination import LinearElimination
 from solver.body.stiffness import Elastic, Isotropic
 from solver.body.validation import check_body, check_held, check_loads, loose
 from solver.element import GAUSS_4, line
-from solver.mesh import Array, Indices, Mesh
+from solver.mesh import Mesh
 
 Motion = Literal["x", "y", "turn"]
-Narrow = NDArray[np.int32]
 _POINTS, _WEIGHTS = GAUSS_4
 _VALUES, _SLOPES = line(_POINTS)  # (q, 3)
 UNHELD = 1e14  # stiffness by its inverse, largest numbers, from which a body is taken to move freely [-]

@@ -12,9 +12,10 @@ from numpy.linalg import LinAlgError
 from solver import _kernels as kernels
 from solver._kernels import hooke
 from solver._kernels.arguments import RecoveryArrays
+from solver.arrays import Array, Indices
 from solver.body.stiffness import Isotropic, condensed_elements
 from solver.linalg.multifrontal import factors_of, symbolic_factorization
-from solver.mesh import Array, Indices, Mesh
+from solver.mesh import Mesh
 
 _ALONE = Lock()  # held while the memory of `_memory` is in use
 

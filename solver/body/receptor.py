@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.arrays import Array, Indices
 from solver.body.stiffness import Centred, Elastic, Probes, local_coordinates
 from solver.element import GAUSS_3
-from solver.mesh import Array, Indices, Mesh, distinct
+from solver.mesh import Mesh, distinct
 from solver.mesh.mesher import FingerMesh
 from solver.scene import Receptor
 

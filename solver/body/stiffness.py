@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from solver._kernels import hooke
 from solver._kernels.arguments import LinearElements, LinearMesh, ShapeFunctions
+from solver.arrays import Array, Indices
 from solver.element import Q2P1
-from solver.mesh import Array, Indices, Mesh
+from solver.mesh import Mesh
 
 _VALUES, _GRADIENTS = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
 _SHAPES = ShapeFunctions(

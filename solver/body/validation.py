@@ -6,10 +6,11 @@ from typing import Protocol
 
 import numpy as np
 
+from solver.arrays import Array
 from solver.constitutive.hyperelastic import STIFFENING, Law
 from solver.constitutive.linear import Prony
 from solver.element import Q2P1
-from solver.mesh import Array, Mesh
+from solver.mesh import Mesh
 from solver.mesh.grid import jacobians
 
 HELD = 1e-9  # part of a motion of the body as a whole below which what is held does not move with it [-]

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from solver.arrays import Array
 from solver.constitutive.linear import lame_modulus, shear_modulus
 
-Array = NDArray[np.float64]
 PLAIN = 2.0  # Ogden's exponent of the neo-Hookean law
 HUMAN_SKIN = 9.0  # and that of human skin (ascribed to Shergold and Fleck 2004; docs/scene-file.md)
 STIFFENING = PLAIN, 14.0  # least and largest exponent: steeper ones contradicted themselves

@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from solver.arrays import Array
 
 
 def shear_modulus(E: float, nu: float) -> float:

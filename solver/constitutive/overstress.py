@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from solver.arrays import Array
 from solver.constitutive.linear import kept
-from solver.mesh import Array
 
 
 def unstrained(F: Array) -> Array:

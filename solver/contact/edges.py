@@ -7,7 +7,7 @@ centre at 2/5 of the way from there to the edge.
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.mesh import Array
+from solver.arrays import Array
 from solver.mesh.mesher import FingerMesh, with_middles
 
 FEWEST = 5  # touching nodes for which the force can tell

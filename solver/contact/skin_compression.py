@@ -3,11 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from solver.mesh import Array
+from solver.arrays import Array, Flags
 
-Flags = NDArray[np.bool_]
 SQUEEZED = 0.85  # stretch of skin, on one side at least, in which a kink is told of
 
 

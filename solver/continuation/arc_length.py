@@ -12,10 +12,10 @@ from typing import Protocol
 
 import numpy as np
 
+from solver.arrays import Array
 from solver.contact.skin_compression import Pinch
 from solver.equilibrium.newton import BY_FRICTION, EQUILIBRIUM, Newton, Pull, Shape
 from solver.failures import Cancelled, NotConverged
-from solver.mesh import Array
 from solver.progress import tell
 
 LARGEST_MU = 2.0  # beyond this a coefficient of friction is not looked for

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
 
+from solver.arrays import Array
 from solver.body.tissues import finite_laws
 from solver.continuation.arc_length import CREASE, LARGEST_MU, TOLERANCE, Branch, followed
 from solver.continuation.surface_instability import folds_at
@@ -16,7 +17,6 @@ from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, Pull, Shape
 from solver.failures import NotConverged
-from solver.mesh import Array
 from solver.mesh.mesher import EPIDERMIS, Sizing
 from solver.scene import Finger, Materials, Receptor, Scene
 

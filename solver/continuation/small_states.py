@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver._kernels import SHEAR_LIMITED, STICK
-from solver.accuracy.step_error import HALF
+from solver.arrays import Array
 from solver.body.tissues import relaxing_laws
 from solver.contact.law import STEEP
 from solver.continuation.wedging import followed
@@ -18,8 +18,8 @@ from solver.equilibrium.load_path import PRESSING_STEPS, PRESSING_TIME, Instant,
 from solver.equilibrium.loads import forces_of, pull_of, sliding_pull
 from solver.equilibrium.newton import Newton, Shape
 from solver.equilibrium.relaxation import RelaxingBody, RelaxingWay, march_relaxing
+from solver.equilibrium.step_error import HALF
 from solver.failures import ContactLost, NoSteadyState, beyond_friction
-from solver.mesh import Array
 from solver.scene import Scene
 
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding

@@ -11,8 +11,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.arrays import Array
 from solver.constitutive.hyperelastic import Law, stress, tangent
-from solver.mesh import Array
 
 Waves = NDArray[np.complex128]
 STEP = 0.01  # of the stretch, between two looks

@@ -7,6 +7,7 @@ from time import perf_counter
 
 import numpy as np
 
+from solver.arrays import Array
 from solver.body.linear import LinearBody
 from solver.body.receptor import Endings, endings, middle
 from solver.body.stiffness import Probes
@@ -14,7 +15,7 @@ from solver.body.tissues import settled_moduli
 from solver.contact.edges import arcs_of, width
 from solver.element import Q2P1
 from solver.equilibrium.newton import Newton, Shape
-from solver.mesh import Array, distinct
+from solver.mesh import distinct
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
 from solver.prediction import ROW
 from solver.scene import Receptor, Scene

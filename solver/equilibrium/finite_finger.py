@@ -9,6 +9,7 @@ from numpy.linalg import LinAlgError
 
 from solver import _kernels as kernels
 from solver._kernels import OPEN, SHEAR_LIMITED
+from solver.arrays import Array
 from solver.body.finite import FiniteBody, FiniteProbes
 from solver.body.receptor import endings, middle
 from solver.body.tissues import finite_laws
@@ -16,7 +17,6 @@ from solver.contact.edges import edges, width
 from solver.contact.skin_compression import Pinch
 from solver.equilibrium.mesh_transfer import Bridge, Places
 from solver.equilibrium.newton import FiniteNewton, Shape
-from solver.mesh import Array
 from solver.mesh.grid import MeshError
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
 from solver.prediction import ROW

@@ -11,6 +11,7 @@ import numpy as np
 
 from solver import _kernels as kernels
 from solver._kernels import STICK
+from solver.arrays import Array, Indices
 from solver.body.finite import CondensedFinite, FiniteBody, FiniteProbes
 from solver.body.finite_measures import deformation
 from solver.body.tissues import relaxing_laws
@@ -32,7 +33,6 @@ from solver.equilibrium.load_path import (
 from solver.equilibrium.newton import FiniteNewton, Given, Newton, Shape, lowered
 from solver.equilibrium.relaxation import RELAXED, wait
 from solver.failures import Cancelled, NotConverged, followed_to
-from solver.mesh import Array, Indices
 from solver.progress import tell
 from solver.scene import Scene
 

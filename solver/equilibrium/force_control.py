@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 from solver._kernels import STICK
+from solver.arrays import Array
 from solver.equilibrium.newton import EQUILIBRIUM, Given, Newton, Pull, Shape, lowered
 from solver.equilibrium.root import UNMET, met
 from solver.failures import Cancelled, ContactLost, NotConverged, followed_to
-from solver.mesh import Array
 from solver.progress import tell
 
 HALVINGS = 8  # how often a step that failed is cut in two before it is given up

@@ -6,11 +6,11 @@ import numpy as np
 
 from solver import _kernels as kernels
 from solver._kernels.arguments import MeshTransferArrays
-from solver.body.finite import VALUES, FiniteBody, Narrow
+from solver.arrays import Array, Flags, Indices, Narrow
+from solver.body.finite import VALUES, FiniteBody
 from solver.contact.edges import arcs_of
 from solver.element import Q2P1
 from solver.equilibrium.newton import Shape
-from solver.mesh import Array, Flags, Indices
 from solver.mesh.mesher import FingerMesh, with_middles
 
 

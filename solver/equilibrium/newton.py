@@ -24,12 +24,12 @@ from solver._kernels.arguments import (
     Skin,
     SkinPosition,
 )
+from solver.arrays import Array
 from solver.body.condensed import CondensedBody
 from solver.body.finite import CondensedFinite, FiniteBody
 from solver.body.validation import finite
 from solver.contact.law import FrictionLaw
 from solver.failures import ContactLost, NotConverged
-from solver.mesh import Array
 
 States = NDArray[np.int32]
 SHORTEST = 1.0 / 16.0  # part of a Newton step below which a body that turns inside out is given up

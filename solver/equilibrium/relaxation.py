@@ -16,6 +16,7 @@ from math import ceil
 
 import numpy as np
 
+from solver.arrays import Array
 from solver.body.linear import CondensedLinear, LinearBody
 from solver.body.receptor import Endings
 from solver.body.stiffness import Elastic, Probes
@@ -23,7 +24,7 @@ from solver.body.validation import check_body, check_driven, check_held, check_t
 from solver.constitutive.linear import Moduli, Prony, kept
 from solver.equilibrium.load_path import PRESSING_STEPS, PRESSING_TIME, Aim, Progress, Way, course
 from solver.equilibrium.newton import Newton, Pull, Shape
-from solver.mesh import Array, Mesh
+from solver.mesh import Mesh
 from solver.scene import Loading
 
 KEPT = 4  # lengths of steps that a body is kept ready for, factors and all

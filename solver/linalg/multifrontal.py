@@ -4,14 +4,13 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver import _kernels as kernels
 from solver._kernels.arguments import Factors, SymbolicFactorization
+from solver.arrays import Array, Indices, Narrow
 from solver.linalg.nested_dissection import Tree, places
-from solver.mesh import Array, Indices, Mesh
+from solver.mesh import Mesh
 
-Narrow = NDArray[np.int32]
 LEAF: Final = 8  # elements in a part that is not halved any more
 
 

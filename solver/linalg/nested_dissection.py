@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.mesh import Array, Indices, distinct
+from solver.arrays import Array, Indices
+from solver.mesh import distinct
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from solver.arrays import Array
 from solver.mesh.grid import grid_mesh
-from solver.mesh.mesh import Array, Mesh
+from solver.mesh.mesh import Mesh
 
 
 def block(x_lines: Array, y_lines: Array, radius: float = np.inf, *, held: bool = True) -> Mesh:

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from solver.arrays import Array, Indices
 from solver.element import Q2P1
-from solver.mesh import Array, Indices, Mesh
+from solver.mesh import Mesh
 
 # offsets along the grid's two directions of an element's nodes, for grids whose first direction turns to the second
 # clockwise (as from proximal to distal, then outwards to the skin)

@@ -6,9 +6,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from solver.arrays import Array, Flags, Indices
+
 Numbers = TypeVar("Numbers", bound=np.generic)
 _NONE: Indices = np.empty(0, np.int64)
 

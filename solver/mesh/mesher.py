@@ -8,7 +8,8 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.mesh import Array, Indices, Mesh, distinct
+from solver.arrays import Array, Indices
+from solver.mesh import Mesh, distinct
 from solver.mesh.grid import grid_mesh
 from solver.mesh.outline import Outline
 from solver.scene import Finger, Receptor

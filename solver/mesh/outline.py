@@ -9,11 +9,9 @@ from math import cos, pi, radians, sin
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from solver.arrays import Array
 from solver.scene import Finger
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

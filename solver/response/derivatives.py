@@ -16,9 +16,9 @@ import numpy as np
 from solver import _kernels as kernels
 from solver._kernels import SHEAR_LIMITED, STICK
 from solver._kernels.arguments import ContactStates, SkinPosition
+from solver.arrays import Array
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, Newton, Shape, load_state
-from solver.mesh import Array
 from solver.scene import Scene
 
 MU, TAU_MAX, DEPTH = range(3)

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.arrays import Array, Indices
 from solver.body.receptor import Endings
 from solver.body.stiffness import Elastic, Probes, local_coordinates
 from solver.body.tissues import finite_laws, settled_moduli
 from solver.element import Q2P1
-from solver.mesh import Array, Indices, Mesh
+from solver.mesh import Mesh
 from solver.mesh.outline import Outline
 from solver.prediction import Prediction
 from solver.scene import Scene

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.arrays import Array
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.load_path import Instant, Progress, Way, course
 from solver.equilibrium.loads import pull_of
 from solver.equilibrium.newton import Shape
 from solver.failures import SolveFailure
-from solver.mesh import Array
 from solver.prediction import Skin
 from solver.response.fields import Fields, Sketch
 from solver.response.small_solution import skin_of

@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from solver.arrays import Array
 from solver.body.finite import FiniteBody, FiniteProbes
 from solver.constitutive.hyperelastic import slopes
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.newton import FiniteNewton, Shape
-from solver.mesh import Array
 from solver.response.derivatives import Derivatives, driven, of_skin
 from solver.scene import Scene
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver import _kernels as kernels
+from solver.arrays import Array
 from solver.body.finite_measures import pressure
 from solver.continuation.arc_length import leapt
 from solver.continuation.limit_point import sound
@@ -14,7 +15,6 @@ from solver.equilibrium import full_slip as sliding
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.newton import Given, Pull, Shape
 from solver.failures import NotConverged
-from solver.mesh import Array
 from solver.prediction import Prediction
 from solver.response.derivatives import Derivatives
 from solver.response.finite_derivatives import of_shape

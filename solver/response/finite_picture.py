@@ -5,13 +5,13 @@ from typing import Self
 
 import numpy as np
 
+from solver.arrays import Array, Indices
 from solver.body.finite import FiniteBody, FiniteProbes
 from solver.body.receptor import Endings
 from solver.body.stiffness import Elastic, Probes
 from solver.body.tissues import settled_moduli
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.newton import Shape
-from solver.mesh import Array, Indices
 from solver.response.live_picture import MIDDLES, QUARTERS
 from solver.scene import Scene
 

@@ -20,6 +20,7 @@ from solver.accuracy.audits import forces_missed, refuse_unsound, rounding, unba
 from solver.accuracy.finite_audits import audits, course_audits
 from solver.accuracy.finite_ends import times_on_way
 from solver.accuracy.finite_errors import error_estimates
+from solver.arrays import Array
 from solver.contact.law import NAMES
 from solver.continuation.existence import doubts
 from solver.continuation.finite_states import course, presses
@@ -28,7 +29,6 @@ from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.finite_relaxation import RelaxingCourse
 from solver.equilibrium.newton import EQUILIBRIUM, FiniteNewton, Shape
 from solver.failures import Cancelled, NotConverged, SolveFailure
-from solver.mesh import Array
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW, History, Prediction, Row, Skin, drag
 from solver.progress import tell

@@ -11,10 +11,10 @@ from math import isfinite
 import numpy as np
 
 from solver._kernels import OPEN, SLIP, STICK
+from solver.arrays import Array
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.force_control import corrected
 from solver.equilibrium.newton import BY_DEPTH, Given, Pull, Shape
-from solver.mesh import Array
 
 SLIDING = 0.995  # part of the friction limit beyond which the tangential force means sliding
 LIGHT = 1e-7  # N/mm: less than this is no touch

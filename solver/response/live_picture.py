@@ -8,10 +8,10 @@ from typing import Self
 
 import numpy as np
 
+from solver.arrays import Array, Indices
 from solver.body.stiffness import Probes
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.newton import Shape
-from solver.mesh import Array, Indices
 
 # A nine-node element as four quadrilaterals, and the middle of each in its coordinates.
 QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])

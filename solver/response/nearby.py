@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver._kernels import SLIP
+from solver.arrays import Array
 from solver.contact.law import NAMES
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.full_slip import slide_beside
 from solver.equilibrium.loads import sliding_pull
 from solver.equilibrium.newton import Shape
 from solver.failures import ContactLost
-from solver.mesh import Array
 from solver.prediction import Prediction, Skin
 from solver.response.derivatives import Derivatives, of_contact
 from solver.scene import Scene

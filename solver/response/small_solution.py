@@ -25,7 +25,7 @@ from solver.accuracy.audits import (
 from solver.accuracy.contrasts import those_of, together
 from solver.accuracy.omitted_effects import model, warnings
 from solver.accuracy.small_errors import error_estimates, others_on, steps_asked, times_on_way
-from solver.accuracy.step_error import Steps
+from solver.arrays import Array
 from solver.contact.law import NAMES, FrictionLaw
 from solver.continuation.small_existence import direct
 from solver.continuation.small_states import depends_on_way, gives_way, in_tissue, marched, refined, shift_of
@@ -33,8 +33,8 @@ from solver.continuation.wedging import WIDE
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.load_path import Instant
 from solver.equilibrium.newton import Shape
+from solver.equilibrium.step_error import Steps
 from solver.failures import Cancelled, NotConverged, SolveFailure
-from solver.mesh import Array
 from solver.mesh.grid import MeshError
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW, History, Prediction, Row, Skin, drag

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver._kernels import SLIP, STICK
+from solver.arrays import Array
 from solver.body.linear import CondensedLinear
 from solver.body.receptor import Endings
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.newton import Given, Newton, Pull, Shape, lowered
 from solver.failures import ContactLost
-from solver.mesh import Array
 
 SLIDING = 0.995  # part of the friction limit beyond which the tangential force means sliding
 LIGHT = 1e-7  # N/mm: less than this is no touch

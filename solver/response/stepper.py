@@ -2,8 +2,8 @@
 
 from typing import Protocol
 
+from solver.arrays import Array
 from solver.equilibrium.expected_depth import expected_depth
-from solver.mesh import Array
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
 

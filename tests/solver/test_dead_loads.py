@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from solver._kernels import SLIP
-from solver.body.dead_loads import loaded
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive.hyperelastic import NeoHooke, stress
 from solver.constitutive.linear import Hooke
+from solver.equilibrium.dead_loads import loaded
 from solver.equilibrium.newton import FiniteNewton, Pull, Shape
 from tests.solver.finite_examples import block
 

@@ -3,13 +3,13 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from solver.body.dead_loads import loaded
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody
 from solver.body.validation import BodyError
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
 from solver.constitutive.linear import Hooke, Prony
 from solver.contact.law import FrictionLaw
+from solver.equilibrium.dead_loads import loaded
 from solver.equilibrium.finite_relaxation import RelaxingNewton
 from solver.equilibrium.force_control import untouched
 from solver.equilibrium.full_slip import settled

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.accuracy.step_error import Steps
 from solver.continuation.small_states import end
 from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.step_error import Steps
 from solver.mesh.mesher import Sizing
 from solver.response.solution import solve
 from solver.scene import Friction, Loading, Scene, Solve

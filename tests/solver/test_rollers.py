@@ -7,12 +7,12 @@ import pytest
 
 from daq_app.accuracy.published.bodies import ring
 from daq_app.accuracy.published.locking import INNER, OUTER, YOUNG, widening
-from solver.body.dead_loads import loaded
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.body.validation import BodyError
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.constitutive.linear import Hooke
+from solver.equilibrium.dead_loads import loaded
 from solver.equilibrium.march import march
 from solver.equilibrium.newton import FiniteNewton, Newton, Pull
 from solver.mesh import Mesh

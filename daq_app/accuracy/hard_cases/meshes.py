@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.arrays import Array, Indices
 from solver.element import Q2P1
-from solver.mesh import Array, Indices, Mesh
+from solver.mesh import Mesh
 from solver.mesh.blocks import block
 
 

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.arrays import Array, Indices
 from solver.body.linear import LinearBody
 from solver.body.stiffness import Probes, local_coordinates
 from solver.contact.law import OPEN, SLIP
 from solver.equilibrium.newton import Newton
-from solver.mesh import Array, Indices, Mesh
+from solver.mesh import Mesh
 from solver.mesh.grid import grid_mesh, quality
 
 NONE: Indices = np.zeros(0, np.int64)

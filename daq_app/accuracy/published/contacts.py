@@ -19,13 +19,13 @@ from daq_app.accuracy.published.bodies import (
     touching_within,
 )
 from daq_app.accuracy.published.zones import half_above, half_width
+from solver.arrays import Array
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive.linear import Hooke
 from solver.contact.law import OPEN, STICK, FrictionLaw
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.full_slip import settled, slide_beside
 from solver.equilibrium.newton import Given, Newton, Pull, Shape
-from solver.mesh import Array
 
 ELEMENT = 1 / 30  # of the half-width
 RADIUS = 1000.0  # in half-widths: the theory's limit of light loads

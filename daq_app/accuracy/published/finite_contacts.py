@@ -9,12 +9,12 @@ import numpy as np
 from daq_app.accuracy.published.bodies import graded, mirrored, mound
 from daq_app.accuracy.published.zones import half_above, half_width
 from solver._kernels import STICK
+from solver.arrays import Array
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.march import march
 from solver.equilibrium.newton import FiniteNewton, Pull, Shape
-from solver.mesh import Array
 
 ELEMENT = 1 / 10  # of the half-width expected
 RADIUS = 1000.0  # in half-widths

@@ -3,11 +3,12 @@
 import numpy as np
 
 from daq_app.accuracy.published.bodies import distorted, membrane, ring
+from solver.arrays import Array, Indices
 from solver.body.linear import LinearBody, edge_load
 from solver.body.stiffness import Probes
 from solver.constitutive.linear import Hooke
 from solver.element import Q2P1
-from solver.mesh import Array, Indices, Mesh
+from solver.mesh import Mesh
 
 INNER, OUTER, YOUNG = 3.0, 9.0, 1000.0  # radii [mm] and modulus [MPa] of the cylinder, under an inner pressure of 1 MPa
 _SHARE = INNER**2 / (OUTER**2 - INNER**2)

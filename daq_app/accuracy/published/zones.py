@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.arrays import Array
 from solver.contact.edges import last_edge
-from solver.mesh import Array
 
 
 def half_width(x: Array, force: Array, inside: NDArray[np.bool_]) -> float:

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.arrays import Array
 from solver.body.validation import check_loads
 from solver.equilibrium.newton import FiniteNewton, Pull, Shape
 from solver.failures import NotConverged
-from solver.mesh import Array
 
 SMALLEST = 1.0 / 256.0  # part of the loads below which a failing step is given up
 

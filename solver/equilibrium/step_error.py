@@ -10,7 +10,7 @@ from math import ceil
 
 import numpy as np
 
-from solver.mesh import Array
+from solver.arrays import Array
 
 HALF = 0.5
 MOST = 16  # times the usual steps, at most
