@@ -26,15 +26,13 @@ from typing import Any, Literal
 
 import numpy as np
 
+from solver import Finger, Friction, Loading, Material, Materials, Scene, Solve, SolveFailure, solve_many
 from solver.accuracy.adaptivity import ascended
 from solver.accuracy.contrasts import told
 from solver.continuation.small_states import numbers_on, settled
 from solver.continuation.wedging import WIDE
 from solver.equilibrium.finger import FingerModel
-from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
-from solver.response.solution import solve_together
-from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
 
 NAMES = ("SED", "normal force", "drag")
 TOLERANCES = (None, 0.01, 0.003)
@@ -92,7 +90,7 @@ def measured(number: int, kinematics: Literal["small", "finite"]) -> dict[str, A
         for tolerance in TOLERANCES:
             asked = [replace(s, solve=replace(s.solve, tolerance=tolerance, evidence="estimated")) for s in scenes]
             begun = process_time()
-            found = solve_together(asked)
+            found = solve_many(asked)
             answers[str(tolerance)] = {
                 "numbers": [told(one)[:3] for one in found],
                 "warned": any("Differences" in warning for warning in found[0].warnings),

@@ -26,13 +26,12 @@ from typing import Any
 
 import numpy as np
 
+from solver import Finger, Friction, Loading, Material, Materials, Receptor, Scene, SceneError, SolveFailure
 from solver.accuracy.error_estimate import FINENESS, coarsest_for, estimates
 from solver.continuation.small_states import numbers_on, settled
 from solver.continuation.wedging import WIDE
 from solver.equilibrium.finger import FingerModel
-from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
-from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, SceneError
 
 NAMES = ("SED of the ending", "normal force", "drag")
 OVERKILL = ((26.0, False), (26.0, True), (23.0, False))  # fineness, and whether moved by half an element

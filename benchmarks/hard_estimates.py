@@ -30,13 +30,23 @@ import numpy as np
 
 from benchmarks.error_estimate import on_mesh, random_scene
 from daq_app.accuracy.methods import overkill
+from solver import (
+    Finger,
+    Friction,
+    Loading,
+    Material,
+    Materials,
+    NotConverged,
+    Prediction,
+    Receptor,
+    Scene,
+    Solve,
+    SolveFailure,
+    solve_many,
+)
 from solver.accuracy.adaptivity import MARGIN, sized
 from solver.arrays import Array
-from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
-from solver.prediction import Prediction
-from solver.response.solution import answers
-from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
 
 NAMES = ("SED of the ending", "normal force", "drag")
 ASKED = (None, 0.01, 0.003)
@@ -124,7 +134,7 @@ def measured(family: str, number: int, kinematics: str) -> dict[str, Any]:
     for tolerance in ASKED:
         begun = process_time()
         asked = replace(drawn, solve=replace(drawn.solve, tolerance=tolerance))
-        answer = answers([asked])[0]
+        answer = solve_many([asked])[0]
         told = _numbers(answer) if isinstance(answer, Prediction) else str(answer)
         row["answers"].append({"told": told, "seconds": process_time() - begun})
     try:

@@ -4,8 +4,7 @@ import subprocess
 import sys
 from dataclasses import replace
 
-from solver.response.solution import solve
-from solver.response.stepper import stepper
+from solver import solve, stepper
 from solver.scene.published import SLIPPERINESS, scene
 
 if __name__ == "__main__":

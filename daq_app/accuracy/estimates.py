@@ -15,7 +15,7 @@ from daq_app.accuracy.random_scenes import random_scene
 from daq_app.accuracy.truth import KINEMATICS, NUMBERS, cases, judged, known, overkill
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
-from solver.response.solution import answers
+from solver.response.solution import solve_many
 from solver.scene import Scene, Solve
 
 TOLERANCES = (0.01, 0.003, 0.001)
@@ -86,7 +86,7 @@ def _published(asked: Asked, found: Found, kinematics: Kinematics) -> Iterator[E
             yield tolerance if isinstance(tolerance, LeftOut) else LeftOut(f"No truth is known at {kinematics} strain.")
             return
         begun = clock()
-        found_all = answers([replace(s, solve=Solve(kinematics, tolerance=tolerance)) for s in chosen])
+        found_all = solve_many([replace(s, solve=Solve(kinematics, tolerance=tolerance)) for s in chosen])
         took = clock() - begun
         rows: list[Estimate] = []
         good = [a for a in found_all if isinstance(a, Prediction)]
@@ -110,7 +110,7 @@ def _random(asked: Asked, kinematics: Kinematics) -> Iterator[Estimate | LeftOut
             yield number
             break
         scene = random_scene(number, kinematics)
-        (answer,) = answers([replace(scene, solve=Solve(kinematics, tolerance=TOLERANCES[0]))])
+        (answer,) = solve_many([replace(scene, solve=Solve(kinematics, tolerance=TOLERANCES[0]))])
         truth = _truth(scene)
         if isinstance(answer, SolveFailure) or truth is None:
             refused += 1

@@ -16,7 +16,7 @@ import numpy as np
 from daq_app.accuracy.asked import Asked, Found, LeftOut, clock
 from daq_app.accuracy.methods import Kinematics, SmallMeshed, climbed_twice
 from solver.failures import SolveFailure
-from solver.response.solution import answers
+from solver.response.solution import solve_many
 from solver.scene import Scene, Solve
 from solver.scene.published import scenes
 
@@ -110,7 +110,7 @@ def _sorted_out(kinematics: Kinematics, chosen: list[Scene]) -> tuple[list[Truth
             todo.append(scene)
             continue
         begun = clock()
-        (answer,) = answers([replace(scene, solve=Solve(kinematics, tolerance=0.02))])
+        (answer,) = solve_many([replace(scene, solve=Solve(kinematics, tolerance=0.02))])
         if isinstance(answer, SolveFailure):
             refused.append(Truth(kinematics, scene.title, (), (), (), clock() - begun, str(answer)))
         else:

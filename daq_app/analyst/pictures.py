@@ -7,9 +7,9 @@ import numpy as np
 from daq_app.analyst.frame import Contact, Film, Finger, Frame, Instant, Parts
 from sessions.prediction import Way
 from sessions.report import Field
+from solver import Cancelled, Prediction
 from solver.equilibrium.load_path import Instant as Step
-from solver.failures import Cancelled
-from solver.prediction import ROW, Prediction, Skin
+from solver.prediction import ROW, Skin
 from solver.response.fields import Fields, Sketch, fields_of
 from solver.response.film import Still, most_squeezed, stills, way_until
 

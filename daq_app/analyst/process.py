@@ -89,7 +89,7 @@ class _Server:
 
 
 def _cancelled() -> type[Exception]:
-    from solver.failures import Cancelled
+    from solver import Cancelled
 
     return Cancelled
 

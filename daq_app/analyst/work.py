@@ -24,9 +24,8 @@ from sessions.report import Field, Report, findings
 from sessions.report.predictions import field_of, finding_of
 from sessions.strokes import analyse
 from sessions.strokes.decisions import DecisionError, append, read
-from solver.failures import Cancelled
+from solver import Cancelled, SceneError
 from solver.response.fields import Sketch
-from solver.scene import SceneError
 
 if TYPE_CHECKING:
     from sessions.report.figures import Panel

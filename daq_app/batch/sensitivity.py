@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.toml_file import SettingsError, shown
-from solver.failures import SolveFailure
-from solver.response.solution import solve
-from solver.scene import TISSUES, Scene
+from solver import Scene, SolveFailure, solve
+from solver.scene import TISSUES
 
 Design = Mapping[str, tuple[float, float]]  # dotted key of the scene file -> least and greatest value
 

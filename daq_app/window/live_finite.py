@@ -1,12 +1,12 @@
 """The live model at finite strain: as far as its warm stepper reaches, and back again once the forces have eased."""
 
+from solver import Scene
 from solver.arrays import Array, Indices
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.mesh.mesher import Sizing
 from solver.response.finite_picture import FinitePicture
 from solver.response.finite_stepper import FiniteStepper
 from solver.response.stepper import FINENESS, MARGIN
-from solver.scene import Scene
 
 WARMING = 1e-3  # [N/mm]
 

@@ -16,17 +16,15 @@ from daq_app.window.live_model import Forces, Kinematics, Picture, Provisional, 
 from sessions.plan.plan import SessionPlan
 from sessions.prediction import DEFAULT_SPEED, SLIDES, PredictionOptions, with_own_finger
 from sessions.strokes import AnalysisSettings, FrictionParameters
+from solver import Friction, Loading, Scene, Solve, SolveFailure, solve
 from solver.arrays import Array, Indices
 from solver.equilibrium.finger import FingerModel
-from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW
 from solver.response.fields import fields_of
 from solver.response.live_picture import LivePicture
 from solver.response.small_stepper import Condensed, SmallStepper
-from solver.response.solution import solve
 from solver.response.stepper import FINENESS, MARGIN
-from solver.scene import Friction, Loading, Scene, Solve
 
 if TYPE_CHECKING:
     from daq_app.window.live_finite import LiveFinite

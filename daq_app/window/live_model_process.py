@@ -26,8 +26,8 @@ def run(connection: Connection) -> None:
     give_way()
     # Loaded in the process alone: the window has no need of the solver, and opens sooner without it.
     from daq_app.window.live_follower import Follower
+    from solver import SceneError
     from solver.mesh.grid import MeshError
-    from solver.scene import SceneError
 
     follower: Follower | None = None
     speaking = threading.Lock()

@@ -18,9 +18,8 @@ from sessions.prediction.solving import (
     traction_reached,
 )
 from sessions.prediction.stored import SessionPrediction, TrialPrediction
-from solver.prediction import Prediction
+from solver import Friction, Prediction, Scene
 from solver.response.nearby import Nearby
-from solver.scene import Friction, Scene
 
 __all__ = [
     "DEFAULT_SPEED",

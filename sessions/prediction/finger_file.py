@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from sessions.toml_file import from_toml, text_of
-from solver.scene import Scene
+from solver import Scene
 
 # Every scene has them, and `sessions.prediction.scenes` puts those of the trials in their place.
 _OF_TRIALS: Mapping[str, Mapping[str, Any]] = {"friction": {"mu": 0.0}, "loading": {"indentation": 1.0}}

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from sessions.plan.plan import SessionPlan
-from solver.scene import Friction, Loading, Scene
+from solver import Friction, Loading, Scene
 from solver.scene.published import SCALE
 from solver.scene.published import Reading as TauReading
 

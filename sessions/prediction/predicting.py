@@ -9,13 +9,10 @@ from sessions.prediction.scenes import Prepared, opposite, prepared_cases
 from sessions.prediction.solving import Progress, quick
 from sessions.prediction.stored import SessionPrediction, TrialPrediction
 from sessions.strokes import Analysis
+from solver import Finger, Prediction, Scene, SolveFailure, solve_many
 from solver.equilibrium.expected_depth import matching_depths
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.load_path import Instant
-from solver.failures import SolveFailure
-from solver.prediction import Prediction
-from solver.response.solution import answers
-from solver.scene import Finger, Scene
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +74,7 @@ def predict(
             told(solved[at], known(at), ways.get(at))
 
     both = [one for scene in scenes for one in (scene, quick(opposite(scene)))]
-    found |= dict(enumerate(answers(both, progress, seen if watch else None)))
+    found |= dict(enumerate(solve_many(both, progress, seen if watch else None)))
     for at, number in enumerate(solved):
         rows[number] = known(at)
     base = asked.scene

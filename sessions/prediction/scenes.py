@@ -8,7 +8,7 @@ from sessions.prediction.options import PredictionOptions, bound, template, with
 from sessions.prediction.stored import TrialPrediction
 from sessions.prediction.variants import Variant
 from sessions.strokes import Analysis, FrictionParameters, Stroke
-from solver.scene import Friction, Loading, Scene, SceneError, Slide, Solve
+from solver import Friction, Loading, Scene, SceneError, Slide, Solve
 from solver.scene.published import SCALE
 
 SLIDES: dict[int, Slide] = {PROXIMAL_TO_DISTAL: "+x", DISTAL_TO_PROXIMAL: "-x"}

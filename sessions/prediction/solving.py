@@ -5,13 +5,10 @@ from dataclasses import replace
 
 from sessions.prediction.options import PredictionOptions, bound, template
 from sessions.prediction.scenes import SLIDES
+from solver import Cancelled, Friction, Loading, Prediction, Scene, Solve, SolveFailure, solve_many
 from solver.accuracy.audits import inside_out
-from solver.failures import Cancelled, SolveFailure
-from solver.prediction import Prediction
 from solver.response.derivatives import By
 from solver.response.nearby import Nearby, nearby
-from solver.response.solution import answers
-from solver.scene import Friction, Loading, Scene, Solve
 
 Progress = Callable[[float], bool]
 
@@ -27,7 +24,7 @@ def solved(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[P
 
 
 def _answers(scenes: Sequence[Scene], progress: Progress | None) -> tuple[Prediction | SolveFailure, ...]:
-    return answers([quick(scene) for scene in scenes], progress)
+    return solve_many([quick(scene) for scene in scenes], progress)
 
 
 def quick(scene: Scene) -> Scene:

@@ -10,7 +10,8 @@ from sessions.prediction.sed_interval import Ends, SedInterval
 from sessions.prediction.variants import Alternative
 from sessions.strokes.contact_area import FIXED, AreaLaw
 from sessions.strokes.decisions import Decision
-from solver.prediction import History, Prediction, Skin
+from solver import Prediction
+from solver.prediction import History, Skin
 from solver.response.fields import Fields, fields_of
 
 _NOT_TOLD = ("prediction", "opposite")  # of a row as plain data: all that the solver found

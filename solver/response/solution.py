@@ -30,48 +30,34 @@ Rough = Callable[[Prediction], None]  # told an answer before more is made of it
 
 
 def solve(scene: Scene, progress: Progress | None = None, *, rough: Rough | None = None) -> Prediction:
-    """Return the prediction of one scene; `rough` as in `answers`.
+    """Return the prediction of one scene; `rough` as in `solve_many`.
 
     Raises NoSteadyState where the scene has no settled sliding, NotConverged where none was found, SceneError where
     its finger cannot be meshed, Cancelled where `progress` says so.
     """
-    return solve_together((scene,), progress, rough=rough)[0]
+    answer = solve_many((scene,), progress, rough=rough)[0]
+    if isinstance(answer, SolveFailure):
+        raise answer
+    return answer
 
 
-def solve_together(
-    scenes: Sequence[Scene],
-    progress: Progress | None = None,
-    *,
-    rough: Rough | None = None,
-) -> tuple[Prediction, ...]:
-    """Return the predictions of several scenes, in their order; `rough` as in `answers`.
-
-    Scenes with the same finger, materials and receptor share one mesh, fine enough for the strictest tolerance among
-    them, so that differences between them are more accurate than each of them; at finite strain those do that are
-    pressed alike, its lines moved to the edges of contact of each. It is also so fine that differences between those
-    pressed alike are good to 5 % of their range, as estimated, in SED and, where a tolerance is asked for, in forces
-    and depth, but for variants, asked for with quick evidence; where the finest is not, a warning says by how much.
-    Raises as `solve` does.
-    """
-    done: list[Prediction] = []
-    for answer in answers(scenes, progress, rough=rough):
-        if isinstance(answer, SolveFailure):
-            raise answer
-        done.append(answer)
-    return tuple(done)
-
-
-def answers(
+def solve_many(
     scenes: Sequence[Scene],
     progress: Progress | None = None,
     watch: Watch | None = None,
     *,
     rough: Rough | None = None,
 ) -> tuple[Prediction | SolveFailure, ...]:
-    """Return the prediction of each scene or why it has none, as `solve_together` does.
+    """Return the prediction of each scene, in their order, or the failure that says why it has none.
 
-    At small strain `watch` is told each answer, by the position of its scene, as soon as it is found, with the finger
-    and the way that led to it; where another mesh is needed it is told once more. `rough` is told the answers that a
+    Scenes with the same finger, materials and receptor share one mesh, fine enough for the strictest tolerance among
+    them, so that differences between them are more accurate than each of them. At finite strain those share it that are
+    pressed alike, its lines moved to the edges of contact of each. It is also so fine that differences between those
+    pressed alike are good to 5 % of their range, as estimated, in SED and, where a tolerance is asked for, in forces
+    and depth, but for variants, asked for with quick evidence. Where the finest is not, a warning says by how much.
+
+    At small strain `watch` is given each answer, by the position of its scene, as soon as it is found, with the finger
+    and the way that led to it; where another mesh is needed it is given once more. `rough` is given the answers that a
     tolerance sends to a finer mesh, or that await their evidence. Raises SceneError where a finger cannot be meshed,
     Cancelled where `progress` says so.
     """

@@ -26,8 +26,8 @@ from daq_app.accuracy.subjects import Subject
 from daq_app.accuracy.tables import tables
 from daq_app.accuracy.truth import JUDGED, Truth, cases
 from daq_app.accuracy.warm import Warm
+from solver import solve
 from solver.accuracy.error_estimate import DEFAULT
-from solver.response.solution import solve
 
 FOREVER = Asked(quick=True, until=perf_counter() + 1e6)
 OVER = Asked(quick=True, until=perf_counter() - 1.0)

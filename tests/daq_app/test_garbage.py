@@ -210,7 +210,7 @@ def _nothing_is_computed(monkeypatch):
     """Reading is what is tried: a scene that is taken is not solved, and a study that is taken is not pooled."""
     from daq_app.cli.verbs import study
     from sessions.recording import RecordingError
-    from solver.failures import SolveFailure
+    from solver import SolveFailure
     from solver.response import solution
 
     def failing(kind):

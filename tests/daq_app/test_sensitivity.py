@@ -18,8 +18,7 @@ from daq_app.batch.sensitivity import (
 )
 from daq_app.cli.main import run
 from sessions.toml_file import SettingsError
-from solver.failures import NotConverged
-from solver.scene import Friction, Loading, Scene
+from solver import Friction, Loading, NotConverged, Scene
 
 SCENE = Scene(friction=Friction(0.4, 0.02), loading=Loading(1.0))
 DESIGN = {"friction.mu": (0.2, 0.6), "loading.indentation": (0.5, 1.5)}

@@ -9,10 +9,9 @@ from paper_friction import MEASURED, PLAN, analysis, parameters, stroke
 
 from sessions.plan.plan import Finger as OwnFinger
 from sessions.prediction import PredictionOptions, predict, with_own_finger
+from solver import Finger, Friction, Loading, Scene, SceneError, solve
 from solver.response.fields import Sketch
 from solver.response.film import most_squeezed, stills, way_until
-from solver.response.solution import solve
-from solver.scene import Finger, Friction, Loading, Scene, SceneError
 from solver.scene.published import SLIPPERINESS, STICKINESS
 
 

@@ -9,8 +9,7 @@ from paper_friction import MEASURED, PLAN, analysis, parameters, stroke
 from sessions.prediction import PredictionOptions, predict, side_by_side
 from sessions.prediction.side_by_side import with_alternatives
 from sessions.prediction.variants import Variant
-from solver.response.solution import solve
-from solver.scene import Friction, Loading, Scene, Solve
+from solver import Friction, Loading, Scene, Solve, solve
 from solver.scene.published import STICKINESS
 
 TRIALS = (2, 4)  # stickiness 20 and 80: with and without a settled slide at finite strain

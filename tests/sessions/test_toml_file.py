@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sessions.toml_file import NotAllowed, SettingsError, from_table, from_toml, load_toml, toml_text
-from solver.scene import Finger, Friction, Loading, Material, Materials, Relaxation, Scene
+from solver import Finger, Friction, Loading, Material, Materials, Relaxation, Scene
 from solver.scene.published import STICKINESS
 from solver.scene.published import scene as published
 

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 
+from solver import Finger, Friction, Loading, Materials, Receptor, Scene, Solve
 from solver.body.finite import FiniteBody, FiniteProbes
 from solver.body.receptor import endings
 from solver.body.stiffness import Elastic
@@ -13,7 +14,6 @@ from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.newton import FiniteNewton
 from solver.mesh import Mesh
 from solver.mesh.mesher import Sizing, finger_mesh
-from solver.scene import Finger, Friction, Loading, Materials, Receptor, Scene, Solve
 
 
 @cache

@@ -45,7 +45,7 @@ def scenes():
 
 
 def _drawn(kind, kinematics, number):
-    from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Relaxation, Scene, Solve
+    from solver import Finger, Friction, Loading, Material, Materials, Receptor, Relaxation, Scene, Solve
 
     rng = np.random.default_rng([SEED, sum(map(ord, kind + kinematics)), number])
     softer = rng.uniform(0.7, 1.3, 3).tolist()
@@ -82,7 +82,7 @@ def _drawn(kind, kinematics, number):
 
 
 def _loading(rng, kind, number, drawn):
-    from solver.scene import Loading
+    from solver import Loading
 
     depth, slide, mu = drawn
     if kind == "force":
@@ -100,7 +100,7 @@ def _loading(rng, kind, number, drawn):
 
 
 def _finger(rng, number, angle):
-    from solver.scene import Finger
+    from solver import Finger
 
     radius = float(rng.uniform(3.5, 8.0))
     return Finger(
@@ -114,8 +114,7 @@ def _finger(rng, number, angle):
 
 def outcome(scene):
     """Return what the solver says of a scene: its numbers or its refusal, without what it took."""
-    from solver.failures import SolveFailure
-    from solver.response.solution import solve
+    from solver import SolveFailure, solve
 
     try:
         plain = solve(scene).to_dict()

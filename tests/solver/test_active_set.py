@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver import ContactLost, Finger, Loading, Receptor
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody
 from solver.constitutive.linear import Hooke
@@ -13,9 +14,7 @@ from solver.equilibrium.force_control import balanced
 from solver.equilibrium.full_slip import settled, slide_beside
 from solver.equilibrium.load_path import march
 from solver.equilibrium.newton import Given, Newton, Pull, Shape, lowered
-from solver.failures import ContactLost
 from solver.mesh.mesher import Sizing, finger_mesh
-from solver.scene import Finger, Loading, Receptor
 from tests.solver.oracle.active_set import Course, forced, touchable, untouched
 from tests.solver.oracle.active_set import lowered as lowered_plain
 

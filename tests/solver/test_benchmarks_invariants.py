@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from solver import Friction, Loading, Material, Materials, Scene
 from solver._kernels import SHEAR_LIMITED, SLIP
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.finger import FingerModel
@@ -13,7 +14,6 @@ from solver.equilibrium.load_path import march
 from solver.equilibrium.loads import sliding_pull
 from solver.equilibrium.newton import Pull, Shape
 from solver.mesh.mesher import Sizing
-from solver.scene import Friction, Loading, Material, Materials, Scene
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
 LAWS = {"no bound": FrictionLaw(0.44, np.inf), "bound": FrictionLaw(0.44, 0.005)}

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from solver import Finger, Receptor
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.mesh_transfer import Bridge, Places
 from solver.equilibrium.newton import Pull
 from solver.mesh.mesher import Sizing, finger_mesh
-from solver.scene import Finger, Receptor
 from tests.solver.finite_examples import finger
 from tests.solver.oracle import finite as oracle
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver import ContactLost
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.full_slip import settled, slide_beside, slide_under
 from solver.equilibrium.newton import Given, Newton, Pull, Shape
-from solver.failures import ContactLost
 from solver.mesh.blocks import block
 
 RADIUS = 5.0

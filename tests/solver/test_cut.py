@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
+from solver import Friction, Loading, Scene, Solve
 from solver.accuracy import adaptivity as climbing
 from solver.accuracy.adaptivity import ascended, climbed, foot, sized, sized_together
 from solver.mesh.mesher import AT_CUT, SHORT_AT_CUT
-from solver.scene import Friction, Loading, Scene, Solve
 
 
 def dragged(mu, depth=1.0, slide="+x"):

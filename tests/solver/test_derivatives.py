@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver import Friction, Loading, Scene, Solve
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.finite import FiniteBody, FiniteProbes
 from solver.body.linear import CondensedLinear
@@ -23,7 +24,6 @@ from solver.equilibrium.newton import Newton, Pull
 from solver.mesh.mesher import Sizing
 from solver.response.derivatives import of_contact, of_skin
 from solver.response.finite_derivatives import of_shape, slope
-from solver.scene import Friction, Loading, Scene, Solve
 from tests.solver.finite_examples import block
 
 NAMES = ("mu", "tau_max", "press")

@@ -6,10 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from solver import Finger, Friction, Loading, Material, Materials, Scene, Solve, solve, solve_many
 from solver.accuracy.contrasts import TOLD, finer, off, off_by, together
 from solver.accuracy.error_estimate import FINENESS
-from solver.response.solution import answers, solve, solve_together
-from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
 from solver.scene.published import STICKINESS, scene
 
 
@@ -107,7 +106,7 @@ def test_differences_between_surfaces_that_hardly_differ_are_good_to_5_percent_o
     kinematics,
 ):
     asked, true = hardly_different(kinematics, 0.01)  # on the coarsest mesh they were up to 41 % of their range off
-    together = solve_together(asked)
+    together = solve_many(asked)
     found = np.array([(p.sed_ending, p.normal_force, p.tangential_force) for p in together])
     assert (np.ptp(found - true, axis=0) < 0.05 * np.ptp(true, axis=0)).all()
     assert solve(together[0].scene).dofs < together[0].dofs
@@ -116,14 +115,14 @@ def test_differences_between_surfaces_that_hardly_differ_are_good_to_5_percent_o
 def test_surfaces_that_the_finest_mesh_does_not_tell_apart_say_in_what_and_by_how_much(monkeypatch):
     monkeypatch.setitem(FINENESS, "small", (5, 6, 8))
     asked, true = hardly_different("small", None)
-    found = solve_together(asked)
+    found = solve_many(asked)
     seds = np.array([p.sed_ending for p in found])
     wrong = np.ptp(seds - true[:, 0]) / np.ptp(true[:, 0])
     assert wrong > 0.02
     (told,) = {w for p in found for w in p.warnings if w.startswith("Differences in SED")}
     part = float(told.split(" may be off by ")[1].split(" %")[0])
     assert 100.0 * wrong < part < 1000.0 * wrong
-    quick = solve_together([replace(s, solve=Solve(evidence="quick")) for s in asked])
+    quick = solve_many([replace(s, solve=Solve(evidence="quick")) for s in asked])
     assert not [w for p in quick for w in p.warnings if w.startswith("Differences")]
 
 
@@ -131,7 +130,7 @@ def test_surfaces_that_the_finest_mesh_does_not_tell_apart_say_in_what_and_by_ho
 def test_courses_of_surfaces_that_hardly_differ_are_marched_and_told_once_on_a_mesh_that_tells_them_apart():
     asked, true = hardly_different("small", None, "history")
     told = []
-    together = answers(asked, watch=lambda number, *_: told.append(number))
+    together = solve_many(asked, watch=lambda number, *_: told.append(number))
     assert told == [0, 1, 2]
     found = np.array([p.sed_ending for p in together])
     assert np.ptp(found - true[:, 0]) < 0.05 * np.ptp(true[:, 0])

@@ -6,12 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from solver import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve, solve
 from solver.accuracy.adaptivity import ascended, climbed
 from solver.accuracy.error_estimate import DEFAULT, FINENESS, coarsest_for, estimates
 from solver.accuracy.finite_errors import error_estimates
 from solver.mesh.mesher import AT_CUT
-from solver.response.solution import solve
-from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
 from solver.scene.published import STICKINESS, scene
 from tests.solver.drawn_scenes import DRAWN, HELD_OUT
 

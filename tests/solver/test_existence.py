@@ -3,13 +3,11 @@
 import numpy as np
 import pytest
 
+from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState, Receptor, Scene, Solve, solve
 from solver.accuracy.adaptivity import ascended
 from solver.continuation.existence import steady
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import Pull
-from solver.failures import NoSteadyState
-from solver.response.solution import solve
-from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
 from tests.solver.finite_examples import published
 
 TOWARDS_TIP = -1

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver import Finger, Friction, Material, Materials, Receptor, SceneError, Solve, solve
 from solver.mesh.mesher import BONE, Sizing, finger_mesh
 from solver.mesh.outline import Outline
-from solver.response.solution import solve
-from solver.scene import Finger, Friction, Material, Materials, Receptor, SceneError, Solve
 from solver.scene.published import SLIPPERINESS, scene
 
 KINEMATICS = ("small", "finite")

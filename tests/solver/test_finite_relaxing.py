@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from solver import Materials, Relaxation, Solve, solve
 from solver.accuracy.finite_audits import course_audits
 from solver.body.finite import FiniteBody
 from solver.constitutive import overstress
@@ -19,8 +20,6 @@ from solver.constitutive.overstress import Past
 from solver.equilibrium.finite_relaxation import RelaxingNewton
 from solver.equilibrium.newton import Pull, Shape
 from solver.progress import listening
-from solver.response.solution import solve
-from solver.scene import Materials, Relaxation, Solve
 from solver.scene.published import SLIPPERINESS, scene
 from tests.solver.finite_examples import block
 from tests.solver.oracle import finite as oracle

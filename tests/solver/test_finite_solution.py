@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from daq_app.accuracy.methods import climbed_twice
+from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve, solve, solve_many
 from solver.accuracy import finite_errors
 from solver.accuracy.adaptivity import ascended
 from solver.accuracy.audits import refuse_unsound, rounding
@@ -14,9 +15,7 @@ from solver.accuracy.finite_audits import audits
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import Pull
-from solver.failures import NoSteadyState, NotConverged
-from solver.response.solution import UNKNOWN, answers, solve, solve_together
-from solver.scene import Friction, Loading, Scene, Solve
+from solver.response.solution import UNKNOWN
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 from tests.solver.finite_examples import published
 
@@ -37,7 +36,7 @@ def finite(surface, **options):
 @pytest.fixture(scope="module")
 def four():
     surfaces = [SLIPPERINESS[0], SLIPPERINESS[2], SLIPPERINESS[4], STICKINESS[0]]
-    return dict(zip(REFERENCE, answers([finite(surface) for surface in surfaces]), strict=True))
+    return dict(zip(REFERENCE, solve_many([finite(surface) for surface in surfaces]), strict=True))
 
 
 @pytest.mark.parametrize("name", REFERENCE)
@@ -102,7 +101,7 @@ def test_differences_between_surfaces_solved_together_are_good_to_5_percent_of_t
 @pytest.mark.slow
 def test_differences_between_five_surfaces_are_those_of_separate_overkill_solves():
     scenes = [finite(surface, tolerance=0.01) for surface in SLIPPERINESS]
-    found = np.array([[p.sed_ending, p.normal_force, p.tangential_force] for p in solve_together(scenes)])
+    found = np.array([[p.sed_ending, p.normal_force, p.tangential_force] for p in solve_many(scenes)])
     true = np.array([climbed_twice(scene, (14.0, 20.0, 17.0))[0].mean(axis=0) for scene in scenes])
     apart = (found[:, None] - found) - (true[:, None] - true)
     assert (np.abs(apart).max(axis=(0, 1)) < DIFFERENT * np.ptp(true, axis=0)).all()

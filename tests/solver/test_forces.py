@@ -7,11 +7,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from solver import (
+    Finger,
+    Friction,
+    Loading,
+    Material,
+    Materials,
+    NoSteadyState,
+    NotConverged,
+    Scene,
+    SceneError,
+    Solve,
+    SolveFailure,
+    solve,
+)
 from solver.continuation import limit_point as reach
 from solver.equilibrium import force_control as finite_forced
-from solver.failures import NoSteadyState, NotConverged, SolveFailure
-from solver.response.solution import solve
-from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, SceneError, Solve
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
 KINEMATICS = ("small", "finite")

@@ -11,9 +11,19 @@ from daq_app.accuracy.hard_cases import cases, judged
 from daq_app.accuracy.hard_cases.light import of_light_touch
 from daq_app.accuracy.hard_cases.outcome import of_scene
 from daq_app.accuracy.hard_cases.suite import TELLING, Case
-from solver.failures import SolveFailure
-from solver.response.solution import answers, solve
-from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
+from solver import (
+    Finger,
+    Friction,
+    Loading,
+    Material,
+    Materials,
+    Receptor,
+    Scene,
+    Solve,
+    SolveFailure,
+    solve,
+    solve_many,
+)
 
 SUITE = {(case.kinematics, case.name): case for kind in ("small", "finite") for case in cases(kind)}
 
@@ -100,7 +110,7 @@ def ended(kinematics, finger, tissues, depth, mu, bound, slide, course):
         receptor=Receptor(outline.epidermis + outline.dermis - 0.03, (0.05, 0.5)),
         solve=Solve(kinematics, course),
     )
-    (found,) = answers([asked])
+    (found,) = solve_many([asked])
     json.dumps(found.to_dict(), allow_nan=False)
     if isinstance(found, SolveFailure):
         assert str(found).endswith(".")

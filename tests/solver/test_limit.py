@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState, NotConverged, Scene, Solve
 from solver.body.finite import FiniteBody
 from solver.body.tissues import finite_laws
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
@@ -15,10 +16,8 @@ from solver.continuation.surface_instability import folds_at
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import BY_FRICTION, FiniteNewton, Pull
-from solver.failures import NoSteadyState, NotConverged
 from solver.mesh import mesher
 from solver.mesh.grid import grid_mesh
-from solver.scene import Finger, Friction, Loading, Material, Materials, Scene, Solve
 from tests.solver.finite_examples import published
 
 SLOW = pytest.mark.slow

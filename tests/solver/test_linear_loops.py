@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 from numpy.linalg import LinAlgError
 
+from solver import Finger, Receptor, solve, solve_many
 from solver.body.linear import LinearBody
 from solver.body.linear_elimination import LinearElimination
 from solver.constitutive.linear import Hooke, Moduli
 from solver.mesh import Mesh
 from solver.mesh.blocks import block
 from solver.mesh.mesher import Sizing, finger_mesh
-from solver.response.solution import answers, solve
-from solver.scene import Finger, Receptor
 from solver.scene.published import SLIPPERINESS, scene
 from tests.solver.oracle import linear as oracle
 
@@ -74,8 +73,8 @@ def test_what_no_stable_body_is_made_of_is_refused(mesh):
 
 def test_the_same_question_is_answered_bit_by_bit_the_same_again():
     scenes = [scene(surface) for surface in SLIPPERINESS]
-    first = answers(scenes)
-    again = answers(scenes)
+    first = solve_many(scenes)
+    again = solve_many(scenes)
     for one, other in zip(first, again, strict=True):
         assert (one.sed_ending, one.error_estimate) == (other.sed_ending, other.error_estimate)
         np.testing.assert_array_equal(one.displacement, other.displacement)

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver import Friction, Loading, Scene
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.newton import Pull, Shape
 from solver.mesh.mesher import Sizing
 from solver.response.live_picture import LivePicture
-from solver.scene import Friction, Loading, Scene
 
 
 @pytest.fixture(scope="module")

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver import Friction, Loading, Scene, Solve, solve
 from solver.continuation.small_states import end
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.step_error import Steps
 from solver.mesh.mesher import Sizing
-from solver.response.solution import solve
-from solver.scene import Friction, Loading, Scene, Solve
 from solver.scene.published import SLIPPERINESS, scene
 
 WHOLE = np.array([1.0, 2.0, -0.5, 1.5, -0.2, 6.0])

@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver import Friction, Loading, Material, Relaxation, Scene, SceneError, Solve, solve
 from solver.accuracy.residual_overstress import relaxing
-from solver.response.solution import solve
-from solver.scene import Friction, Loading, Material, Relaxation, Scene, SceneError, Solve
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
 

@@ -3,11 +3,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from solver import Finger, Receptor
 from solver.element import ELEMENTS, GAUSS_3, GAUSS_4, Q2P1
 from solver.mesh.grid import MeshError, grid_mesh, quality
 from solver.mesh.mesher import AT_CUT, DERMIS, EPIDERMIS, FAT, Sizing, finger_mesh, sharing
 from solver.mesh.outline import Outline
-from solver.scene import Finger, Receptor
 
 
 def test_gauss_rules_are_those_of_numpy():

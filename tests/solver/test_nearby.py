@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver import Friction, Loading, Scene, Solve, solve_many
 from solver.response.nearby import nearby
-from solver.response.solution import answers
-from solver.scene import Friction, Loading, Scene, Solve
 
 DRIVEN = {
     "small, by depth": Scene(friction=Friction(0.44, 0.03), loading=Loading(2.0)),
@@ -25,7 +24,7 @@ def rubbed(scene, mu):
 
 @pytest.fixture(scope="module")
 def found():
-    return dict(zip(DRIVEN, answers(tuple(DRIVEN.values())), strict=True))
+    return dict(zip(DRIVEN, solve_many(tuple(DRIVEN.values())), strict=True))
 
 
 def taken_up(prediction):
@@ -53,7 +52,7 @@ def test_states_beside_it_are_those_that_are_solved_alone(found, name):
     # Alone, a scene at finite strain or under a force has a mesh of its own, so that its difference holds mesh error.
     scene, one = DRIVEN[name], taken_up(found[name])
     beside = rubbed(scene, 1.05 * scene.friction.mu)
-    (alone,) = answers([beside])
+    (alone,) = solve_many([beside])
     here, there = one.seds([scene, beside])[:, 0]
     assert there - here == pytest.approx(alone.sed_ending - here, rel=1e-6 if name == "small, by depth" else 0.05)
 
@@ -61,7 +60,7 @@ def test_states_beside_it_are_those_that_are_solved_alone(found, name):
 @pytest.mark.parametrize("name", ["small, by depth", "finite, by depth"])
 def test_beyond_the_limit_of_sliding_there_is_no_state_and_none_is_invented(name):
     scene = replace(DRIVEN[name], friction=Friction(0.3), loading=Loading(1.2))
-    (prediction,) = answers([scene])
+    (prediction,) = solve_many([scene])
     seds = taken_up(prediction).seds([rubbed(scene, 0.31), rubbed(scene, 1.9)])
     assert np.isnan(seds).tolist() == [[False, False], [True, True]]
 
@@ -69,7 +68,7 @@ def test_beyond_the_limit_of_sliding_there_is_no_state_and_none_is_invented(name
 def test_a_finger_that_is_only_pressed_or_held_by_a_drag_depends_on_its_way():
     pressed = Loading(1.0, "none")
     held = Loading(normal_force=0.06, tangential_force=0.01)
-    found = answers([Scene(friction=Friction(0.4), loading=one) for one in (pressed, held)])
+    found = solve_many([Scene(friction=Friction(0.4), loading=one) for one in (pressed, held)])
     assert [taken_up(one) for one in found] == [None, None]
 
 
@@ -85,6 +84,6 @@ def test_the_end_of_a_course_that_has_nearly_settled_is_taken_up_as_the_settled_
 @pytest.mark.parametrize("kinematics", ["small", "finite"])
 def test_no_sed_is_told_where_contact_would_reach_beyond_the_skin_that_was_looked_at(kinematics):
     scene = Scene(friction=Friction(0.3), loading=Loading(0.5), solve=Solve(kinematics))
-    (prediction,) = answers([scene])
+    (prediction,) = solve_many([scene])
     seds = taken_up(prediction).seds([replace(scene, loading=Loading(depth)) for depth in (0.52, 1.5)])
     assert np.isnan(seds).tolist() == [[False, False], [True, True]]

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver import ContactLost
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody, edge_load
 from solver.body.stiffness import Probes
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import Newton, Pull, Shape
-from solver.failures import ContactLost
 from solver.mesh import Mesh
 from solver.mesh.blocks import block
 

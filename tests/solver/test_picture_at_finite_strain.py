@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
+from solver import Friction, Loading, Scene, Solve, solve
 from solver.response.fields import fields_of
-from solver.response.solution import solve
-from solver.scene import Friction, Loading, Scene, Solve
 
 # Friction of two of the paper's surfaces; the first turns the corner node's own element inside out.
 SURFACES = {"stickiness 0": (0.28, 0.008033, 2.0, "+x"), "slipperiness 100": (0.24, 0.00877, 1.5, "-x")}

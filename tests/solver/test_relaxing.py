@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver import Material, Materials, Relaxation, Solve, solve
 from solver.body.stiffness import Probes
 from solver.constitutive.linear import Prony
 from solver.equilibrium import relaxation as relaxing
 from solver.equilibrium.relaxation import RelaxingBody
 from solver.mesh.blocks import block
-from solver.response.solution import solve
-from solver.scene import Material, Materials, Relaxation, Solve
 from solver.scene.published import SLIPPERINESS, scene
 
 TIMES = [0.5, 1.0, 1.5, 2.0, 3.0, 6.0]

@@ -3,18 +3,7 @@ from dataclasses import fields, replace
 
 import pytest
 
-from solver.scene import (
-    Finger,
-    Friction,
-    Loading,
-    Material,
-    Materials,
-    Receptor,
-    Relaxation,
-    Scene,
-    SceneError,
-    Solve,
-)
+from solver import Finger, Friction, Loading, Material, Materials, Receptor, Relaxation, Scene, SceneError, Solve
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene, scenes
 
 

@@ -8,17 +8,29 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from solver import (
+    Cancelled,
+    Finger,
+    Friction,
+    Loading,
+    Material,
+    Materials,
+    NoSteadyState,
+    Receptor,
+    Scene,
+    Solve,
+    SolveFailure,
+    solve,
+    solve_many,
+)
 from solver.accuracy.audits import audits
 from solver.body.linear import skin_lengths
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import Pull
-from solver.failures import Cancelled, NoSteadyState, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.response.fields import fields_of
-from solver.response.solution import answers, solve, solve_together
-from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene, scenes
 
 # Mean of two independent codes (structured quadrilaterals with exact active sets; a public high-order triangle code
@@ -37,13 +49,13 @@ PRESSED = (0.0051777, 0.0053391, 0.10065, 0.0)  # d = 1.5 without friction
 
 @pytest.fixture(scope="module")
 def ten():
-    return {p.scene.title: p for p in solve_together(scenes())}
+    return {p.scene.title: p for p in solve_many(scenes())}
 
 
 @pytest.fixture(scope="module")
 def marched():
     asked = [replace(s, solve=Solve(course="history")) for s in (scene(STICKINESS[4]), scene(SLIPPERINESS[4]))]
-    return solve_together(asked)
+    return solve_many(asked)
 
 
 @pytest.mark.parametrize("title", REFERENCE)
@@ -168,7 +180,7 @@ def test_direction_and_speed_do_not_matter_without_friction():
         for mu, cap, slide, speed in ((0.0, None, "+x", 5.0), (0.0, None, "-x", 50.0), (0.4, 0.0, "+x", 5.0))
     ]
     asked.append(Scene(friction=Friction(0.0), loading=Loading(1.5, "none")))
-    found = solve_together(asked)
+    found = solve_many(asked)
     for other in found[1:]:
         assert other.sed_ending == pytest.approx(found[0].sed_ending, rel=1e-12)
     still = solve(Scene(friction=Friction(0.4, 0.0), loading=Loading(1.5, "+x"), solve=Solve(course="history")))
@@ -196,7 +208,7 @@ def test_pressing_with_friction_is_marched_and_sticks_in_the_middle():
 def test_work_put_in_by_deeper_pressing_is_the_normal_force():
     """Without friction dW/dd = N: elastic energy U = 1/2 sum f u at d + h less that at d - h, by 2 h."""
     step = 1e-3
-    deep, mid, shallow = solve_together(
+    deep, mid, shallow = solve_many(
         [Scene(friction=Friction(0.0), loading=Loading(d, "none")) for d in (1.0 + step, 1.0, 1.0 - step)]
     )
 
@@ -245,7 +257,7 @@ def test_any_scene_ends_in_a_balanced_answer_or_in_a_sentence(depth, mu, bound, 
         loading=Loading(depth, slide),
         solve=Solve(course=course),
     )
-    (found,) = answers([asked])
+    (found,) = solve_many([asked])
     if isinstance(found, SolveFailure):
         assert str(found).endswith(".")
         assert mu > 0.7 or "round-off" in str(found)  # a state exists below, and is not refused
@@ -261,7 +273,7 @@ def test_any_scene_ends_in_a_balanced_answer_or_in_a_sentence(depth, mu, bound, 
 
 def test_a_run_can_be_stopped():
     with pytest.raises(Cancelled):
-        solve_together(scenes(), progress=lambda part: part < 0.35)
+        solve_many(scenes(), progress=lambda part: part < 0.35)
 
 
 def test_a_prediction_is_told_as_plain_data_with_all_the_contract_asks_for(ten, marched):

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from solver import Friction, Loading, Scene, Solve, solve, stepper
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.force_control import march as forced_march
@@ -17,9 +18,6 @@ from solver.mesh.mesher import Sizing
 from solver.prediction import ROW
 from solver.response.finite_stepper import FiniteStepper
 from solver.response.small_stepper import Condensed, SmallStepper
-from solver.response.solution import solve
-from solver.response.stepper import stepper
-from solver.scene import Friction, Loading, Scene, Solve
 
 KINEMATICS = ("small", "finite")
 

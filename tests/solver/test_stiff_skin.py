@@ -4,11 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from solver.failures import NoSteadyState, NotConverged
-from solver.prediction import Prediction
+from solver import Friction, Loading, Materials, NoSteadyState, NotConverged, Prediction, Scene, Solve, solve
 from solver.response import solution
-from solver.response.solution import solve
-from solver.scene import Friction, Loading, Materials, Scene, Solve
 
 
 def stiffening(mu, tolerance=None):

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from solver import Finger, Receptor
 from solver.body.linear import LinearBody
 from solver.body.stiffness import Elastic, Probes, local_coordinates
 from solver.constitutive.linear import MATERIALS, Hooke
@@ -8,7 +9,6 @@ from solver.element import Q2P1
 from solver.linalg.nested_dissection import Tree, places
 from solver.mesh.blocks import block
 from solver.mesh.mesher import Sizing, finger_mesh
-from solver.scene import Finger, Receptor
 
 TISSUES = [Hooke(0.136, 0.48), Hooke(0.08, 0.48), Hooke(0.034, 0.48)]
 

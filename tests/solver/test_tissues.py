@@ -5,9 +5,8 @@ from dataclasses import replace
 import pytest
 
 from sessions.toml_file import load_toml
+from solver import Friction, Loading, Material, Materials, Relaxation, Scene, SceneError, Solve, solve
 from solver.response.fields import fields_of
-from solver.response.solution import solve
-from solver.scene import Friction, Loading, Material, Materials, Relaxation, Scene, SceneError, Solve
 from solver.scene.published import SLIPPERINESS, scene
 
 NAMES = ("epidermis", "dermis", "fat")

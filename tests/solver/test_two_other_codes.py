@@ -10,9 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from solver.prediction import Prediction
-from solver.response.solution import solve
-from solver.scene import Friction, Loading, Scene, Solve
+from solver import Friction, Loading, Prediction, Scene, Solve, solve
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
 FILE = Path(__file__).resolve().parents[3] / "shared" / "reference" / "fe-reference.json"

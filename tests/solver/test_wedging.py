@@ -2,9 +2,7 @@
 
 import pytest
 
-from solver.failures import NoSteadyState
-from solver.response.solution import solve
-from solver.scene import Friction, Loading, Scene, Solve
+from solver import Friction, Loading, NoSteadyState, Scene, Solve, solve
 
 COARSE = 0.5  # tolerance that the coarsest mesh meets
 LIFTED = "The drag lifts the bone"

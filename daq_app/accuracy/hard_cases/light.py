@@ -7,7 +7,7 @@ from math import log, pi, sqrt
 from daq_app.accuracy.hard_cases.outcome import Outcome, of_answer
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
-from solver.response.solution import answers
+from solver.response.solution import solve_many
 from solver.scene import Scene
 
 KNOWN = 1e-3  # indentation at which contact spans many elements, and is still far thinner than the epidermis [mm]
@@ -25,7 +25,7 @@ class Touch:
 
 def of_light_touch(asked: Scene) -> Outcome:
     """Solve a scene of a light touch; SED, normal force and width must be Hertz's within their estimates."""
-    (found,) = answers([asked])
+    (found,) = solve_many([asked])
     outcome = of_answer(found)
     if not isinstance(found, Prediction):
         return outcome
@@ -70,7 +70,7 @@ def hertz(asked: Scene) -> Touch:
 @cache
 def _finger(deeper: Scene) -> tuple[tuple[float, float], float]:
     """Return the depth [mm] and force [N/mm] of a touch, and its SED by the force squared [mm^2/(N^2) MPa]."""
-    (found,) = answers([deeper])
+    (found,) = solve_many([deeper])
     if isinstance(found, SolveFailure):
         raise found
     force = found.normal_force

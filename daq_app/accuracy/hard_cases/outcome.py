@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
-from solver.response.solution import answers
+from solver.response.solution import solve_many
 from solver.scene import Scene
 
 BALANCE = ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance")  # those of them that an answer has
@@ -29,7 +29,7 @@ class Outcome:
 
 def of_scene(asked: Scene) -> Outcome:
     """Solve a scene of the finger through the solver's front door."""
-    return of_answer(answers([asked])[0])
+    return of_answer(solve_many([asked])[0])
 
 
 def of_answer(found: Prediction | SolveFailure) -> Outcome:

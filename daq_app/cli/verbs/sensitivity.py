@@ -11,7 +11,7 @@ from daq_app.batch.sensitivity import checked, doubts, left_as_it_is, sensitivit
 from daq_app.cli.console import Console, number, table
 from daq_app.cli.main import WrongValue
 from sessions.toml_file import load_toml, tables_in, text_of
-from solver.scene import Scene
+from solver import Scene
 
 EXAMPLE = "daq-app sensitivity scene.toml --samples 64"
 

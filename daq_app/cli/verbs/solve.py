@@ -9,7 +9,7 @@ from daq_app.cli.console import Console, number, table
 from daq_app.cli.main import DONE, STOPPED
 
 if TYPE_CHECKING:
-    from solver.prediction import Prediction
+    from solver import Prediction
 
 EXAMPLE = "daq-app solve stickiness-100.toml --json"
 UNFINISHED = "Stopped before all that was asked for was done: this is what had been found by then."
@@ -37,9 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     """Solve the scene and print what came out; stopped by the user, what was found by then."""
     from sessions.toml_file import load_toml
-    from solver.failures import SolveFailure
-    from solver.response.solution import solve
-    from solver.scene import Scene
+    from solver import Scene, SolveFailure, solve
 
     scene = load_toml(options.scene, Scene)
     before: list[Prediction] = []

@@ -15,8 +15,7 @@ from daq_app.window.view_model import ModelTrace, model_words
 from sessions.plan.plan import Frame
 from sessions.plan.protocols import plan, protocol
 from sessions.strokes import FrictionParameters
-from solver.failures import NoSteadyState
-from solver.response.solution import solve
+from solver import NoSteadyState, solve
 
 PLAN = plan(protocol("sensotact-friction"), "S01", 3, frame=Frame("-z", "set", 20.0, "set"))
 MU, NORMAL, AREA = 0.6, 2.0, PLAN.contact_area

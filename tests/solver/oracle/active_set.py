@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 
+from solver import ContactLost
 from solver.body.linear import CondensedLinear
 from solver.body.validation import finite
 from solver.contact.law import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
-from solver.failures import ContactLost
 
 Array = NDArray[np.float64]
 States = NDArray[np.int8]

@@ -6,10 +6,10 @@ from typing import cast
 import numpy as np
 
 from solver._kernels.skin import STEEP
+from solver.arrays import Array, Flags, Indices
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import shape, slopes
 from solver.contact.law import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
-from solver.mesh import Array, Flags, Indices
 
 IMAGINARY = 1e-30  # step whose square is nothing [-]
 
