@@ -21,7 +21,7 @@ from daq_app.window.view_bench import bench_view
 from drivers.clock import RealClock
 from drivers.transducer import Health
 from sessions.plan.protocols import plan, protocol
-from sessions.recording import Recording, SessionWriter
+from sessions.recording import Recording, SessionWriter, provenance
 from sessions.run.runner import run_session
 from simulators.faults import Fault, Faults
 from simulators.net_ft_box import NetFtBox
@@ -48,7 +48,7 @@ def recorded(tmp_path, monkeypatch):
         planned = plan(protocol("sensotact-friction"), "P01", 1)
         with connected("sim:?seed=3", clock) as bench:
             writer = SessionWriter.create(
-                folder, planned, bench.transducer.info, {}, subject_simulated=True, clock=clock
+                folder, planned, bench.transducer.info, provenance(clock), subject_simulated=True, clock=clock
             )
             until = clock.now_ns() + 2_500_000_000
 

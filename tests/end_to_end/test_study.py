@@ -18,7 +18,7 @@ from daq_app.cli.console import Console
 from daq_app.cli.main import run
 from daq_app.simulation.synthetic import synthetic_study
 from sessions.prediction import PredictionOptions
-from sessions.recording import RecordingError
+from sessions.recording import RecordingError, atomic_file
 from sessions.recording.provenance import software_versions
 from sessions.statistics.pooling.visit import Visit, VisitOptions
 
@@ -101,13 +101,15 @@ def test_what_was_kept_and_is_not_as_it_was_written_is_named_and_computed_anew(p
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full, which is always full")
-def test_a_full_disk_ends_a_study_in_a_sentence_and_leaves_no_part_of_a_file(tmp_path):
+def test_a_full_disk_ends_a_study_in_a_sentence_and_leaves_no_part_of_a_file(tmp_path, monkeypatch):
+    def full(_):
+        return Path("/dev/full").open("wb")
+
     shelf = Shelf(tmp_path, STEADY)
-    part = tmp_path / ".key.json.part"
-    part.symlink_to("/dev/full")
+    monkeypatch.setattr(atomic_file, "open_new", full)
     with pytest.raises(RecordingError, match=r"cannot be written \(No space left on device\): make room"):
         shelf.keep("key", {})
-    assert not part.is_symlink()
+    assert list(tmp_path.iterdir()) == []
     assert shelf.found("key") is None
 
 

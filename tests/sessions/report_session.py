@@ -22,7 +22,11 @@ CALIBRATION = Calibration(
 INFO = TransducerInfo(
     "net-ft://127.0.0.1", "net-ft", "SIMULATED Net F/T", "FT00001", True, RATE, 7000.0, CALIBRATION, {"filter": "off"}
 )
-PROVENANCE = {"created_utc": "2026-01-01T00:00:00+00:00"}
+PROVENANCE = {
+    "created_utc": "2026-01-01T00:00:00+00:00",
+    "software": {"daq-app": "0.1.0"},
+    "clock": {"factor": 1.0, "now_ns": 0},
+}
 DEPTH = {"stickiness": 2.0, "slipperiness": 1.5}
 
 

@@ -95,7 +95,9 @@ def test_what_an_earlier_program_did_not_know_in_a_plan_is_left_out(tmp_path, mo
 
 
 def test_a_later_version_is_refused_by_name(tmp_path):
-    folder = begun(tmp_path / "s").folder
+    writer = begun(tmp_path / "s")
+    writer.close()
+    folder = writer.folder
     value = json.dumps({"name": "daq-app session", "version": FORMAT_VERSION + 1})
     import zlib
 

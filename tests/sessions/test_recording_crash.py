@@ -105,7 +105,7 @@ def test_a_full_disk_gives_one_sentence_and_all_that_was_acknowledged_can_be_rea
     *safe, (sentence,) = reported(reading)
     (acknowledged,) = safe[-1]
     assert acknowledged > 500
-    assert f"the first {acknowledged} readings and 0 events are safe; free space on the disk" in sentence
+    assert f"the first {acknowledged} readings and 0 events are safe; check the disk and its cable" in sentence
     recording = Recording.open(folder)
     assert recording.readings().sequence.tolist()[:acknowledged] == list(range(acknowledged))
     assert recording.losses[-1].startswith("the session has no end")
