@@ -20,6 +20,7 @@ from sessions.plan.protocols.protocol import (
     Scale,
 )
 from sessions.recording.archive import seal
+from sessions.run import event_log
 from sessions.run.runner import LOSSES
 from sessions.run.steps import Event
 
@@ -62,7 +63,7 @@ def test_every_data_set_of_the_copy_is_told(recorded):
 
 def test_every_kind_of_event_is_told(recorded):
     met = {kind for (kind,) in rows(recorded, "SELECT kind FROM events")}
-    possible = {re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__).lower() for kind in get_args(Event)}
+    possible = {event_log._kind(kind) for kind in get_args(Event)}
     assert met | possible | set(LOSSES) <= NAMED
 
 
