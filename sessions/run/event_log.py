@@ -1,4 +1,4 @@
-"""How events and commands of a session are written into its log. `docs/session-format.md` lists the kinds."""
+"""How events and commands of a session are written into its log. `docs/session-format/events.md` lists the kinds."""
 
 import math
 import re
