@@ -1,4 +1,4 @@
-"""Measure all that `daq-app accuracy` measures and write its tables into docs/benchmarks.md, between their marks.
+"""Measure all that `daq-app accuracy` measures and write its tables into the docs, between their marks.
 
 Run from the root, alone: python -m benchmarks.accuracy [--out DIR] [--seconds S]. With names of subjects (speed, warm,
 hard_cases, ...) only those are measured, and their tables printed: python -m benchmarks.accuracy speed
@@ -20,8 +20,14 @@ from daq_app.accuracy.subjects import SUBJECTS
 from daq_app.accuracy.tables import tables
 from daq_app.cli.console import Console
 
-DOCUMENT = Path(__file__).resolve().parent.parent / "docs" / "benchmarks.md"
-NAMES = ("targets", "estimates", "problems", "orders", "hard-small", "hard-finite", "machine")
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+PAGES = {
+    "benchmarks.md": ("targets", "estimates", "machine"),
+    "benchmarks/published-problems.md": ("problems",),
+    "benchmarks/convergence.md": ("orders",),
+    "benchmarks/hard-cases-small.md": ("hard-small",),
+    "benchmarks/hard-cases-finite.md": ("hard-finite",),
+}
 
 
 def filled(text: str, name: str, made: str) -> str:
@@ -34,12 +40,12 @@ def filled(text: str, name: str, made: str) -> str:
     head, _, rest = text.partition(begin)
     _, found, tail = rest.partition(end)
     if not found:
-        raise ValueError(f"{DOCUMENT} has no marks for {name}")
+        raise ValueError(f"The page has no marks for {name}.")
     return f"{head}{begin}\n{made}\n{end}{tail}"
 
 
 def main() -> int:
-    """Measure, write the page to --out and the tables into the document."""
+    """Measure, write the page to --out and the tables into the docs."""
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("accuracy"), help="folder of page, pictures and data")
     parser.add_argument("--seconds", type=float, help="of processor time, however long they take on a busy machine")
@@ -61,11 +67,12 @@ def main() -> int:
         found = measured(asked.quick, console.progress, seconds=asked.seconds, clock=process_time)
     write(found, asked.out)
     made = tables(found)
-    text = DOCUMENT.read_text(encoding="utf-8")
-    for name in NAMES:
-        if name in made:
-            text = filled(text, name, f"{made[name].caption}\n\n{made[name].markdown()}")
-    DOCUMENT.write_text(text, encoding="utf-8")
+    for page, names in PAGES.items():
+        text = (DOCS / page).read_text(encoding="utf-8")
+        for name in names:
+            if name in made:
+                text = filled(text, name, f"{made[name].caption}\n\n{made[name].markdown()}")
+        (DOCS / page).write_text(text, encoding="utf-8")
     for told in found.left_out:
         console.note(told)
     return 0 if not found.stopped else 130

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.pacing import GAP, Paced
+from drivers.clock_recovery import GAP, Paced
 from drivers.rate import RateWatch
 
 

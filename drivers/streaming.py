@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock
+from drivers.clock_recovery import Paced
 from drivers.deadline import CONNECTING, ENDING, TICK, Deadline, Stopped
 from drivers.link import Link
-from drivers.pacing import Paced
 from drivers.rate import RateWatch, rate_of_least_late, rate_words
 from drivers.readings import ReadingBlock
 from drivers.records import RecordDecoder, Records
@@ -32,7 +32,7 @@ _BACK_OFF = (0.05, 0.1, 0.2, 0.4)  # between two tries to bring it back; the las
 
 
 class Numbering(Protocol):
-    """Gives records their numbers and times; `drivers.pacing.Pacing` where the host's clock must, for one."""
+    """Gives records their numbers and times; `ClockRecovery` does it from the host's clock."""
 
     @property
     def lost(self) -> int:
@@ -159,9 +159,9 @@ class StreamingTransducer(ThreadedTransducer):
         """Totals since start. `restarted` counts how often the stream was lost and came back."""
         with self._lock:
             self._digest()
-            watch = self._pacing.watch
+            watch = self._numbering.watch
             return self._health(
-                lost=self._pacing.lost,
+                lost=self._numbering.lost,
                 malformed=self._malformed_before + self._decoder.malformed,
                 restarted=self._restarted,
                 off_rate=watch.found,
@@ -182,8 +182,8 @@ class StreamingTransducer(ThreadedTransducer):
         """Forget what an earlier stream left."""
         super()._reset()
         self._pending.clear()
-        self._pacing = self._conversation.numbering(self._info.rate, self._clock.factor)
-        self._unpaced: list[_Arrived] = []  # arrivals that pacing keeps back
+        self._numbering = self._conversation.numbering(self._info.rate, self._clock.factor)
+        self._unpaced: list[_Arrived] = []  # arrivals that the numbering keeps back
         self._restarted = 0
         self._malformed_before = 0  # by decoders that have had their day
         self._decoder = self._conversation.decoder()
@@ -257,17 +257,17 @@ class StreamingTransducer(ThreadedTransducer):
         while self._pending:
             arrived = self._pending.popleft()
             if arrived.records is None:
-                self._hand_on(self._pacing.release())
-                self._pacing.bridge(arrived.received_ns)
+                self._hand_on(self._numbering.release())
+                self._numbering.bridge(arrived.received_ns)
                 self._restarted += 1
             else:
                 self._unpaced.append(arrived)
-                self._hand_on(self._pacing.take(arrived.records.damaged, arrived.received_ns))
+                self._hand_on(self._numbering.take(arrived.records.damaged, arrived.received_ns))
         if end:
-            self._hand_on(self._pacing.release())
+            self._hand_on(self._numbering.release())
 
     def _hand_on(self, paced: Paced) -> None:
-        """Make a block of all arrivals pacing has placed."""
+        """Return a block of all arrivals that the numbering has placed."""
         if not len(paced.sequence):
             return
         arrivals, self._unpaced = self._unpaced, []

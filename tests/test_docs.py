@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks import accuracy
 from daq_app.cli.main import VERBS
 
 ROOT = Path(__file__).parents[1]
@@ -39,3 +40,13 @@ def test_every_file_of_code_that_a_page_names_is_there(page):
 def test_readme_names_every_verb():
     told = (ROOT / "README.md").read_text(encoding="utf-8")
     assert [verb for verb in VERBS if not re.search(rf"`(\w+`, `)*{verb}\b", told)] == []
+
+
+def test_every_table_that_the_accuracy_run_writes_has_its_place_on_one_page():
+    marks = [
+        mark for page in PAGES for mark in re.findall(r"<!-- ([\w-]+): begin -->", page.read_text(encoding="utf-8"))
+    ]
+    assert sorted(marks) == sorted(name for names in accuracy.PAGES.values() for name in names)
+    for page, names in accuracy.PAGES.items():
+        text = (accuracy.DOCS / page).read_text(encoding="utf-8")
+        assert all("new" in accuracy.filled(text, name, "new") for name in names), page

@@ -17,14 +17,14 @@ from sessions.run.steps import (
     AskScore,
     AskStroke,
     Begin,
-    Chosen,
     Command,
     EndSession,
     Event,
     Finish,
+    MagnitudeEstimate,
     MeasureZero,
     Note,
-    NumberGiven,
+    PairedChoice,
     Pause,
     Redo,
     Refuse,
@@ -152,9 +152,9 @@ class Terminal:
             case AskScore():
                 return Scored(number, input_device=KEYBOARD)
             case AskNumber():
-                return NumberGiven(number, input_device=KEYBOARD)
+                return MagnitudeEstimate(number, input_device=KEYBOARD)
             case AskChoice() if number is None or number in CHOICES:
-                return Chosen(None if number is None else CHOICES[number], input_device=KEYBOARD)
+                return PairedChoice(None if number is None else CHOICES[number], input_device=KEYBOARD)
             case _:
                 return None
 

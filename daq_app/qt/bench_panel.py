@@ -175,8 +175,8 @@ class BenchPanel(QFrame):
 class BenchStrip(QFrame):
     """The bench folded: a lamp, and a short bar for each axis."""
 
-    def __init__(self, tokens: Tokens, scale: float, unfold: Callable[[], None]) -> None:
-        """Show no transducer; `unfold` shows the bench whole."""
+    def __init__(self, tokens: Tokens, scale: float, expand: Callable[[], None]) -> None:
+        """Show no transducer; `expand` shows the bench whole."""
         super().__init__()
         self.setProperty("role", "strip")
         self.setAccessibleName("bench, folded")
@@ -185,7 +185,7 @@ class BenchStrip(QFrame):
         self.setFixedWidth(round(150 * scale))
         layout = QVBoxLayout(self)
         layout.setContentsMargins(GRID, GRID, GRID, GRID)
-        layout.addWidget(button("Bench  B", "show the bench", unfold))
+        layout.addWidget(button("Bench  B", "show the bench", expand))
         row = QHBoxLayout()
         self._words = label("", "quiet", wrap=True)
         row.addWidget(self._lamp)

@@ -25,7 +25,7 @@ TEXT_WIDTH = 900  # of a text that is still easily read
 class SubjectWindow(QWidget):
     """A window of its own, for a second screen or a tablet."""
 
-    answered = Signal(object)  # Scored, NumberGiven or Chosen
+    answered = Signal(object)  # Scored, MagnitudeEstimate or PairedChoice
     screen_changed = Signal()
 
     def __init__(self, tokens: Tokens, scale: float, now: Callable[[], float]) -> None:

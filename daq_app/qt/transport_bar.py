@@ -37,7 +37,7 @@ class TransportBar(QWidget):
         self.slider.setAccessibleName(f"place in {what}")
         self.slider.setMinimumHeight(TARGET)
         self.slider.setMinimumWidth(60)
-        self.slider.valueChanged.connect(self._slid)
+        self.slider.valueChanged.connect(self._move_to)
         self.speed = QComboBox()
         self.speed.setAccessibleName(f"speed of {what}")
         self.speed.setMinimumHeight(TARGET)
@@ -123,7 +123,7 @@ class TransportBar(QWidget):
             case _:
                 super().keyPressEvent(event)
 
-    def _slid(self, at: int) -> None:
+    def _move_to(self, at: int) -> None:
         if at != self._shown and len(self._times):
             self.seek(at)
 

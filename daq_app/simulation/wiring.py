@@ -24,11 +24,11 @@ from sessions.run.steps import (
     AskScore,
     AskStroke,
     Begin,
-    Chosen,
     Command,
     Event,
     Finish,
-    NumberGiven,
+    MagnitudeEstimate,
+    PairedChoice,
     Resume,
     Scored,
     StimulusMounted,
@@ -206,10 +206,10 @@ class SimulatedPeople:
                 return Scored(score, ((at, score),), at, 0, None, INPUT)
             case AskNumber(trial):
                 number = self._subject.number(planted_surface(self._known(trial)), self._takes[trial.number])
-                return NumberGiven(number, at, 0, None, INPUT)
+                return MagnitudeEstimate(number, at, 0, None, INPUT)
             case AskChoice(first, second):
                 more = self._judged(first) > self._judged(second)
-                return Chosen("first" if more else "second", at, 0, None, INPUT)
+                return PairedChoice("first" if more else "second", at, 0, None, INPUT)
 
     @property
     def _judging(self) -> float:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from sessions.plan.plan import Hand
-from sessions.run.steps import Chosen, NumberGiven, Scored
+from sessions.run.steps import MagnitudeEstimate, PairedChoice, Scored
 
 Device = Literal["mouse", "touch", "pen", "keyboard"]
 
@@ -77,9 +77,9 @@ class Choice:
         again = self.corrections + (self.value is not None and value is not None and value != self.value)
         return Choice(value, first, again, device)
 
-    def given(self, hand: Hand | None) -> NumberGiven | Chosen:
+    def given(self, hand: Hand | None) -> MagnitudeEstimate | PairedChoice:
         """Return the event of an answer that is given."""
         if self.value in ("first", "second"):
-            return Chosen(self.value, self.first_touch, self.corrections, hand, self.device)
+            return PairedChoice(self.value, self.first_touch, self.corrections, hand, self.device)
         number = self.value if isinstance(self.value, float) else None
-        return NumberGiven(number, self.first_touch, self.corrections, hand, self.device)
+        return MagnitudeEstimate(number, self.first_touch, self.corrections, hand, self.device)

@@ -191,9 +191,9 @@ def _no_answer(asked: steps.Command | None) -> steps.Event | None:
         case steps.AskScore():
             return steps.Scored(None)
         case steps.AskNumber():
-            return steps.NumberGiven(None)
+            return steps.MagnitudeEstimate(None)
         case steps.AskChoice():
-            return steps.Chosen(None)
+            return steps.PairedChoice(None)
         case _:
             return None
 

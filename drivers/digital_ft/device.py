@@ -9,10 +9,10 @@ from functools import partial
 
 from drivers.address import Address, check_options
 from drivers.clock import Clock
+from drivers.clock_recovery import GAP, ClockRecovery
 from drivers.deadline import Deadline
 from drivers.digital_ft import wire
 from drivers.link import Link
-from drivers.pacing import GAP, Pacing
 from drivers.records import RecordDecoder
 from drivers.serial_link import Parity, SerialLink, port_of
 from drivers.streaming import StreamingTransducer, measured_rate
@@ -150,9 +150,9 @@ class DigitalConversation:
         """Return a decoder for a stream about to begin."""
         return wire.StreamDecoder(self._word)
 
-    def numbering(self, rate: float, factor: float) -> Pacing:
+    def numbering(self, rate: float, factor: float) -> ClockRecovery:
         """Return what numbers the stream: its records carry neither number nor time."""
-        return Pacing(rate, factor)
+        return ClockRecovery(rate, factor)
 
     def begin(self, link: Link) -> bytes:
         """Put the calibration's gains and offsets in force, prove it, and let the transducer stream.

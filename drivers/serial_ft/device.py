@@ -10,9 +10,9 @@ import numpy as np
 from drivers.address import Address, check_options
 from drivers.calibration import Calibration
 from drivers.clock import Clock
+from drivers.clock_recovery import GAP, ClockRecovery
 from drivers.deadline import Deadline
 from drivers.link import Link
-from drivers.pacing import GAP, Pacing
 from drivers.records import RecordDecoder
 from drivers.serial_ft import wire
 from drivers.serial_link import SerialLink, port_of
@@ -178,9 +178,9 @@ class ControllerConversation:
         """Return a decoder for the records asked for."""
         return wire.BinaryDecoder() if self._binary else wire.AsciiDecoder()
 
-    def numbering(self, rate: float, factor: float) -> Pacing:
+    def numbering(self, rate: float, factor: float) -> ClockRecovery:
         """Return what numbers the stream: its records carry neither number nor time."""
-        return Pacing(rate, factor)
+        return ClockRecovery(rate, factor)
 
     def begin(self, link: Link) -> bytes:
         """Set the controller up and let it stream; return what it streamed already. Raises LinkLost, DeviceFault."""

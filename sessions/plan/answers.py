@@ -4,12 +4,17 @@ import math
 from itertools import pairwise
 
 from sessions.plan.plan import Answer
-from sessions.run.steps import Chosen, NumberGiven, Scored
+from sessions.run.steps import MagnitudeEstimate, PairedChoice, Scored
 
-Given = Scored | NumberGiven | Chosen
+Given = Scored | MagnitudeEstimate | PairedChoice
 
-ASKED: dict[Answer, type[Given] | None] = {"line": Scored, "number": NumberGiven, "choice": Chosen, "none": None}
-IN_WORDS: dict[type[Given], str] = {Scored: "a score", NumberGiven: "a number", Chosen: "a choice"}
+ASKED: dict[Answer, type[Given] | None] = {
+    "line": Scored,
+    "number": MagnitudeEstimate,
+    "choice": PairedChoice,
+    "none": None,
+}
+IN_WORDS: dict[type[Given], str] = {Scored: "a score", MagnitudeEstimate: "a number", PairedChoice: "a choice"}
 
 
 def problem(given: Given, asked: Answer) -> str | None:
@@ -34,7 +39,7 @@ def problem(given: Given, asked: Answer) -> str | None:
             return "every position on the line has a time and lies between 0 and 100; one of these does not"
         case Scored(positions=positions) if any(after < before for (before, _), (after, _) in pairwise(positions)):
             return "positions on the line come in the order of time; these do not"
-        case NumberGiven(number) if number is not None and not (number > 0 and math.isfinite(number)):
+        case MagnitudeEstimate(number) if number is not None and not (number > 0 and math.isfinite(number)):
             return f"a number on a scale of one's own is above 0; {number:g} is not"
         case _:
             return None

@@ -32,7 +32,7 @@ class _Number(msgspec.Struct):
     number: float | None
 
 
-class _Chosen(msgspec.Struct):
+class _PairedChoice(msgspec.Struct):
     choice: Literal["first", "second"] | None
 
 
@@ -75,7 +75,7 @@ SHAPES: Mapping[str, type[msgspec.Struct]] = {
     "take_discarded": _Discarded,
     "scored": _Scored,
     "number_given": _Number,
-    "chosen": _Chosen,
+    "chosen": _PairedChoice,
     "zeroed": _Zeroed,
     "losses": _Losses,
     "log_torn": _Sentence,

@@ -17,7 +17,7 @@ class LoggedEvent:
 
     number: int  # from 1, without gaps
     time_ns: int  # session clock [ns]
-    kind: str  # one of the kinds of docs/session-format.md
+    kind: str  # one of the kinds of docs/session-format/events.md
     trial: int | None  # number of the trial it belongs to
     readings: int  # how many readings had been handed to the recording before it
     data: Mapping[str, Any]  # what else is known, by name; plain JSON values

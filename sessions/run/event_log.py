@@ -1,4 +1,4 @@
-"""How events and commands of a session are written into its log. `docs/session-format.md` lists the kinds."""
+"""How events and commands of a session are written into its log. `docs/session-format/events.md` lists the kinds."""
 
 import math
 import re
@@ -21,6 +21,8 @@ from sessions.run.steps import (
     Event,
     KeepTake,
     LeaveOut,
+    MagnitudeEstimate,
+    PairedChoice,
     ShowInstruction,
     StartTake,
     Tell,
@@ -30,7 +32,7 @@ Line = tuple[str, int | None, dict[str, Any]]  # kind, number of the trial, data
 
 
 def kind_of(event: Event) -> str:
-    """Return the kind an event is logged as: its name in small letters.
+    """Return the kind an event is logged as: its name in small letters, or the one that the file format has for it.
 
     >>> from sessions.run.steps import ContactOnset
     >>> kind_of(ContactOnset())
@@ -105,7 +107,8 @@ def _plain(value: Any) -> Any:  # noqa: ANN401  whatever an event holds
 
 
 def _kind(cls: type[Event]) -> str:
-    return re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
+    return _RECORDED_AS.get(cls) or re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
 
 
+_RECORDED_AS: dict[type[Event], str] = {MagnitudeEstimate: "number_given", PairedChoice: "chosen"}
 _EVENTS: dict[str, type[Event]] = {_kind(cls): cls for cls in get_args(Event)}

@@ -29,7 +29,6 @@ from sessions.run.steps import (
     AskScore,
     AskStroke,
     Begin,
-    Chosen,
     Command,
     ContactOnset,
     DiscardTake,
@@ -39,9 +38,10 @@ from sessions.run.steps import (
     Finish,
     KeepTake,
     LeaveOut,
+    MagnitudeEstimate,
     MeasureZero,
     Note,
-    NumberGiven,
+    PairedChoice,
     Pause,
     Redo,
     Refuse,
@@ -91,7 +91,7 @@ def advance(state: State, event: Event) -> Step:
             return _left_out(state, reason)
         case _, ContactOnset() | FingerLifted() | Settled():
             return _touched(state, event)
-        case Scoring(), Scored() | NumberGiven() | Chosen():
+        case Scoring(), Scored() | MagnitudeEstimate() | PairedChoice():
             return _answered(state, event)
         case _:
             return _went_on(state, event)
@@ -354,8 +354,8 @@ WORDS: dict[type[Event], str] = {
     Settled: "a finger that stays off",
     StrokeDone: "a stroke reported by hand",
     Scored: "a score",
-    NumberGiven: "a number",
-    Chosen: "a choice",
+    MagnitudeEstimate: "a number",
+    PairedChoice: "a choice",
     Note: "a note",
     Redo: "redo",
     Skip: "skip",

@@ -75,7 +75,7 @@ class Scored:
 
 
 @dataclass(frozen=True, slots=True)
-class NumberGiven:
+class MagnitudeEstimate:
     """The subject has given a number on a scale of its own (free modulus)."""
 
     number: float | None  # above 0; None: the subject gave no answer
@@ -86,7 +86,7 @@ class NumberGiven:
 
 
 @dataclass(frozen=True, slots=True)
-class Chosen:
+class PairedChoice:
     """The subject has said which of two stimuli has more of what is asked."""
 
     choice: Literal["first", "second"] | None  # None: the subject gave no answer
@@ -156,8 +156,8 @@ Event = (
     | Settled
     | StrokeDone
     | Scored
-    | NumberGiven
-    | Chosen
+    | MagnitudeEstimate
+    | PairedChoice
     | Note
     | Redo
     | Skip
@@ -223,7 +223,7 @@ class AskScore:
 
 @dataclass(frozen=True, slots=True)
 class AskNumber:
-    """Have the subject give a number on a scale of its own; answered by NumberGiven."""
+    """Have the subject give a number on a scale of its own; answered by MagnitudeEstimate."""
 
     trial: Trial
     question: str
@@ -231,7 +231,7 @@ class AskNumber:
 
 @dataclass(frozen=True, slots=True)
 class AskChoice:
-    """Have the subject say which of two; answered by Chosen."""
+    """Have the subject say which of two; answered by PairedChoice."""
 
     first: Trial
     second: Trial  # the trial in hand

@@ -23,7 +23,7 @@ from daq_app.accuracy.published.problems import Problem
 from daq_app.accuracy.random_scenes import random_scene
 from daq_app.accuracy.speed import Speed
 from daq_app.accuracy.subjects import Subject
-from daq_app.accuracy.tables import tables
+from daq_app.accuracy.tables import Table, tables
 from daq_app.accuracy.truth import JUDGED, Truth, cases
 from daq_app.accuracy.warm import Warm
 from solver import solve
@@ -198,8 +198,13 @@ def test_growth_is_the_power_of_the_unknowns():
 
 def test_a_table_stands_in_the_docs_as_markdown_whatever_its_cells_hold(example):
     lines = tables(example)["hard-finite"].markdown().splitlines()
-    assert lines[0] == "| case | must | verdict | outcome |"
-    assert lines[2] == "| mu 9 | answer | FAILED: no answer | No <state> & no \\| answer. |"
+    assert lines[0] == "| case | must | outcome |"
+    assert lines[2] == "| mu 9 | answer | FAILED, no answer: No <state> & no \\| answer. |"
+
+
+def test_a_cell_of_the_docs_ends_in_an_ellipsis_where_it_has_more_than_25_words():
+    table = Table("x", "", ("case",), ((" ".join("w" * 25),), (" ".join("w" * 26),)))
+    assert table.markdown().splitlines()[2:] == [f"| {'w ' * 25}|", f"| {'w ' * 24}… |"]
 
 
 def test_random_scenes_are_the_same_every_time_and_differ_from_each_other():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drivers.pacing import Pacing
+from drivers.clock_recovery import ClockRecovery
 from drivers.rate import RateWatch, rate_of_least_late, rate_words
 
 START = 7.0  # [s]
@@ -77,17 +77,17 @@ def test_a_stretch_without_records_is_a_loss_and_no_slower_rate():
 def test_a_line_without_numbers_is_followed_at_its_new_rate(to):
     rate = 295.0
     made = np.cumsum(np.repeat([1.0, 1.0 / to], [round(5 * rate), round(30 * rate * to)]) / rate)
-    pacing, blocks = Pacing(rate), []
+    recovery, blocks = ClockRecovery(rate), []
     for at in made:
-        blocks.append(pacing.take(np.zeros(1, np.int64), round((START + at) * 1e9)))
-    time = np.concatenate([block.time for block in [*blocks, pacing.release()]])
-    assert pacing.watch.found == 1
-    assert pacing.watch.rate == pytest.approx(rate * to, rel=0.02)
+        blocks.append(recovery.take(np.zeros(1, np.int64), round((START + at) * 1e9)))
+    time = np.concatenate([block.time for block in [*blocks, recovery.release()]])
+    assert recovery.watch.found == 1
+    assert recovery.watch.rate == pytest.approx(rate * to, rel=0.02)
     assert len(time) == len(made)
     assert np.all(np.diff(time) > 0.0)
     settled = made > 25.0
     np.testing.assert_allclose((time - made)[settled], made[0] * -1.0, atol=0.02)
-    lost_before = pacing.lost
+    lost_before = recovery.lost
     assert lost_before <= (4.0 * rate if to < 1 else 0)
 
 

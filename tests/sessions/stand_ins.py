@@ -15,9 +15,9 @@ from sessions.run.steps import (
     AskScore,
     AskStroke,
     Begin,
-    Chosen,
     Finish,
-    NumberGiven,
+    MagnitudeEstimate,
+    PairedChoice,
     Resume,
     Scored,
     StimulusMounted,
@@ -133,9 +133,9 @@ class Hands:
             case AskScore(trial):
                 return [Scored(float(trial.stimulus.index))]
             case AskNumber(trial):
-                return [NumberGiven(trial.stimulus.index + 1.0)]
+                return [MagnitudeEstimate(trial.stimulus.index + 1.0)]
             case AskChoice(first, second):
-                return [Chosen("first" if first.stimulus.index > second.stimulus.index else "second")]
+                return [PairedChoice("first" if first.stimulus.index > second.stimulus.index else "second")]
             case AskRest(None):
                 return [Resume()]
             case AskFinish():

@@ -17,7 +17,6 @@ from sessions.run.steps import (
     AskScore,
     AskStroke,
     Begin,
-    Chosen,
     ContactOnset,
     DiscardTake,
     EndSession,
@@ -25,9 +24,10 @@ from sessions.run.steps import (
     Finish,
     KeepTake,
     LeaveOut,
+    MagnitudeEstimate,
     MeasureZero,
     Note,
-    NumberGiven,
+    PairedChoice,
     Pause,
     Redo,
     Refuse,
@@ -281,9 +281,9 @@ def test_a_number_is_asked_for_and_must_be_above_nought():
     state, commands = after(NUMBERS, Begin(), *stroked(NUMBERS, 1))
     assert commands == (AskNumber(NUMBERS.trials[0], "Which?"),)
     for wrong in (0.0, -1.0, float("inf"), float("nan")):
-        assert "above 0" in advance(state, NumberGiven(wrong))[1][0].sentence
-    assert advance(state, NumberGiven(1700.0))[1][0] == KeepTake(1, 1)
-    assert advance(state, NumberGiven(None))[1][0] == KeepTake(1, 1)
+        assert "above 0" in advance(state, MagnitudeEstimate(wrong))[1][0].sentence
+    assert advance(state, MagnitudeEstimate(1700.0))[1][0] == KeepTake(1, 1)
+    assert advance(state, MagnitudeEstimate(None))[1][0] == KeepTake(1, 1)
 
 
 def test_an_answer_of_another_kind_is_refused_by_what_is_asked_for():
@@ -297,7 +297,7 @@ def test_two_are_presented_one_after_the_other_and_then_one_is_chosen():
     assert commands == (KeepTake(1, 1), AskMount(second))
     commands = commands_after(PAIRS, Begin(), *stroked(PAIRS, 1), *stroked(PAIRS, 2)[:-1])
     assert commands == (AskChoice(first, second, "Which?"),)
-    commands = commands_after(PAIRS, Begin(), *stroked(PAIRS, 1), *stroked(PAIRS, 2), Chosen("second"))
+    commands = commands_after(PAIRS, Begin(), *stroked(PAIRS, 1), *stroked(PAIRS, 2), PairedChoice("second"))
     assert commands == (KeepTake(2, 1), AskMount(PAIRS.trials[2]))
 
 
@@ -305,8 +305,8 @@ def test_a_pair_is_repeated_as_a_pair():
     one, two = stroked(PAIRS, 1), stroked(PAIRS, 2)
     back = (DiscardTake(2, 1, "slip"), DiscardTake(1, 1, "slip"), AskMount(PAIRS.trials[0]))
     assert commands_after(PAIRS, Begin(), *one, *two, Redo("slip")) == back
-    assert commands_after(PAIRS, Begin(), *one, *two, Chosen("first"), Redo("slip")) == back
-    state, _ = after(PAIRS, Begin(), *one, *two, Chosen("first"), Redo("slip"), *one, *two, Chosen("first"))
+    assert commands_after(PAIRS, Begin(), *one, *two, PairedChoice("first"), Redo("slip")) == back
+    state, _ = after(PAIRS, Begin(), *one, *two, PairedChoice("first"), Redo("slip"), *one, *two, PairedChoice("first"))
     assert trial_in_hand(state) == 3
 
 

@@ -23,8 +23,8 @@ from sessions.run.steps import (
     AskScore,
     AskStroke,
     Begin,
+    MagnitudeEstimate,
     Note,
-    NumberGiven,
     Pause,
     Redo,
     Resume,
@@ -100,7 +100,7 @@ def test_a_whole_session_comes_out_identical_to_the_last_bit(whole, tmp_path):
         {AskScore: once(Scored(120.5), Scored(None), Redo(""))},
         {
             AskScore: once(
-                Scored(float("nan")), Note("cold hands"), Note(""), NumberGiven(3.0), Scored(5.0, ((1.0, 4.0),))
+                Scored(float("nan")), Note("cold hands"), Note(""), MagnitudeEstimate(3.0), Scored(5.0, ((1.0, 4.0),))
             )
         },
         {AskScore: once(Abort("fire alarm"))},

@@ -1,4 +1,4 @@
-"""What the format page tells is what is written."""
+"""What the pages of the format describe is what is written."""
 
 import re
 from pathlib import Path
@@ -20,11 +20,13 @@ from sessions.plan.protocols.protocol import (
     Scale,
 )
 from sessions.recording.archive import seal
+from sessions.run import event_log
 from sessions.run.runner import LOSSES
 from sessions.run.steps import Event
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGE = (DOCS / "session-format.md").read_text(encoding="utf-8")
+PAGES = [DOCS / "session-format.md", *sorted((DOCS / "session-format").glob("*.md"))]
+PAGE = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
 NAMED = set(re.findall(r"`([\w./-]+)`", PAGE))
 
 
@@ -38,7 +40,7 @@ def recorded(tmp_path_factory):
 
 @pytest.mark.parametrize("table", ["head", "blocks", "events"])
 def test_every_column_of_the_live_file_is_told(recorded, table):
-    assert f"### Table `{table}`" in PAGE
+    assert f"## Table `{table}`" in PAGE
     columns = {name for _, name, *_ in rows(recorded, f"PRAGMA table_info({table})")}
     assert columns <= NAMED
 
@@ -61,7 +63,7 @@ def test_every_data_set_of_the_copy_is_told(recorded):
 
 def test_every_kind_of_event_is_told(recorded):
     met = {kind for (kind,) in rows(recorded, "SELECT kind FROM events")}
-    possible = {re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__).lower() for kind in get_args(Event)}
+    possible = {event_log._kind(kind) for kind in get_args(Event)}
     assert met | possible | set(LOSSES) <= NAMED
 
 

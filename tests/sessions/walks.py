@@ -8,12 +8,12 @@ from sessions.run.machine import advance, start
 from sessions.run.states import Closing, Mounting, Paused, Ready, Resting, Scoring, Settling, Stroking, Taring
 from sessions.run.steps import (
     Begin,
-    Chosen,
     ContactOnset,
     FingerLifted,
     Finish,
+    MagnitudeEstimate,
     Note,
-    NumberGiven,
+    PairedChoice,
     Pause,
     Redo,
     RestOver,
@@ -65,8 +65,8 @@ EVENTS = st.one_of(
     ),
     st.builds(StimulusMounted, st.sampled_from([*CODES, "K01", "K02", "K03"])),
     st.builds(Scored, st.none() | st.floats(-10, 110)),
-    st.builds(NumberGiven, st.none() | st.floats(-1, 1e6)),
-    st.builds(Chosen, st.sampled_from([None, "first", "second"])),
+    st.builds(MagnitudeEstimate, st.none() | st.floats(-1, 1e6)),
+    st.builds(PairedChoice, st.sampled_from([None, "first", "second"])),
     st.builds(Note, st.sampled_from(["", "yawned"])),
     st.builds(Redo, st.sampled_from(["", "sneezed"])),
     st.builds(Skip, st.sampled_from(["", "dirty"])),
@@ -89,7 +89,9 @@ def meant(state):
         case Stroking():
             return FingerLifted()
         case Scoring(place):
-            return {"line": Scored(40.0), "number": NumberGiven(4.0), "choice": Chosen("first")}[place.trial.answer]
+            return {"line": Scored(40.0), "number": MagnitudeEstimate(4.0), "choice": PairedChoice("first")}[
+                place.trial.answer
+            ]
         case Settling(touching=touching):
             return FingerLifted() if touching else Settled()
         case Paused() | Resting():

@@ -7,9 +7,9 @@ from daq_app.accuracy.hard_cases.light import KNOWN
 from daq_app.accuracy.methods import Kinematics
 from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
 
-Must = Literal["answer", "answer where a state exists"]
+Must = Literal["answer", "answer or limit"]
 ANSWER: Must = "answer"
-EITHER: Must = "answer where a state exists"
+EITHER: Must = "answer or limit"
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,15 +3,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.pacing import GAP, Pacing
+from drivers.clock_recovery import GAP, ClockRecovery
 
 START = 5_000_000_000
 
 
-def paced(pacing, arrivals):
+def paced(recovery, arrivals):
     """Place (time [s], records) in order; return sequence and time of all."""
-    blocks = [pacing.take(np.zeros(count, np.int64), START + round(time * 1e9)) for time, count in arrivals]
-    blocks.append(pacing.release())
+    blocks = [recovery.take(np.zeros(count, np.int64), START + round(time * 1e9)) for time, count in arrivals]
+    blocks.append(recovery.release())
     return np.concatenate([b.sequence for b in blocks]), np.concatenate([b.time for b in blocks])
 
 
@@ -28,10 +28,10 @@ def lumps(rate, seconds, lump, lost=(0.0, 0.0)):
 @pytest.mark.parametrize("rate", [74.0, 295.0, 7000.0])
 def test_times_follow_the_clock_though_the_rate_is_a_little_wrong(rate, error):
     arrivals, made = lumps(rate, 20.0, 0.016)
-    pacing = Pacing(rate * (1.0 + error))
-    sequence, time = paced(pacing, arrivals)
+    recovery = ClockRecovery(rate * (1.0 + error))
+    sequence, time = paced(recovery, arrivals)
     np.testing.assert_array_equal(sequence, np.arange(1, len(made) + 1))
-    assert pacing.lost == 0
+    assert recovery.lost == 0
     assert np.all(np.diff(time) > 0.0)
     np.testing.assert_allclose(time, made, atol=0.02)
 
@@ -39,11 +39,11 @@ def test_times_follow_the_clock_though_the_rate_is_a_little_wrong(rate, error):
 @pytest.mark.parametrize("rate", [74.0, 295.0, 7000.0])
 def test_a_pause_that_nothing_makes_up_for_is_a_loss_of_its_length(rate):
     arrivals, made = lumps(rate, 8.0, 0.01, lost=(4.0, 4.5))
-    pacing = Pacing(rate)
-    sequence, time = paced(pacing, arrivals)
+    recovery = ClockRecovery(rate)
+    sequence, time = paced(recovery, arrivals)
     missing = 0.5 * rate
-    assert abs(pacing.lost - missing) <= 0.02 * rate + 1
-    assert sequence[-1] == len(made) + pacing.lost
+    assert abs(recovery.lost - missing) <= 0.02 * rate + 1
+    assert sequence[-1] == len(made) + recovery.lost
     np.testing.assert_allclose(time, made, atol=0.03)
 
 
@@ -54,9 +54,9 @@ def test_a_pause_followed_by_the_lump_that_was_kept_back_is_no_loss():
     handed[(made > 3.0) & (made < 3.1)] = 3.41
     handed.sort()
     times, counts = np.unique(handed, return_counts=True)
-    pacing = Pacing(rate)
-    sequence, time = paced(pacing, zip(times.tolist(), counts.tolist(), strict=True))
-    assert pacing.lost == 0
+    recovery = ClockRecovery(rate)
+    sequence, time = paced(recovery, zip(times.tolist(), counts.tolist(), strict=True))
+    assert recovery.lost == 0
     np.testing.assert_array_equal(sequence, np.arange(1, len(made) + 1))
     np.testing.assert_allclose(time, made, atol=0.07)  # half of the lump came late by GAP
 
@@ -67,38 +67,38 @@ def test_a_lump_that_a_busy_computer_hands_over_bit_by_bit_is_no_loss_either():
     slow = (made > 2.0) & (made < 3.0)
     handed = np.where(slow, 2.5 + (made - 2.0) * 0.5, made)  # half a second of nothing, then twice as fast
     times, counts = np.unique(np.ceil(handed / 0.01) * 0.01, return_counts=True)
-    pacing = Pacing(rate)
-    sequence, time = paced(pacing, zip(times.tolist(), counts.tolist(), strict=True))
-    assert pacing.lost == 0
+    recovery = ClockRecovery(rate)
+    sequence, time = paced(recovery, zip(times.tolist(), counts.tolist(), strict=True))
+    assert recovery.lost == 0
     np.testing.assert_array_equal(sequence, np.arange(1, len(made) + 1))
     assert np.all(np.diff(time) > 0.0)
 
 
 def test_broken_records_take_their_numbers_with_them():
-    pacing = Pacing(100.0)
-    first = pacing.take(np.array([3, 0]), START)
-    second = pacing.take(np.array([2, 0]), START + 40_000_000)
+    recovery = ClockRecovery(100.0)
+    first = recovery.take(np.array([3, 0]), START)
+    second = recovery.take(np.array([2, 0]), START + 40_000_000)
     assert first.sequence.tolist() == [1, 2]  # what came before the first record is not of this stream
     assert second.sequence.tolist() == [5, 6]
-    assert pacing.lost == 2
+    assert recovery.lost == 2
     np.testing.assert_allclose(second.time, [0.04, 0.05], atol=0.002)
 
 
 def test_a_stream_begun_anew_goes_on_behind_a_gap_as_long_as_the_clock_says():
-    pacing = Pacing(100.0)
-    pacing.take(np.zeros(101, np.int64), START)
-    pacing.bridge(START + 2_000_000_000)
-    after = pacing.take(np.zeros(1, np.int64), START + 2_000_000_000)
+    recovery = ClockRecovery(100.0)
+    recovery.take(np.zeros(101, np.int64), START)
+    recovery.bridge(START + 2_000_000_000)
+    after = recovery.take(np.zeros(1, np.int64), START + 2_000_000_000)
     assert after.sequence.tolist() == [301]
-    assert pacing.lost == 199
+    assert recovery.lost == 199
     np.testing.assert_allclose(after.time, [3.0], atol=0.01)
 
 
 def test_the_shortest_gap_noticed_grows_with_a_told_clock():
-    pacing = Pacing(100.0, factor=10.0)
+    recovery = ClockRecovery(100.0, factor=10.0)
     arrivals, _ = lumps(100.0, 8.0, 0.01, lost=(4.0, 4.0 + 5 * GAP))
-    paced(pacing, arrivals)
-    assert pacing.lost == 0
+    paced(recovery, arrivals)
+    assert recovery.lost == 0
 
 
 @given(
@@ -106,12 +106,12 @@ def test_the_shortest_gap_noticed_grows_with_a_told_clock():
     rate=st.floats(1.0, 7000.0),
 )
 def test_numbers_and_times_always_rise_and_every_missing_number_is_counted(pauses, rate):
-    pacing, now, blocks, given_ = Pacing(rate), START, [], 0
+    recovery, now, blocks, given_ = ClockRecovery(rate), START, [], 0
     for pause, count, broken in pauses:
         now += round(pause * 1e9)
         given_ += count
-        blocks.append(pacing.take(np.full(count, broken), now))
-    blocks.append(pacing.release())
+        blocks.append(recovery.take(np.full(count, broken), now))
+    blocks.append(recovery.release())
     sequence = np.concatenate([b.sequence for b in blocks])
     time = np.concatenate([b.time for b in blocks])
     assert len(sequence) == len(time) == given_
@@ -119,4 +119,4 @@ def test_numbers_and_times_always_rise_and_every_missing_number_is_counted(pause
     assert np.all(np.diff(time) > 0.0)
     if given_:
         assert sequence[0] == 1
-        assert sequence[-1] - given_ == pacing.lost
+        assert sequence[-1] - given_ == recovery.lost

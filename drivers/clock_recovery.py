@@ -31,7 +31,7 @@ class Paced:
     time: NDArray[np.float64]  # (n,) [s] from 0, strictly rising
 
 
-class Pacing:
+class ClockRecovery:
     """Paces one stream. Records after a pause are kept back until it is clear whether any were lost."""
 
     def __init__(self, rate: float, factor: float = 1.0) -> None:
