@@ -98,6 +98,32 @@ def test_an_export_of_nonsense_ends_in_one_sentence(session, tmp_path, capsys, n
     assert VERB[name] in told[0]
 
 
+@pytest.mark.parametrize("name", [ANALYSIS, PREDICTION])
+def test_a_document_comes_back_as_it_was_stored(session, documents, name):
+    assert kept(session, name) == documents[name]
+
+
+@pytest.mark.parametrize(
+    ("name", "path"),
+    [
+        (ANALYSIS, ("bootstrap", "settings", "confidence")),
+        (ANALYSIS, ("strokes", 0, "mu_max")),
+        (ANALYSIS, ("strokes", 0, "kept")),
+        (PREDICTION, ("trials", 0, "solver")),
+    ],
+)
+def test_a_document_that_lacks_a_number_is_damaged_and_the_sentence_names_it(documents, tmp_path, name, path):
+    document = copy.deepcopy(documents[name])
+    *inside, last = path
+    holder = document
+    for part in inside:
+        holder = holder[part]
+    del holder[last]
+    (tmp_path / name).write_text(json.dumps(document))
+    with pytest.raises(RecordingError, match=f"{name} is damaged .*{last}.*{VERB[name]}"):
+        kept(tmp_path, name)
+
+
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_a_seal_with_nonsense_proves_nothing_and_stands_in_nobodys_way(session, data):
