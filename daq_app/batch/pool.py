@@ -109,7 +109,8 @@ def visits(
                 shelf.keep(named[name], answer)
                 done.append(Visit.from_dict(answer))
             left = (time.monotonic() - begun) / count * (len(missing) - count)
-            console.progress(0.95 * count / len(missing), f"{count} of {len(missing)} sessions, {left:.0f} s left")
+            told = "" if console.at_terminal else f", {left:.0f} s left"
+            console.progress(0.95 * count / len(missing), f"{count} of {len(missing)} sessions{told}")
     except KeyboardInterrupt:
         console.note(f"{len(done)} of {len(folders)} sessions are computed and kept; the next run goes on from there")
         raise
