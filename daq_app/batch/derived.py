@@ -6,12 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from daq_app.cli.console import Console
-from daq_app.cli.main import WrongValue
-from sessions.plan.blinding import revealed
+from daq_app.console import Console, WrongValue
 from sessions.plan.plan import SessionPlan
 from sessions.plan.study_file import is_study
-from sessions.plan.visits import force_visit
 from sessions.prediction import PredictionOptions, Progress, SessionPrediction, predict
 from sessions.prediction.afferent import AfferentSettings, firing_document
 from sessions.prediction.side_by_side import with_alternatives
@@ -20,6 +17,8 @@ from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording, RecordingError
 from sessions.recording.calibration_uncertainty import checked_gain_error, gain_error_set, set_gain_error
 from sessions.recording.derived import load_derived, store_derived
+from sessions.recording.unblinding import revealed
+from sessions.recording.visits import force_visit
 from sessions.strokes import Analysis, AnalysisSettings, analyse
 from sessions.strokes.bootstrap import BootstrapSettings, drawn_from, intervals_of
 from sessions.strokes.contact_area import AreaLaw

@@ -17,9 +17,9 @@ from daq_app.batch.cluster import by_cluster
 from daq_app.batch.session_numbers import Answer, computed, content_of
 from daq_app.batch.workers import attend
 from daq_app.child_process import fresh_processes
-from daq_app.cli.console import Console
+from daq_app.console import Console
+from sessions.atomic_file import write_whole
 from sessions.recording import RecordingError
-from sessions.recording.atomic_file import write_whole
 from sessions.recording.provenance import software_versions
 from sessions.statistics.pooling.visit import FORM, Visit, VisitOptions
 

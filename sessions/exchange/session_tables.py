@@ -16,9 +16,9 @@ from sessions.exchange.column_meanings import (
     PREDICTION,
     STROKE,
 )
+from sessions.exchange.given_and_made import given, made_with
 from sessions.recording import Recording
 from sessions.recording.log import ANSWERS, OUTCOMES
-from sessions.report.given_and_made import given, made_with
 from sessions.strokes.bootstrap import NUMBERS
 
 Cell = str | int | float | None

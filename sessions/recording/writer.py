@@ -10,9 +10,9 @@ from typing import Any, NoReturn, Self
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
+from sessions.atomic_file import sync_folder
 from sessions.file_access import remedy
 from sessions.plan.plan import SessionPlan
-from sessions.recording.atomic_file import sync_folder
 from sessions.recording.disk_space import Reserve, release_reserve
 from sessions.recording.errors import RecordingError
 from sessions.recording.head import info_to_dict, json_text, plan_to_dict, simulated_sentence

@@ -7,8 +7,8 @@ import threading
 
 import pytest
 
-from daq_app.cli.console import Console, NotWritten, Underway, takes_all
 from daq_app.cli.main import run
+from daq_app.console import Console, NotWritten, Underway, takes_all
 from solver.progress import listening, tell
 
 
@@ -105,8 +105,8 @@ def _lines_at_terminal(monkeypatch, calls, columns=80):
     """Return what a terminal is shown of (instant [s], part done, end known)."""
     err = _Terminal()
     speaker, now = Console(as_json=False, err=err), [0.0]
-    monkeypatch.setattr("daq_app.cli.console.time.monotonic", lambda: now[0])
-    monkeypatch.setattr("daq_app.cli.console.os.get_terminal_size", lambda _: os.terminal_size((columns, 24)))
+    monkeypatch.setattr("daq_app.console.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("daq_app.console.os.get_terminal_size", lambda _: os.terminal_size((columns, 24)))
     monkeypatch.setattr(err, "fileno", lambda: 2)
     for instant, done, known in calls:
         now[0] = instant
@@ -148,7 +148,7 @@ def test_a_terminal_without_blocks_gets_a_bar_of_plain_signs(monkeypatch):
 def test_progress_elsewhere_is_a_plain_line_now_and_then(monkeypatch):
     speaker, _, err = console(as_json=False)
     now = [10.0]
-    monkeypatch.setattr("daq_app.cli.console.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("daq_app.console.time.monotonic", lambda: now[0])
     for instant, done in ((10.0, 0.25), (11.0, 0.3), (12.5, 0.5)):
         now[0] = instant
         speaker.progress(done, "solving")
@@ -156,7 +156,7 @@ def test_progress_elsewhere_is_a_plain_line_now_and_then(monkeypatch):
 
 
 def test_work_whose_end_nobody_knows_shows_how_long_it_has_taken_and_can_still_be_left(monkeypatch):
-    monkeypatch.setattr("daq_app.cli.console.PATIENCE", 0.0)
+    monkeypatch.setattr("daq_app.console.PATIENCE", 0.0)
     speaker, _, err = console(as_json=False)
 
     def work():

@@ -38,6 +38,10 @@ class Underway:
         self.part = max(self.part, min(part, 0.99))
 
 
+class WrongValue(Exception):
+    """The command line or a value in a file was wrong: exit code 2."""
+
+
 class NotWritten(Exception):
     """What was said could not be written: why, where, and what to do."""
 
