@@ -18,7 +18,7 @@ from daq_app.accuracy.measuring import measured, restored
 from daq_app.accuracy.page import write
 from daq_app.accuracy.subjects import SUBJECTS
 from daq_app.accuracy.tables import tables
-from daq_app.cli.console import Console
+from daq_app.console import Console
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PAGES = {

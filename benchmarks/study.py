@@ -15,7 +15,7 @@ from pathlib import Path
 from statistics import median
 
 from daq_app.batch.pool import Shelf, visits
-from daq_app.cli.console import Console
+from daq_app.console import Console
 from daq_app.simulation.synthetic import synthetic_study
 from sessions.statistics.pooling.visit import VisitOptions
 

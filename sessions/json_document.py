@@ -2,7 +2,12 @@
 
 import json
 import math
-from typing import Any, NoReturn, cast
+from collections.abc import Iterator, Mapping
+from typing import Any, NoReturn, TypeVar, cast
+
+import msgspec
+
+T = TypeVar("T")
 
 
 def json_object(text: str | bytes) -> dict[str, Any]:
@@ -28,3 +33,37 @@ def _no_number(name: str) -> NoReturn:
 def _finite(text: str) -> float:
     number = float(text)
     return number if math.isfinite(number) else _no_number(text)
+
+
+def converted(value: object, form: type[T]) -> T:
+    """Return plain data as the type `form`. Raises ValueError that says where it is of another kind, and which."""
+    try:
+        return msgspec.convert(value, form)
+    except msgspec.ValidationError as error:
+        raise ValueError(str(error).replace("`$.", "`")) from error
+
+
+def complete(document: Mapping[str, Any], form: type[T]) -> T:
+    """Return a document that the program wrote itself, as the type `form`.
+
+    A name may be missing only where nothing is known under it. Raises ValueError as `converted` does.
+    """
+    held = converted(document, form)
+    for name in _missing(document, msgspec.to_builtins(held)):
+        raise ValueError(f"Object missing required field `{name}`")
+    return held
+
+
+def _missing(document: object, held: object, where: str = "") -> Iterator[str]:
+    """Yield the path of each name that `document` lacks and for which `held` has a default other than None."""
+    if isinstance(held, list | tuple):
+        for at, (found, item) in enumerate(zip(cast("list[Any]", document), cast("list[Any]", held), strict=True)):
+            yield from _missing(found, item, f"{where}[{at}]")
+    elif isinstance(held, dict):
+        found = cast("Mapping[str, Any]", document)
+        for name, item in cast("dict[str, Any]", held).items():
+            path = f"{where}.{name}" if where else name
+            if name in found:
+                yield from _missing(found[name], item, path)
+            elif item is not None:
+                yield path

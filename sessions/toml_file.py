@@ -6,13 +6,12 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import MISSING, fields, is_dataclass
 from datetime import date, time
 from pathlib import Path
-from types import NoneType
-from typing import Any, Literal, TypeVar, cast, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, cast
 
 import msgspec
+from msgspec import inspect
 
 from sessions.file_access import LARGEST_TEXT, read_limited, remedy
 
@@ -89,24 +88,109 @@ def from_table(table: Mapping[str, Any], cls: type[T], where: str) -> T:
     Unknown keys are refused, whole numbers are taken where a number with a fraction may stand, true and false are no
     numbers, nan and infinity are refused. Raises SettingsError.
     """
-    _check_keys(table, cls, "", where)
+    places = {key: (value, form) for key, value, form in _places(table, inspect.type_info(cls), "")}
+    for key, (value, form) in places.items():
+        if isinstance(value, float) and not math.isfinite(value):
+            raise _Wrong(where, key, f"{key} = {value} is not allowed: it must be a finite number")
+        nested = _nested(form)
+        if isinstance(value, Mapping) and isinstance(nested, inspect.DataclassType):
+            known = [field.name for field in nested.fields]
+            for name in cast("Mapping[str, Any]", value):
+                if name not in known:
+                    full = _joined(key, name)
+                    raise _Wrong(where, full, f"{full} is not known; allowed here: {', '.join(known)}")
     try:
         return msgspec.convert(table, cls)
     except msgspec.ValidationError as error:
-        path = _dotted(str(error))
-        cause = error.__cause__
-        if cause is None:
-            value, kind = _found_at(table, cls, path)
-            allowed = f"it must be {_in_words(kind)}"
-            raise _Wrong(where, path, f"{path} = {shown(value)} is not allowed: {allowed}") from error
-        # A dataclass that checks itself names the key, in full or from itself on.
-        key = str(getattr(cause, "key", ""))
-        full = key if not path or key == path or key.startswith((f"{path}.", f"{path}[")) else f"{path}.{key}"
-        if not key:
-            raise _Wrong(where, path, f"{path or 'this'}: {cause}") from error
-        value: object = getattr(cause, "value", None)
-        allowed = str(getattr(cause, "allowed", cause)).rstrip(".")
-        raise _Wrong(where, full, f"{full} = {shown(value)} is not allowed: {allowed}") from error
+        raise _Wrong(where, *_sentence(error, places)) from error
+
+
+def _places(value: Any, form: inspect.Type | None, key: str) -> Iterator[tuple[str, Any, inspect.Type | None]]:  # noqa: ANN401  any TOML value
+    """Yield the key, the value and the type of a place in a table and of all places inside it."""
+    yield key, value, form
+    if isinstance(value, list):
+        for at, item in enumerate(cast("list[Any]", value)):
+            yield from _places(item, _inside(form, at), f"{key}[{at}]")
+    if isinstance(value, Mapping):
+        for name, item in cast("Mapping[str, Any]", value).items():
+            yield from _places(item, _inside(form, name), _joined(key, name))
+
+
+def _nested(form: inspect.Type | None) -> inspect.Type | None:
+    """Return the choice of a union that has places inside, or the type where it is no union."""
+    kinds = (inspect.DataclassType, inspect.VarTupleType, inspect.TupleType)
+    types = form.types if isinstance(form, inspect.UnionType) else (form,)
+    return next((one for one in types if isinstance(one, kinds)), None)
+
+
+def _inside(form: inspect.Type | None, part: str | int) -> inspect.Type | None:
+    """Return the type at a name or a position inside a type; None where it has none there."""
+    match _nested(form), part:
+        case inspect.DataclassType(fields=fields), str():
+            return next((field.type for field in fields if field.name == part), None)
+        case inspect.VarTupleType(item_type=item), int():
+            return item
+        case inspect.TupleType(item_types=items), int():
+            return items[min(part, len(items) - 1)]
+        case _:
+            return None
+
+
+def _sentence(error: msgspec.ValidationError, places: Mapping[str, tuple[Any, inspect.Type | None]]) -> tuple[str, str]:
+    """Return the key that msgspec refuses, as a TOML file would write it, and a sentence about it."""
+    message, _, located = str(error).partition(" - at `$")
+    path = located.strip(".`").removesuffix("[...]")
+    cause = error.__cause__
+    if cause is None:
+        value, form = places[path]
+        if missing := re.match(r"Object missing required field `(.*?)`", message):
+            return path, f"{_joined(path, missing[1])} is missing; it must be {_in_words(_inside(form, missing[1]))}"
+        return path, f"{path} = {shown(value)} is not allowed: it must be {_in_words(form)}"
+    # A dataclass that checks itself names the key, in full or from itself on.
+    key = str(getattr(cause, "key", ""))
+    if not key:
+        return path, f"{path or 'this'}: {cause}"
+    full = key if not path or key == path or key.startswith((f"{path}.", f"{path}[")) else f"{path}.{key}"
+    allowed = str(getattr(cause, "allowed", cause)).rstrip(".")
+    return full, f"{full} = {shown(getattr(cause, 'value', None))} is not allowed: {allowed}"
+
+
+def _joined(key: str, name: str) -> str:
+    """Return the key of a name inside a table, as TOML writes it.
+
+    >>> _joined("finger", "tip_radius"), _joined("", ""), _joined("a", "a b")
+    ('finger.tip_radius', '""', 'a."a b"')
+    """
+    written = name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _inline(name)
+    return f"{key}.{written}" if key else written
+
+
+def _in_words(form: inspect.Type | None) -> str:
+    """Say what a type allows.
+
+    >>> _in_words(inspect.type_info(tuple[float, float])), _in_words(inspect.type_info(float | None))
+    ('a list of 2, each a number', 'a number')
+    """
+    match form:
+        case inspect.UnionType(types):
+            return " or ".join(_in_words(choice) for choice in types if not isinstance(choice, inspect.NoneType))
+        case inspect.LiteralType(values):
+            return " or ".join(f'"{value}"' for value in values)
+        case inspect.VarTupleType(item):
+            return f"a list, each {_in_words(item)}"
+        case inspect.TupleType(items):
+            return f"a list of {len(items)}, each {_in_words(items[0])}"
+        case _:
+            return _WORDS.get(type(form), "a value")
+
+
+_WORDS: Mapping[type[inspect.Type | None], str] = {
+    inspect.FloatType: "a number",
+    inspect.IntType: "a whole number",
+    inspect.StrType: "text in quotes",
+    inspect.BoolType: "true or false",
+    inspect.DataclassType: "a table",
+}
 
 
 def toml_text(made: Any) -> str:  # noqa: ANN401  any dataclass of texts, numbers, tuples and dataclasses
@@ -154,15 +238,6 @@ def _escaped(character: str) -> str:
     return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
 
 
-def _key(name: str) -> str:
-    """Return a key as TOML writes it.
-
-    >>> _key("tip_radius"), _key(""), _key("a b")
-    ('tip_radius', '""', '"a b"')
-    """
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _inline(name)
-
-
 class _Wrong(SettingsError):
     """A SettingsError that still knows its key, so that the line can be found."""
 
@@ -170,79 +245,6 @@ class _Wrong(SettingsError):
         super().__init__(f"{where}: {sentence}")
         self.key = key
         self.sentence = sentence
-
-
-def _check_keys(value: Any, kind: Any, key: str, where: str) -> None:  # noqa: ANN401  any TOML value, any annotation
-    """Refuse unknown and missing keys and numbers that are none, at any depth."""
-    if isinstance(value, float) and not math.isfinite(value):
-        raise _Wrong(where, key, f"{key} = {value} is not allowed: it must be a finite number")
-    if isinstance(value, list):
-        inner = _item_type(kind)
-        for i, item in enumerate(cast("list[Any]", value)):
-            _check_keys(item, inner, f"{key}[{i}]", where)
-    dataclass = _dataclass_in(kind)
-    if not isinstance(value, Mapping) or dataclass is None:
-        return
-    table = cast("Mapping[str, Any]", value)
-    hints = get_type_hints(dataclass)
-    for name, inside in table.items():
-        full = f"{key}.{_key(name)}" if key else _key(name)
-        if name not in hints:
-            raise _Wrong(where, full, f"{full} is not known; allowed here: {', '.join(hints)}")
-        _check_keys(inside, hints[name], full, where)
-    for field in fields(dataclass):
-        if field.default is MISSING and field.default_factory is MISSING and field.name not in table:
-            full = f"{key}.{field.name}" if key else field.name
-            raise _Wrong(where, key, f"{full} is missing; it must be {_in_words(hints[field.name])}")
-
-
-def _dataclass_in(kind: Any) -> Any:  # noqa: ANN401  annotations are objects of many classes
-    """Return the dataclass an annotation names, alone or in a union; else None."""
-    return next((choice for choice in (kind, *get_args(kind)) if is_dataclass(choice)), None)
-
-
-def _item_type(kind: Any) -> Any:  # noqa: ANN401  as above
-    """Return the type of the items of a tuple annotation; None where it is none, or its items differ."""
-    items = [item for item in get_args(kind) if item is not Ellipsis]
-    return items[0] if get_origin(kind) is tuple and len(items) == 1 else None
-
-
-def _in_words(kind: Any) -> str:  # noqa: ANN401  as above
-    """Say what an annotation allows.
-
-    >>> _in_words(tuple[float, float]), _in_words(Literal["steady", "history"]), _in_words(float | None)
-    ('a list of 2, each a number', '"steady" or "history"', 'a number')
-    """
-    simple = {float: "a number", int: "a whole number", str: "text in quotes", bool: "true or false"}
-    if kind in simple:
-        return simple[kind]
-    arguments = [argument for argument in get_args(kind) if argument is not NoneType]
-    if get_origin(kind) is Literal:
-        return " or ".join(f'"{choice}"' for choice in arguments)
-    if get_origin(kind) is tuple:
-        item = _in_words(arguments[0])
-        return f"a list, each {item}" if Ellipsis in arguments else f"a list of {len(arguments)}, each {item}"
-    if is_dataclass(kind):
-        return "a table"
-    return " or ".join(_in_words(argument) for argument in arguments) or "a value"
-
-
-def _dotted(message: str) -> str:
-    """Return the key a msgspec message speaks of, as a TOML file would write it; "" for the whole file."""
-    found = re.search(r" - at `\$\.?(.*?)`$", message)
-    return found.group(1) if found else ""
-
-
-def _found_at(table: Any, kind: Any, key: str) -> tuple[object, Any]:  # noqa: ANN401  as above
-    """Return the value at a dotted key, and the annotation it should have met."""
-    for part in re.findall(r"[^.\[\]]+", key):
-        if part.isdigit():
-            lists = [choice for choice in (kind, *get_args(kind)) if get_origin(choice) is tuple]
-            kinds = [item for item in get_args(lists[0]) if item is not Ellipsis]
-            table, kind = table[int(part)], kinds[min(int(part), len(kinds) - 1)]
-        else:
-            table, kind = table[part], get_type_hints(_dataclass_in(kind))[part]
-    return table, kind
 
 
 def shown(value: object) -> str:

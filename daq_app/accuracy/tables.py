@@ -17,7 +17,7 @@ from daq_app.accuracy.speed import Speed
 from daq_app.accuracy.targets import Target
 from daq_app.accuracy.truth import NUMBERS, Truth
 from daq_app.accuracy.warm import Warm
-from daq_app.cli.console import number
+from daq_app.console import number
 
 CELL_WORDS = 25  # the limit for a cell of the docs: tests/test_documents_prose.py
 

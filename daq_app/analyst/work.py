@@ -14,12 +14,12 @@ from daq_app.analyst.pictures import field_at, film_of, finger_of, lost_film
 from daq_app.analyst.raw import RawFile
 from daq_app.batch.derived import analysis_document, settings_kept
 from sessions.exchange import ExportError, ExportSource, export
-from sessions.plan.blinding import revealed
 from sessions.plan.plan import Blinded
 from sessions.prediction import TrialPrediction, Way, predict
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording, RecordingError
 from sessions.recording.provenance import software_versions
+from sessions.recording.unblinding import revealed
 from sessions.report import Field, Report, findings
 from sessions.report.predictions import field_of, finding_of
 from sessions.strokes import analyse
@@ -276,7 +276,7 @@ class Work:
         return str(export(source, asked.what, path, shown))
 
     def _write_picture(self, name: str, path: Path) -> str:
-        from sessions.recording.atomic_file import write_whole
+        from sessions.atomic_file import write_whole
         from sessions.report.html import panel_csv, swap_in
 
         self._say(m.Step(0.0, f"writing {path.name}"))

@@ -6,24 +6,24 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from daq_app.cli.console import Console
-from daq_app.cli.main import WrongValue
-from sessions.plan.blinding import revealed
+from daq_app.console import Console, WrongValue
 from sessions.plan.plan import SessionPlan
 from sessions.plan.study_file import is_study
-from sessions.plan.visits import force_visit
 from sessions.prediction import PredictionOptions, Progress, SessionPrediction, predict
 from sessions.prediction.afferent import AfferentSettings, firing_document
 from sessions.prediction.side_by_side import with_alternatives
+from sessions.prediction.stored import check_prediction
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording, RecordingError
 from sessions.recording.calibration_uncertainty import checked_gain_error, gain_error_set, set_gain_error
 from sessions.recording.derived import load_derived, store_derived
-from sessions.recording.kept_shape import check_analysis, check_prediction
+from sessions.recording.unblinding import revealed
+from sessions.recording.visits import force_visit
 from sessions.strokes import Analysis, AnalysisSettings, analyse
 from sessions.strokes.bootstrap import BootstrapSettings, drawn_from, intervals_of
 from sessions.strokes.contact_area import AreaLaw
 from sessions.strokes.decisions import Decisions
+from sessions.strokes.stored import check_analysis
 from sessions.toml_file import SettingsError, from_table
 
 ANALYSIS = "analysis.json"
@@ -112,10 +112,8 @@ def kept(folder: Path, name: str) -> dict[str, Any] | None:
     except RecordingError as damaged:
         told = str(damaged).replace("make it anew from the recording", f"'daq-app {verb}' makes it anew")
         raise RecordingError(told) from damaged
-    except (SettingsError, AttributeError, TypeError) as damaged:
-        why = (
-            damaged if isinstance(damaged, SettingsError) else "its parts are not of the kinds that this program writes"
-        )
+    except (ValueError, AttributeError, TypeError) as damaged:
+        why = damaged if isinstance(damaged, ValueError) else "its parts are not of the kinds that this program writes"
         raise RecordingError(f"{folder / name} is damaged ({why}); 'daq-app {verb}' makes it anew") from damaged
     return document
 

@@ -17,9 +17,9 @@ from daq_app.batch.cluster import by_cluster
 from daq_app.batch.session_numbers import Answer, computed, content_of
 from daq_app.batch.workers import attend
 from daq_app.child_process import fresh_processes
-from daq_app.cli.console import Console
+from daq_app.console import Console
+from sessions.atomic_file import write_whole
 from sessions.recording import RecordingError
-from sessions.recording.atomic_file import write_whole
 from sessions.recording.provenance import software_versions
 from sessions.statistics.pooling.visit import FORM, Visit, VisitOptions
 
@@ -109,7 +109,8 @@ def visits(
                 shelf.keep(named[name], answer)
                 done.append(Visit.from_dict(answer))
             left = (time.monotonic() - begun) / count * (len(missing) - count)
-            console.progress(0.95 * count / len(missing), f"{count} of {len(missing)} sessions, {left:.0f} s left")
+            told = "" if console.at_terminal else f", {left:.0f} s left"
+            console.progress(0.95 * count / len(missing), f"{count} of {len(missing)} sessions{told}")
     except KeyboardInterrupt:
         console.note(f"{len(done)} of {len(folders)} sessions are computed and kept; the next run goes on from there")
         raise

@@ -2,7 +2,7 @@
 
 import argparse
 
-from daq_app.cli.main import WrongValue
+from daq_app.console import WrongValue
 from sessions.strokes.contact_area import FIXED, HERTZ, PLANNED_AT, AreaLaw
 
 AS_BEFORE = "as the session was analysed before, or else fixed"

@@ -2,9 +2,8 @@
 
 from dataclasses import dataclass
 
-from daq_app.cli.console import Console
-from daq_app.cli.main import WrongValue
 from daq_app.cli.terminal import Terminal
+from daq_app.console import Console, WrongValue
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import (
     Connect,

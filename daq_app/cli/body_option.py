@@ -3,7 +3,7 @@
 import argparse
 import math
 
-from daq_app.cli.main import WrongValue
+from daq_app.console import WrongValue
 from sessions.plan.plan import Finger, SessionPlan
 from sessions.plan.protocols import Body
 

@@ -2,7 +2,7 @@
 
 import argparse
 
-from daq_app.cli.main import WrongValue
+from daq_app.console import WrongValue
 
 
 def add_calibration(parser: argparse.ArgumentParser) -> None:

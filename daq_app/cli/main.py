@@ -7,7 +7,7 @@ import traceback
 from types import ModuleType
 from typing import NoReturn
 
-from daq_app.cli.console import Console, harmless, takes_all
+from daq_app.console import Console, WrongValue, harmless, takes_all
 
 LONGEST = 1500  # of the sentence a failure is told in [characters]: half a page of a terminal
 DONE, FAILED, WRONG, FLAWED, STOPPED = 0, 1, 2, 3, 130
@@ -47,7 +47,7 @@ _WRONG = (
 )
 _FAILED = (
     "daq_app.batch.cluster.SchedulerError",
-    "daq_app.cli.console.NotWritten",
+    "daq_app.console.NotWritten",
     "daq_app.batch.sensitivity.TooFewAnswers",
     "drivers.transducer.DeviceFault",
     "drivers.transducer.LinkLost",
@@ -63,10 +63,6 @@ _FAILED = (
 
 
 _OUR_OWN = ("daq_app", "drivers", "sessions", "simulators", "solver")
-
-
-class WrongValue(Exception):
-    """The command line or a value in a file was wrong: exit code 2."""
 
 
 def run(arguments: list[str]) -> int:

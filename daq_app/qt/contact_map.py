@@ -33,7 +33,7 @@ class ContactMap(PaintedWidget):
         """Show which way the stroke is to go: +1 away from the subject, -1 towards, 0 none."""
         if direction != self._direction:
             self._direction = direction
-            self._anew()
+            self.redraw()
 
     def show_trail(self, position: Array) -> None:
         """Show the last positions (n, 2) [mm], the newest last; nan where nothing presses."""
@@ -49,7 +49,7 @@ class ContactMap(PaintedWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Copy the sample, and paint the trail upon it."""
-        painter = self._upon_ground()
+        painter = self.painter_on_ground()
         per_mm = self._per_mm()
         if not len(self._trail) or per_mm <= TOO_SMALL:
             return
@@ -61,7 +61,7 @@ class ContactMap(PaintedWidget):
         for piece in lines(x, y):
             painter.drawPolyline(piece)
         if self._touching:
-            painter.setPen(QPen(QColor(self._tokens.text), 2))
+            painter.setPen(QPen(QColor(self.tokens.text), 2))
             painter.setBrush(QColor(MU))
             painter.drawEllipse(QPointF(x[-1], y[-1]), 6, 6)
 
@@ -69,9 +69,9 @@ class ContactMap(PaintedWidget):
         """Return how many pixels a millimetre has."""
         return min((self.height() - 2 * MARGIN) / ALONG, (self.width() - 2 * MARGIN) / ACROSS)
 
-    def _painted_ground(self) -> QPixmap:
+    def draw_ground(self) -> QPixmap:
         """Return sample, grid, words and arrow."""
-        t = self._tokens
+        t = self.tokens
         made = blank(self, t.surface)
         per_mm = self._per_mm()
         if per_mm <= TOO_SMALL:
@@ -105,7 +105,7 @@ class ContactMap(PaintedWidget):
     def _paint_arrow(self, painter: QPainter, box: QRectF) -> None:
         if not self._direction:
             return
-        painter.setPen(QPen(QColor(self._tokens.quiet), 2))
+        painter.setPen(QPen(QColor(self.tokens.quiet), 2))
         x, half = box.right() - 10, box.height() * 0.3
         tip = box.center().y() - self._direction * half
         painter.drawLine(QPointF(x, box.center().y() + self._direction * half), QPointF(x, tip))

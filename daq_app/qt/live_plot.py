@@ -59,13 +59,13 @@ class LivePlot(PaintedWidget):
         """Show the last so many seconds."""
         if seconds != self._seconds:
             self._seconds = seconds
-            self._anew()
+            self.redraw()
 
     def show_times(self, shown: bool) -> None:
         """Show the numbers of the time axis, or leave them to the plot below."""
         if shown != self._times_shown:
             self._times_shown = shown
-            self._anew()
+            self.redraw()
 
     def show_columns(self, columns: Columns, now: float, marks: Sequence[Mark], clock: float) -> None:
         """Draw the columns with `now` [s, device time] at the right edge; `clock` [s] is for the scale's patience."""
@@ -73,13 +73,13 @@ class LivePlot(PaintedWidget):
         least, greatest = _range(columns.values, self._rows)
         scale = self._scale.following(least, greatest, clock)
         if (scale.low, scale.high) != (self._scale.low, self._scale.high):
-            self._ground = None
+            self.forget_ground()
         self._scale = scale
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Copy what stands still, and draw the rest upon it."""
-        painter = self._upon_ground()
+        painter = self.painter_on_ground()
         inside = self._inside()
         painter.setClipRect(inside)
         self._paint_marks(painter, inside)
@@ -105,15 +105,15 @@ class LivePlot(PaintedWidget):
         beyond = MARGIN * (self._scale.high - self._scale.low)
         return self._scale.low - beyond, self._scale.high + beyond
 
-    def _painted_ground(self) -> QPixmap:
+    def draw_ground(self) -> QPixmap:
         """Return axes, grid, numbers and names."""
-        made = blank(self, self._tokens.surface)
+        made = blank(self, self.tokens.surface)
         painter = QPainter(made)
         painter.setFont(font(SMALL, self._type_scale))
         inside = self._inside()
         self._paint_values(painter, inside)
         self._paint_times(painter, inside)
-        painter.setPen(fine(self._tokens.line))
+        painter.setPen(fine(self.tokens.line))
         painter.drawLine(inside.topLeft(), inside.bottomLeft())
         painter.drawLine(inside.bottomLeft(), inside.bottomRight())
         self._paint_names(painter, inside)
@@ -125,11 +125,11 @@ class LivePlot(PaintedWidget):
         low, high = self._reach()
         for value in ticks(self._scale.low, self._scale.high, inside.height() / line):
             y = inside.bottom() - (value - low) * inside.height() / (high - low)
-            faint = QColor(self._tokens.line)
+            faint = QColor(self.tokens.line)
             faint.setAlpha(110)
             painter.setPen(fine(faint))
             painter.drawLine(QPointF(inside.left(), y), QPointF(inside.right(), y))
-            painter.setPen(QColor(self._tokens.quiet))
+            painter.setPen(QColor(self.tokens.quiet))
             top = min(max(y - line / 2.0, 0.0), self.height() - line)
             box = QRectF(0, top, inside.left() - 5, line)
             painter.drawText(box, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, _number(value))
@@ -139,14 +139,14 @@ class LivePlot(PaintedWidget):
         widest = metrics.horizontalAdvance("−00 s ")
         for value in times(self._seconds, inside.width() / widest):
             x = inside.right() + value * inside.width() / self._seconds
-            painter.setPen(fine(self._tokens.line))
+            painter.setPen(fine(self.tokens.line))
             painter.drawLine(QPointF(x, inside.bottom()), QPointF(x, inside.bottom() - 4))
             if not self._times_shown:
                 continue
             text = f"{_number(value)} s" if value else "now"
             width = metrics.horizontalAdvance(text)
             left = min(max(x - width / 2.0, 0.0), self.width() - width - 1)
-            painter.setPen(QColor(self._tokens.quiet))
+            painter.setPen(QColor(self.tokens.quiet))
             painter.drawText(QPointF(left, inside.bottom() + metrics.ascent() + 1), text)
 
     def _paint_names(self, painter: QPainter, inside: QRectF) -> None:
@@ -164,10 +164,10 @@ class LivePlot(PaintedWidget):
             end = x + SAMPLE * self._type_scale
             middle = baseline - metrics.xHeight() / 2.0
             painter.drawLine(QPointF(x, middle), QPointF(end, middle))
-            painter.setPen(QColor(self._tokens.quiet))
+            painter.setPen(QColor(self.tokens.quiet))
             painter.drawText(QPointF(end + 4, baseline), curve.channel)
             x = end + 4 + metrics.horizontalAdvance(f"{curve.channel}  ")
-        painter.setPen(QColor(self._tokens.quiet))
+        painter.setPen(QColor(self.tokens.quiet))
         painter.drawText(QPointF(x, baseline), self._name[self._name.index("[") :] if several else self._name)
 
     def _paint_marks(self, painter: QPainter, inside: QRectF) -> None:
@@ -178,15 +178,15 @@ class LivePlot(PaintedWidget):
         for mark in self._marks:
             start, stop = (inside.right() + (at - self._now) * across for at in (mark.start, mark.stop))
             if mark.kind == "steady":
-                fill = QColor(self._tokens.act)
+                fill = QColor(self.tokens.act)
                 fill.setAlpha(36)
                 painter.fillRect(QRectF(start, inside.top(), stop - start, inside.height()), fill)
-                painter.setPen(fine(self._tokens.act, Qt.PenStyle.DotLine))
+                painter.setPen(fine(self.tokens.act, Qt.PenStyle.DotLine))
                 painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
                 painter.drawLine(QPointF(stop, inside.top()), QPointF(stop, inside.bottom()))
                 continue
             onset = mark.kind == "onset"
-            painter.setPen(fine(self._tokens.quiet, Qt.PenStyle.SolidLine if onset else Qt.PenStyle.DashLine))
+            painter.setPen(fine(self.tokens.quiet, Qt.PenStyle.SolidLine if onset else Qt.PenStyle.DashLine))
             painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
             words = self._words[mark.kind]
             if inside.height() >= 5 * line:  # a lower plot has no room for words; the ones above it say them
@@ -194,7 +194,7 @@ class LivePlot(PaintedWidget):
                 painter.drawStaticText(QPointF(left, inside.top() + line), words)
 
     def _colour(self, name: str) -> str:
-        return name if name.startswith("#") else str(getattr(self._tokens, name))
+        return name if name.startswith("#") else str(getattr(self.tokens, name))
 
 
 def _range(values: Array, rows: Sequence[int]) -> tuple[float, float]:

@@ -13,34 +13,38 @@ class PaintedWidget(QWidget):
     def __init__(self, tokens: Tokens) -> None:
         """Begin without a ground."""
         super().__init__()
-        self._tokens = tokens
+        self.tokens = tokens
         self._ground: QPixmap | None = None  # what stands still
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # nothing behind it needs painting
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
     def set_tokens(self, tokens: Tokens) -> None:
         """Follow another theme."""
-        self._tokens = tokens
-        self._anew()
+        self.tokens = tokens
+        self.redraw()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Paint the ground for the new size."""
         super().resizeEvent(event)
+        self.forget_ground()
+
+    def forget_ground(self) -> None:
+        """Draw what stands still once more when the widget is next painted."""
         self._ground = None
 
-    def _anew(self) -> None:
+    def redraw(self) -> None:
         """Paint everything anew, the ground too."""
-        self._ground = None
+        self.forget_ground()
         self.update()
 
-    def _upon_ground(self) -> QPainter:
+    def painter_on_ground(self) -> QPainter:
         """Return a painter at work on the widget, the ground already there."""
         if self._ground is None or self._ground.devicePixelRatio() != self.devicePixelRatioF():
-            self._ground = self._painted_ground()
+            self._ground = self.draw_ground()
         painter = QPainter(self)
         painter.drawPixmap(0, 0, self._ground)
         return painter
 
-    def _painted_ground(self) -> QPixmap:
+    def draw_ground(self) -> QPixmap:
         """Return what stands still, as large as the widget."""
         raise NotImplementedError

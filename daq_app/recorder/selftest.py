@@ -263,13 +263,9 @@ def _cut(copies: list[Path], folder: Path, chance: random.Random) -> int:
 class _OnAQuota(SessionWriter):
     """A writer whose file may grow to a size, and further when the reserve is given back."""
 
-    def limit(self, size: int) -> None:
-        """Let the file grow to so many bytes."""
-        (page,) = self._connection.execute("PRAGMA page_size").fetchone()
-        self._connection.execute(f"PRAGMA max_page_count={size // page}")
-
-    def _give_back(self) -> None:
-        super()._give_back()
+    def give_back_reserve(self) -> None:
+        """Give it back, and let the file grow into it."""
+        super().give_back_reserve()
         self.limit(QUOTA + RESERVE)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from daq_app.cli.console import Console
+from daq_app.console import Console
 from drivers.clock import Clock
 from drivers.transducer import Transducer
 from sessions.plan.plan import SessionPlan

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from daq_app.cli.console import Console
+from daq_app.console import Console
 from daq_app.simulation.conduct import conduct
 from daq_app.simulation.wiring import Connected, SimulatedPeople, connected
 from drivers.clock import Clock

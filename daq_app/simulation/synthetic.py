@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from daq_app.cli.console import Console
+from daq_app.console import Console
 from daq_app.simulation.conduct import conduct
 from daq_app.simulation.due_events import DueEvents
 from daq_app.simulation.wiring import planted_surface
 from drivers.clock import Clock, ToldClock
+from sessions.atomic_file import write_json
 from sessions.plan.plan import Block, Frame, SessionPlan, Trial
 from sessions.plan.protocols import plan, protocol
 from sessions.recording import RecordingError, Setting
-from sessions.recording.atomic_file import write_json
 from sessions.recording.schema import LIVE_FILE
 from sessions.run.runner import RunnerSettings
 from sessions.run.steps import (

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from drivers.readings import ReadingBlock
+from sessions.atomic_file import write_json
 from sessions.exchange import ExportSource, Progress
 from sessions.exchange.csv_text import write_rows
 from sessions.exchange.exported import ExportedSession, head_of
@@ -25,7 +26,6 @@ from sessions.exchange.session_tables import Column, Table, tables
 from sessions.file_access import packed_lines, read_limited
 from sessions.json_document import json_object
 from sessions.recording import LoggedEvent, Recording
-from sessions.recording.atomic_file import write_json
 from sessions.recording.calibration_uncertainty import GAIN_ERROR, gain_error_content
 from sessions.recording.description import description
 from sessions.recording.event_shapes import event_data

@@ -1,6 +1,6 @@
 """The unit and the meaning of every column of a session's tables: column to (unit, "" for none; meaning)."""
 
-from sessions.report.given_and_made import MADE_WITH
+from sessions.exchange.given_and_made import MADE_WITH
 
 STROKE = {
     "trial": ("", "number of its trial"),

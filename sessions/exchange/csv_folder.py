@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from drivers.readings import ReadingBlock
+from sessions.atomic_file import write_json
 from sessions.exchange import ExportSource, Progress
 from sessions.exchange.csv_text import plain, write_rows
 from sessions.exchange.exported import ExportedSession, head_of
@@ -14,7 +15,6 @@ from sessions.exchange.session_tables import Column, Table, tables
 from sessions.file_access import read_limited
 from sessions.json_document import json_object
 from sessions.recording import LoggedEvent, Recording
-from sessions.recording.atomic_file import write_json
 from sessions.recording.calibration_uncertainty import GAIN_ERROR, gain_error_content
 from sessions.recording.description import description
 from sessions.recording.event_shapes import event_data

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from drivers.clock import StillClock
 from drivers.readings import ReadingBlock
-from sessions.recording.atomic_file import write_whole
+from sessions.atomic_file import write_whole
 from sessions.recording.calibration_uncertainty import GAIN_ERROR
 from sessions.recording.digests import Digest, different, digest_of
 from sessions.recording.head import info_from_dict, plan_from_dict

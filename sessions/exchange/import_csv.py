@@ -14,10 +14,10 @@ from drivers.calibration import Calibration
 from drivers.clock import StillClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
+from sessions.atomic_file import write_whole
 from sessions.exchange.csv_columns import TIME_UNITS, Columns, ColumnsUnknown, columns
 from sessions.file_access import LARGEST_TABLE, read_limited, remedy
 from sessions.plan.plan import Frame, Origin, SessionPlan
-from sessions.recording.atomic_file import write_whole
 from sessions.recording.provenance import Setting, provenance
 from sessions.recording.writer import SessionWriter
 from sessions.strokes import ZERO_SETTING, ZERO_STATED

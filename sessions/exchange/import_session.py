@@ -7,8 +7,6 @@ import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
-import msgspec
-
 from sessions.exchange import bids, csv_folder, hdf5
 from sessions.exchange.exported import ExportedSession, restore
 from sessions.exchange.import_csv import ImportRefused
@@ -18,7 +16,7 @@ from sessions.recording.schema import DESCRIPTION_FILE, LIVE_FILE, SEALED_FILE
 
 _DAMAGED = (
     *(OSError, EOFError, ValueError, LookupError, TypeError, AttributeError, RuntimeError, MemoryError),
-    *(csv.Error, zlib.error, msgspec.ValidationError),
+    *(csv.Error, zlib.error),
 )
 
 

@@ -16,9 +16,9 @@ from sessions.exchange.column_meanings import (
     PREDICTION,
     STROKE,
 )
+from sessions.exchange.given_and_made import given, made_with
 from sessions.recording import Recording
 from sessions.recording.log import ANSWERS, OUTCOMES
-from sessions.report.given_and_made import given, made_with
 from sessions.strokes.bootstrap import NUMBERS
 
 Cell = str | int | float | None
@@ -101,7 +101,7 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
             **{k: v for k, v in one.items() if k not in ("variant", "interval")},
             **_sed_interval("sed", one.get("interval")),
             **_force_intervals(one.get("interval")),
-            "indentation_interval": None if one.get("interval") is None else one["interval"]["indentation"],
+            "indentation_interval": None if one.get("interval") is None else one["interval"].get("indentation"),
         }
         for row in prediction["trials"]
         for one in row.get("alternatives", ())
@@ -122,7 +122,7 @@ def _sed_interval(name: str, told: Mapping[str, Any] | None) -> dict[str, Any]:
 
 def _force_intervals(told: Mapping[str, Any] | None) -> dict[str, Any]:
     """Return the columns of the intervals of a state's forces, and of its depth where that was found."""
-    return {} if told is None else {f"{name}_interval": told[name] for name in ("normal_force", "tangential_force")}
+    return {} if told is None else {f"{name}_interval": told.get(name) for name in ("normal_force", "tangential_force")}
 
 
 def trials(recording: Recording) -> Table:

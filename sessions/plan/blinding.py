@@ -12,11 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from sessions.plan.plan import SessionPlan, Trial
-from sessions.recording import Recording, RecordingError
-from sessions.recording.derived import load_derived
-from sessions.recording.log import trial_records
-
-UNBLINDING = "unblinding.json"  # in a session's folder, once its key was opened
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,24 +60,3 @@ class Key:
     def plan(self, plan: SessionPlan) -> SessionPlan:
         """Return a blinded plan with the index of every stimulus."""
         return replace(plan, blocks=tuple(replace(b, trials=tuple(map(self.of, b.trials))) for b in plan.blocks))
-
-
-def revealed(recording: Recording) -> Recording:
-    """Return a session with all that is known of its stimuli by now: a blinded one as it is, until its key was opened.
-
-    Raises RecordingError where the opened key is not the one that was sealed.
-    """
-    if not recording.plan.blinded:
-        return recording
-    told = load_derived(recording.folder, UNBLINDING)
-    if told is None:
-        return recording
-    path = recording.folder / UNBLINDING
-    try:
-        key = Key.from_dict(told["key"])
-        if key.sha256 != recording.plan.key_sha256:
-            raise ValueError("its SHA-256 is not that in the plan")
-        plan = key.plan(recording.plan)
-    except (ValueError, KeyError, TypeError) as error:
-        raise RecordingError(f"{path} is not the key that was sealed ({error}); unblind the session anew") from error
-    return replace(recording, plan=plan, trials=trial_records(plan, recording.events))

@@ -94,7 +94,6 @@ def _prepared(case: _Case, options: PredictionOptions) -> Prepared:
         matching_depth=None,
         opposite_sed=None,
         wall_s=None,
-        prediction=None,
         reasons={},
     )
     why = _missing(row, stroke)

@@ -4,13 +4,17 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
+import msgspec
+
+from sessions.json_document import complete, converted
 from sessions.plan.plan import Stimulus
 from sessions.prediction.options import PredictionOptions, template
 from sessions.prediction.sed_interval import Ends, SedInterval
 from sessions.prediction.variants import Alternative
 from sessions.strokes.contact_area import FIXED, AreaLaw
 from sessions.strokes.decisions import Decision
-from solver import Prediction
+from sessions.toml_file import from_table
+from solver import Prediction, Scene
 from solver.prediction import History, Skin
 from solver.response.fields import Fields, fields_of
 
@@ -46,8 +50,8 @@ class TrialPrediction:
     matching_depth: float | None  # indentation at which the model's normal force is the measured one [mm]
     opposite_sed: float | None  # at the same depth, slid the other way [MPa]
     wall_s: float | None  # the solve [s]
-    prediction: Prediction | None  # all that the solver found
     reasons: Mapping[str, str]
+    prediction: Prediction | None = None  # all that the solver found
     opposite: Prediction | None = None  # that slid the other way
     alternatives: tuple[Alternative, ...] = ()  # the same trial predicted otherwise, where that was asked for
     interval: SedInterval | None = None  # of `sed`, where it was asked for
@@ -112,3 +116,36 @@ class SessionPrediction:
             },
             "scene": asdict(template(self.options)),  # finger, materials and settings as used, defaults filled in
         }
+
+
+class _Solver(msgspec.Struct):
+    dofs: int
+
+
+class _Solved(msgspec.Struct):
+    solver: _Solver | None
+
+
+class _SolvedTrials(msgspec.Struct):
+    trials: tuple[_Solved, ...]
+
+
+class _Document(msgspec.Struct):
+    """The parts of `prediction.json` that the program itself reads."""
+
+    made_by: dict[str, str]
+    trials: tuple[TrialPrediction, ...]
+    width: float
+    width_origin: str
+    options: dict[str, Any]
+    scene: dict[str, Any]
+    area: dict[str, Any]
+    decisions: tuple[Decision, ...]
+
+
+def check_prediction(document: Mapping[str, Any]) -> None:
+    """Raise ValueError where a document is no prediction that this program writes: where, and what is expected."""
+    held = complete(document, _Document)
+    converted(document, _SolvedTrials)
+    from_table(held.options, PredictionOptions, "options")
+    from_table(held.scene, Scene, "scene")

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, cast
 
+from sessions.atomic_file import put_in_place, write_whole
 from sessions.file_access import read_limited, remedy
 from sessions.json_document import json_value
-from sessions.recording.atomic_file import put_in_place, write_whole
 from sessions.recording.description import description
 from sessions.recording.disk_space import release_reserve
 from sessions.recording.errors import RecordingError

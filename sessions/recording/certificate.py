@@ -4,9 +4,9 @@ import json
 from pathlib import Path
 from typing import Any
 
+from sessions.atomic_file import write_whole
 from sessions.file_access import read_limited
 from sessions.json_document import json_object
-from sessions.recording.atomic_file import write_whole
 from sessions.recording.provenance import software_versions
 
 CERTIFICATE_FILE = "daq-app-selftest.json"

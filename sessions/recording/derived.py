@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from sessions.atomic_file import write_whole
 from sessions.file_access import read_limited, remedy
 from sessions.json_document import json_object
-from sessions.recording.atomic_file import write_whole
 from sessions.recording.errors import RecordingError
 from sessions.recording.manifest import is_sealed, list_in_manifest
 from sessions.recording.provenance import software_versions

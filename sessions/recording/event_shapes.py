@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 
-from sessions.json_document import json_object
+from sessions.json_document import converted, json_object
 
 Whole: TypeAlias = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]  # what SQLite, HDF5 and NumPy hold alike
 Count: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
@@ -88,8 +88,5 @@ SHAPES: Mapping[str, type[msgspec.Struct]] = {
 def event_data(kind: str, text: str) -> dict[str, Any]:
     """Return the data of an event from its JSON text. Raises ValueError where it is none of that kind."""
     data = json_object(text)
-    try:
-        msgspec.convert(data, SHAPES.get(kind, dict[str, Any]))
-    except msgspec.ValidationError as error:
-        raise ValueError(str(error)) from error
+    converted(data, SHAPES.get(kind, dict[str, Any]))
     return data

@@ -14,6 +14,7 @@ import numpy as np
 from drivers.calibration import Calibration
 from drivers.status import StatusBit, StatusTable, bit
 from drivers.transducer import TransducerInfo
+from sessions.json_document import converted
 from sessions.plan.plan import SessionPlan
 
 _Row: TypeAlias = tuple[float, float, float, float, float, float]
@@ -70,8 +71,8 @@ class _Provenance(msgspec.Struct):
 
 
 def check_provenance(data: object) -> None:
-    """Raise msgspec.ValidationError where a provenance is of another shape than this program writes."""
-    msgspec.convert(data, _Provenance)
+    """Raise ValueError where a provenance is of another shape than this program writes."""
+    converted(data, _Provenance)
 
 
 def simulated_sentence(info: TransducerInfo | None, subject_simulated: bool) -> str | None:
@@ -100,8 +101,8 @@ def plan_to_dict(plan: SessionPlan) -> dict[str, Any]:
 
 
 def plan_from_dict(data: Mapping[str, Any]) -> SessionPlan:
-    """Return the plan that `plan_to_dict` gave `data` for."""
-    return msgspec.convert(data, SessionPlan)
+    """Return the plan that `plan_to_dict` gave `data` for. Raises ValueError for another shape."""
+    return converted(data, SessionPlan)
 
 
 def info_to_dict(info: TransducerInfo) -> dict[str, Any]:
@@ -134,9 +135,9 @@ def info_to_dict(info: TransducerInfo) -> dict[str, Any]:
 def info_from_dict(data: Mapping[str, Any]) -> TransducerInfo:
     """Return the transducer that `info_to_dict` gave `data` for.
 
-    Raises msgspec.ValidationError for another shape, ValueError when the matrix is not the one its hash was taken of.
+    Raises ValueError for another shape, and when the matrix is not the one its hash was taken of.
     """
-    info = msgspec.convert(data, _Info)
+    info = converted(data, _Info)
     told = info.calibration
     if len(told.tool) not in (0, 6):
         raise ValueError("the tool transform is no list of six numbers")

@@ -12,14 +12,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
 
-import msgspec
 import numpy as np
 
 from drivers.readings import ReadingBlock
 from drivers.status import flagged_words
 from drivers.transducer import TransducerInfo
 from sessions.file_access import DATABASE_FAILURES, bounded, remedy
-from sessions.json_document import json_value
+from sessions.json_document import converted, json_value
 from sessions.plan.plan import SessionPlan
 from sessions.recording.errors import RecordingError
 from sessions.recording.event_shapes import event_data
@@ -92,7 +91,7 @@ class Recording:
             plan, transducer = plan_from_dict(head["plan"]), head["transducer"]
             info = info_from_dict(transducer) if transducer else None
             check_provenance(head["provenance"])
-        except (ValueError, KeyError, TypeError, msgspec.ValidationError) as error:
+        except (ValueError, KeyError, TypeError) as error:
             raise RecordingError(f"{path}: its head is damaged ({error}); restore it from a copy") from error
         simulated = None if head["simulated"] == "no" else head["simulated"]
         trials = trial_records(plan, events)
@@ -305,14 +304,14 @@ def _events(connection: sqlite3.Connection, losses: list[str]) -> tuple[LoggedEv
         expected = number + 1
         try:
             found.append(_event(number, row))
-        except (ValueError, msgspec.ValidationError) as error:
+        except ValueError as error:
             losses.append(f"event {number} is damaged and left out ({error})")
     return tuple(found)
 
 
 def _event(number: int, row: Sequence[object]) -> LoggedEvent:
-    """Return an event from its row. Raises ValueError, msgspec.ValidationError where it is damaged or oddly shaped."""
-    time_ns, kind, trial, readings, text, crc = msgspec.convert(row, tuple[int, str, int | None, int, str, int])
+    """Return an event from its row. Raises ValueError where it is damaged or oddly shaped."""
+    time_ns, kind, trial, readings, text, crc = converted(row, tuple[int, str, int | None, int, str, int])
     if event_crc(LoggedEvent(number, time_ns, kind, trial, readings, {}), text) != crc:
         raise ValueError("CRC-32 differs")
     return LoggedEvent(number, time_ns, kind, trial, readings, event_data(kind, text))

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import closing, suppress
 from pathlib import Path
 
-from sessions.recording.atomic_file import sync_folder
+from sessions.atomic_file import sync_folder
 from sessions.recording.errors import RecordingError
 
 Identity = tuple[int, int] | None  # device and inode, as `os.stat` tells; None where there is no such file

@@ -10,9 +10,9 @@ from typing import Any, NoReturn, Self
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
+from sessions.atomic_file import sync_folder
 from sessions.file_access import remedy
 from sessions.plan.plan import SessionPlan
-from sessions.recording.atomic_file import sync_folder
 from sessions.recording.disk_space import Reserve, release_reserve
 from sessions.recording.errors import RecordingError
 from sessions.recording.head import info_to_dict, json_text, plan_to_dict, simulated_sentence
@@ -161,14 +161,23 @@ class SessionWriter:
         """Return how much is safe."""
         return self._acknowledged
 
+    @property
+    def waiting(self) -> int:
+        """Return how many readings were handed over and are not safe yet."""
+        return self._readings - self._acknowledged.readings
+
+    def limit(self, size: int) -> None:
+        """Let the file grow to so many bytes, as on a disk that has no more room."""
+        (page,) = self._connection.execute("PRAGMA page_size").fetchone()
+        self._connection.execute(f"PRAGMA max_page_count={size // page}")
+
     def readings(self, block: ReadingBlock) -> None:
         """Take readings over; commits when the last commit lies a second back. Raises RecordingError when it cannot."""
         self._check()
         if len(block):
             self._blocks.append(block)
             self._readings += len(block)
-        waiting = self._readings - self._acknowledged.readings
-        if self._clock.now_ns() - self._acknowledged.time_ns >= COMMIT_EVERY_NS or waiting >= LARGEST_BLOCK:
+        if self._clock.now_ns() - self._acknowledged.time_ns >= COMMIT_EVERY_NS or self.waiting >= LARGEST_BLOCK:
             self.commit()
 
     def event(
@@ -256,7 +265,7 @@ class SessionWriter:
             self.must_end = (
                 f"the disk took no more ({error}); all that was measured is safe: {remedy(error)}, and resume"
             )
-            self._give_back()
+            self.give_back_reserve()
         try:
             return self._written()
         except sqlite3.Error as again:
@@ -285,7 +294,7 @@ class SessionWriter:
             f" {without_home(str(self.folder))}: resume the session there"
         )
 
-    def _give_back(self) -> None:
+    def give_back_reserve(self) -> None:
         """Give the reserve back to the disk."""
         release_reserve(self.folder)
 

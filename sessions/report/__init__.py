@@ -4,10 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sessions.plan.sealed_predictions import NUMBERS, sealed_sentence
 from sessions.prediction import SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing
-from sessions.prediction.multiverse import Seds
+from sessions.prediction.sealed_predictions import NUMBERS, sealed_sentence
 from sessions.recording.provenance import software_versions
 from sessions.recording.reader import Recording
 from sessions.report import facts
@@ -29,6 +28,7 @@ from sessions.report.contents import (
 from sessions.report.experiments import experiments
 from sessions.report.predictions import fields, left_out, model_in_short, modelled, predicted_seds, predictions
 from sessions.report.strokes import course, flaws, strokes
+from sessions.statistics.multiverse import Seds
 from sessions.statistics.scores import MeanScore, Relation, ScoreTable, joined, score_table
 from sessions.strokes import Analysis
 from sessions.strokes.bootstrap import drawn_from

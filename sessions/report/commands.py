@@ -7,9 +7,9 @@ from dataclasses import fields, replace
 
 from sessions.prediction import PredictionOptions, SessionPrediction, with_own_finger
 from sessions.prediction.afferent import AfferentSettings
-from sessions.prediction.multiverse import PATHS, Seds
 from sessions.recording.reader import Recording
 from sessions.report.contents import TextFile
+from sessions.statistics.multiverse import PATHS, Seds
 from sessions.strokes.analysis import Analysis
 from sessions.strokes.contact_area import PLANNED_AT, AreaLaw
 from sessions.toml_file import toml_text

@@ -2,9 +2,9 @@
 
 from dataclasses import asdict, dataclass, field
 
-from sessions.prediction.multiverse import PathFinding
 from sessions.prediction.sed_interval import Ends, SedInterval
 from sessions.prediction.variants import Alternative
+from sessions.statistics.multiverse import PathFinding
 from sessions.statistics.scores import MeanScore, Relation
 
 Numbers = tuple[float, ...]

@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 from sessions.plan.plan import Block, SessionPlan
-from sessions.prediction.multiverse import PathTrial, Seds, path_findings
 from sessions.report.contents import Answers, Experiment
+from sessions.statistics.multiverse import PathTrial, Seds, path_findings
 from sessions.statistics.scores import MeanScore, Relation, ScoreTable, mean_scores, relation, score_matrix
 from sessions.strokes.contact_area import FIXED, AreaLaw
 from sessions.strokes.friction import rule_for

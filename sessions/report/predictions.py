@@ -3,39 +3,19 @@
 import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence, Set
-from dataclasses import asdict, replace
-from typing import Any, cast
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing, parameters
+from sessions.prediction.model_facts import model_facts
 from sessions.report.contents import Fact, Field, History, PredictionFinding
 from sessions.strokes.contact_area import AreaLaw
 
-_SCENE = {"finger": "mm, degrees", "materials": "E in MPa", "receptor": "mm"}  # what all trials share, with its units
-_READINGS = {
-    "computed": "greatest tangential force over the contact area",
-    "as-printed": "a hundredth of that, as the paper's tables are headed",
-}
-UNKNOWNS = "unknowns"  # of the mesh: the name of that fact
 _NUMBER = re.compile(r"\d+(\.\d+)?(e[-+]?\d+)?")
-_AUDITS = {  # 0 is perfect, but for the volume
-    "equilibrium_x": "forces along the surface out of balance by, of the contact force",
-    "equilibrium_y": "forces across the surface out of balance by, of the contact force",
-    "inner_forces": "largest unbalanced force inside the tissue, of the contact force",
-    "work_balance": "work of the contact forces against stored energy",
-    "penetration": "skin too low by, of the indentation",
-    "tension": "largest pull on a touching point, of the largest push",
-    "cone_violation": "friction beyond its law by, of the largest force on a node",
-    "normal_force_missed": "normal force given and missed by, of it",
-    "drag_missed": "drag given and missed by, of what friction could carry",
-    "smallest_det_F": "smallest volume, of what it was",
-    "course_work_balance": "over the course, work of the bone less stored and lost energy, of that work",
-    "course_step_work": "over the course, work of points that touch or let go within a step, of the bone's work",
-    "course_least_dissipation": "least energy that friction takes in a step of the course, of the bone's work",
-}
 _FROM_ROW = {"tau_max": "mu", "error_estimate": "sed", "normal_per_mm": "normal_force", "wall_s": "sed"}
 
 
@@ -105,20 +85,7 @@ def model_in_short(options: PredictionOptions, area: AreaLaw) -> str:
 
 def modelled(found: SessionPrediction | None) -> tuple[Fact, ...]:
     """Return what the model holds, with the greatest residual of each audit over all trials."""
-    solved = [] if found is None else [row.prediction for row in found.trials if row.prediction is not None]
-    if found is None or not solved:
-        return ()
-    first = solved[0]
-    facts = [Fact(name, str(value)) for name, value in first.model.items() if name != "left_out"]
-    facts += [Fact(name, _values(asdict(getattr(first.scene, name))), units) for name, units in _SCENE.items()]
-    facts.append(Fact("finger's width", f"{found.width:g} mm", found.width_origin))
-    facts.append(Fact("τ max", _READINGS[found.options.tau_reading]))
-    facts.append(Fact(UNKNOWNS, f"{first.dofs} displacements", "one mesh for all trials"))
-    audits = "; ".join(
-        f"{_AUDITS.get(name, name.replace('_', ' '))}: {_worst(name, [p.audits for p in solved]):.2g}"
-        for name in first.audits
-    )
-    return (*facts, Fact("audits", audits, "the worst over all trials; 0 is perfect, of a volume 1"))
+    return tuple(Fact(*fact) for fact in model_facts(found))
 
 
 def left_out(found: SessionPrediction | None) -> tuple[Fact, ...]:
@@ -137,12 +104,6 @@ def left_out(found: SessionPrediction | None) -> tuple[Fact, ...]:
         *facts,
         *(Fact("warning", same[0], f"the first of {len(same)} trials warned so") for same in warned.values()),
     )
-
-
-def _worst(audit: str, told: Sequence[Mapping[str, float]]) -> float:
-    """Return the least value of an audit whose name says that it has one, else the greatest."""
-    values = [audits[audit] for audits in told if audit in audits]
-    return (min(values) if "least" in audit or "smallest" in audit else max(values, key=abs)) + 0.0  # no minus zero
 
 
 def finding_of(row: TrialPrediction) -> PredictionFinding:
@@ -246,28 +207,6 @@ def _plain(value: float) -> str:
     if value == 0.0 or value >= 10.0:
         return f"{value:.0f}"
     return "below 0.01" if value < 0.01 else f"{value:.2g}"
-
-
-def _values(table: Mapping[str, Any]) -> str:
-    """Return a scene's table in words, mm, degrees and MPa as in a scene file; what is not set is left out.
-
-    >>> _values({"E": 0.08, "law": None, "prony": ({"g": 0.2, "tau": 0.07},)})
-    'E 0.08; prony (g 0.2, tau 0.07)'
-    """
-    return "; ".join(f"{name.replace('_', ' ')} {_value(value)}" for name, value in table.items() if _is_set(value))
-
-
-def _is_set(value: object) -> bool:
-    return value is not None and value != ()
-
-
-def _value(value: Any) -> str:  # noqa: ANN401  whatever a scene file holds
-    if isinstance(value, Mapping):
-        inside = cast("Mapping[str, Any]", value)
-        return ", ".join(f"{name} {_value(item)}" for name, item in inside.items() if _is_set(item))
-    if isinstance(value, tuple):
-        return "(" + ", ".join(_value(item) for item in cast("tuple[Any, ...]", value)) + ")"
-    return value if isinstance(value, str) else f"{value:g}"
 
 
 def _numbers(values: NDArray[np.float64]) -> tuple[float, ...]:

@@ -3,9 +3,9 @@
 from functools import partial
 from itertools import chain
 
-from sessions.exchange.study_csv import columns_csv, trials_csv
 from sessions.report.figures.study import study_plates
 from sessions.report.html import data_address, drawn, text_address
+from sessions.report.study_csv import columns_csv, trials_csv
 from sessions.report.study_models import missing_models, missing_scores
 from sessions.report.study_prose import again, command, excluded, modelled, remarks, sealed, summary, versions, who
 from sessions.report.study_tables import study_tables

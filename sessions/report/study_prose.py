@@ -6,10 +6,10 @@ from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 
+from sessions.prediction.model_facts import UNKNOWNS
 from sessions.recording.provenance import software_versions
 from sessions.report import Fact
 from sessions.report.commands import area_words, calibration_words, model_words
-from sessions.report.predictions import UNKNOWNS
 from sessions.report.tables.multiverse import paths_sentence
 from sessions.report.wording import correlation, digits, plural, significant
 from sessions.statistics.pooling.exclusions import Exclusion

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Callable, Iterable, Sequence
 
-from sessions.exchange.study_trials import trials_table
 from sessions.report.study_cells import between, correlations, interval, model_in_short, p_value, study_table
 from sessions.report.study_models import flaws_table, models_table, planted_table
+from sessions.report.study_trials import trials_table
 from sessions.report.tables.cells import Cell, Column, Notes, Table
 from sessions.report.tables.multiverse import paths_table
 from sessions.report.tables.scores import spread_cell

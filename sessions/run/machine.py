@@ -1,7 +1,7 @@
 """The course of a session as a table of cases: state and event to state and commands. It does nothing itself."""
 
-from sessions.plan.answers import Given, problem
 from sessions.plan.plan import SessionPlan
+from sessions.run.answers import Given, problem
 from sessions.run.states import (
     Closing,
     Ended,

@@ -48,6 +48,7 @@ def replay(recording: Recording, folder: Path, speed: float | None, progress: Pr
         recording.provenance,
         subject_simulated="subject" in (recording.simulated_sentence or ""),
         clock=clock,
+        durable=False,
     )
     writer.follow(recording)
     if recording.plan.trials:
@@ -96,7 +97,6 @@ class _Rewriter(SessionWriter):
         self._told = 0
         self._closing = False
         self.made: list[LoggedEvent] = []
-        self._connection.execute("PRAGMA synchronous=OFF")
 
     def follow_part(self, log: Sequence[LoggedEvent]) -> None:
         """Take the instants from the log of a part, which may have been cut short."""
@@ -127,8 +127,7 @@ class _Rewriter(SessionWriter):
 
     def commit(self) -> Acknowledged:
         """Write in large parts: nobody waits for an acknowledgement."""
-        waiting = self._readings - self._acknowledged.readings
-        return super().commit() if self._closing or waiting >= PART else self._acknowledged
+        return super().commit() if self._closing or self.waiting >= PART else self.acknowledged
 
     def close(self) -> None:
         """Wait: what ended may have been resumed."""

@@ -7,8 +7,8 @@ import threading
 
 import pytest
 
-from daq_app.cli.console import Console, NotWritten, Underway, takes_all
 from daq_app.cli.main import run
+from daq_app.console import Console, NotWritten, Underway, takes_all
 from solver.progress import listening, tell
 
 
@@ -94,8 +94,69 @@ def test_the_part_shown_of_work_whose_end_nobody_knows_moves_and_never_goes_back
     assert (work.doing, work.part) == ("estimating", 0.99)
 
 
+class _Terminal(io.StringIO):
+    encoding = "utf-8"
+
+    def isatty(self):
+        return True
+
+
+def _lines_at_terminal(monkeypatch, calls, columns=80):
+    """Return what a terminal is shown of (instant [s], part done, end known)."""
+    err = _Terminal()
+    speaker, now = Console(as_json=False, err=err), [0.0]
+    monkeypatch.setattr("daq_app.console.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("daq_app.console.os.get_terminal_size", lambda _: os.terminal_size((columns, 24)))
+    monkeypatch.setattr(err, "fileno", lambda: 2)
+    for instant, done, known in calls:
+        now[0] = instant
+        speaker.progress(done, "solving", end_known=known)
+    speaker.note("over")
+    assert err.getvalue().endswith("\nover\n")
+    return err.getvalue().removesuffix("\nover\n").split("\r\x1b[K")[1:]
+
+
+def test_a_terminal_shows_a_bar_with_rate_and_time_left(monkeypatch):
+    *_, half = _lines_at_terminal(monkeypatch, [(10.0, 0.0, True), (30.0, 0.5, True)])
+    assert half.startswith(" 50 %  solving |███")
+    assert half.endswith("|  2.50%/s, 00:20 left")  # 50 % in 20 s
+    assert len(half) == 79
+
+
+def test_a_job_after_another_has_a_rate_of_its_own(monkeypatch):
+    calls = [(0.0, 0.0, True), (500.0, 1.0, True), (510.0, 0.0, True), (530.0, 0.5, True)]
+    assert _lines_at_terminal(monkeypatch, calls)[-1].endswith("|  2.50%/s, 00:20 left")
+
+
+def test_a_bar_whose_end_nobody_knows_tells_no_time_left(monkeypatch):
+    *_, half = _lines_at_terminal(monkeypatch, [(10.0, 0.0, False), (30.0, 0.5, False)])
+    assert half.startswith(" 50 %  solving |███")
+    assert half.endswith("|")
+
+
+@pytest.mark.parametrize("columns", [1, 12, 40, 200])
+def test_a_bar_stays_on_one_line_of_a_terminal_of_any_width(monkeypatch, columns):
+    lines = _lines_at_terminal(monkeypatch, [(10.0, 0.0, True), (30.0, 0.5, True)], columns)
+    assert all(len(line) < max(columns, 2) for line in lines)
+
+
+def test_a_terminal_without_blocks_gets_a_bar_of_plain_signs(monkeypatch):
+    monkeypatch.setattr(_Terminal, "encoding", "ascii")
+    assert _lines_at_terminal(monkeypatch, [(10.0, 0.0, True), (30.0, 0.5, True)])[-1].isascii()
+
+
+def test_progress_elsewhere_is_a_plain_line_now_and_then(monkeypatch):
+    speaker, _, err = console(as_json=False)
+    now = [10.0]
+    monkeypatch.setattr("daq_app.console.time.monotonic", lambda: now[0])
+    for instant, done in ((10.0, 0.25), (11.0, 0.3), (12.5, 0.5)):
+        now[0] = instant
+        speaker.progress(done, "solving")
+    assert err.getvalue() == " 25 %  solving\n 50 %  solving\n"
+
+
 def test_work_whose_end_nobody_knows_shows_how_long_it_has_taken_and_can_still_be_left(monkeypatch):
-    monkeypatch.setattr("daq_app.cli.console.PATIENCE", 0.0)
+    monkeypatch.setattr("daq_app.console.PATIENCE", 0.0)
     speaker, _, err = console(as_json=False)
 
     def work():

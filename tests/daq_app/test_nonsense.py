@@ -14,9 +14,9 @@ from daq_app.batch.derived import ANALYSIS, PREDICTION, kept
 from daq_app.cli.main import run
 from sessions.exchange import ExportSource
 from sessions.exchange.session_tables import tables
-from sessions.plan.blinding import revealed
-from sessions.plan.sealed_predictions import SEAL, digest, sealed_sentence
+from sessions.prediction.sealed_predictions import SEAL, digest, sealed_sentence
 from sessions.recording import Recording, RecordingError
+from sessions.recording.unblinding import revealed
 from sessions.statistics.pooling.ground_truth import checked_planted, found_flaws, found_friction, recovered
 
 VERB = {ANALYSIS: "'daq-app analyse' makes it anew", PREDICTION: "'daq-app predict' makes it anew"}
@@ -96,6 +96,32 @@ def test_an_export_of_nonsense_ends_in_one_sentence(session, tmp_path, capsys, n
     assert len(told) == 1
     assert f"{name} is damaged" in told[0]
     assert VERB[name] in told[0]
+
+
+@pytest.mark.parametrize("name", [ANALYSIS, PREDICTION])
+def test_a_document_comes_back_as_it_was_stored(session, documents, name):
+    assert kept(session, name) == documents[name]
+
+
+@pytest.mark.parametrize(
+    ("name", "path"),
+    [
+        (ANALYSIS, ("bootstrap", "settings", "confidence")),
+        (ANALYSIS, ("strokes", 0, "mu_max")),
+        (ANALYSIS, ("strokes", 0, "kept")),
+        (PREDICTION, ("trials", 0, "solver")),
+    ],
+)
+def test_a_document_that_lacks_a_number_is_damaged_and_the_sentence_names_it(documents, tmp_path, name, path):
+    document = copy.deepcopy(documents[name])
+    *inside, last = path
+    holder = document
+    for part in inside:
+        holder = holder[part]
+    del holder[last]
+    (tmp_path / name).write_text(json.dumps(document))
+    with pytest.raises(RecordingError, match=f"{name} is damaged .*{last}.*{VERB[name]}"):
+        kept(tmp_path, name)
 
 
 @settings(max_examples=40, deadline=None)

@@ -49,7 +49,7 @@ def test_solve_stopped_by_the_user_gives_the_answer_that_was_there_already(tmp_p
 
         yield told
 
-    monkeypatch.setattr("daq_app.cli.console.Console.working", impatient)
+    monkeypatch.setattr("daq_app.console.Console.working", impatient)
     assert run(["solve", str(scene), "--json"]) == 130
     document = printed(capsys)
     assert document["sed_ending"] > 0.0

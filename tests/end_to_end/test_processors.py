@@ -11,7 +11,7 @@ import sys
 import numpy as np
 import pytest
 
-from daq_app.cli.console import Console
+from daq_app.console import Console
 from daq_app.simulation.synthetic import synthetic_study
 
 NEAR = 1e-12

@@ -14,8 +14,8 @@ from daq_app.batch import cluster
 from daq_app.batch import pool as pooling
 from daq_app.batch.pool import Shelf, visits
 from daq_app.batch.session_numbers import computed, computed_from, content_of
-from daq_app.cli.console import Console
 from daq_app.cli.main import run
+from daq_app.console import Console
 from daq_app.simulation.synthetic import synthetic_study
 from sessions.prediction import PredictionOptions
 from sessions.recording import RecordingError, atomic_file

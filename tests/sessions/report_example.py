@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 
-from sessions.prediction.multiverse import PATHS, PathTrial, path_findings
 from sessions.prediction.sed_interval import SedInterval
 from sessions.prediction.variants import Alternative, variants
 from sessions.report import (
@@ -21,6 +20,7 @@ from sessions.report import (
     StrokeFinding,
     Trace,
 )
+from sessions.statistics.multiverse import PATHS, PathTrial, path_findings
 from sessions.statistics.scores import Score, ScoreTable, mean_scores, relation, score_matrix
 
 # The published Tables 1 and 2, and SEDs of the small-strain reference where it has them, else between its neighbours.

@@ -9,6 +9,7 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.recording import SessionWriter
+from sessions.recording.provenance import software_versions
 from simulators.bench import Bench
 from simulators.subject import SimulatedSubject
 from simulators.surface import paper_surfaces
@@ -24,7 +25,7 @@ INFO = TransducerInfo(
 )
 PROVENANCE = {
     "created_utc": "2026-01-01T00:00:00+00:00",
-    "software": {"daq-app": "0.1.0"},
+    "software": software_versions(),
     "clock": {"factor": 1.0, "now_ns": 0},
 }
 DEPTH = {"stickiness": 2.0, "slipperiness": 1.5}

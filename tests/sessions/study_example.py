@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sessions.prediction.multiverse import PATHS
+from sessions.statistics.multiverse import PATHS
 from sessions.statistics.pooling.exclusions import Exclusion
 from sessions.statistics.pooling.pooled import pooled
 from sessions.statistics.pooling.visit import TrialRow, Visit, VisitOptions

@@ -6,7 +6,8 @@ import pytest
 from report_session import record
 
 from sessions.prediction import PredictionOptions, predict, scenes_of, settled
-from sessions.prediction.multiverse import (
+from sessions.recording import Recording
+from sessions.statistics.multiverse import (
     PATHS,
     RECEPTORS,
     WINDOWS,
@@ -17,7 +18,6 @@ from sessions.prediction.multiverse import (
     spread,
     trial_paths,
 )
-from sessions.recording import Recording
 from sessions.strokes import AnalysisSettings, analyse
 
 STEADY = PredictionOptions(course="steady")

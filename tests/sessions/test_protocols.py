@@ -99,10 +99,10 @@ def test_an_unknown_protocol_is_refused_with_the_names_of_those_there_are():
         ("strokes_allowed = 1", "strokes_allowed = 0", r"blocks\[0\].strokes_allowed = 0 .*between 1 and 20"),
         ("practice = [0, 100]", "practice = [7]", r"blocks\[0\].practice = \[7\] .*one of indices"),
         ("ticks = 0", "ticks = 200", r"scale.ticks = 200 .*between 0 and 99"),
-        ('answer = "line"', 'answer = "colour"', r'scale.answer = "colour" .*"line" or "number" or "choice"'),
+        ('answer = "line"', 'answer = "colour"', r'scale.answer = "colour" .*"choice" or "line" or "number"'),
         ("not_first = []", "not_first = [0, 20, 50, 55, 75, 80, 100]", r"no order of these meets"),
         ('subject = ["instruction"]', 'subject = ["score"]', r'shown.subject\[0\] = "score" .*"trial count"'),
-        ('phases = ["main"]', 'phases = ["warm-up"]', r'phases\[0\] = "warm-up" .*"pre-evaluation" or "practice"'),
+        ('phases = ["main"]', 'phases = ["warm-up"]', r'phases\[0\] = "warm-up" .*"practice" or "pre-evaluation"'),
         ("# duration = 60 ", "duration = 0.5", r"rests.duration = 0.5 .*between 1 and 3600 s"),
     ],
 )

@@ -66,6 +66,7 @@ def test_whole_numbers_stand_for_numbers_and_defaults_for_what_is_left_out():
         ),
         ({"kind": "three"}, 'here: kind = "three" is not allowed: it must be "one" or "two"'),
         ({"note": 3}, "here: note = 3 is not allowed: it must be text in quotes"),
+        ({"many": {"y": 1}}, "here: many = {y = 1} is not allowed: it must be a list, each a table"),
         ({"inner": 3}, "here: inner = 3 is not allowed: it must be a table"),
         ({"": 3}, 'here: "" is not known; allowed here: count, inner, kind, note, limit, many'),
         ({"a\x1b[2J": 3}, r'here: "a\u001b[2J" is not known; allowed here: count, inner, kind, note, limit, many'),

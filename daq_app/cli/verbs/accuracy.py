@@ -8,7 +8,7 @@ import argparse
 import os
 from pathlib import Path
 
-from daq_app.cli.console import Console, table
+from daq_app.console import Console, table
 
 EXAMPLE = "daq-app accuracy --quick --out accuracy"
 

@@ -10,8 +10,7 @@ from pathlib import Path
 from daq_app.batch.derived import analysed, analysis_document, made_otherwise
 from daq_app.cli.area_option import add_area, area_law
 from daq_app.cli.calibration_option import add_calibration, calibration_error
-from daq_app.cli.console import Console, number, span, table
-from daq_app.cli.main import WrongValue
+from daq_app.console import Console, WrongValue, number, span, table
 from sessions.recording import Recording
 from sessions.strokes.bootstrap import StrokeIntervals, drawn_from, stroke_intervals
 from sessions.strokes.tilt import Tilt

@@ -10,8 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from daq_app.batch.derived import ANALYSIS, PREDICTION, analysed, kept, settings_of
-from daq_app.cli.console import Console, number
-from daq_app.cli.main import DONE, FLAWED, WrongValue
+from daq_app.cli.main import DONE, FLAWED
+from daq_app.console import Console, WrongValue, number
 from sessions.plan.study import check_code
 from sessions.recording import Recording
 from sessions.recording.calibration_uncertainty import gain_error_set

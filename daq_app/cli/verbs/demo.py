@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from daq_app.batch.derived import analysed, predicted
-from daq_app.cli.console import Console, number, table
-from daq_app.cli.main import FLAWED, WrongValue
+from daq_app.cli.main import FLAWED
+from daq_app.console import Console, WrongValue, number, table
 from daq_app.simulation.demo_study import Study, StudyCutShort, simulated_study
 from drivers.clock import PacedClock, RealClock
 from sessions.prediction import PredictionOptions, SessionPrediction

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from daq_app.cli.console import Console, number, table
-from daq_app.cli.main import WrongValue
+from daq_app.console import Console, WrongValue, number, table
 from daq_app.recorder.device_history import Life, life_of
 from daq_app.simulation.wiring import connected
 from drivers.catalog import Found, reachable

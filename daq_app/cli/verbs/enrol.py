@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from daq_app.cli.body_option import add_body_arguments, body_of
-from daq_app.cli.console import Console, table
-from daq_app.cli.main import DONE, WrongValue
+from daq_app.cli.main import DONE
+from daq_app.console import Console, WrongValue, table
+from sessions.atomic_file import write_whole
 from sessions.plan.protocols import protocol_file
 from sessions.plan.study import Member, Study, StudyError
 from sessions.plan.study_file import create_study, enrol, is_study, note, open_study, study_key, withdraw
-from sessions.recording.atomic_file import write_whole
 from sessions.toml_file import text_of
 
 EXAMPLE = "daq-app enrol studies/friction --subject P07 --finger tip_radius=6.5 contact_angle=40"

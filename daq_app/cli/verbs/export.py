@@ -17,13 +17,13 @@ from daq_app.batch.derived import (
     predicted_again,
     settings_of,
 )
-from daq_app.cli.console import Console
 from daq_app.cli.main import FLAWED
+from daq_app.console import Console
 from sessions.exchange import FORMATS, ExportSource, export
-from sessions.plan.blinding import revealed
 from sessions.recording import Recording
 from sessions.recording.calibration_uncertainty import gain_error_set
 from sessions.recording.provenance import software_versions
+from sessions.recording.unblinding import revealed
 from sessions.strokes import analyse
 from sessions.strokes.decisions import read
 

@@ -11,8 +11,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq_app.cli.console import Console, number
-from daq_app.cli.main import FLAWED, WrongValue
+from daq_app.cli.main import FLAWED
+from daq_app.console import Console, WrongValue, number
 
 if TYPE_CHECKING:
     from sessions.exchange.exported import ExportedSession

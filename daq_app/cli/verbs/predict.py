@@ -13,11 +13,10 @@ from typing import Any
 from daq_app.batch.derived import analysed, predicted, visit
 from daq_app.cli.area_option import add_area, area_law
 from daq_app.cli.calibration_option import add_calibration, calibration_error
-from daq_app.cli.console import Console, number, span, table
-from daq_app.cli.main import WrongValue
-from sessions.plan.sealed_predictions import SEAL, seal_prediction
+from daq_app.console import Console, WrongValue, number, span, table
 from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction, finger_in
 from sessions.prediction.afferent import AfferentSettings, firing_document, settings_with
+from sessions.prediction.sealed_predictions import SEAL, seal_prediction
 from sessions.prediction.sed_interval import SedInterval
 from sessions.prediction.variants import Alternative
 

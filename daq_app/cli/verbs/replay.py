@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from daq_app.batch.derived import ANALYSIS, PREDICTION, analysed_again, kept, predicted_again, settings_of
-from daq_app.cli.console import Console
-from daq_app.cli.main import WrongValue
+from daq_app.console import Console, WrongValue
 from sessions.recording import Recording
 from sessions.recording.provenance import software_versions
 from sessions.recording.verification import differences, told, why

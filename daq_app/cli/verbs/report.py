@@ -10,18 +10,18 @@ from pathlib import Path
 from daq_app.batch.derived import afferent_before, analysed, asked_before, predicted, visit
 from daq_app.cli.area_option import add_area, area_law
 from daq_app.cli.calibration_option import add_calibration, calibration_error
-from daq_app.cli.console import Console
-from sessions.plan.blinding import revealed
+from daq_app.console import Console
 from sessions.plan.plan import Blinded
 from sessions.plan.study_file import is_study
-from sessions.plan.visits import score_visits
 from sessions.prediction import PredictionOptions, Progress, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, session_firing
-from sessions.prediction.multiverse import trial_paths
 from sessions.recording import Recording
 from sessions.recording.derived import store_page
+from sessions.recording.unblinding import revealed
+from sessions.recording.visits import score_visits
 from sessions.report import Further
 from sessions.report.predictions import afferent_facts
+from sessions.statistics.multiverse import trial_paths
 
 PAGE = "report.html"
 EXAMPLE = "daq-app report recordings/P07 -o P07.html --scores recordings/P01 recordings/P02"

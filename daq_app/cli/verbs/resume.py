@@ -8,8 +8,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from daq_app.cli.attending import attended
-from daq_app.cli.console import Console
-from daq_app.cli.main import DONE, FLAWED, WrongValue
+from daq_app.cli.main import DONE, FLAWED
+from daq_app.console import Console, WrongValue
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import People, ResumeSession
 from sessions.recording import Recording, RecordingError

@@ -12,8 +12,8 @@ from typing import get_args
 
 from daq_app.cli.attending import attended, opened
 from daq_app.cli.body_option import add_body_arguments, body_of, own_sentence
-from daq_app.cli.console import Console
-from daq_app.cli.main import DONE, FLAWED, WrongValue
+from daq_app.cli.main import DONE, FLAWED
+from daq_app.console import Console, WrongValue
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import People, StartSession
 from drivers.status import flagged_words

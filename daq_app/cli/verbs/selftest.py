@@ -9,8 +9,8 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from daq_app.cli.console import Console
 from daq_app.cli.main import DONE, FLAWED
+from daq_app.console import Console
 from daq_app.recorder.selftest import SelfTestFailed, selftest
 from sessions.recording.certificate import write_certificate
 from sessions.recording.storage_safety import unsafe

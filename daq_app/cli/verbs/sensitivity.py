@@ -8,8 +8,7 @@ import argparse
 from pathlib import Path
 
 from daq_app.batch.sensitivity import checked, doubts, left_as_it_is, sensitivity, usual_design
-from daq_app.cli.console import Console, number, table
-from daq_app.cli.main import WrongValue
+from daq_app.console import Console, WrongValue, number, table
 from sessions.toml_file import load_toml, tables_in, text_of
 from solver import Scene
 

@@ -10,8 +10,7 @@ import argparse
 import time
 from pathlib import Path
 
-from daq_app.cli.console import Console
-from daq_app.cli.main import WrongValue
+from daq_app.console import Console, WrongValue
 from daq_app.simulation.wiring import serve_digital_ft, serve_net_ft, serve_serial_ft
 
 EXAMPLE = "daq-app simulate net-ft --rdt-port 50000 --tcp-port 50001 --http-port 8080"

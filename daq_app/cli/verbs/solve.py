@@ -5,8 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq_app.cli.console import Console, number, table
 from daq_app.cli.main import DONE, STOPPED
+from daq_app.console import Console, number, table
 
 if TYPE_CHECKING:
     from solver import Prediction

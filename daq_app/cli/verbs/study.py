@@ -16,12 +16,11 @@ from typing import Any
 from daq_app.batch.pool import Shelf, visits
 from daq_app.cli.area_option import add_area, area_law
 from daq_app.cli.calibration_option import add_calibration, calibration_error
-from daq_app.cli.console import Console
-from daq_app.cli.main import WrongValue
+from daq_app.console import Console, WrongValue
+from sessions.atomic_file import json_text
 from sessions.file_access import read_limited
 from sessions.prediction import PredictionOptions
 from sessions.recording import RecordingError
-from sessions.recording.atomic_file import json_text
 from sessions.recording.schema import LIVE_FILE
 from sessions.statistics.pooling.exclusions import exclusions_in
 from sessions.statistics.pooling.findings import UNITS, StudyFindings
@@ -137,8 +136,8 @@ def _places(options: argparse.Namespace, console: Console) -> tuple[Path, Path]:
 def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
     """Write page, table and numbers and return where they are."""
     # Imported here: drawing is slow to load.
-    from sessions.exchange.study_csv import COLUMNS, TRIALS, columns_csv, paths_csv, trials_csv
     from sessions.report.html import swap_in
+    from sessions.report.study_csv import COLUMNS, TRIALS, columns_csv, paths_csv, trials_csv
     from sessions.report.study_page import study_page
 
     files = {"page": out / "study.html", "table": out / TRIALS, "columns": out / COLUMNS, "numbers": out / "study.json"}

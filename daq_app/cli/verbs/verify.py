@@ -8,14 +8,15 @@ import json
 from pathlib import Path
 
 from daq_app.batch.derived import ANALYSIS, PREDICTION, analysed_again, kept, made_under, predicted_again, settings_of
-from daq_app.cli.console import Console
+from daq_app.console import Console
 from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems
 from sessions.recording.calibration_uncertainty import GAIN_ERROR, gain_error_set
 from sessions.recording.provenance import software_versions
-from sessions.recording.verification import differences, doubtful_readings, told, why
+from sessions.recording.verification import differences, told, why
 from sessions.strokes import analyse
 from sessions.strokes.decisions import DECISIONS, read
+from sessions.strokes.doubtful_readings import doubtful_readings
 from sessions.toml_file import SettingsError
 
 EXAMPLE = "daq-app verify recordings/P07"

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sessions.prediction.multiverse import CHOICES, TOLD, PathFinding, by_choice, correlations
 from sessions.report.figures.style import GREY, INK, PALE, Panel, look, sheet, svg
 from sessions.report.wording import correlation
+from sessions.statistics.multiverse import CHOICES, TOLD, PathFinding, by_choice, correlations
 
 CAPTION = (
     "The correlation of predicted SED with scores along every path of the analysis. Above: how many paths come to "

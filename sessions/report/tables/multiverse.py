@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable, Sequence
 
-from sessions.prediction.multiverse import SAME, TOLD, PathFinding, Spread, by_choice, correlations, spread
 from sessions.report.tables.cells import Cell, Column, Group, Table
 from sessions.report.wording import NONE, correlation
+from sessions.statistics.multiverse import SAME, TOLD, PathFinding, Spread, by_choice, correlations, spread
 
 Named = tuple[str, Sequence[PathFinding]]
 

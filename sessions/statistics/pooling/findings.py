@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from sessions.prediction.multiverse import PathFinding
 from sessions.statistics.mixed_model import MixedModel
+from sessions.statistics.multiverse import PathFinding
 from sessions.statistics.pooling.averages import Average, Estimates
 from sessions.statistics.pooling.exclusions import Exclusion
 from sessions.statistics.pooling.visit import Visit, VisitOptions

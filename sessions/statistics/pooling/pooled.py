@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from sessions.prediction.multiverse import PathTrial, path_findings
 from sessions.statistics.adjusted_means import surface_means
 from sessions.statistics.mixed_model import MixedModel, mixed_model
+from sessions.statistics.multiverse import PathTrial, path_findings
 from sessions.statistics.pooling.averages import Average, average, averages, by_subject, estimates
 from sessions.statistics.pooling.exclusions import Exclusion, decided
 from sessions.statistics.pooling.findings import (

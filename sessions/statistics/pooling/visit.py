@@ -6,18 +6,18 @@ from typing import Any, Literal
 
 import msgspec
 
-from sessions.plan.blinding import revealed
 from sessions.plan.plan import Block
-from sessions.plan.sealed_predictions import NUMBERS, sealed_sentence
 from sessions.prediction import PredictionOptions, SessionPrediction, predict
-from sessions.prediction.multiverse import Seds, trial_paths
+from sessions.prediction.model_facts import model_facts
+from sessions.prediction.sealed_predictions import NUMBERS, sealed_sentence
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording
 from sessions.recording.calibration_uncertainty import gain_error_set
 from sessions.recording.log import TrialRecord
 from sessions.recording.manifest import file_sha256
 from sessions.recording.schema import LIVE_FILE
-from sessions.report.predictions import modelled
+from sessions.recording.unblinding import revealed
+from sessions.statistics.multiverse import Seds, trial_paths
 from sessions.statistics.scores import Score, ScoreTable
 from sessions.strokes import Analysis, AnalysisSettings, analyse
 from sessions.strokes.bootstrap import drawn_from, stroke_intervals
@@ -36,7 +36,7 @@ class VisitOptions:
     prediction: PredictionOptions = field(default_factory=lambda: PredictionOptions(course="steady", intervals=True))
     area: AreaLaw = FIXED  # by which tau_max is told; the paths have areas of their own
     paths: Literal["none", "small", "finite"] = (
-        "none"  # many paths too, and at which strain; see `sessions.prediction.multiverse`
+        "none"  # many paths too, and at which strain; see `sessions.statistics.multiverse`
     )
     gain_error: float | None = None  # of each axis of every transducer [-]; None: what was set for each session
 
@@ -83,7 +83,7 @@ class TrialRow:
     matching_depth: float | None = None  # [mm]
     flaws: tuple[str, ...] = ()
     why: str = ""
-    paths: Seds = ()  # SED along each of `sessions.prediction.multiverse.PATHS` [MPa], where they were asked for
+    paths: Seds = ()  # SED along each of `sessions.statistics.multiverse.PATHS` [MPa], where they were asked for
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +151,7 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
         sealed="" if prediction is None else _sealed(known, prediction),
         decisions=tuple(decision.sentence for decision in analysis.decisions),
         calibration=drawn_from(analysis.settings).calibration,
-        model=tuple((fact.name, fact.value, fact.remark) for fact in modelled(prediction) if fact.name != "audits"),
+        model=tuple(fact for fact in model_facts(prediction) if fact[0] != "audits"),
     )
 
 

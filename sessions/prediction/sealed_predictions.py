@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, cast
 
-from sessions.plan.blinding import UNBLINDING
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import load_derived, store_derived
+from sessions.recording.unblinding import UNBLINDING
 
 SEAL = "sealed-prediction.json"
 NUMBERS = ("trial", "mu", "tau_max", "indentation", "direction", "sed")

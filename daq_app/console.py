@@ -2,6 +2,7 @@
 
 import io
 import json
+import os
 import re
 import sys
 import threading
@@ -14,6 +15,7 @@ from typing import Any, TextIO
 from solver.progress import listening
 
 _MOST_DIGITS = 9  # of a range whose ends read alike with fewer
+_COLUMNS = 80  # of a terminal that does not say how many it has
 PATIENCE = 1.0  # of people, before they want to see that something is going on [s]
 
 
@@ -34,6 +36,10 @@ class Underway:
     def reach(self, part: float) -> None:
         """Move on to this part of the whole; the end is only there when it is there."""
         self.part = max(self.part, min(part, 0.99))
+
+
+class WrongValue(Exception):
+    """The command line or a value in a file was wrong: exit code 2."""
 
 
 class NotWritten(Exception):
@@ -65,7 +71,14 @@ class Console:
         self._out = out or sys.stdout
         self._err = err or sys.stderr
         self._shown = 0.0
+        self._begun = 0.0  # the job that progress is shown of [s]
+        self._done = 1.0  # of it
         self._line_open = False
+
+    @property
+    def at_terminal(self) -> bool:
+        """Say whether people see progress as a moving bar, with the time left."""
+        return self._err.isatty()
 
     def say(self, text: str = "") -> None:
         """Print a line for people; left out where a script reads."""
@@ -84,16 +97,43 @@ class Console:
             self._end_progress()
             self._answer(json.dumps(document, indent=1, allow_nan=False))
 
-    def progress(self, done: float, text: str) -> None:
-        """Show how far a long job is (`done` from 0 to 1): a moving line on a terminal, else now and then a new one."""
+    def progress(self, done: float, text: str, *, end_known: bool = True) -> None:
+        """Show how far a long job is (`done` from 0 to 1): a bar on a terminal, else now and then a new line.
+
+        The bar tells rate and time left where the end is known. A `done` below the last one begins another job.
+        """
         now = time.monotonic()
-        terminal = self._err.isatty()
+        if done < self._done:
+            self._begun = now
+        self._done = done
+        terminal = self.at_terminal
         if now - self._shown < (0.1 if terminal else 2.0) and done < 1:
             return
         self._shown = now
-        line = f"{100 * done:3.0f} %  {text}"
-        print(f"\r\x1b[K{line}" if terminal else line, end="" if terminal else "\n", file=self._err, flush=True)
+        if terminal:
+            print(f"\r\x1b[K{self._bar(harmless(text), now, end_known)}", end="", file=self._err, flush=True)
+        else:
+            print(f"{100 * done:3.0f} %  {text}", file=self._err, flush=True)
         self._line_open = terminal
+
+    def _bar(self, text: str, now: float, end_known: bool) -> str:
+        """Return the line of a terminal: part done, text, bar, and where the end is known rate and time left."""
+        from tqdm import tqdm  # here: it takes longer to import than most verbs take to answer
+
+        try:
+            columns = os.get_terminal_size(self._err.fileno()).columns or _COLUMNS
+        except (OSError, ValueError):
+            columns = _COLUMNS
+        return tqdm.format_meter(
+            100.0 * self._done,
+            100.0,
+            now - self._begun,
+            ncols=max(columns - 1, 1),  # a full line would be broken by some terminals
+            prefix=text,
+            ascii=not (self._err.encoding or "").lower().startswith("utf"),
+            unit="%",
+            bar_format="{percentage:3.0f} %  {desc} |{bar}|" + (" {rate_fmt}, {remaining} left" if end_known else ""),
+        )
 
     @contextmanager
     def working(self, text: str) -> Generator[Callable[[float], bool]]:
@@ -112,7 +152,9 @@ class Console:
         def show() -> None:
             pause = PATIENCE
             while not over.wait(pause):
-                self.progress(at.part, f"{at.doing}, {time.monotonic() - begun:.0f} s so far; Ctrl-C stops")
+                self.progress(
+                    at.part, f"{at.doing}, {time.monotonic() - begun:.0f} s so far; Ctrl-C stops", end_known=False
+                )
                 pause = 0.2
 
         shower = threading.Thread(target=show, name="progress", daemon=True)

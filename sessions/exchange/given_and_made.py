@@ -52,7 +52,8 @@ def made_with(prediction: Mapping[str, Any], row: Mapping[str, Any]) -> dict[str
     """Return what one trial's prediction was made with, as cells of `MADE_WITH`."""
     options: Mapping[str, Any] = prediction.get("options") or {}
     area: Mapping[str, Any] = prediction.get("area") or {}
-    scene: Mapping[str, Any] | None = prediction.get("scene")
+    held: Mapping[str, Any] | None = prediction.get("scene")
+    scene = None if held is None else from_table(held, Scene, "scene")
     solver: Mapping[str, Any] = row.get("solver") or {}
     return {
         "kinematics": options.get("kinematics"),
@@ -64,10 +65,10 @@ def made_with(prediction: Mapping[str, Any], row: Mapping[str, Any]) -> dict[str
         "width": prediction.get("width"),
         "width_origin": prediction.get("width_origin"),
         "scene_sha256": None if scene is None else _sha256(scene),
-        "tolerance": None if scene is None else scene["solve"]["tolerance"],
+        "tolerance": None if scene is None else scene.solve.tolerance,
         "dofs": solver.get("dofs"),
     }
 
 
-def _sha256(scene: Mapping[str, Any]) -> str:
-    return hashlib.sha256(toml_text(from_table(scene, Scene, "scene")).encode()).hexdigest()
+def _sha256(scene: Scene) -> str:
+    return hashlib.sha256(toml_text(scene).encode()).hexdigest()

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from sessions.plan.blinding import revealed
 from sessions.plan.study import StudyError
 from sessions.recording import Recording
 from sessions.recording.schema import LIVE_FILE
+from sessions.recording.unblinding import revealed
 
 
 def sessions_of(folder: Path, subject: str | None = None) -> tuple[Recording, ...]:

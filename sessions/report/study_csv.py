@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 
 from sessions.exchange.csv_text import write_rows
-from sessions.prediction.multiverse import Path
+from sessions.statistics.multiverse import Path
 from sessions.statistics.pooling.exclusions import decided
 from sessions.statistics.pooling.findings import StudyFindings
 
