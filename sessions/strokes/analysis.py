@@ -9,14 +9,13 @@ import numpy as np
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan, Trial
-from sessions.strokes.contacts import Contact, contacts, split_at_valleys
+from sessions.strokes.contacts import Contact, contacts, split_at_reversals, split_at_valleys
 from sessions.strokes.decisions import OF_SESSION, Decided, Decision, Decisions, read
 from sessions.strokes.flaws import Flaw, FlawName
 from sessions.strokes.friction import FrictionParameters, friction_parameters
 from sessions.strokes.onset import Baseline, onset_threshold
-from sessions.strokes.reversals import split_at_turns
 from sessions.strokes.settings import AnalysisSettings
-from sessions.strokes.signal_quality import soundness
+from sessions.strokes.signal_quality import signal_quality
 from sessions.strokes.span import Span, ZeroInForce, recorded_zero, span_of, zero_for
 from sessions.strokes.stroke import Stroke
 from sessions.strokes.stroke_measures import measured
@@ -187,7 +186,7 @@ def _of_part(
     if len(block) < settings.detector.baseline_readings:
         sentence = f"Only {len(block)} readings: too few for a stroke."
         return _Part((), (Flaw(FlawName.NO_STROKE, sentence, "refused"),), "")
-    sound = soundness(block, info, settings)
+    sound = signal_quality(block, info, settings)
     flaws = [Flaw(name, sentence, grade) for name, sentence, grade in sound.flaws]
     if sound.refused:
         return _Part((), tuple(flaws), "")
@@ -253,7 +252,7 @@ def _ways(piece: Contact, span: Span, zero: ZeroInForce | None, settings: Analys
     """Cut a contact where the finger turns, as far as its zero tells that."""
     if zero is None:
         return (piece,)
-    return split_at_turns(piece, span.time, span.smooth - zero.level, zero.unsure[0], settings)
+    return split_at_reversals(piece, span.time, span.smooth - zero.level, zero.unsure[0], settings)
 
 
 def _general_zero(span: Span, info: TransducerInfo, settings: AnalysisSettings, *, stated: bool) -> ZeroInForce | None:
@@ -320,7 +319,7 @@ def _worth_measuring(
         if stop - start >= settings.shortest_stroke and peak >= settings.light_share * greatest:
             kept.append(piece)
             continue
-        beside = [gap for gap in span.soundness.gaps if abs(gap.stop - start) < near or abs(gap.start - stop) < near]
+        beside = [gap for gap in span.quality.gaps if abs(gap.stop - start) < near or abs(gap.start - stop) < near]
         if beside:
             sentence = (
                 f"What presses from {start:.2f} to {stop:.2f} s goes on where readings are not sound "

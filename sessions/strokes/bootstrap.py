@@ -16,7 +16,7 @@ from sessions.strokes.event_uncertainty import break_away_draws, onset_draws, sl
 from sessions.strokes.friction import Rule
 from sessions.strokes.onset import DetectorSettings
 from sessions.strokes.settings import ASSUMED_GAIN_ERROR, AnalysisSettings
-from sessions.strokes.steady import strays
+from sessions.strokes.sliding import strays
 from sessions.strokes.stroke import Interval, Stroke, StrokeCurve
 
 Array = NDArray[np.float64]

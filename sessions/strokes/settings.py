@@ -34,7 +34,7 @@ class AnalysisSettings:
     shortest_stroke: float = 0.2  # a shorter contact is a tap [s]
     sliding_share: float = 0.5  # sliding: the centre of pressure is faster than this share of its greatest speed [-]
     slide_share: float = 0.2  # the slide has begun: faster than this share of the steady speed [-]
-    steady_rule: WindowRule = "widened"  # how the steady window is chosen: see `steady.steady_window`
+    steady_rule: WindowRule = "widened"  # how the steady window is chosen: see `sliding.steady_window`
     steady_seed: float = 0.5  # share of the slide over which the variance of T/N is least, before it is widened [-]
     steady_spread: float = 0.10  # steady: standard deviation of T/N over its mean [-] ...
     steady_trend: float = 0.05  # ... and the means of its four quarters differ from it by no more than this [-]

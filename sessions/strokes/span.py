@@ -12,7 +12,7 @@ from sessions.strokes.contacts import Contact
 from sessions.strokes.flaws import FlawName
 from sessions.strokes.forces import Filter, in_face_frame, levelled
 from sessions.strokes.settings import AnalysisSettings
-from sessions.strokes.signal_quality import Soundness
+from sessions.strokes.signal_quality import SignalQuality
 from sessions.strokes.zero import QuietWindows, Zero, quiet_windows
 
 Array = NDArray[np.float64]
@@ -29,13 +29,13 @@ class Span:
     rate: float  # [Hz]
     filtered: str  # what the filter did
     windows: QuietWindows
-    soundness: Soundness
+    quality: SignalQuality
     saturated_at: Array  # times of readings left out because they were saturated [s]
     torque_step: float  # least step of a torque [N mm]; 0 where it is too fine to matter
 
 
 def span_of(
-    block: ReadingBlock, sound: Soundness, calibration: Calibration, frame: Frame, settings: AnalysisSettings
+    block: ReadingBlock, sound: SignalQuality, calibration: Calibration, frame: Frame, settings: AnalysisSettings
 ) -> Span:
     """Return the sound readings of a block."""
     good = sound.good

@@ -10,9 +10,8 @@ from sessions.strokes.contacts import Contact
 from sessions.strokes.decisions import Decided
 from sessions.strokes.flaws import Flaw, FlawName
 from sessions.strokes.settings import AnalysisSettings
-from sessions.strokes.sliding import slide
+from sessions.strokes.sliding import mean_of, slide
 from sessions.strokes.span import Span, ZeroInForce
-from sessions.strokes.steady import mean_of
 from sessions.strokes.stroke import Stroke
 from sessions.strokes.stroke_findings import COEFFICIENTS, DIRECTION, EVERYTHING, PEAKS, SPEED, Findings
 from sessions.strokes.track import Track, curve_of, mean_vector, track_of
@@ -130,7 +129,7 @@ def _judge_gaps(found: Findings, span: Span, contact: Contact, settings: Analysi
     if ((span.saturated_at >= first) & (span.saturated_at <= last)).any():
         sentence = "Readings of this stroke are saturated or come with a fault of the device: its peaks are not known."
         found.flaw(FlawName.SATURATED, sentence, "doubtful", PEAKS)
-    inside = [gap for gap in span.soundness.gaps if first <= gap.start and gap.stop <= last]
+    inside = [gap for gap in span.quality.gaps if first <= gap.start and gap.stop <= last]
     widest = max(inside, key=lambda gap: gap.stop - gap.start, default=None)
     if widest is not None and widest.stop - widest.start > settings.longest_gap + 1.0 / span.rate:
         sentence = (

@@ -14,8 +14,8 @@ import numpy as np
 from sessions.plan.plan import Frame
 from sessions.strokes.contacts import Contact
 from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.sliding import block_means, displacement
 from sessions.strokes.span import Span, ZeroInForce
-from sessions.strokes.steady import block_means, displacement
 from sessions.strokes.track import track_of
 
 Pair = tuple[float, float]

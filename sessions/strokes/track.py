@@ -41,7 +41,7 @@ def track_of(span: Span, contact: Contact, zero: ZeroInForce, height: float, set
     tangential = np.hypot(wrench[:, 0], wrench[:, 1])
     ratio = friction_ratio(wrench, floor)
     position = np.where(np.isfinite(ratio)[:, None], centre_of_pressure(wrench, height), np.nan)
-    if any(name.startswith("T") for name in span.soundness.dead):
+    if any(name.startswith("T") for name in span.quality.dead):
         position = np.full_like(position, np.nan)
     speed = _speed(span.time[part], position, span, settings)
     return Track(span.time[part], wrench, normal, tangential, ratio, position, speed, floor, span.rate)
@@ -65,7 +65,7 @@ def _speed(time: Array, position: Array, span: Span, settings: AnalysisSettings)
             continue
         part = slice(int(start), int(stop))
         path = position[part]
-        if span.soundness.even and smoother.fits(span.rate):
+        if span.quality.even and smoother.fits(span.rate):
             path = smoother.applied(path, span.rate, [slice(0, len(path))])
         velocity = np.gradient(path, time[part], axis=0)
         speed[part] = np.hypot(velocity[:, 0], velocity[:, 1])

@@ -25,7 +25,7 @@ from scipy.signal import lfilter
 
 from sessions.plan.plan import Frame
 from sessions.strokes.forces import Filter, centre_of_pressure, friction_ratio, in_face_frame, normal_force
-from sessions.strokes.steady import mean_of, movement, steady_window
+from sessions.strokes.sliding import mean_of, movement, steady_window
 
 T = times()
 PLAIN = stroke(T)
