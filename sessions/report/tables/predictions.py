@@ -6,7 +6,7 @@ from dataclasses import replace
 from sessions.prediction.sed_interval import Ends, SedInterval
 from sessions.prediction.variants import Alternative
 from sessions.report import PredictionFinding, Report
-from sessions.report.tables.cells import Cell, Column, Group, Notes, Table, grouped
+from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, grouped, table
 from sessions.report.tables.strokes import model_mu
 from sessions.report.wording import direction, places, sed, significant, tau, with_error
 
@@ -17,18 +17,11 @@ def prediction_table(report: Report) -> Table | None:
         return None
     notes = Notes()
     columns = (
-        *_who(report),
-        Column("µ", "1"),
-        Column("which µ"),
-        Column("τ max", "kPa"),
-        Column("depth", "mm"),
-        Column("SED", "kPa"),
-        Column("estimated error", "%"),
-        Column("solved in", "s"),
+        f"{_who(report)} | µ [1] | which µ | τ max [kPa] | depth [mm] | SED [kPa] | estimated error [%] | solved in [s]"
     )
     strokes = {stroke.number: stroke for stroke in report.strokes}
 
-    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+    def row(p: PredictionFinding) -> Row:
         stroke = None if p.stroke is None else strokes.get(p.stroke)
         held = {} if stroke is None else stroke.bootstrap
         mu = held.get(model_mu(stroke, p)[0])
@@ -55,7 +48,7 @@ def prediction_table(report: Report) -> Table | None:
         "estimated error: of one SED, from the mesh; differences between stimuli, which share the mesh, are more "
         f"accurate. Model: {report.model}."
     )
-    return Table("table-predictions", caption, columns, groups, notes.listed())
+    return table("table-predictions", caption, columns, groups, notes)
 
 
 _HOW = "by derivatives (the solver's converged tangent), or where marked * by solving draws"
@@ -100,9 +93,9 @@ def afferent_table(report: Report) -> Table | None:
     if all(p.settled_rate is None for p in report.predictions):
         return None
     notes = Notes()
-    columns = (*_who(report), Column("SED", "kPa"), Column("peak rate", "imp/s"), Column("settled rate", "imp/s"))
+    columns = f"{_who(report)} | SED [kPa] | peak rate [imp/s] | settled rate [imp/s]"
 
-    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+    def row(p: PredictionFinding) -> Row:
         told = ((p.peak_rate, p.peak_rate_interval), (p.settled_rate, p.settled_rate_interval))
         why, without = p.reasons.get("sed"), p.reasons.get("sed_interval")
         rates = (notes.estimate(rate, places(1), why, ends, without) for rate, ends in told)
@@ -117,7 +110,7 @@ def afferent_table(report: Report) -> Table | None:
         "friction makes of it, parameters and reference as given; ±: the SED's error from the mesh. Model of the SED: "
         f"{report.model}."
     )
-    return Table("table-afferent", caption, columns, groups, notes.listed())
+    return table("table-afferent", caption, columns, groups, notes)
 
 
 def beside_table(report: Report) -> Table | None:
@@ -141,8 +134,8 @@ def beside_table(report: Report) -> Table | None:
         "mesh. Under it: the 95 % interval that the uncertainty of friction makes, and of the force where that drives "
         f"the model, {_HOW}. At one strain all trials of a column share a mesh. A dash says why."
     )
-    columns = (*_who(report), *(Column(f"({n})", "kPa") for n in range(1, len(ways) + 1)))
-    return Table("table-beside", caption, columns, _by_strain(report, cell), notes.listed())
+    columns = " | ".join([_who(report), *(f"({n}) [kPa]" for n in range(1, len(ways) + 1))])
+    return table("table-beside", caption, columns, _by_strain(report, cell), notes)
 
 
 def beside_forces_table(report: Report) -> Table | None:
@@ -171,8 +164,8 @@ def beside_forces_table(report: Report) -> Table | None:
         "to. ±: the solver's estimate of its error, from the mesh. Under it: the 95 % interval that the uncertainty of "
         "friction makes, and of the force where that drives the model, by derivatives."
     )
-    columns = (*_who(report), *(Column(f"({n})", units[way]) for n, way in enumerate(ways, 1)))
-    return Table("table-beside-forces", caption, columns, _by_strain(report, cell), notes.listed())
+    columns = " | ".join([_who(report), *(f"({n}) [{units[way]}]" for n, way in enumerate(ways, 1))])
+    return table("table-beside-forces", caption, columns, _by_strain(report, cell), notes)
 
 
 def _ways(report: Report) -> tuple[str, ...]:
@@ -187,7 +180,7 @@ def _by_strain(report: Report, cell: Callable[[Alternative], Cell]) -> tuple[Gro
     groups: list[Group] = []
     for strain in dict.fromkeys(one.variant.kinematics for one in first):
 
-        def row(p: PredictionFinding, strain: str = strain) -> tuple[Cell, ...]:
+        def row(p: PredictionFinding, strain: str = strain) -> Row:
             return (*_named(p), *(cell(one) for one in p.alternatives if one.variant.kinematics == strain))
 
         found = grouped(report, report.predictions, lambda p: p.experiment, row)
@@ -201,18 +194,12 @@ def force_table(report: Report) -> Table | None:
         return None
     notes = Notes()
     columns = (
-        *_who(report),
-        Column("model N", "N/mm"),
-        Column("model N × width", "N"),
-        Column("measured N", "N"),
-        Column("model T × width", "N"),
-        Column("measured T", "N"),
-        Column("depth of the model", "mm"),
-        Column("depth to match", "mm"),
+        f"{_who(report)} | model N [N/mm] | model N × width [N] | measured N [N] | model T × width [N] | "
+        "measured T [N] | depth of the model [mm] | depth to match [mm]"
     )
     strokes = {stroke.number: stroke.bootstrap for stroke in report.strokes}
 
-    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+    def row(p: PredictionFinding) -> Row:
         held = {} if p.stroke is None else strokes.get(p.stroke, {})
         normal = p.normal_force_interval
         per_mm = None if normal is None or not report.width else (normal[0] / report.width, normal[1] / report.width)
@@ -242,7 +229,7 @@ def force_table(report: Report) -> Table | None:
         f"as given. Under what was measured: its bootstrap interval. Model: {report.model}."
     )
     groups = grouped(report, report.predictions, lambda p: p.experiment, row)
-    return Table("table-forces", caption, columns, groups, notes.listed())
+    return table("table-forces", caption, columns, groups, notes)
 
 
 _ROUGH = "found on a rough mesh; under the measured force trials are solved with tau_max computed (--beside small)"
@@ -254,15 +241,10 @@ def direction_table(report: Report) -> Table | None:
         return None
     notes = Notes()
     columns = (
-        *_who(report),
-        Column("depth", "mm"),
-        Column("stroked"),
-        Column("SED as stroked", "kPa"),
-        Column("SED the other way", "kPa"),
-        Column("d → p over p → d", "1"),
+        f"{_who(report)} | depth [mm] | stroked | SED as stroked [kPa] | SED the other way [kPa] | d → p over p → d [1]"
     )
 
-    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+    def row(p: PredictionFinding) -> Row:
         back, without, star = _of(p.opposite_interval)
         why = p.reasons.get("opposite_sed") or p.reasons.get("sed")
         ratio, ends = _ratio(p, back)
@@ -283,7 +265,7 @@ def direction_table(report: Report) -> Table | None:
         f"Model: {report.model}."
     )
     groups = grouped(report, report.predictions, lambda p: p.experiment, row)
-    return Table("table-directions", caption, columns, groups, notes.listed())
+    return table("table-directions", caption, columns, groups, notes)
 
 
 def _ratio(p: PredictionFinding, back: Ends | None) -> tuple[float | None, Ends | None]:
@@ -297,13 +279,13 @@ def _ratio(p: PredictionFinding, back: Ends | None) -> tuple[float | None, Ends 
     return upper / lower, (over[0] / under[1], over[1] / under[0])
 
 
-def _who(report: Report) -> tuple[Column, ...]:
+def _who(report: Report) -> str:
     """Return the columns that name a row: trial and index, or the stroke where there are no trials."""
     planned = any(p.trial is not None for p in report.predictions)
-    return (Column("trial"), Column("index")) if planned else (Column("stroke"),)
+    return "trial | index" if planned else "stroke"
 
 
-def _named(p: PredictionFinding) -> tuple[Cell, ...]:
+def _named(p: PredictionFinding) -> Row:
     return (Cell(str(p.stroke)),) if p.trial is None else (Cell(str(p.trial)), Cell(str(p.index)))
 
 

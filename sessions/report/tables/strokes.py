@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from sessions.report import Planted, PredictionFinding, Report, StrokeFinding
-from sessions.report.tables.cells import Cell, Column, Notes, Table, grouped
+from sessions.report.tables.cells import Cell, Notes, Row, Table, grouped, table
 from sessions.report.wording import NONE, places, signed, tau, with_error
 
 Told = Callable[[float], str]
@@ -28,17 +28,11 @@ def stroke_table(report: Report) -> Table | None:
     notes = Notes()
     planned = any(stroke.trial is not None for stroke in report.strokes)
     columns = (
-        *_who(planned=planned),
-        Column("µ static", "1"),
-        Column("µ dynamic", "1"),
-        Column("µ maximum", "1"),
-        Column("τ max", "kPa"),
-        Column("speed", "mm/s"),
-        Column("direction"),
-        Column("flaws"),
+        f"{_who(planned=planned)} | µ static [1] | µ dynamic [1] | µ maximum [1] | τ max [kPa] | speed [mm/s] | "
+        "direction | flaws"
     )
 
-    def row(stroke: StrokeFinding) -> tuple[Cell, ...]:
+    def row(stroke: StrokeFinding) -> Row:
         def cell(name: str, shown: Told, ends: Told | None = None, unit: float = 1.0) -> Cell:
             return _estimate(notes, stroke, name, shown, ends, unit)
 
@@ -65,7 +59,7 @@ def stroke_table(report: Report) -> Table | None:
         "the contact area, which is taken as given; speed: slope of the centre of pressure (± its standard error)."
         f"{kind}"
     )
-    return Table("table-strokes", caption, columns, groups, notes.listed())
+    return table("table-strokes", caption, columns, groups, notes)
 
 
 def course_table(report: Report) -> Table | None:
@@ -75,17 +69,11 @@ def course_table(report: Report) -> Table | None:
     notes = Notes()
     planned = any(stroke.trial is not None for stroke in report.strokes)
     columns = (
-        *_who(planned=planned),
-        Column("normal force", "N"),
-        Column("tangential force", "N"),
-        Column("heading", "°"),
-        Column("agree", "1"),
-        Column("onset", "s"),
-        Column("break-away", "s"),
-        Column("slide onset", "s"),
+        f"{_who(planned=planned)} | normal force [N] | tangential force [N] | heading [°] | agree [1] | "
+        "onset [s] | break-away [s] | slide onset [s]"
     )
 
-    def row(stroke: StrokeFinding) -> tuple[Cell, ...]:
+    def row(stroke: StrokeFinding) -> Row:
         def cell(name: str, shown: Told) -> Cell:
             return _estimate(notes, stroke, name, shown)
 
@@ -110,14 +98,14 @@ def course_table(report: Report) -> Table | None:
         f"{kinds}."
     )
     groups = grouped(report, report.strokes, lambda s: s.experiment, row)
-    return Table("table-courses", caption, columns, groups, notes.listed())
+    return table("table-courses", caption, columns, groups, notes)
 
 
-def _who(*, planned: bool) -> tuple[Column, ...]:
-    return (Column("stroke"), *((Column("trial"), Column("index")) if planned else ()))
+def _who(*, planned: bool) -> str:
+    return "stroke | trial | index" if planned else "stroke"
 
 
-def _named(stroke: StrokeFinding, notes: Notes, *, planned: bool) -> tuple[Cell, ...]:
+def _named(stroke: StrokeFinding, notes: Notes, *, planned: bool) -> Row:
     if not planned:
         return (Cell(str(stroke.number)),)
     asked = (notes.number(v, places(0), "no trial asks for it") for v in (stroke.trial, stroke.index))
@@ -142,21 +130,11 @@ def planted_table(report: Report) -> Table | None:
     found = {stroke.trial: stroke for stroke in reversed(report.strokes) if stroke.trial is not None}
     given = {prediction.trial: prediction for prediction in report.predictions}
     columns = (
-        Column("trial"),
-        Column("index"),
-        Column("µ planted", "1"),
-        Column("µ found", "1"),
-        Column("off by", "%"),
-        Column("τ max planted", "kPa"),
-        Column("τ max found", "kPa"),
-        Column("off by", "%"),
-        Column("speed planted", "mm/s"),
-        Column("speed found", "mm/s"),
-        Column("off by", "%"),
-        Column("direction"),
+        "trial | index | µ planted [1] | µ found [1] | off by [%] | τ max planted [kPa] | "
+        "τ max found [kPa] | off by [%] | speed planted [mm/s] | speed found [mm/s] | off by [%] | direction"
     )
 
-    def row(p: Planted) -> tuple[Cell, ...]:
+    def row(p: Planted) -> Row:
         stroke = found.get(p.trial)
         cells: list[Cell] = [
             Cell(str(p.trial)),
@@ -185,7 +163,7 @@ def planted_table(report: Report) -> Table | None:
         "Planted friction beside what the analysis found: the µ and τ max that the model gets, and the speed. The "
         "analysis does not know what was planted. Under what was found: its 95 % bootstrap interval."
     )
-    return Table("table-planted", caption, columns, groups, notes.listed())
+    return table("table-planted", caption, columns, groups, notes)
 
 
 def model_mu(stroke: StrokeFinding | None, prediction: PredictionFinding | None) -> tuple[str, float | None]:
