@@ -28,8 +28,6 @@ ZERO_SETTING = "zero"  # of `TransducerInfo.settings`: who says that the recordi
 ZERO_STATED = "as recorded, stated to be true"
 RAW_WRENCH = "N, N mm"  # raw unit of readings that came as a wrench
 
-_BESIDE = 2.5  # readings: a contact so near to unsound ones may go on in them
-
 
 @dataclass(frozen=True, slots=True)
 class Analysis:
@@ -60,7 +58,7 @@ class Analysis:
             "tilt": None if self.tilt is None else self.tilt.to_dict(),
             "filter": self.filtered,
             "interval": self.settings.interval_kind,
-            "settings": asdict(self.settings),
+            "settings": self.settings.to_dict(),
             "settings_origin": "default" if self.settings == AnalysisSettings() else "set",
         }
 
@@ -214,7 +212,7 @@ def _strokes(
     if implausible is not None:
         return (), [implausible], ()
     unknown = general.flaw is FlawName.NO_UNLOADED_STRETCH
-    threshold = settings.light_share * float(np.percentile(normal, 99.9))
+    threshold = settings.contact.light_share * float(np.percentile(normal, 99.9))
     noise = threshold / settings.detector.onset_noise if unknown else float(general.noise[2])
     touching = contacts(span.time, normal, Baseline(0.0, noise), settings)
     smooth = -(span.smooth[:, 2] - general.level[2])
@@ -259,7 +257,7 @@ def _general_zero(span: Span, info: TransducerInfo, settings: AnalysisSettings, 
     """Return the zero that contacts are looked for with; None where nothing tells one."""
     if stated:
         return recorded_zero(span, stated=True)
-    first = span.windows.after(-np.inf, settings.zero_stretch)
+    first = span.windows.after(-np.inf, settings.zero.zero_stretch)
     if first is not None:
         return ZeroInForce(first.level, first.noise, first.noise[:3], 0.0, first.error, "", None, (0.0, 0.0), None)
     return recorded_zero(span, stated=False) if info.calibration.raw_unit == RAW_WRENCH else None
@@ -311,12 +309,12 @@ def _worth_measuring(
     """Leave out taps and light touches, and name them."""
     peaks = [float(np.nanmax(smooth[piece.start : piece.stop], initial=0.0)) for piece in pieces]
     greatest = max(peaks, default=0.0)
-    near = _BESIDE / span.rate
+    near = settings.contact.gap_beside / span.rate
     kept: list[Contact] = []
     flaws: list[Flaw] = []
     for piece, peak in zip(pieces, peaks, strict=True):
         start, stop = span.time[piece.start], span.time[piece.stop - 1]
-        if stop - start >= settings.shortest_stroke and peak >= settings.light_share * greatest:
+        if stop - start >= settings.contact.shortest_stroke and peak >= settings.contact.light_share * greatest:
             kept.append(piece)
             continue
         beside = [gap for gap in span.quality.gaps if abs(gap.stop - start) < near or abs(gap.start - stop) < near]
@@ -327,7 +325,7 @@ def _worth_measuring(
             )
             flaws.append(Flaw(beside[0].cause, sentence, "doubtful"))
         else:
-            tapped = stop - start < settings.shortest_stroke
+            tapped = stop - start < settings.contact.shortest_stroke
             what, name = ("tap", FlawName.TAP) if tapped else ("light touch", FlawName.LIGHT_TOUCH)
             sentence = f"A {what} from {start:.2f} to {stop:.2f} s, up to {peak:.2g} N, is no stroke."
             flaws.append(Flaw(name, sentence, "note"))

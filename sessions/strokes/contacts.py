@@ -13,9 +13,6 @@ from sessions.strokes.settings import AnalysisSettings
 
 Array = NDArray[np.float64]
 
-_BLOCK = 0.05  # the drag is followed in means over so long [s]
-_RECENT = 4  # such means tell the way the drag pointed last
-
 
 @dataclass(frozen=True, slots=True)
 class Contact:
@@ -53,14 +50,16 @@ def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: Ana
     no force beside a gap that may hide a lift, and no valley elsewhere, as in stretches too short for the filter.
     """
     inside = slice(contact.start, contact.stop)
-    force = np.maximum(_bridged(time[inside], normal[inside], settings.longest_gap), 0.0)
+    force = np.maximum(_bridged(time[inside], normal[inside], settings.contact.longest_gap), 0.0)
     padded = np.concatenate([[0.0], force, [0.0]])
     places, prominences = peaks(padded)
-    standing = places[prominences >= (1.0 - settings.valley) * padded[places]] - 1
-    standing = standing[force[standing] >= settings.light_share * force.max(initial=0.0)]
+    standing = places[prominences >= (1.0 - settings.contact.valley) * padded[places]] - 1
+    standing = standing[force[standing] >= settings.contact.light_share * force.max(initial=0.0)]
     between = [(a, b, int(a + np.argmin(force[a:b]))) for a, b in pairwise(standing)]
     # Peaks of exactly the same height stand out of everything but one another.
-    valleys = [contact.start + at for a, b, at in between if force[at] < settings.valley * min(force[a], force[b])]
+    valleys = [
+        contact.start + at for a, b, at in between if force[at] < settings.contact.valley * min(force[a], force[b])
+    ]
     if not valleys:
         return (contact,)
     bounds = [contact.start, *valleys, contact.stop]
@@ -83,7 +82,7 @@ def _piece(contact: Contact, start: int, stop: int, time: Array, normal: Array, 
     """Return the stroke between two borders; where a border is a valley it is cut back to a share of its peak."""
     valleys = tuple(border for border in (start, stop) if border not in (contact.start, contact.stop))
     force = np.nan_to_num(normal[start:stop])
-    pressed = np.flatnonzero(force >= settings.valley * force.max())
+    pressed = np.flatnonzero(force >= settings.contact.valley * force.max())
     onset, lift = contact.onset, contact.lift
     if start != contact.start:
         start += int(pressed[0])
@@ -142,35 +141,38 @@ def split_at_reversals(
 def _ways(wrench: Array, time: Array, unsure: float, settings: AnalysisSettings) -> list[_Way]:
     """Return the ways of the drag in a wrench (n, 6); those that are too short or too weak are left out."""
     normal = -wrench[:, 2]
-    floor = max(settings.force_floor, settings.force_floor_share * float(np.nanmax(normal, initial=0.0)))
+    floor = max(settings.ratio.force_floor, settings.ratio.force_floor_share * float(np.nanmax(normal, initial=0.0)))
     with np.errstate(invalid="ignore"):
         held = np.flatnonzero(normal >= floor)
     if len(held) < 2:
         return []
-    firsts = np.flatnonzero(np.diff(np.floor((time[held] - time[held[0]]) / _BLOCK), prepend=-1.0))
+    firsts = np.flatnonzero(np.diff(np.floor((time[held] - time[held[0]]) / settings.contact.turn_block), prepend=-1.0))
     counts = np.diff(np.append(firsts, len(held)))
     force, pressed = (np.add.reduceat(column[held], firsts, axis=0).T / counts for column in (wrench[:, :2], normal))
     drag = np.hypot(*force)
-    if unsure > settings.drift_refused * float(np.median(drag)):  # nothing of the drag will be told
+    if unsure > settings.zero.drift_refused * float(np.median(drag)):  # nothing of the drag will be told
         return []
     strong = np.flatnonzero(
-        (drag >= settings.turn_share * float(np.median(drag / pressed)) * pressed) & (drag > 2.0 * unsure)
+        (drag >= settings.contact.turn_share * float(np.median(drag / pressed)) * pressed)
+        & (drag > settings.contact.turn_unsure * unsure)
     )
     lasts = held[np.append(firsts[1:], len(held)) - 1]
     runs: list[list[int]] = []  # of blocks
     for block in strong.tolist():
-        if runs and float(force[:, runs[-1][-_RECENT:]].sum(axis=1) @ force[:, block]) >= 0.0:
+        if runs and float(force[:, runs[-1][-settings.contact.turn_recent :]].sum(axis=1) @ force[:, block]) >= 0.0:
             runs[-1].append(block)
         else:
             runs.append([block])
     found = [_Way(int(held[firsts[run[0]]]), int(lasts[run[-1]]), force[:, run].sum(axis=1), len(run)) for run in runs]
     greatest = max((way.drag for way in found), default=0.0)
     longest = max((float(time[way.last] - time[way.first]) for way in found), default=0.0)
-    shortest = max(settings.shortest_stroke - _BLOCK, settings.turn_shortest * longest)
+    shortest = max(
+        settings.contact.shortest_stroke - settings.contact.turn_block, settings.contact.turn_shortest * longest
+    )
     ways: list[_Way] = []
     dropped = False  # since the last way
     for way in found:
-        if time[way.last] - time[way.first] < shortest or way.drag < settings.light_share * greatest:
+        if time[way.last] - time[way.first] < shortest or way.drag < settings.contact.light_share * greatest:
             dropped = True
         elif ways and dropped and float(ways[-1].push @ way.push) >= 0.0:
             ways[-1] = _Way(ways[-1].first, way.last, ways[-1].push + way.push, ways[-1].blocks + way.blocks)

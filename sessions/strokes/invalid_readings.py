@@ -7,29 +7,14 @@ from numpy.typing import NDArray
 
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.onset import NORMAL_STEP
+from sessions.strokes.settings import SignalSettings
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_SPIKE_WIDEST = 2  # readings; a force that lasts longer may be a touch
-_SPIKE_NEIGHBOURS = 2  # readings on each side that a wild one stands out of
-_SPIKE_AROUND = 20  # readings on each side whose steps tell what is usual there
-_SPIKE_STEPS = 8  # such steps; fewer tell nothing
-_SPIKE_LEAST_STEPS = 4.0  # of a coarse axis
-_NORMAL_STEP = 1.4826 / np.sqrt(2.0)  # standard deviation of white noise over the median step between neighbours
-_CLIP_READINGS = 4  # readings of a flat top
-_CLIP_AROUND = 0.15  # over so long the other axes must move [s]: where nothing presses they only make noise
-_CLIP_JUMP = 3.5  # least steps
-_CLIP_MOVES = 3.0  # moving: the spread is so many times the noise, told from steps between neighbours [-]
-_COARSE = 3.0  # coarse: half an axis' changes are no more than so many of its least steps
-_COARSE_JUMP = 2.0  # times the step that an axis' changes seldom exceed
-_REST_OFF = (
-    0.1  # share of an axis' range: so far from every rest before, a sensor that repeats itself to the end is frozen
-)
 
-
-def spikes(raw: Array, settings: AnalysisSettings) -> Mask:
+def spikes(raw: Array, settings: SignalSettings) -> Mask:
     """Mark the wild readings of each axis (n, k): beyond all neighbours by far more than these differ themselves."""
     marked = np.zeros(raw.shape, np.bool_)
     for axis in range(raw.shape[1]):
@@ -39,9 +24,14 @@ def spikes(raw: Array, settings: AnalysisSettings) -> Mask:
         if not len(moving):
             continue
         floor = max(
-            settings.wild_noise * _NORMAL_STEP * float(np.median(steps)), _SPIKE_LEAST_STEPS * float(moving.min())
+            settings.wild_noise * NORMAL_STEP * float(np.median(steps)),
+            settings.wild_coarse * float(moving.min()),
         )
-        found = [(at, w) for w in range(1, _SPIKE_WIDEST + 1) for at in _candidates(np.diff(column), w, floor).tolist()]
+        found = [
+            (at, w)
+            for w in range(1, settings.wild_widest + 1)
+            for at in _candidates(np.diff(column), w, floor, settings).tolist()
+        ]
         alike = np.zeros(len(column), np.bool_)  # these may be wild: none of them says what is usual around another
         for at, width in found:
             alike[at : at + width] = True
@@ -51,21 +41,21 @@ def spikes(raw: Array, settings: AnalysisSettings) -> Mask:
     return marked
 
 
-def _candidates(steps: Array, width: int, floor: float) -> NDArray[np.int64]:
+def _candidates(steps: Array, width: int, floor: float, settings: SignalSettings) -> NDArray[np.int64]:
     """Return where `width` readings begin that more than `floor` leads to and back from, with neighbours beside."""
     there, back = steps[:-width], steps[width:]
     found = np.flatnonzero((np.minimum(np.abs(there), np.abs(back)) > floor) & (there * back < 0.0)) + 1
-    return found[(found >= _SPIKE_NEIGHBOURS) & (found + width + _SPIKE_NEIGHBOURS <= len(steps) + 1)]
+    return found[(found >= settings.wild_neighbours) & (found + width + settings.wild_neighbours <= len(steps) + 1)]
 
 
-def _stands_out(column: Array, alike: Mask, at: int, width: int, settings: AnalysisSettings) -> bool:
+def _stands_out(column: Array, alike: Mask, at: int, width: int, settings: SignalSettings) -> bool:
     """Say whether readings stand out by far more than any step around them between readings that are not `alike`."""
-    before = _sound(column, alike, range(at - 1, max(-1, at - 1 - _SPIKE_AROUND), -1))
-    after = _sound(column, alike, range(at + width, min(len(column), at + width + _SPIKE_AROUND)))
+    before = _sound(column, alike, range(at - 1, max(-1, at - 1 - settings.wild_around), -1))
+    after = _sound(column, alike, range(at + width, min(len(column), at + width + settings.wild_around)))
     usual = np.abs(np.concatenate([np.diff(before), np.diff(after)]))
-    if len(usual) < _SPIKE_STEPS or min(len(before), len(after)) < _SPIKE_NEIGHBOURS:
+    if len(usual) < settings.wild_fewest or min(len(before), len(after)) < settings.wild_neighbours:
         return False
-    beside = np.concatenate([before[:_SPIKE_NEIGHBOURS], after[:_SPIKE_NEIGHBOURS]])
+    beside = np.concatenate([before[: settings.wild_neighbours], after[: settings.wild_neighbours]])
     inside = column[at : at + width]
     height = max(float(inside.min() - beside.max()), float(beside.min() - inside.max()))
     return height > settings.wild_steps * float(usual.max())
@@ -88,7 +78,7 @@ class ConstantRun:
     value: float  # raw
 
 
-def constant_runs(time: Array, raw: Array, ignored: Mask, settings: AnalysisSettings) -> tuple[ConstantRun, ...]:
+def constant_runs(time: Array, raw: Array, ignored: Mask, settings: SignalSettings) -> tuple[ConstantRun, ...]:
     """Return the runs of one value on single axes of raw (n, k) at `time` (n,) [s].
 
     A run counts where it is long against the runs that its axis shows elsewhere, so that coarse steps are no fault.
@@ -110,14 +100,14 @@ def at_the_same_value(raw: Array, found: tuple[ConstantRun, ...], *, clipped: bo
     return marked
 
 
-def _of_axis(axis: int, time: Array, raw: Array, ignored: Mask, settings: AnalysisSettings) -> list[ConstantRun]:
+def _of_axis(axis: int, time: Array, raw: Array, ignored: Mask, settings: SignalSettings) -> list[ConstantRun]:
     column = raw[:, axis]
     firsts = np.flatnonzero(np.concatenate([[True], np.diff(column) != 0.0]))
     lasts = np.concatenate([firsts[1:], [len(column)]]) - 1
     lengths = lasts - firsts + 1
     lasting = time[lasts] - time[firsts]
     # Times are sums of ticks, so a run as long as the limit may seem a little shorter.
-    candidates = np.flatnonzero((lengths >= _CLIP_READINGS) & (lasting > settings.flat_top - 1e-9))
+    candidates = np.flatnonzero((lengths >= settings.flat_readings) & (lasting > settings.flat_top - 1e-9))
     if not len(candidates) or len(firsts) == 1:
         return []
     sound = column[~ignored]
@@ -125,7 +115,7 @@ def _of_axis(axis: int, time: Array, raw: Array, ignored: Mask, settings: Analys
     found: list[ConstantRun] = []
     for value in np.unique(column[firsts[candidates]]).tolist():
         runs = candidates[column[firsts[candidates]] == value]
-        moving = np.array([_others_move(axis, time, raw, int(firsts[at]), int(lasts[at])) for at in runs])
+        moving = np.array([_others_move(axis, time, raw, (int(firsts[at]), int(lasts[at])), settings) for at in runs])
         if lasting[runs[moving]].sum() <= lasting[runs].sum() / 2.0:  # what the axis reads where nothing presses
             continue
         for at in runs[moving].tolist():
@@ -133,7 +123,7 @@ def _of_axis(axis: int, time: Array, raw: Array, ignored: Mask, settings: Analys
             frozen = lengths[at] > settings.frozen_readings and lasting[at] >= settings.frozen_shortest
             elsewhere = lengths[~np.isin(column[firsts], ends)] if clipped else lengths[2 * lengths < lengths[at]]
             long = lengths[at] > settings.long_run * (_usual(elsewhere) - 1.0)
-            if (clipped or frozen) and long and _jumps(column, int(firsts[at]), int(lasts[at])):
+            if (clipped or frozen) and long and _jumps(column, int(firsts[at]), int(lasts[at]), settings):
                 found.append(ConstantRun(axis, clipped, int(firsts[at]), int(lasts[at]), value))
     return found
 
@@ -146,31 +136,32 @@ def _usual(lengths: NDArray[np.int64]) -> float:
     return float(ordered[np.searchsorted(np.cumsum(ordered), 0.9 * ordered.sum())])
 
 
-def _jumps(column: Array, first: int, last: int) -> bool:
+def _jumps(column: Array, first: int, last: int, settings: SignalSettings) -> bool:
     """Say whether a run begins or ends by more than a few of its axis' least steps: a slow turn does neither."""
     steps = np.abs(np.diff(column))
     least = float(steps[steps > 0.0].min())
     ends = [float(steps[at]) for at in (first - 1, last) if 0 <= at < len(steps)]
-    return max(ends, default=0.0) > _CLIP_JUMP * least
+    return max(ends, default=0.0) > settings.flat_jump * least
 
 
-def _others_move(axis: int, time: Array, raw: Array, first: int, last: int) -> bool:
+def _others_move(axis: int, time: Array, raw: Array, run: tuple[int, int], settings: SignalSettings) -> bool:
     """Say whether other axes live during a run, and some of them moves by more than its noise around it."""
+    first, last = run
     others = np.delete(raw, axis, axis=1)
     alive = (np.diff(others[first : last + 1], axis=0) != 0.0).any(axis=1)
     if alive.mean() < 0.5:
         return False
-    lacking = max(0.0, _CLIP_AROUND - (time[last] - time[first])) / 2.0
+    lacking = max(0.0, settings.flat_around - (time[last] - time[first])) / 2.0
     window = others[(time >= time[first] - lacking) & (time <= time[last] + lacking)]
     steps = np.abs(np.diff(window, axis=0))
-    noise = _NORMAL_STEP * np.median(steps, axis=0)
+    noise = NORMAL_STEP * np.median(steps, axis=0)
     least = np.array([float(each[each > 0.0].min(initial=np.inf)) for each in steps.T])
-    return bool((window.std(axis=0) > np.maximum(_CLIP_MOVES * noise, least)).any())
+    return bool((window.std(axis=0) > np.maximum(settings.flat_moves * noise, least)).any())
 
 
-def repeated_readings(block: ReadingBlock, settings: AnalysisSettings) -> Mask:
+def repeated_readings(block: ReadingBlock, settings: SignalSettings) -> Mask:
     """Mark every repeat of the same six numbers in a run that neither noise nor a rest in coarse steps explains."""
-    jumps = _jumps_of_coarse(block.raw)
+    jumps = _jumps_of_coarse(block.raw, settings)
     same = np.concatenate([[False], (np.diff(block.raw, axis=0) == 0.0).all(axis=1), [False]])
     edges = np.flatnonzero(np.diff(same.astype(np.int8)))
     frozen = np.zeros(len(block), np.bool_)
@@ -181,18 +172,20 @@ def repeated_readings(block: ReadingBlock, settings: AnalysisSettings) -> Mask:
         ):
             jumped = not len(jumps) or bool(jumps[max(start - 1, 0) : start].any() or jumps[last : last + 1].any())
             ends = last == len(block) - 1
-            frozen[start + 1 : last + 1] = jumped or (ends and _off_every_rest(block.raw, start, rests))
+            frozen[start + 1 : last + 1] = jumped or (
+                ends and _off_every_rest(block.raw, start, rests, settings.frozen_off)
+            )
             rests += [] if frozen[last] else [start]
     return frozen
 
 
-def _off_every_rest(raw: Array, at: int, rests: list[int]) -> bool:
+def _off_every_rest(raw: Array, at: int, rests: list[int], far: float) -> bool:
     """Say whether some axis of a reading lies far from where it lay in each rest before: it is pressed, or was."""
-    off = np.abs(raw[rests] - raw[at]) > _REST_OFF * np.ptp(raw, axis=0)
+    off = np.abs(raw[rests] - raw[at]) > far * np.ptp(raw, axis=0)
     return bool(rests) and bool(off.any(axis=1).all())
 
 
-def _jumps_of_coarse(raw: Array) -> Mask:
+def _jumps_of_coarse(raw: Array, settings: SignalSettings) -> Mask:
     """Mark the steps (n - 1,) that no axis in coarse steps makes by itself; empty where the steps are fine.
 
     Steps are coarse where an axis that changes does so by its least step or little more: at rest such a sensor repeats
@@ -201,9 +194,11 @@ def _jumps_of_coarse(raw: Array) -> Mask:
     steps = np.abs(np.diff(raw, axis=0))
     changes = [column[column > 0.0] for column in steps.T]
     known = [each for each in changes if len(each)]
-    if not known or any(float(np.median(each)) > _COARSE * float(each.min()) for each in known):
+    if not known or any(float(np.median(each)) > settings.coarse_steps * float(each.min()) for each in known):
         return np.zeros(0, np.bool_)
-    large = np.array([_COARSE_JUMP * float(np.percentile(each, 95)) if len(each) else np.inf for each in changes])
+    large = np.array(
+        [settings.coarse_jump * float(np.percentile(each, 95)) if len(each) else np.inf for each in changes]
+    )
     return np.asarray((steps > large).any(axis=1), np.bool_)
 
 

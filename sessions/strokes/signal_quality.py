@@ -23,7 +23,6 @@ from sessions.strokes.settings import AnalysisSettings
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_LONG = 1.8  # times the usual step: a reading is missing in between
 _AXIS_NAMES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 
 
@@ -61,28 +60,28 @@ def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: Analysis
     forward = steps[steps > 0.0]
     step = float(np.median(forward)) if len(forward) else np.nan
     beyond = saturated_readings(block, info)
-    wild_axes = spikes(block.raw, settings) & ~beyond[:, None]
+    wild_axes = spikes(block.raw, settings.signal) & ~beyond[:, None]
     wild: Mask = np.asarray(wild_axes.any(axis=1), np.bool_)
-    repeated = repeated_readings(block, settings)
-    stuck = constant_runs(block.time, block.raw, wild | beyond, settings)
+    repeated = repeated_readings(block, settings.signal)
+    stuck = constant_runs(block.time, block.raw, wild | beyond, settings.signal)
     frozen = repeated | at_the_same_value(block.raw, stuck, clipped=False)
     clipped = at_the_same_value(block.raw, stuck, clipped=True)
     saturated = beyond | clipped
     stalled = np.concatenate([[False], steps <= 0.0])
     good = ~(frozen | saturated | wild | stalled)
-    long = (np.diff(block.sequence) == 1) & (steps > _LONG * step)
+    long = (np.diff(block.sequence) == 1) & (steps > settings.signal.missing_step * step)
     # A few long steps are readings that a stream without numbers lost; as many as this are another rate.
-    another = bool(long.mean() > settings.uneven)
+    another = bool(long.mean() > settings.signal.uneven)
     widest = float(np.percentile(forward, 98)) if another else step
-    broken = (np.diff(block.sequence) != 1) | (steps > _LONG * widest) | (steps <= 0.0)
+    broken = (np.diff(block.sequence) != 1) | (steps > settings.signal.missing_step * widest) | (steps <= 0.0)
     neighbours = steps[~broken]
     spread = np.ptp(np.percentile(neighbours, [2, 98])) if len(neighbours) else np.inf
-    even = bool(not another and spread <= settings.uneven * step)
+    even = bool(not another and spread <= settings.signal.uneven * step)
     segments = _segments(good, broken)
     dead = tuple(
         name
         for name, column in zip(_AXIS_NAMES, block.raw[good].T, strict=True)
-        if len(column) > settings.frozen_readings and np.ptp(column) == 0.0
+        if len(column) > settings.signal.frozen_readings and np.ptp(column) == 0.0
     )
     missing = np.diff(block.sequence) - 1
     lost = int(missing[missing > 0].sum())
@@ -143,7 +142,7 @@ def _loss_flaws(lost: int, arrived: int) -> _Found:
 
 def _frozen_flaws(repeated: Mask, frozen: Mask, time: Array, settings: AnalysisSettings) -> _Found:
     """Name readings that repeat all six numbers; from a share of frozen ones on, of any axis, refuse the rest too."""
-    refused = float(frozen.mean()) >= settings.frozen_refused
+    refused = float(frozen.mean()) >= settings.signal.frozen_refused
     found: _Found = []
     if repeated.any():
         sentence = (

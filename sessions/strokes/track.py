@@ -37,7 +37,7 @@ def track_of(span: Span, contact: Contact, zero: ZeroInForce, height: float, set
     wrench = span.smooth[part] - zero.level
     normal = -wrench[:, 2]
     peak = float(np.nanmax(normal, initial=0.0))
-    floor = max(settings.force_floor, settings.force_floor_share * peak)
+    floor = max(settings.ratio.force_floor, settings.ratio.force_floor_share * peak)
     tangential = np.hypot(wrench[:, 0], wrench[:, 1])
     ratio = friction_ratio(wrench, floor)
     position = np.where(np.isfinite(ratio)[:, None], centre_of_pressure(wrench, height), np.nan)
@@ -55,9 +55,9 @@ def mean_vector(vectors: Array) -> Array:
 def _speed(time: Array, position: Array, span: Span, settings: AnalysisSettings) -> Array:
     """Return the speed (n,) [mm/s] of a position (n, 2) [mm], filtered within each unbroken stretch."""
     speed = np.full(len(time), np.nan)
-    smoother = Filter(settings.speed_cut_off)
+    smoother = Filter(settings.filter.speed_cut_off, settings.filter.shortest_segment)
     held = np.isfinite(position[:, 0]) & np.isfinite(position[:, 1])
-    joined = held[1:] & held[:-1] & (np.diff(time) < 1.8 / span.rate)
+    joined = held[1:] & held[:-1] & (np.diff(time) < settings.signal.missing_step / span.rate)
     starts = np.flatnonzero(held & ~np.concatenate([[False], joined]))
     stops = np.flatnonzero(held & ~np.concatenate([joined, [False]])) + 1
     for start, stop in zip(starts, stops, strict=True):
