@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from daq_app.cli.console import Console
-from daq_app.simulation.conduct import conduct
+from daq_app.simulation.conduct import Participants, conduct
 from daq_app.simulation.due_events import DueEvents
 from daq_app.simulation.wiring import planted_surface
 from drivers.clock import Clock, ToldClock
 from sessions.plan.plan import Block, Frame, SessionPlan, Trial
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols import VisitSetting, plan, protocol
 from sessions.recording import RecordingError, Setting
 from sessions.recording.atomic_file import write_json
 from sessions.recording.schema import LIVE_FILE
@@ -139,20 +139,12 @@ def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str
     clock = ToldClock()
     transducer = DirectTransducer(bench, clock, Hurt(_one(spoilt.lost), _one(spoilt.frozen)))
     settings = replace(PEOPLE, gain=-PEOPLE.gain) if spoilt.reversed else PEOPLE
-    planned = plan(protocol(PROTOCOL), subject, own, frame=Frame("-z", "set", bench.settings.height, "set"))
+    setting = VisitSetting(frame=Frame("-z", "set", bench.settings.height, "set"))
+    planned = plan(protocol(PROTOCOL), subject, own, setting=setting)
     people = SyntheticPeople(SimulatedSubject(own, settings), bench, transducer, clock, planned, spoilt)
     told = [Setting("study seed", seed, "", "set")]
-    conduct(
-        planned,
-        out / subject,
-        people,
-        transducer,
-        clock,
-        console,
-        settings=told,
-        run=RunnerSettings(tick=TICK),
-        durable=False,
-    )
+    taking_part = Participants(people, transducer, clock)
+    conduct(planned, out / subject, taking_part, console, settings=told, run=RunnerSettings(tick=TICK), durable=False)
     return [
         {**_row(subject, trial, stroke), **people.meant(trial)}
         for trial, stroke in zip(people.stroked, bench.planted(), strict=True)

@@ -236,7 +236,7 @@ def _strokes(
     presses: list[Press] = []
     for at, piece in enumerate(kept):
         zero = general if stated else zero_for(span, piece, idle, settings) or recorded_zero(span, stated=False)
-        stroke, more = measured(span, piece, zero, plan.frame, plan.contact_area, settings, trial, at + 1, decided[at])
+        stroke, more = measured(span, piece, zero, plan, settings, trial, at + 1, decided[at])
         flaws += [replace(flaw, stroke=len(strokes)) for flaw in more]
         strokes.append(stroke)
         if stroke.mu_dynamic is None and zero.flaw is not FlawName.NO_UNLOADED_STRETCH:

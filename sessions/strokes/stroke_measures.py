@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sessions.plan.plan import PROXIMAL_TO_DISTAL, Frame, Trial
+from sessions.plan.plan import PROXIMAL_TO_DISTAL, SessionPlan, Trial
 from sessions.strokes.break_away import break_away
 from sessions.strokes.contacts import Contact
 from sessions.strokes.decisions import Decided
@@ -25,25 +25,24 @@ def measured(
     span: Span,
     contact: Contact,
     zero: ZeroInForce,
-    frame: Frame,
-    contact_area: float,
+    plan: SessionPlan,
     settings: AnalysisSettings,
     trial: Trial | None = None,
     number: int = 1,
     decided: Decided | None = None,
 ) -> tuple[Stroke, tuple[Flaw, ...]]:
-    """Return a contact's stroke and its flaws. `contact_area` [mm2] is what tau_max is told for.
+    """Return a contact's stroke and its flaws; `plan` tells the face's frame and the area that tau_max is of.
 
     `number` is that of the stroke within its trial; what was `decided` of it goes before what is found.
     """
-    found = Findings()
+    found, frame = Findings(), plan.frame
     decided = decided or Decided({})
     track = track_of(span, contact, zero, frame.height, settings)
     _judge_ends(found, contact, track, settings)
     _judge_zero(found, zero, track)
     if zero.flaw is not FlawName.NO_UNLOADED_STRETCH:
         _judge_gaps(found, span, contact, settings)
-        _judge_loads(found, track, contact_area, settings)
+        _judge_loads(found, track, plan.contact_area, settings)
         whole = None
         if contact.around is not None:
             first, last = contact.around

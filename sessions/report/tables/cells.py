@@ -79,19 +79,17 @@ class Notes:
         *,
         told: Callable[[float], str] | None = None,
         unit: float = 1.0,
-        star: bool = False,
     ) -> Cell:
         """Return the number over its interval, `without` which it has a note that says why; or a dash with its reason.
 
         `told` shows an end of the interval where `shown` shows more than a number; `unit` as for `wording.between`.
-        `star` marks an interval that was found otherwise than the others of its table.
         """
         if value is None:
             return self.number(None, shown, reason)
         if ends is None:
             why = f"no interval: {without or 'not computed'}"
             return Cell(shown(value), self.mark(why), why)
-        return Cell(shown(value), interval=between(*ends, told or shown, unit) + ("*" if star else ""))
+        return Cell(shown(value), interval=between(*ends, told or shown, unit))
 
     def interval(
         self, low: float | None, high: float | None, shown: Callable[[float], str], reason: str | None

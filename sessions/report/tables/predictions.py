@@ -72,8 +72,12 @@ def _sed(
     *,
     star: bool,
 ) -> Cell:
-    """Return an SED in kPa, ± its relative error from the mesh, over the interval that friction makes."""
-    return notes.estimate(value, _with(error, 3, 1e3), reason, ends, without, told=sed, unit=1e3, star=star)
+    """Return an SED in kPa, ± its relative error from the mesh, over the interval that friction makes.
+
+    `star` marks an interval that was found otherwise than the others of its table.
+    """
+    cell = notes.estimate(value, _with(error, 3, 1e3), reason, ends, without, told=sed, unit=1e3)
+    return replace(cell, interval=f"{cell.interval}*") if star and cell.interval else cell
 
 
 def _with(error: float | None, least: int, unit: float = 1.0) -> Callable[[float], str]:
