@@ -4,9 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy
 
 from daq_app.qt.indicators import paint_lost
+from daq_app.qt.painted import Painted
 from daq_app.qt.shapes import draw_line, faces, fine
 from daq_app.qt.tokens import MODEL, SMALL, Tokens, font
 from daq_app.window.live_model import Picture
@@ -26,13 +27,13 @@ EVERY = 1 / 30  # no new picture sooner after another: nobody sees more [s]
 TOP = 0.97  # of the faces' SED lies below the end of the colour scale
 
 
-class FingerView(QWidget):
+class FingerView(Painted):
     """A picture of the last state of a model."""
 
     def __init__(self, tokens: Tokens, scale: float) -> None:
         """Show nothing yet."""
-        super().__init__()
-        self._tokens, self._scale = tokens, scale
+        super().__init__(tokens)
+        self._scale = scale
         self._picture: Picture | None = None
         self._row: Array = np.empty(0)
         self._words = ModelWords("", "none")
@@ -43,11 +44,6 @@ class FingerView(QWidget):
         self.setMinimumSize(100, 1)  # it is folded where it is low
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("finger as the model sees it")
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._tokens = tokens
-        self.update()
 
     def show_model(self, picture: Picture | None, row: Array, words: ModelWords, clock: float) -> None:
         """Show a state; `row` (r,) [MPa] at `solver.prediction.ROW`, `clock` [s] is for the scales' patience."""

@@ -16,7 +16,7 @@ class DueEvents:
         """Let an event come up in `after` seconds of the clock."""
         self._due.append((self._clock.now_ns() + int(after * 1e9), event))
 
-    def taken(self) -> tuple[Event, ...]:
+    def poll(self) -> tuple[Event, ...]:
         """Return what has come up by now, once."""
         now_ns = self._clock.now_ns()
         done = tuple(event for due, event in self._due if due <= now_ns)
