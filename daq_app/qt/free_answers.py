@@ -18,16 +18,32 @@ Which = Literal["first", "second"]
 LARGE = 36  # type of the number [device-independent pixels]
 
 
-class NumberField(QWidget):
-    """Takes a number above 0; a comma is a point."""
+class _Field(QWidget):
+    """Takes an answer that is no place on a line."""
 
     changed = Signal()
 
-    def __init__(self, scale: float, now: Callable[[], float]) -> None:
-        """Show an empty field; `now` tells the session clock [s]."""
+    def __init__(self, now: Callable[[], float]) -> None:
         super().__init__()
         self._now = now
         self._answer = Choice()
+
+    @property
+    def answered(self) -> bool:
+        """Say whether there is an answer."""
+        return self._answer.value is not None
+
+    def given(self, hand: Hand | None) -> Event:
+        """Return the answer."""
+        return self._answer.given(hand)
+
+
+class NumberField(_Field):
+    """Takes a number above 0; a comma is a point."""
+
+    def __init__(self, scale: float, now: Callable[[], float]) -> None:
+        """Show an empty field; `now` tells the session clock [s]."""
+        super().__init__(now)
         self.field = QLineEdit()
         self.field.setAccessibleName("your number, above 0")
         self.field.setFixedWidth(round(260 * scale))
@@ -40,20 +56,11 @@ class NumberField(QWidget):
         layout.addStretch(1)
         self.setFocusProxy(self.field)
 
-    @property
-    def answered(self) -> bool:
-        """Say whether there is an answer."""
-        return self._answer.value is not None
-
     def begin(self) -> None:
         """Begin another answer."""
         self._answer = Choice()
         self.field.clear()
         self.changed.emit()
-
-    def given(self, hand: Hand | None) -> Event:
-        """Return the answer."""
-        return self._answer.given(hand)
 
     def _typed(self, text: str) -> None:
         try:
@@ -67,16 +74,12 @@ class NumberField(QWidget):
         self.changed.emit()
 
 
-class ChoiceOfTwo(QWidget):
+class ChoiceOfTwo(_Field):
     """Two buttons of the same size; the one that is chosen stays pressed."""
-
-    changed = Signal()
 
     def __init__(self, scale: float, now: Callable[[], float]) -> None:
         """Show two buttons; `now` tells the session clock [s]."""
-        super().__init__()
-        self._now = now
-        self._answer = Choice()
+        super().__init__(now)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName("which of the two: 1 for the first, 2 for the second")
         self.first = self._button("The first", "first", scale)
@@ -88,18 +91,9 @@ class ChoiceOfTwo(QWidget):
         layout.addWidget(self.second)
         layout.addStretch(1)
 
-    @property
-    def answered(self) -> bool:
-        """Say whether there is an answer."""
-        return self._answer.value is not None
-
     def begin(self) -> None:
         """Begin another answer."""
         self._take(Choice())
-
-    def given(self, hand: Hand | None) -> Event:
-        """Return the answer."""
-        return self._answer.given(hand)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Choose with 1 and 2, or the arrows."""

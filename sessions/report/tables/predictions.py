@@ -1,6 +1,6 @@
 """Tables of predictions: responses, forces beside measured ones, both directions."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from sessions.prediction.sed_interval import Ends, SedInterval
@@ -16,9 +16,7 @@ def prediction_table(report: Report) -> Table | None:
     if not report.predictions:
         return None
     notes = Notes()
-    columns = (
-        f"{_who(report)} | µ [1] | which µ | τ max [kPa] | depth [mm] | SED [kPa] | estimated error [%] | solved in [s]"
-    )
+    columns = "µ [1] | which µ | τ max [kPa] | depth [mm] | SED [kPa] | estimated error [%] | solved in [s]"
     strokes = {stroke.number: stroke for stroke in report.strokes}
 
     def row(p: PredictionFinding) -> Row:
@@ -30,7 +28,6 @@ def prediction_table(report: Report) -> Table | None:
             bound = bound[0] * p.tau_max / stroke.tau_max, bound[1] * p.tau_max / stroke.tau_max  # as it was read
         missing = p.reasons.get("sed")
         return (
-            *_named(p),
             notes.estimate(p.mu, places(3), p.reasons.get("mu") or missing, mu, _SHORT),
             Cell({"mean over steady window": "mean"}.get(p.mu_rule, p.mu_rule)),
             notes.estimate(p.tau_max, tau, p.reasons.get("tau_max") or missing, bound, _SHORT, unit=1e3),
@@ -40,7 +37,6 @@ def prediction_table(report: Report) -> Table | None:
             notes.number(p.wall_s, lambda v: significant(v, 2), p.reasons.get("wall_s")),
         )
 
-    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
     caption = (
         "Predictions: SED averaged over the ending in the settled state (1 kPa = 1 mJ/cm³). Which µ: the mean over the "
         "steady window, or the maximum; under µ and τ max their bootstrap intervals. Under the SED: the 95 % interval "
@@ -48,7 +44,7 @@ def prediction_table(report: Report) -> Table | None:
         "estimated error: of one SED, from the mesh; differences between stimuli, which share the mesh, are more "
         f"accurate. Model: {report.model}."
     )
-    return table("table-predictions", caption, columns, groups, notes)
+    return _table(report, "table-predictions", caption, columns, _rows(report, row), notes)
 
 
 _HOW = "by derivatives (the solver's converged tangent), or where marked * by solving draws"
@@ -97,15 +93,14 @@ def afferent_table(report: Report) -> Table | None:
     if all(p.settled_rate is None for p in report.predictions):
         return None
     notes = Notes()
-    columns = f"{_who(report)} | SED [kPa] | peak rate [imp/s] | settled rate [imp/s]"
+    columns = "SED [kPa] | peak rate [imp/s] | settled rate [imp/s]"
 
     def row(p: PredictionFinding) -> Row:
         told = ((p.peak_rate, p.peak_rate_interval), (p.settled_rate, p.settled_rate_interval))
         why, without = p.reasons.get("sed"), p.reasons.get("sed_interval")
         rates = (notes.estimate(rate, places(1), why, ends, without) for rate, ends in told)
-        return (*_named(p), _stroked_sed(p, notes), *rates)
+        return (_stroked_sed(p, notes), *rates)
 
-    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
     caption = (
         "Firing of an SA-II afferent: an illustration. No fitted map from SED to the rate of a human SA-II afferent is "
         "known; every parameter is told below, assumed unless it says that somebody set it. The order of the settled "
@@ -114,7 +109,7 @@ def afferent_table(report: Report) -> Table | None:
         "friction makes of it, parameters and reference as given; ±: the SED's error from the mesh. Model of the SED: "
         f"{report.model}."
     )
-    return table("table-afferent", caption, columns, groups, notes)
+    return _table(report, "table-afferent", caption, columns, _rows(report, row), notes)
 
 
 def beside_table(report: Report) -> Table | None:
@@ -138,8 +133,8 @@ def beside_table(report: Report) -> Table | None:
         "mesh. Under it: the 95 % interval that the uncertainty of friction makes, and of the force where that drives "
         f"the model, {_HOW}. At one strain all trials of a column share a mesh. A dash says why."
     )
-    columns = " | ".join([_who(report), *(f"({n}) [kPa]" for n in range(1, len(ways) + 1))])
-    return table("table-beside", caption, columns, _by_strain(report, cell), notes)
+    columns = " | ".join(f"({n}) [kPa]" for n in range(1, len(ways) + 1))
+    return _table(report, "table-beside", caption, columns, _by_strain(report, cell), notes)
 
 
 def beside_forces_table(report: Report) -> Table | None:
@@ -168,8 +163,8 @@ def beside_forces_table(report: Report) -> Table | None:
         "to. ±: the solver's estimate of its error, from the mesh. Under it: the 95 % interval that the uncertainty of "
         "friction makes, and of the force where that drives the model, by derivatives."
     )
-    columns = " | ".join([_who(report), *(f"({n}) [{units[way]}]" for n, way in enumerate(ways, 1))])
-    return table("table-beside-forces", caption, columns, _by_strain(report, cell), notes)
+    columns = " | ".join(f"({n}) [{units[way]}]" for n, way in enumerate(ways, 1))
+    return _table(report, "table-beside-forces", caption, columns, _by_strain(report, cell), notes)
 
 
 def _ways(report: Report) -> tuple[str, ...]:
@@ -185,10 +180,9 @@ def _by_strain(report: Report, cell: Callable[[Alternative], Cell]) -> tuple[Gro
     for strain in dict.fromkeys(one.variant.kinematics for one in first):
 
         def row(p: PredictionFinding, strain: str = strain) -> Row:
-            return (*_named(p), *(cell(one) for one in p.alternatives if one.variant.kinematics == strain))
+            return tuple(cell(one) for one in p.alternatives if one.variant.kinematics == strain)
 
-        found = grouped(report, report.predictions, lambda p: p.experiment, row)
-        groups += [Group(f"{group.name or 'trials'}, at {strain} strain", group.rows) for group in found]
+        groups += [Group(f"{group.name or 'trials'}, at {strain} strain", group.rows) for group in _rows(report, row)]
     return tuple(groups)
 
 
@@ -198,7 +192,7 @@ def force_table(report: Report) -> Table | None:
         return None
     notes = Notes()
     columns = (
-        f"{_who(report)} | model N [N/mm] | model N × width [N] | measured N [N] | model T × width [N] | "
+        "model N [N/mm] | model N × width [N] | measured N [N] | model T × width [N] | "
         "measured T [N] | depth of the model [mm] | depth to match [mm]"
     )
     strokes = {stroke.number: stroke.bootstrap for stroke in report.strokes}
@@ -214,7 +208,6 @@ def force_table(report: Report) -> Table | None:
 
         why = p.reasons.get("sed_interval")
         return (
-            *_named(p),
             cell("normal_per_mm", p.normal_force_error, per_mm, why, 4),
             cell("normal_force", p.normal_force_error, normal, why),
             cell("measured_normal", None, held.get("normal_force"), _SHORT),
@@ -232,8 +225,7 @@ def force_table(report: Report) -> Table | None:
         "of friction makes, and of the measured force where that is to be matched, by derivatives; the width is taken "
         f"as given. Under what was measured: its bootstrap interval. Model: {report.model}."
     )
-    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
-    return table("table-forces", caption, columns, groups, notes)
+    return _table(report, "table-forces", caption, columns, _rows(report, row), notes)
 
 
 _ROUGH = "found on a rough mesh; under the measured force trials are solved with tau_max computed (--beside small)"
@@ -244,16 +236,13 @@ def direction_table(report: Report) -> Table | None:
     if all(p.opposite_sed is None for p in report.predictions):
         return None
     notes = Notes()
-    columns = (
-        f"{_who(report)} | depth [mm] | stroked | SED as stroked [kPa] | SED the other way [kPa] | d → p over p → d [1]"
-    )
+    columns = "depth [mm] | stroked | SED as stroked [kPa] | SED the other way [kPa] | d → p over p → d [1]"
 
     def row(p: PredictionFinding) -> Row:
         back, without, star = _of(p.opposite_interval)
         why = p.reasons.get("opposite_sed") or p.reasons.get("sed")
         ratio, ends = _ratio(p, back)
         return (
-            *_named(p),
             _depth(p, notes),
             Cell(direction(p.direction)),
             _stroked_sed(p, notes),
@@ -268,8 +257,7 @@ def direction_table(report: Report) -> Table | None:
         "the least and greatest that both intervals allow: no narrower than 95 %, for both move with one friction. "
         f"Model: {report.model}."
     )
-    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
-    return table("table-directions", caption, columns, groups, notes)
+    return _table(report, "table-directions", caption, columns, _rows(report, row), notes)
 
 
 def _ratio(p: PredictionFinding, back: Ends | None) -> tuple[float | None, Ends | None]:
@@ -283,14 +271,22 @@ def _ratio(p: PredictionFinding, back: Ends | None) -> tuple[float | None, Ends 
     return upper / lower, (over[0] / under[1], over[1] / under[0])
 
 
-def _who(report: Report) -> str:
-    """Return the columns that name a row: trial and index, or the stroke where there are no trials."""
+def _table(
+    report: Report, name: str, caption: str, columns: str, groups: Iterable[Group], notes: Notes
+) -> Table | None:
+    """Return a table whose rows are named by trial and index, or by the stroke where there are no trials."""
     planned = any(p.trial is not None for p in report.predictions)
-    return "trial | index" if planned else "stroke"
+    return table(name, caption, f"{'trial | index' if planned else 'stroke'} | {columns}", groups, notes)
 
 
-def _named(p: PredictionFinding) -> Row:
-    return (Cell(str(p.stroke)),) if p.trial is None else (Cell(str(p.trial)), Cell(str(p.index)))
+def _rows(report: Report, row: Callable[[PredictionFinding], Row]) -> tuple[Group, ...]:
+    """Return the named rows of all trials by experiment; `row` gives the cells after the name."""
+
+    def named(p: PredictionFinding) -> Row:
+        name = (Cell(str(p.stroke)),) if p.trial is None else (Cell(str(p.trial)), Cell(str(p.index)))
+        return (*name, *row(p))
+
+    return grouped(report, report.predictions, lambda p: p.experiment, named)
 
 
 def _depth(p: PredictionFinding, notes: Notes) -> Cell:

@@ -26,11 +26,7 @@ def stroke_table(report: Report) -> Table | None:
     if not report.strokes:
         return None
     notes = Notes()
-    planned = any(stroke.trial is not None for stroke in report.strokes)
-    columns = (
-        f"{_who(planned=planned)} | µ static [1] | µ dynamic [1] | µ maximum [1] | τ max [kPa] | speed [mm/s] | "
-        "direction | flaws"
-    )
+    columns = "µ static [1] | µ dynamic [1] | µ maximum [1] | τ max [kPa] | speed [mm/s] | direction | flaws"
 
     def row(stroke: StrokeFinding) -> Row:
         def cell(name: str, shown: Told, ends: Told | None = None, unit: float = 1.0) -> Cell:
@@ -39,7 +35,6 @@ def stroke_table(report: Report) -> Table | None:
         half = None if stroke.mu_interval is None else (stroke.mu_interval[1] - stroke.mu_interval[0]) / 2
         error = stroke.speed_error
         return (
-            *_named(stroke, notes, planned=planned),
             cell("mu_static", places(3)),
             cell("mu_dynamic", lambda v: with_error(v, half, 3), places(3)),
             cell("mu_max", places(3)),
@@ -51,7 +46,6 @@ def stroke_table(report: Report) -> Table | None:
             Cell(", ".join(name.replace("_", " ") for name in stroke.flaws) or "none"),
         )
 
-    groups = grouped(report, report.strokes, lambda s: s.experiment, row)
     kind = f" Under each number: {report.interval_kind}." if report.interval_kind else ""
     caption = (
         "Strokes. µ dynamic: mean over the steady window (± half its 95 % interval: noise, zero, gains); µ static: "
@@ -59,7 +53,7 @@ def stroke_table(report: Report) -> Table | None:
         "the contact area, which is taken as given; speed: slope of the centre of pressure (± its standard error)."
         f"{kind}"
     )
-    return table("table-strokes", caption, columns, groups, notes)
+    return _table(report, "table-strokes", caption, columns, row, notes)
 
 
 def course_table(report: Report) -> Table | None:
@@ -67,9 +61,8 @@ def course_table(report: Report) -> Table | None:
     if not any(stroke.bootstrap for stroke in report.strokes):
         return None
     notes = Notes()
-    planned = any(stroke.trial is not None for stroke in report.strokes)
     columns = (
-        f"{_who(planned=planned)} | normal force [N] | tangential force [N] | heading [°] | agree [1] | "
+        "normal force [N] | tangential force [N] | heading [°] | agree [1] | "
         "onset [s] | break-away [s] | slide onset [s]"
     )
 
@@ -79,7 +72,6 @@ def course_table(report: Report) -> Table | None:
 
         why = stroke.reasons.get("direction") or _TOO_SHORT
         return (
-            *_named(stroke, notes, planned=planned),
             cell("normal_force", places(2)),
             cell("tangential_force", places(2)),
             cell("heading", places(1)),
@@ -97,19 +89,22 @@ def course_table(report: Report) -> Table | None:
         "Slide onset: from when the centre of pressure keeps a fifth of its steady speed. What each interval holds: "
         f"{kinds}."
     )
-    groups = grouped(report, report.strokes, lambda s: s.experiment, row)
-    return table("table-courses", caption, columns, groups, notes)
+    return _table(report, "table-courses", caption, columns, row, notes)
 
 
-def _who(*, planned: bool) -> str:
-    return "stroke | trial | index" if planned else "stroke"
+def _table(
+    report: Report, name: str, caption: str, columns: str, row: Callable[[StrokeFinding], Row], notes: Notes
+) -> Table | None:
+    """Return a table of strokes by experiment, each named with its trial and index where there are trials."""
+    planned = any(stroke.trial is not None for stroke in report.strokes)
 
+    def named(stroke: StrokeFinding) -> Row:
+        asked = (stroke.trial, stroke.index) if planned else ()
+        where = (notes.number(v, places(0), "no trial asks for it") for v in asked)
+        return (Cell(str(stroke.number)), *where, *row(stroke))
 
-def _named(stroke: StrokeFinding, notes: Notes, *, planned: bool) -> Row:
-    if not planned:
-        return (Cell(str(stroke.number)),)
-    asked = (notes.number(v, places(0), "no trial asks for it") for v in (stroke.trial, stroke.index))
-    return (Cell(str(stroke.number)), *asked)
+    groups = grouped(report, report.strokes, lambda s: s.experiment, named)
+    return table(name, caption, f"{'stroke | trial | index' if planned else 'stroke'} | {columns}", groups, notes)
 
 
 def _estimate(
