@@ -63,10 +63,10 @@ class FingerView(Painted):
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint words, finger and row."""
         painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(self._tokens.surface))
+        painter.fillRect(self.rect(), QColor(self.tokens.surface))
         painter.setFont(font(SMALL, self._scale, bold=self._words.state in ("settled", "instead", "beyond")))
         painter.setPen(
-            QColor(self._tokens.look if self._words.state in ("instead", "beyond", "failed") else self._tokens.quiet)
+            QColor(self.tokens.look if self._words.state in ("instead", "beyond", "failed") else self.tokens.quiet)
         )
         flags = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignTop)
         box = QRectF(4, 0, self.width() - 8, self.height() * WORDS)
@@ -92,19 +92,19 @@ class FingerView(Painted):
 
         painter.save()
         painter.setClipRect(box)
-        painter.setPen(QPen(QColor(self._tokens.quiet), 2))
+        painter.setPen(QPen(QColor(self.tokens.quiet), 2))
         painter.drawLine(QPointF(box.left(), origin.y()), QPointF(box.right(), origin.y()))
         picture = self._picture
         if picture is not None:
             self._paint_faces(painter, picture, placed(picture.nodes))
             style = Qt.PenStyle.SolidLine if self._words.state == "settled" else Qt.PenStyle.DashLine
-            painter.setPen(fine(self._tokens.text, style))
+            painter.setPen(fine(self.tokens.text, style))
             draw_line(painter, *placed(picture.outline).T)
             if picture.lost is not None:
                 x, y = placed(np.array([picture.lost]))[0].tolist()
-                paint_lost(painter, QPointF(x, y), self._tokens)
+                paint_lost(painter, QPointF(x, y), self.tokens)
         painter.restore()
-        painter.setPen(QColor(self._tokens.quiet))
+        painter.setPen(QColor(self.tokens.quiet))
         painter.drawText(
             box.adjusted(4, 0, -4, -2),
             Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop,
@@ -126,7 +126,7 @@ class FingerView(Painted):
     def _paint_row(self, painter: QPainter, box: QRectF) -> None:
         line = painter.fontMetrics().height()
         plot = box.adjusted(6, 2, -6, -line)
-        painter.setPen(QColor(self._tokens.quiet))
+        painter.setPen(QColor(self.tokens.quiet))
         painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop, "  SED along the skin [kPa]")
         painter.drawText(
             box.adjusted(0, 0, -6, 0),
@@ -138,11 +138,11 @@ class FingerView(Painted):
         painter.drawText(box.adjusted(0, 0, -6, 0), Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBottom, ends[1])
         if plot.height() < 10:
             return
-        painter.setPen(QPen(QColor(self._tokens.line), 1))
+        painter.setPen(QPen(QColor(self.tokens.line), 1))
         painter.drawLine(plot.bottomLeft(), plot.bottomRight())
         across = (ROW - ROW[0]) / (ROW[-1] - ROW[0])
         here = plot.left() + plot.width() * float(-ROW[0] / (ROW[-1] - ROW[0]))
-        painter.setPen(QPen(QColor(self._tokens.quiet), 1, Qt.PenStyle.DotLine))
+        painter.setPen(QPen(QColor(self.tokens.quiet), 1, Qt.PenStyle.DotLine))
         painter.drawLine(QPointF(here, plot.top()), QPointF(here, plot.bottom()))
         if len(self._row) != len(ROW):
             return

@@ -25,17 +25,17 @@ class _Field(QWidget):
 
     def __init__(self, now: Callable[[], float]) -> None:
         super().__init__()
-        self._now = now
-        self._answer = Choice()
+        self.now = now
+        self.answer = Choice()
 
     @property
     def answered(self) -> bool:
         """Say whether there is an answer."""
-        return self._answer.value is not None
+        return self.answer.value is not None
 
     def given(self, hand: Hand | None) -> Event:
         """Return the answer."""
-        return self._answer.given(hand)
+        return self.answer.given(hand)
 
 
 class NumberField(_Field):
@@ -58,7 +58,7 @@ class NumberField(_Field):
 
     def begin(self) -> None:
         """Begin another answer."""
-        self._answer = Choice()
+        self.answer = Choice()
         self.field.clear()
         self.changed.emit()
 
@@ -68,9 +68,9 @@ class NumberField(_Field):
         except ValueError:
             number = 0.0
         value = number if number > 0.0 and isfinite(number) else None
-        first = self._answer.first_touch
+        first = self.answer.first_touch
         # What stands while a number is typed is not yet an answer that is corrected.
-        self._answer = Choice(value, self._now() if first is None else first, self._answer.corrections, "keyboard")
+        self.answer = Choice(value, self.now() if first is None else first, self.answer.corrections, "keyboard")
         self.changed.emit()
 
 
@@ -104,19 +104,19 @@ class ChoiceOfTwo(_Field):
             Qt.Key.Key_Right: "second",
         }
         if event.key() in keys:
-            self._take(self._answer.changed(self._now(), keys[event.key()], "keyboard"))
+            self._take(self.answer.changed(self.now(), keys[event.key()], "keyboard"))
         else:
             super().keyPressEvent(event)
 
     def _button(self, words: str, which: Which, scale: float) -> QPushButton:
-        made = button(words, words, lambda: self._take(self._answer.changed(self._now(), which, "mouse")))
+        made = button(words, words, lambda: self._take(self.answer.changed(self.now(), which, "mouse")))
         made.setCheckable(True)
         made.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         made.setMinimumSize(round(220 * scale), round(96 * scale))
         return made
 
     def _take(self, answer: Choice) -> None:
-        self._answer = answer
+        self.answer = answer
         self.first.setChecked(answer.value == "first")
         self.second.setChecked(answer.value == "second")
         self.changed.emit()

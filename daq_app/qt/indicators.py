@@ -34,7 +34,7 @@ class Lamp(Painted):
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint the shape of the state."""
-        t = self._tokens
+        t = self.tokens
         colour = {"off": t.quiet, "on": t.record, "well": t.quiet, "look": t.look, "wrong": t.wrong}[self._grade]
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -87,7 +87,7 @@ class LoadBar(Painted):
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint name, bar, peak and noise."""
-        t, bar = self._tokens, self._bar
+        t, bar = self.tokens, self._bar
         painter = QPainter(self)
         left, right = round(self.NAME * self._scale), round(self.NOISE * self._scale)
         if self.width() < left + right + 40:
@@ -141,7 +141,7 @@ class Arrow(Painted):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.translate(self.width() / 2, self.height() / 2)
         painter.scale(1, self._direction)
-        painter.setPen(QPen(QColor(self._tokens.text), 4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+        painter.setPen(QPen(QColor(self.tokens.text), 4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         half = self.height() / 2 - 6
         painter.drawLine(QPointF(0, half), QPointF(0, -half))
         painter.drawLine(QPointF(0, -half), QPointF(-12, -half + 14))

@@ -11,9 +11,9 @@ class Painted(QWidget):
     def __init__(self, tokens: Tokens) -> None:
         """Begin with a theme."""
         super().__init__()
-        self._tokens = tokens
+        self.tokens = tokens
 
     def set_tokens(self, tokens: Tokens) -> None:
         """Follow another theme."""
-        self._tokens = tokens
+        self.tokens = tokens
         self.update()

@@ -41,6 +41,6 @@ class PressBar(Painted):
         box = QRectF(self.rect()).adjusted(1, 1, -1, -1)
         filled = QRectF(box)
         filled.setWidth(box.width() * min(max(self._force / FULL, 0.0), 1.0))
-        painter.fillRect(filled, QColor(self._tokens.act))
-        painter.setPen(QPen(QColor(self._tokens.quiet), 2))
+        painter.fillRect(filled, QColor(self.tokens.act))
+        painter.setPen(QPen(QColor(self.tokens.quiet), 2))
         painter.drawRect(box)

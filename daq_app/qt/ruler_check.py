@@ -84,7 +84,7 @@ class _Line(Painted):
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint the line with its two ends."""
         painter = QPainter(self)
-        painter.setPen(QPen(QColor(self._tokens.text), 2))
+        painter.setPen(QPen(QColor(self.tokens.text), 2))
         box = QRectF((self.width() - self._length) / 2, 10, self._length, 40)
         middle = box.center().y()
         painter.drawLine(QPointF(box.left(), middle), QPointF(box.right(), middle))

@@ -123,7 +123,7 @@ class ScoreLine(Painted):
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint the line, its two ends, and the mark where there is one."""
-        t, mm, line = self._tokens, self._pixels_per_mm, self._line()
+        t, mm, line = self.tokens, self._pixels_per_mm, self._line()
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self.hasFocus():

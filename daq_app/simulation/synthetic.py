@@ -170,7 +170,7 @@ class SyntheticPeople(DueEvents):
         """Let the subject stroke and judge as planned, but for what is to be spoilt."""
         super().__init__(clock)
         self._subject, self._bench, self._transducer = subject, bench, transducer
-        self._clock, self._plan, self._spoilt = clock, planned, spoilt
+        self._plan, self._spoilt = planned, spoilt
         self.stroked: list[Trial] = []
 
     def show(self, command: Command) -> None:
@@ -213,7 +213,7 @@ class SyntheticPeople(DueEvents):
 
     def _scored(self, trial: Trial) -> Scored:
         _, place, before = self._order(trial)
-        at = self._clock.now_ns() * 1e-9 + JUDGING
+        at = self.clock.now_ns() * 1e-9 + JUDGING
         if trial.number == self._spoilt.unanswered:
             return Scored(None, (), None, 0, None, "simulated")
         score = self._subject.score(self._subject.felt(planted_surface(trial)), 1, place, before)

@@ -147,7 +147,6 @@ class SimulatedPeople(DueEvents):
         """Let the subject of that seed stroke the bench, where there is one; `known` tells a blinded stimulus."""
         super().__init__(clock)
         self._subject = SimulatedSubject(subject_seed)
-        self._clock = clock
         self._hand = None if bench is None or bench.bench is None else SimulatedHand(subject_seed, bench, known)
         self._known = known
         self._takes: dict[int, int] = {}  # by trial number
@@ -176,7 +175,7 @@ class SimulatedPeople(DueEvents):
 
     def _judgement(self, command: steps.AskScore | steps.AskNumber | steps.AskChoice) -> steps.Event:
         """Return what the subject answers."""
-        at = self._clock.now_ns() * 1e-9 + self._judging
+        at = self.clock.now_ns() * 1e-9 + self._judging
         match command:
             case steps.AskScore(trial):
                 score = self._judged(trial)
