@@ -1,14 +1,12 @@
 """A recorder that is played: reports made up in advance, and readings of the simulated bench, without any process."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from daq_app.recorder import messages as m
 from drivers.calibration import Calibration
 from drivers.transducer import Health, TransducerInfo
 from sessions.plan.plan import Frame
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols import VisitSetting, plan, protocol
 from sessions.recording import Acknowledged, LoggedEvent
 from sessions.run import steps
 from sessions.run.runner import SessionEnd, Status
@@ -20,7 +18,7 @@ RATE = 7000.0
 FRAME = Frame("-z", "set", 20.0, "set")
 CALIBRATION = Calibration("FT12345", "N, N mm", np.eye(6), np.array(RATED), "FT12345.cal, made 2025-11-03")
 INFO = TransducerInfo("sim:", "sim", "SIMULATED Net F/T SI-36-0.5", "FT12345", True, RATE, RATE, CALIBRATION)
-PLAN = replace(plan(protocol("sensotact-friction"), "P07", 7, frame=FRAME), stroking_hand="right")
+PLAN = plan(protocol("sensotact-friction"), "P07", 7, setting=VisitSetting(frame=FRAME, stroking_hand="right"))
 FOLDER = "recordings/P07_sensotact-friction_20260301T143005"
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from drivers.readings import ReadingBlock
 from sessions.recording import Recording
 from sessions.recording.schema import LIVE_FILE, SEALED_FILE
-from sessions.report.contents import StrokeFinding
+from sessions.report.contents import StrokeFinding, same_fields
 from sessions.strokes.forces import in_face_frame
 
 Array = NDArray[np.float64]
@@ -109,12 +109,7 @@ def _with_forces(recording: Recording, stroke: StrokeFinding, block: ReadingBloc
     return RawReadings(
         place=place,
         unit=calibration.raw_unit,
-        sequence=block.sequence,
-        counter=block.counter,
-        status=block.status,
-        received_ns=block.received_ns,
-        time=block.time,
-        raw=block.raw,
+        **same_fields(block, RawReadings),
         normal=-wrench[:, 2],
         tangential=np.hypot(wrench[:, 0], wrench[:, 1]),
         zero=words,

@@ -6,36 +6,7 @@ from collections import deque
 from typing import Literal, TextIO
 
 from sessions.plan.plan import Trial
-from sessions.run.steps import (
-    Abort,
-    AskBegin,
-    AskChoice,
-    AskFinish,
-    AskMount,
-    AskNumber,
-    AskRest,
-    AskScore,
-    AskStroke,
-    Begin,
-    Command,
-    EndSession,
-    Event,
-    Finish,
-    MagnitudeEstimate,
-    MeasureZero,
-    Note,
-    PairedChoice,
-    Pause,
-    Redo,
-    Refuse,
-    Resume,
-    Scored,
-    ShowInstruction,
-    Skip,
-    StimulusMounted,
-    StrokeDone,
-    Tell,
-)
+from sessions.run import steps
 
 HELP = (
     "Enter does what is asked. At any time: redo REASON, skip REASON, pause, resume, note TEXT, abort REASON. "
@@ -53,14 +24,14 @@ class Terminal:
         """Talk on stderr and listen on stdin; `forces` is False where no transducer tells when a stroke is done."""
         self._forces = forces
         self._out = out or sys.stderr
-        self._asked: Command | None = None
+        self._asked: steps.Command | None = None
         self._lines: deque[str] = deque()
         self.closed = False  # nobody can type any more
         # A daemon: a blocked read of stdin must not keep the program alive.
         threading.Thread(target=self._read, args=(lines or sys.stdin,), daemon=True).start()
         self._print(HELP)
 
-    def show(self, command: Command) -> None:
+    def show(self, command: steps.Command) -> None:
         """Print what is to be done, and remember what was asked."""
         asked = self._question(command)
         if asked is not None:
@@ -68,57 +39,57 @@ class Terminal:
             self._print(asked)
             return
         match command:
-            case ShowInstruction(block):
+            case steps.ShowInstruction(block):
                 self._print(f"\n== {block.name}: {block.instruction}")
-            case MeasureZero():
+            case steps.MeasureZero():
                 self._print("Zero is being measured: hands off.")
-            case Tell(sentence) | Refuse(sentence):
+            case steps.Tell(sentence) | steps.Refuse(sentence):
                 self._print(sentence)
-            case EndSession(reason):
+            case steps.EndSession(reason):
                 self._print(f"The session ends: {reason}.")
             case _:
                 pass
 
-    def _question(self, command: Command) -> str | None:
+    def _question(self, command: steps.Command) -> str | None:
         """Return what a command asks for in words; None for one that asks for nothing."""
         match command:
-            case AskBegin():
+            case steps.AskBegin():
                 return "Press Enter to begin."
-            case AskMount(trial):
+            case steps.AskMount(trial):
                 return f"{_called(trial)}: mount {trial.stimulus.code}, then press Enter."
-            case AskStroke(trial, allowed):
+            case steps.AskStroke(trial, allowed):
                 after = "" if self._forces else " Press Enter when it is done."
                 often = "once" if allowed == 1 else f"up to {allowed} times"
                 return f"Stroke {often}, {WAYS[trial.direction]}.{after}"
-            case AskScore(_, (low, high), question=question):
+            case steps.AskScore(_, (low, high), question=question):
                 return f"{question} Score from 0 ({low}) to 100 ({high}):".strip()
-            case AskNumber(_, question):
+            case steps.AskNumber(_, question):
                 return f"{question} A number above 0, on the subject's own scale:"
-            case AskChoice(first, second, question):
+            case steps.AskChoice(first, second, question):
                 which = f"1 for the first ({first.stimulus.code}), 2 for the second ({second.stimulus.code}):"
                 return f"{question} {which}"
-            case AskRest(duration):
+            case steps.AskRest(duration):
                 long = "" if duration is None else f" It goes on by itself after {duration:g} s."
                 return f"The subject rests. Press Enter to go on.{long}"
-            case AskFinish():
+            case steps.AskFinish():
                 return "Every trial is done. Press Enter to end the session."
             case _:
                 return None
 
-    def poll(self) -> tuple[Event, ...]:
+    def poll(self) -> tuple[steps.Event, ...]:
         """Return what the lines typed since the last call mean."""
         events = [self._meant(self._lines.popleft().strip()) for _ in range(len(self._lines))]
         return tuple(event for event in events if event is not None)
 
-    def _meant(self, line: str) -> Event | None:
+    def _meant(self, line: str) -> steps.Event | None:
         word, _, rest = line.partition(" ")
-        orders: dict[str, Event] = {
-            "redo": Redo(rest),
-            "skip": Skip(rest),
-            "abort": Abort(rest),
-            "note": Note(rest),
-            "pause": Pause(),
-            "resume": Resume(),
+        orders: dict[str, steps.Event] = {
+            "redo": steps.Redo(rest),
+            "skip": steps.Skip(rest),
+            "abort": steps.Abort(rest),
+            "note": steps.Note(rest),
+            "pause": steps.Pause(),
+            "resume": steps.Resume(),
         }
         if word in orders:
             return orders[word]
@@ -127,34 +98,34 @@ class Terminal:
             self._print(f"'{line}' means nothing now. {HELP}" if line else "Nothing is waiting for Enter now.")
         return event
 
-    def _done(self) -> Event | None:
+    def _done(self) -> steps.Event | None:
         """Return what Enter alone means."""
         match self._asked:
-            case AskBegin():
-                return Begin()
-            case AskMount(trial):
-                return StimulusMounted(trial.stimulus.code)
-            case AskStroke() if not self._forces:
-                return StrokeDone()
-            case AskRest():
-                return Resume()
-            case AskFinish():
-                return Finish()
+            case steps.AskBegin():
+                return steps.Begin()
+            case steps.AskMount(trial):
+                return steps.StimulusMounted(trial.stimulus.code)
+            case steps.AskStroke() if not self._forces:
+                return steps.StrokeDone()
+            case steps.AskRest():
+                return steps.Resume()
+            case steps.AskFinish():
+                return steps.Finish()
             case _:
                 return None
 
-    def _answered(self, line: str) -> Event | None:
+    def _answered(self, line: str) -> steps.Event | None:
         """Return the answer that was typed; what a keyboard cannot tell stays open."""
         number = float(line) if line.replace(".", "", 1).isdecimal() else None
         if number is None and line != "-":
             return None
         match self._asked:
-            case AskScore():
-                return Scored(number, input_device=KEYBOARD)
-            case AskNumber():
-                return MagnitudeEstimate(number, input_device=KEYBOARD)
-            case AskChoice() if number is None or number in CHOICES:
-                return PairedChoice(None if number is None else CHOICES[number], input_device=KEYBOARD)
+            case steps.AskScore():
+                return steps.Scored(number, input_device=KEYBOARD)
+            case steps.AskNumber():
+                return steps.MagnitudeEstimate(number, input_device=KEYBOARD)
+            case steps.AskChoice() if number is None or number in CHOICES:
+                return steps.PairedChoice(None if number is None else CHOICES[number], input_device=KEYBOARD)
             case _:
                 return None
 

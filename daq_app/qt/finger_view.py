@@ -4,9 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy
 
 from daq_app.qt.indicators import paint_lost
+from daq_app.qt.painted import Painted
 from daq_app.qt.shapes import draw_line, faces, fine
 from daq_app.qt.tokens import MODEL, SMALL, Tokens, font
 from daq_app.window.live_model import Picture
@@ -26,13 +27,13 @@ EVERY = 1 / 30  # no new picture sooner after another: nobody sees more [s]
 TOP = 0.97  # of the faces' SED lies below the end of the colour scale
 
 
-class FingerView(QWidget):
+class FingerView(Painted):
     """A picture of the last state of a model."""
 
     def __init__(self, tokens: Tokens, scale: float) -> None:
         """Show nothing yet."""
-        super().__init__()
-        self._tokens, self._scale = tokens, scale
+        super().__init__(tokens)
+        self._scale = scale
         self._picture: Picture | None = None
         self._row: Array = np.empty(0)
         self._words = ModelWords("", "none")
@@ -43,11 +44,6 @@ class FingerView(QWidget):
         self.setMinimumSize(100, 1)  # it is folded where it is low
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("finger as the model sees it")
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._tokens = tokens
-        self.update()
 
     def show_model(self, picture: Picture | None, row: Array, words: ModelWords, clock: float) -> None:
         """Show a state; `row` (r,) [MPa] at `solver.prediction.ROW`, `clock` [s] is for the scales' patience."""
@@ -67,10 +63,10 @@ class FingerView(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint words, finger and row."""
         painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(self._tokens.surface))
+        painter.fillRect(self.rect(), QColor(self.tokens.surface))
         painter.setFont(font(SMALL, self._scale, bold=self._words.state in ("settled", "instead", "beyond")))
         painter.setPen(
-            QColor(self._tokens.look if self._words.state in ("instead", "beyond", "failed") else self._tokens.quiet)
+            QColor(self.tokens.look if self._words.state in ("instead", "beyond", "failed") else self.tokens.quiet)
         )
         flags = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignTop)
         box = QRectF(4, 0, self.width() - 8, self.height() * WORDS)
@@ -96,19 +92,19 @@ class FingerView(QWidget):
 
         painter.save()
         painter.setClipRect(box)
-        painter.setPen(QPen(QColor(self._tokens.quiet), 2))
+        painter.setPen(QPen(QColor(self.tokens.quiet), 2))
         painter.drawLine(QPointF(box.left(), origin.y()), QPointF(box.right(), origin.y()))
         picture = self._picture
         if picture is not None:
             self._paint_faces(painter, picture, placed(picture.nodes))
             style = Qt.PenStyle.SolidLine if self._words.state == "settled" else Qt.PenStyle.DashLine
-            painter.setPen(fine(self._tokens.text, style))
+            painter.setPen(fine(self.tokens.text, style))
             draw_line(painter, *placed(picture.outline).T)
             if picture.lost is not None:
                 x, y = placed(np.array([picture.lost]))[0].tolist()
-                paint_lost(painter, QPointF(x, y), self._tokens)
+                paint_lost(painter, QPointF(x, y), self.tokens)
         painter.restore()
-        painter.setPen(QColor(self._tokens.quiet))
+        painter.setPen(QColor(self.tokens.quiet))
         painter.drawText(
             box.adjusted(4, 0, -4, -2),
             Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop,
@@ -130,7 +126,7 @@ class FingerView(QWidget):
     def _paint_row(self, painter: QPainter, box: QRectF) -> None:
         line = painter.fontMetrics().height()
         plot = box.adjusted(6, 2, -6, -line)
-        painter.setPen(QColor(self._tokens.quiet))
+        painter.setPen(QColor(self.tokens.quiet))
         painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop, "  SED along the skin [kPa]")
         painter.drawText(
             box.adjusted(0, 0, -6, 0),
@@ -142,11 +138,11 @@ class FingerView(QWidget):
         painter.drawText(box.adjusted(0, 0, -6, 0), Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBottom, ends[1])
         if plot.height() < 10:
             return
-        painter.setPen(QPen(QColor(self._tokens.line), 1))
+        painter.setPen(QPen(QColor(self.tokens.line), 1))
         painter.drawLine(plot.bottomLeft(), plot.bottomRight())
         across = (ROW - ROW[0]) / (ROW[-1] - ROW[0])
         here = plot.left() + plot.width() * float(-ROW[0] / (ROW[-1] - ROW[0]))
-        painter.setPen(QPen(QColor(self._tokens.quiet), 1, Qt.PenStyle.DotLine))
+        painter.setPen(QPen(QColor(self.tokens.quiet), 1, Qt.PenStyle.DotLine))
         painter.drawLine(QPointF(here, plot.top()), QPointF(here, plot.bottom()))
         if len(self._row) != len(ROW):
             return

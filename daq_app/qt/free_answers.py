@@ -18,16 +18,32 @@ Which = Literal["first", "second"]
 LARGE = 36  # type of the number [device-independent pixels]
 
 
-class NumberField(QWidget):
-    """Takes a number above 0; a comma is a point."""
+class _Field(QWidget):
+    """Takes an answer that is no place on a line."""
 
     changed = Signal()
 
+    def __init__(self, now: Callable[[], float]) -> None:
+        super().__init__()
+        self.now = now
+        self.answer = Choice()
+
+    @property
+    def answered(self) -> bool:
+        """Say whether there is an answer."""
+        return self.answer.value is not None
+
+    def given(self, hand: Hand | None) -> Event:
+        """Return the answer."""
+        return self.answer.given(hand)
+
+
+class NumberField(_Field):
+    """Takes a number above 0; a comma is a point."""
+
     def __init__(self, scale: float, now: Callable[[], float]) -> None:
         """Show an empty field; `now` tells the session clock [s]."""
-        super().__init__()
-        self._now = now
-        self._answer = Choice()
+        super().__init__(now)
         self.field = QLineEdit()
         self.field.setAccessibleName("your number, above 0")
         self.field.setFixedWidth(round(260 * scale))
@@ -40,20 +56,11 @@ class NumberField(QWidget):
         layout.addStretch(1)
         self.setFocusProxy(self.field)
 
-    @property
-    def answered(self) -> bool:
-        """Say whether there is an answer."""
-        return self._answer.value is not None
-
     def begin(self) -> None:
         """Begin another answer."""
-        self._answer = Choice()
+        self.answer = Choice()
         self.field.clear()
         self.changed.emit()
-
-    def given(self, hand: Hand | None) -> Event:
-        """Return the answer."""
-        return self._answer.given(hand)
 
     def _typed(self, text: str) -> None:
         try:
@@ -61,22 +68,18 @@ class NumberField(QWidget):
         except ValueError:
             number = 0.0
         value = number if number > 0.0 and isfinite(number) else None
-        first = self._answer.first_touch
+        first = self.answer.first_touch
         # What stands while a number is typed is not yet an answer that is corrected.
-        self._answer = Choice(value, self._now() if first is None else first, self._answer.corrections, "keyboard")
+        self.answer = Choice(value, self.now() if first is None else first, self.answer.corrections, "keyboard")
         self.changed.emit()
 
 
-class ChoiceOfTwo(QWidget):
+class ChoiceOfTwo(_Field):
     """Two buttons of the same size; the one that is chosen stays pressed."""
-
-    changed = Signal()
 
     def __init__(self, scale: float, now: Callable[[], float]) -> None:
         """Show two buttons; `now` tells the session clock [s]."""
-        super().__init__()
-        self._now = now
-        self._answer = Choice()
+        super().__init__(now)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName("which of the two: 1 for the first, 2 for the second")
         self.first = self._button("The first", "first", scale)
@@ -88,18 +91,9 @@ class ChoiceOfTwo(QWidget):
         layout.addWidget(self.second)
         layout.addStretch(1)
 
-    @property
-    def answered(self) -> bool:
-        """Say whether there is an answer."""
-        return self._answer.value is not None
-
     def begin(self) -> None:
         """Begin another answer."""
         self._take(Choice())
-
-    def given(self, hand: Hand | None) -> Event:
-        """Return the answer."""
-        return self._answer.given(hand)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Choose with 1 and 2, or the arrows."""
@@ -110,19 +104,19 @@ class ChoiceOfTwo(QWidget):
             Qt.Key.Key_Right: "second",
         }
         if event.key() in keys:
-            self._take(self._answer.changed(self._now(), keys[event.key()], "keyboard"))
+            self._take(self.answer.changed(self.now(), keys[event.key()], "keyboard"))
         else:
             super().keyPressEvent(event)
 
     def _button(self, words: str, which: Which, scale: float) -> QPushButton:
-        made = button(words, words, lambda: self._take(self._answer.changed(self._now(), which, "mouse")))
+        made = button(words, words, lambda: self._take(self.answer.changed(self.now(), which, "mouse")))
         made.setCheckable(True)
         made.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         made.setMinimumSize(round(220 * scale), round(96 * scale))
         return made
 
     def _take(self, answer: Choice) -> None:
-        self._answer = answer
+        self.answer = answer
         self.first.setChecked(answer.value == "first")
         self.second.setChecked(answer.value == "second")
         self.changed.emit()

@@ -4,21 +4,21 @@ from typing import Literal
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy
 
+from daq_app.qt.painted import Painted
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.window.view_bench import Bar
 
 Grade = Literal["off", "on", "well", "look", "wrong"]
 
 
-class Lamp(QWidget):
+class Lamp(Painted):
     """A lamp: a ring when off, a disc when well or recording, a triangle to look at, a square when wrong."""
 
     def __init__(self, tokens: Tokens, name: str) -> None:
         """Start switched off; `name` is said to screen readers."""
-        super().__init__()
-        self._tokens = tokens
+        super().__init__(tokens)
         self._grade: Grade = "off"
         self._name = name
         self.setFixedSize(2 * GRID + 4, 2 * GRID + 4)
@@ -32,14 +32,9 @@ class Lamp(QWidget):
             self._grade = grade
             self.update()
 
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._tokens = tokens
-        self.update()
-
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint the shape of the state."""
-        t = self._tokens
+        t = self.tokens
         colour = {"off": t.quiet, "on": t.record, "well": t.quiet, "look": t.look, "wrong": t.wrong}[self._grade]
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -59,15 +54,14 @@ class Lamp(QWidget):
                 painter.drawEllipse(box)
 
 
-class LoadBar(QWidget):
+class LoadBar(Painted):
     """How far one axis is loaded now, and the most it was loaded since somebody acknowledged it."""
 
     NAME, NOISE = 86, 104  # widths of the words beside the bar, before the font's scale
 
     def __init__(self, tokens: Tokens, name: str, scale: float) -> None:
         """Start empty."""
-        super().__init__()
-        self._tokens = tokens
+        super().__init__(tokens)
         self._scale = scale
         self._bar = Bar(name, 0.0, 0.0, over=False, noise="")
         self.setAccessibleName(f"load on {name}")
@@ -77,11 +71,6 @@ class LoadBar(QWidget):
     def sizeHint(self) -> QSize:  # noqa: N802  Qt's name
         """Return the usual size."""
         return QSize(round(200 * self._scale), self.height())
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._tokens = tokens
-        self.update()
 
     def show_bar(self, bar: Bar) -> None:
         """Show a load."""
@@ -98,7 +87,7 @@ class LoadBar(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint name, bar, peak and noise."""
-        t, bar = self._tokens, self._bar
+        t, bar = self.tokens, self._bar
         painter = QPainter(self)
         left, right = round(self.NAME * self._scale), round(self.NOISE * self._scale)
         if self.width() < left + right + 40:
@@ -125,21 +114,15 @@ class LoadBar(QWidget):
             painter.drawText(place, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, words)
 
 
-class Arrow(QWidget):
+class Arrow(Painted):
     """Which way the stroke goes, as somebody facing the subject's finger from behind sees it: up is away."""
 
     def __init__(self, tokens: Tokens) -> None:
         """Start with no arrow."""
-        super().__init__()
-        self._tokens = tokens
+        super().__init__(tokens)
         self._direction = 0
         self.setFixedSize(5 * GRID, 7 * GRID)
         self.setAccessibleName("no stroke asked for")
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._tokens = tokens
-        self.update()
 
     def show_direction(self, direction: int) -> None:
         """Show +1 away from the subject (up), -1 towards the subject (down), 0 nothing."""
@@ -158,7 +141,7 @@ class Arrow(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.translate(self.width() / 2, self.height() / 2)
         painter.scale(1, self._direction)
-        painter.setPen(QPen(QColor(self._tokens.text), 4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+        painter.setPen(QPen(QColor(self.tokens.text), 4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         half = self.height() / 2 - 6
         painter.drawLine(QPointF(0, half), QPointF(0, -half))
         painter.drawLine(QPointF(0, -half), QPointF(-12, -half + 14))

@@ -215,6 +215,29 @@ class NewSessionPage(QFrame):
         layout.setContentsMargins(int(1.5 * GRID), GRID, int(1.5 * GRID), GRID)
         layout.setSpacing(4)
         layout.addWidget(label("New session", "title"))
+        self._build_subject(layout)
+        layout.addSpacing(GRID)
+        self._build_recorded(layout)
+        self._build_people(layout)
+        layout.addSpacing(GRID)
+        folder = QHBoxLayout()
+        folder.addWidget(self.folder, 1)
+        folder.addWidget(button("…", "choose the folder of sessions", self._choose_folder))
+        self._field(layout, "folder", "Folder", folder)
+        self._field(layout, "seed", "Seed", self.seed)
+        layout.addStretch(1)
+        cut_short = QVBoxLayout(self._unfinished)
+        cut_short.setContentsMargins(0, GRID, 0, 0)
+        for widget in (label("Sessions that were cut short", "section"), self._resume, self._go_on):
+            cut_short.addWidget(widget)
+        layout.addWidget(self._unfinished)
+        outer = QVBoxLayout(self)
+        outer.setContentsMargins(2, 2, 2, 2)
+        outer.addWidget(scrolled(inside))
+        self.setMinimumWidth(round(280 * min(scale, 1.25)))
+
+    def _build_subject(self, layout: QVBoxLayout) -> None:
+        """Lay out who takes part, in which study and by which protocol."""
         self._field(layout, "subject", "Subject code", self.subject)
         self._field(layout, "study", "Study, may be empty", self.study)
         layout.addWidget(self._study_words)
@@ -230,7 +253,9 @@ class NewSessionPage(QFrame):
             column.addWidget(box)
             hands.addLayout(column)
         layout.addLayout(hands)
-        layout.addSpacing(GRID)
+
+    def _build_recorded(self, layout: QVBoxLayout) -> None:
+        """Lay out what is recorded, and what the analysis must know of the face."""
         layout.addWidget(label("What is recorded", "section"))
         layout.addWidget(self.with_forces)
         layout.addWidget(self.scores_only)
@@ -244,6 +269,9 @@ class NewSessionPage(QFrame):
         of_area.setContentsMargins(0, 0, 0, 0)
         self._field(of_area, "area", "Contact area, for tau_max [mm²]", self.area)
         layout.addWidget(self._area)
+
+    def _build_people(self, layout: QVBoxLayout) -> None:
+        """Lay out whether people or simulated ones stroke and score."""
         layout.addWidget(label("Who strokes and scores", "section"))
         row = QHBoxLayout()
         row.addWidget(self.people_score)
@@ -253,23 +281,6 @@ class NewSessionPage(QFrame):
         layout.addWidget(self._people_words)
         layout.addWidget(self._line_words)
         self._refusal(layout, "simulated")
-        layout.addSpacing(GRID)
-        folder = QHBoxLayout()
-        folder.addWidget(self.folder, 1)
-        folder.addWidget(button("…", "choose the folder of sessions", self._choose_folder))
-        self._field(layout, "folder", "Folder", folder)
-        self._field(layout, "seed", "Seed", self.seed)
-        layout.addStretch(1)
-        cut_short = QVBoxLayout(self._unfinished)
-        cut_short.setContentsMargins(0, GRID, 0, 0)
-        cut_short.addWidget(label("Sessions that were cut short", "section"))
-        cut_short.addWidget(self._resume)
-        cut_short.addWidget(self._go_on)
-        layout.addWidget(self._unfinished)
-        outer = QVBoxLayout(self)
-        outer.setContentsMargins(2, 2, 2, 2)
-        outer.addWidget(scrolled(inside))
-        self.setMinimumWidth(round(280 * min(scale, 1.25)))
 
     def _field(self, layout: QVBoxLayout, name: str, words: str, field: QWidget | QHBoxLayout) -> None:
         layout.addWidget(label(words, "quiet"))

@@ -3,8 +3,8 @@
 import numpy as np
 from PySide6.QtCore import QRectF
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QWidget
 
+from daq_app.qt.painted import Painted
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 
@@ -12,13 +12,12 @@ FULL = 5.0  # of the bar [N]
 OVER = 0.1  # the mean of so long is shown: an eye follows it, and noise does not move it [s]
 
 
-class PressBar(QWidget):
+class PressBar(Painted):
     """A bar from no force to `FULL`; no number, so that nobody aims at one."""
 
     def __init__(self, tokens: Tokens, scale: float) -> None:
         """Start empty."""
-        super().__init__()
-        self._tokens = tokens
+        super().__init__(tokens)
         self._force = 0.0
         self.setAccessibleName("how hard you press")
         self.setFixedHeight(round(6 * GRID * scale))
@@ -36,17 +35,12 @@ class PressBar(QWidget):
             self._force = force
             self.update()
 
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._tokens = tokens
-        self.update()
-
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint the bar."""
         painter = QPainter(self)
         box = QRectF(self.rect()).adjusted(1, 1, -1, -1)
         filled = QRectF(box)
         filled.setWidth(box.width() * min(max(self._force / FULL, 0.0), 1.0))
-        painter.fillRect(filled, QColor(self._tokens.act))
-        painter.setPen(QPen(QColor(self._tokens.quiet), 2))
+        painter.fillRect(filled, QColor(self.tokens.act))
+        painter.setPen(QPen(QColor(self.tokens.quiet), 2))
         painter.drawRect(box)

@@ -4,6 +4,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QScreen
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 
+from daq_app.qt.painted import Painted
 from daq_app.qt.parts import button, label, say
 from daq_app.qt.screens import LEAST, MOST, checked, millimetres
 from daq_app.qt.tokens import GRID, Tokens
@@ -67,18 +68,12 @@ class RulerCheck(QWidget):
         self.done.emit()
 
 
-class _Line(QWidget):
+class _Line(Painted):
     def __init__(self, tokens: Tokens) -> None:
-        super().__init__()
-        self._tokens = tokens
+        super().__init__(tokens)
         self._length = 0.0
         self.setMinimumHeight(60)
         self.setAccessibleName("line of 100 millimetres to be measured")
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._tokens = tokens
-        self.update()
 
     def set_length(self, pixels: float) -> None:
         """Show a line of this length."""
@@ -89,7 +84,7 @@ class _Line(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint the line with its two ends."""
         painter = QPainter(self)
-        painter.setPen(QPen(QColor(self._tokens.text), 2))
+        painter.setPen(QPen(QColor(self.tokens.text), 2))
         box = QRectF((self.width() - self._length) / 2, 10, self._length, 40)
         middle = box.center().y()
         painter.drawLine(QPointF(box.left(), middle), QPointF(box.right(), middle))

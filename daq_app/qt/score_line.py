@@ -13,8 +13,9 @@ from PySide6.QtGui import (
     QPen,
     QTouchEvent,
 )
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy
 
+from daq_app.qt.painted import Painted
 from daq_app.qt.tokens import Tokens
 from daq_app.window.answer import LEAP, STEP, Answer, Device
 from sessions.plan.plan import Hand
@@ -36,15 +37,14 @@ KEYS = {
 }
 
 
-class ScoreLine(QWidget):
+class ScoreLine(Painted):
     """Takes mouse, touch, pen and keyboard alike; every position is kept with its time."""
 
     changed = Signal()
 
     def __init__(self, tokens: Tokens, now: Callable[[], float]) -> None:
         """Show an empty line; `now` tells the session clock [s]."""
-        super().__init__()
-        self._tokens = tokens
+        super().__init__(tokens)
         self._now = now
         self._pixels_per_mm = 96 / 25.4
         self._answer = Answer()
@@ -67,11 +67,6 @@ class ScoreLine(QWidget):
         if pixels != self._pixels_per_mm:
             self._pixels_per_mm = pixels
             self._resize()
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._tokens = tokens
-        self.update()
 
     @property
     def answered(self) -> bool:
@@ -128,7 +123,7 @@ class ScoreLine(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint the line, its two ends, and the mark where there is one."""
-        t, mm, line = self._tokens, self._pixels_per_mm, self._line()
+        t, mm, line = self.tokens, self._pixels_per_mm, self._line()
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self.hasFocus():

@@ -183,11 +183,7 @@ class SubjectWindow(QWidget):
         layout.addStretch(1)
         for shown in (self._title, self._text, self.press):
             shown.setMaximumWidth(TEXT_WIDTH)
-            row = QHBoxLayout()
-            row.addStretch(1)
-            row.addWidget(shown, 100)
-            row.addStretch(1)
-            layout.addLayout(row)
+            layout.addLayout(_centred(shown, 100))
             layout.addSpacing(3 * GRID)
         layout.addStretch(2)
         return page
@@ -209,11 +205,7 @@ class SubjectWindow(QWidget):
         held.setLayout(self._next_row)
         held.setFixedHeight(self.next.minimumHeight() + 2 * GRID)
         held.setMaximumWidth(WIDEST)
-        row = QHBoxLayout()
-        row.addStretch(1)
-        row.addWidget(held, 1000)
-        row.addStretch(1)
-        layout.addLayout(row)
+        layout.addLayout(_centred(held, 1000))
         self._place_next("right")
         return page
 
@@ -296,3 +288,12 @@ def _large(made: QLabel, size: int, scale: float, *, bold: bool = False) -> QLab
     made.setStyleSheet(f"font-size: {round(size * scale)}px; font-weight: {600 if bold else 400};")
     made.setFont(font(size, scale, bold=bold))
     return made
+
+
+def _centred(widget: QWidget, weight: int) -> QHBoxLayout:
+    """Return a row with a widget in its middle, that takes `weight` times the space of either side."""
+    row = QHBoxLayout()
+    row.addStretch(1)
+    row.addWidget(widget, weight)
+    row.addStretch(1)
+    return row

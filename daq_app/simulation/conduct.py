@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from daq_app.console import Console
 from drivers.clock import Clock
@@ -13,12 +14,18 @@ from sessions.run.resuming import RESUMABLE
 from sessions.run.runner import Operator, RunnerSettings, SessionEnd, Status, run_session
 
 
+class Participants(NamedTuple):
+    """Who and what takes part in a session: whoever strokes and scores, the transducer, and the clock of both."""
+
+    operator: Operator
+    transducer: Transducer | None  # None for a visit that only scores
+    clock: Clock
+
+
 def conduct(
     plan: SessionPlan,
     folder: Path,
-    operator: Operator,
-    transducer: Transducer | None,
-    clock: Clock,
+    taking_part: Participants,
     console: Console,
     *,
     settings: Sequence[Setting] = (),
@@ -31,6 +38,7 @@ def conduct(
 
     Raises RecordingError when the folder cannot be used or the disk takes no more.
     """
+    operator, transducer, clock = taking_part
     info = None if transducer is None else transducer.info
     came_from = provenance(clock, settings)
     writer = SessionWriter.create(folder, plan, info, came_from, subject_simulated=True, clock=clock, durable=durable)

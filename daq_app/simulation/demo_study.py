@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from daq_app.console import Console
-from daq_app.simulation.conduct import conduct
+from daq_app.simulation.conduct import Participants, conduct
 from daq_app.simulation.wiring import Connected, SimulatedPeople, connected
 from drivers.clock import Clock
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols import VisitSetting, plan, protocol
 from sessions.recording import Recording, Setting
 from sessions.report import Planted
 from sessions.run.runner import SessionEnd
@@ -44,23 +44,16 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
         folder = out / f"{subject}-scores"
         people = SimulatedPeople(_seed(seed, number), clock)
         planned = plan(chosen, subject, _seed(seed, number), forces=False)
-        end = conduct(planned, folder, people, None, clock, console, settings=[_told(seed)])
+        end = conduct(planned, folder, Participants(people, None, clock), console, settings=[_told(seed)])
         _check(end, folder)
         scored.append(folder)
     subject = f"S{STROKING:02d}"
     folder = out / f"{subject}-forces"
     with connected(f"sim:?seed={seed}&rate=200", clock) as bench:
         people = SimulatedPeople(_seed(seed, STROKING), clock, bench)
-        planned = plan(chosen, subject, _seed(seed, STROKING) + 1, frame=bench.frame)
-        end = conduct(
-            planned,
-            folder,
-            people,
-            bench.transducer,
-            clock,
-            console,
-            settings=[_told(seed)],
-        )
+        planned = plan(chosen, subject, _seed(seed, STROKING) + 1, setting=VisitSetting(frame=bench.frame))
+        taking_part = Participants(people, bench.transducer, clock)
+        end = conduct(planned, folder, taking_part, console, settings=[_told(seed)])
         _check(end, folder)
         planted = _planted(bench, Recording.open(folder))
     return Study(tuple(scored), folder, planted, end.readings, end.health.lost)

@@ -6,20 +6,20 @@ drift within a block and carry over from one trial to the next. Nobody here know
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from daq_app.console import Console
-from daq_app.simulation.conduct import conduct
+from daq_app.simulation.conduct import Participants, conduct
 from daq_app.simulation.due_events import DueEvents
 from daq_app.simulation.wiring import planted_surface
 from drivers.clock import Clock, ToldClock
 from sessions.atomic_file import write_json
 from sessions.plan.plan import Block, Frame, SessionPlan, Trial
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols import VisitSetting, plan, protocol
 from sessions.recording import RecordingError, Setting
 from sessions.recording.schema import LIVE_FILE
 from sessions.run.runner import RunnerSettings
@@ -32,12 +32,12 @@ from sessions.run.steps import (
     AskStroke,
     Begin,
     Command,
-    Event,
     Finish,
     Scored,
     StimulusMounted,
 )
 from sessions.statistics.pooling.exclusions import EXCLUSIONS
+from sessions.statistics.pooling.ground_truth import Spoilt
 from simulators.bench import Bench, BenchSettings, PlantedStroke
 from simulators.direct import DirectTransducer, Hurt
 from simulators.subject import SimulatedSubject, SubjectSettings
@@ -61,19 +61,6 @@ CALIBRATION = 0.01  # standard deviation of each axis' gain about 1 [-]
 LIGHT = 0.15  # peak normal force of a stroke that presses too lightly [N]
 JUDGING = 0.8  # from lift to score [s]
 TICK = 0.1  # between two looks at the transducer [s, told]: five times as seldom as with people
-
-
-@dataclass(frozen=True, slots=True)
-class Spoilt:
-    """What goes wrong in one subject's visit, by number of the trial; 0: nowhere."""
-
-    lost: int = 0
-    frozen: int = 0
-    light: int = 0
-    unanswered: int = 0
-    aborted: int = 0
-    reversed: bool = False
-    expected: str = ""  # what the analysis should say
 
 
 SPOILT: Mapping[str, Spoilt] = {
@@ -132,27 +119,19 @@ def _decisions() -> str:
 def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str, Any]]:
     """Record one subject's visit and return what was planted in it, a row a stroke."""
     subject, own = f"S{number:02d}", seed * 100 + number
-    spoilt = SPOILT.get(subject, Spoilt())
+    spoilt = SPOILT.get(subject, Spoilt(expected=""))
     gains = np.random.default_rng([own, 7]).normal(1.0, CALIBRATION, 6)
     a, b, c, d, e, f = gains.tolist()
     bench = Bench(own, BenchSettings(gains=(a, b, c, d, e, f)))
     clock = ToldClock()
     transducer = DirectTransducer(bench, clock, Hurt(_one(spoilt.lost), _one(spoilt.frozen)))
     settings = replace(PEOPLE, gain=-PEOPLE.gain) if spoilt.reversed else PEOPLE
-    planned = plan(protocol(PROTOCOL), subject, own, frame=Frame("-z", "set", bench.settings.height, "set"))
+    setting = VisitSetting(frame=Frame("-z", "set", bench.settings.height, "set"))
+    planned = plan(protocol(PROTOCOL), subject, own, setting=setting)
     people = SyntheticPeople(SimulatedSubject(own, settings), bench, transducer, clock, planned, spoilt)
     told = [Setting("study seed", seed, "", "set")]
-    conduct(
-        planned,
-        out / subject,
-        people,
-        transducer,
-        clock,
-        console,
-        settings=told,
-        run=RunnerSettings(tick=TICK),
-        durable=False,
-    )
+    taking_part = Participants(people, transducer, clock)
+    conduct(planned, out / subject, taking_part, console, settings=told, run=RunnerSettings(tick=TICK), durable=False)
     return [
         {**_row(subject, trial, stroke), **people.meant(trial)}
         for trial, stroke in zip(people.stroked, bench.planted(), strict=True)
@@ -176,7 +155,7 @@ def _row(subject: str, trial: Trial, stroke: PlantedStroke) -> dict[str, Any]:
     }
 
 
-class SyntheticPeople:
+class SyntheticPeople(DueEvents):
     """Experimenter and subject in one, on a bench in told time."""
 
     def __init__(
@@ -189,35 +168,31 @@ class SyntheticPeople:
         spoilt: Spoilt,
     ) -> None:
         """Let the subject stroke and judge as planned, but for what is to be spoilt."""
+        super().__init__(clock)
         self._subject, self._bench, self._transducer = subject, bench, transducer
-        self._clock, self._plan, self._spoilt = clock, planned, spoilt
-        self._due = DueEvents(clock)
+        self._plan, self._spoilt = planned, spoilt
         self.stroked: list[Trial] = []
 
     def show(self, command: Command) -> None:
         """Do what the command asks for."""
         match command:
             case AskBegin():
-                self._due.put(Begin())
+                self.put(Begin())
             case AskMount(trial) if trial.number == self._spoilt.aborted:
-                self._due.put(Abort("the subject had to leave"))
+                self.put(Abort("the subject had to leave"))
             case AskMount(trial):
                 self._bench.mount(self._felt(trial))
-                self._due.put(StimulusMounted(trial.stimulus.code))
+                self.put(StimulusMounted(trial.stimulus.code))
             case AskStroke(trial):
                 stroke = self._subject.stroke(self._felt(trial))
                 self._bench.begin_stroke(stroke, self._transducer.now())
                 self.stroked.append(trial)
             case AskScore(trial):
-                self._due.put(self._scored(trial), JUDGING)
+                self.put(self._scored(trial), JUDGING)
             case AskFinish():
-                self._due.put(Finish())
+                self.put(Finish())
             case _:
                 pass
-
-    def poll(self) -> tuple[Event, ...]:
-        """Return what has been done by now."""
-        return self._due.taken()
 
     def meant(self, trial: Trial) -> dict[str, Any]:
         """Return a trial's depth, its place, what was stroked before, and the score without noise."""
@@ -238,7 +213,7 @@ class SyntheticPeople:
 
     def _scored(self, trial: Trial) -> Scored:
         _, place, before = self._order(trial)
-        at = self._clock.now_ns() * 1e-9 + JUDGING
+        at = self.clock.now_ns() * 1e-9 + JUDGING
         if trial.number == self._spoilt.unanswered:
             return Scored(None, (), None, 0, None, "simulated")
         score = self._subject.score(self._subject.felt(planted_surface(trial)), 1, place, before)

@@ -14,26 +14,7 @@ from drivers.transducer import SetupError, Transducer
 from sessions.plan.plan import Frame, Trial
 from sessions.recording import Recording
 from sessions.recording.replay import ReplayTransducer
-from sessions.run.steps import (
-    AskBegin,
-    AskChoice,
-    AskFinish,
-    AskMount,
-    AskNumber,
-    AskRest,
-    AskScore,
-    AskStroke,
-    Begin,
-    Command,
-    Event,
-    Finish,
-    MagnitudeEstimate,
-    PairedChoice,
-    Resume,
-    Scored,
-    StimulusMounted,
-    StrokeDone,
-)
+from sessions.run import steps
 from simulators.bench import Bench
 from simulators.net_ft_box import NetFtBox
 from simulators.serving import serve_digital_ft, serve_net_ft, serve_serial_ft
@@ -139,24 +120,24 @@ class SimulatedHand:
         self._known = known
         self._takes: dict[int, int] = {}  # by trial number
 
-    def show(self, command: Command) -> None:
+    def show(self, command: steps.Command) -> None:
         """Do what the command asks a hand for."""
         match command:
-            case AskMount(trial):
+            case steps.AskMount(trial):
                 self._bench.mount(planted_surface(self._known(trial)))
-            case AskStroke(trial):
+            case steps.AskStroke(trial):
                 self._takes[trial.number] = self._takes.get(trial.number, 0) + 1
                 stroke = self._subject.stroke(planted_surface(self._known(trial)), self._takes[trial.number])
                 self._bench.begin_stroke(stroke, self._now())
             case _:
                 pass
 
-    def poll(self) -> tuple[Event, ...]:
+    def poll(self) -> tuple[steps.Event, ...]:
         """Return nothing: what a hand does is felt by the transducer."""
         return ()
 
 
-class SimulatedPeople:
+class SimulatedPeople(DueEvents):
     """Experimenter and subject in one, for a session nobody sits at: they do at once what is asked of them.
 
     With a bench the subject strokes it, and judges when the finger has left; without one it strokes and judges unseen.
@@ -164,52 +145,47 @@ class SimulatedPeople:
 
     def __init__(self, subject_seed: int, clock: Clock, bench: Connected | None = None, known: Known = itself) -> None:
         """Let the subject of that seed stroke the bench, where there is one; `known` tells a blinded stimulus."""
+        super().__init__(clock)
         self._subject = SimulatedSubject(subject_seed)
-        self._clock = clock
         self._hand = None if bench is None or bench.bench is None else SimulatedHand(subject_seed, bench, known)
         self._known = known
         self._takes: dict[int, int] = {}  # by trial number
-        self._due = DueEvents(clock)
 
-    def show(self, command: Command) -> None:
+    def show(self, command: steps.Command) -> None:
         """Do what the command asks for."""
         if self._hand is not None:
             self._hand.show(command)
         match command:
-            case AskBegin():
-                self._due.put(Begin())
-            case AskMount(trial):
-                self._due.put(StimulusMounted(trial.stimulus.code))
-            case AskStroke(trial):
+            case steps.AskBegin():
+                self.put(steps.Begin())
+            case steps.AskMount(trial):
+                self.put(steps.StimulusMounted(trial.stimulus.code))
+            case steps.AskStroke(trial):
                 self._takes[trial.number] = self._takes.get(trial.number, 0) + 1
                 if self._hand is None:
-                    self._due.put(StrokeDone())
-            case AskScore() | AskNumber() | AskChoice():
-                self._due.put(self._judgement(command), after=self._judging)
-            case AskRest(None):
-                self._due.put(Resume())
-            case AskFinish():
-                self._due.put(Finish())
+                    self.put(steps.StrokeDone())
+            case steps.AskScore() | steps.AskNumber() | steps.AskChoice():
+                self.put(self._judgement(command), after=self._judging)
+            case steps.AskRest(None):
+                self.put(steps.Resume())
+            case steps.AskFinish():
+                self.put(steps.Finish())
             case _:
                 pass
 
-    def poll(self) -> tuple[Event, ...]:
-        """Return what has been done by now."""
-        return self._due.taken()
-
-    def _judgement(self, command: AskScore | AskNumber | AskChoice) -> Event:
+    def _judgement(self, command: steps.AskScore | steps.AskNumber | steps.AskChoice) -> steps.Event:
         """Return what the subject answers."""
-        at = self._clock.now_ns() * 1e-9 + self._judging
+        at = self.clock.now_ns() * 1e-9 + self._judging
         match command:
-            case AskScore(trial):
+            case steps.AskScore(trial):
                 score = self._judged(trial)
-                return Scored(score, ((at, score),), at, 0, None, INPUT)
-            case AskNumber(trial):
+                return steps.Scored(score, ((at, score),), at, 0, None, INPUT)
+            case steps.AskNumber(trial):
                 number = self._subject.number(planted_surface(self._known(trial)), self._takes[trial.number])
-                return MagnitudeEstimate(number, at, 0, None, INPUT)
-            case AskChoice(first, second):
+                return steps.MagnitudeEstimate(number, at, 0, None, INPUT)
+            case steps.AskChoice(first, second):
                 more = self._judged(first) > self._judged(second)
-                return PairedChoice("first" if more else "second", at, 0, None, INPUT)
+                return steps.PairedChoice("first" if more else "second", at, 0, None, INPUT)
 
     @property
     def _judging(self) -> float:

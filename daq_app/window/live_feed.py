@@ -13,12 +13,12 @@ from daq_app.window.live_trace import CHANNELS, LiveTrace
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Frame
-from sessions.strokes import AnalysisSettings
 from sessions.strokes.forces import centre_of_pressure, in_face_frame
+from sessions.strokes.settings import RatioSettings
 
 Array = NDArray[np.float64]
 
-FLOOR = AnalysisSettings().force_floor  # ratio, speed and centre of pressure mean nothing below this normal force [N]
+FLOOR = RatioSettings().force_floor  # ratio, speed and centre of pressure mean nothing below this normal force [N]
 LAG = 0.1  # the speed is the way of the centre of pressure over this time [s] ...
 SMOOTH = 0.05  # ... between two means over this one [s]
 KEPT = 90.0  # readings of a take that are kept to be looked at, at most [s]

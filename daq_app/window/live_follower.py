@@ -15,7 +15,8 @@ import numpy as np
 from daq_app.window.live_model import Forces, Kinematics, Picture, Provisional, Settle, Settled, Use
 from sessions.plan.plan import SessionPlan
 from sessions.prediction import DEFAULT_SPEED, SLIDES, PredictionOptions, with_own_finger
-from sessions.strokes import AnalysisSettings, FrictionParameters
+from sessions.strokes import FrictionParameters
+from sessions.strokes.settings import RatioSettings
 from solver import Friction, Loading, Scene, Solve, SolveFailure, solve
 from solver.arrays import Array, Indices
 from solver.equilibrium.finger import FingerModel
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from daq_app.window.live_finite import LiveFinite
 
 TOUCH = 0.05  # less normal force is no touch [N]
-FLOOR = AnalysisSettings().force_floor  # a ratio means nothing below this normal force [N]
+FLOOR = RatioSettings().force_floor  # a ratio means nothing below this normal force [N]
 LEAST_MU = 0.05  # before any was measured [-]
 KEPT = 60.0  # predictions that are kept for the difference to the full solve [s]
 SEEN, SEEN_EVERY = 100, 0.1  # states that are kept for a stroke whose full solve fails, and the time between them [s]

@@ -9,7 +9,7 @@ from pathlib import Path
 from daq_app.recorder.messages import Kind, People, StartSession
 from daq_app.window.sentences import sentence
 from sessions.plan.plan import Frame, Hand, Phase
-from sessions.plan.protocols import Body, Protocol, StudyPlace, plan, protocol
+from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, plan, protocol
 from sessions.plan.protocols.protocol import LARGEST_SEED, phases_before
 from sessions.plan.study import StudyError
 from sessions.plan.study_file import enrol, is_study, open_study, study_key
@@ -102,10 +102,12 @@ def checked(
             form.subject.strip(),
             seed,
             forces=form.forces,
-            frame=bench.frame if form.forces else None,
-            contact_area=_number(form.area) if form.forces else None,
-            stroking_hand=form.stroking_hand,
-            answering_hand=form.answering_hand,
+            setting=VisitSetting(
+                bench.frame if form.forces else None,
+                _number(form.area) if form.forces else None,
+                form.stroking_hand,
+                form.answering_hand,
+            ),
             phases=phases if len(phases) > 1 else None,
             body=body,
             place=place,

@@ -22,14 +22,13 @@ from sessions.exchange import ExportSource, Progress
 from sessions.exchange.csv_text import write_rows
 from sessions.exchange.exported import ExportedSession, head_of
 from sessions.exchange.readings_text import MISSING, columns, read_rows, rows
-from sessions.exchange.session_tables import Column, Table, tables
+from sessions.exchange.session_tables import EACH_EVENT, Column, Table, event_columns, tables
 from sessions.file_access import packed_lines, read_limited
 from sessions.json_document import json_object
 from sessions.recording import LoggedEvent, Recording
 from sessions.recording.calibration_uncertainty import GAIN_ERROR, gain_error_content
 from sessions.recording.description import description
 from sessions.recording.event_shapes import event_data
-from sessions.recording.head import json_text
 from sessions.strokes.decisions import DECISIONS, content_of
 
 VERSION = "1.10.0"
@@ -140,22 +139,11 @@ def _participants(recording: Recording, names: _Names) -> Table:
 def _events(recording: Recording) -> Table:
     events = recording.events
     first = events[0].time_ns if events else 0
-    return Table(
-        "events",
-        "a row for each thing that happened, in order",
-        (
-            Column("onset", "", "s from the first event", tuple((e.time_ns - first) * 1e-9 for e in events)),
-            Column("duration", "", "s; n/a: an event is an instant, or its end is an event", (None,) * len(events)),
-            Column(
-                "trial_type", "", "what happened, see Levels of the program's manual", tuple(e.kind for e in events)
-            ),
-            Column("trial", "", "number of the trial it belongs to", tuple(e.trial for e in events)),
-            Column("number", "", "from 1", tuple(e.number for e in events)),
-            Column("time", "ns", "session clock", tuple(e.time_ns for e in events)),
-            Column("readings", "", "how many readings were recorded before it", tuple(e.readings for e in events)),
-            Column("data", "", "what else is known, as JSON", tuple(json_text(dict(e.data)) for e in events)),
-        ),
-    )
+    number, time, trial, readings, data = event_columns(events)
+    onset = Column("onset", "", "s from the first event", tuple((e.time_ns - first) * 1e-9 for e in events))
+    lasts = Column("duration", "", "s; n/a: an event is an instant, or its end is an event", (None,) * len(events))
+    kind = Column("trial_type", "", "what happened, see Levels of the program's manual", tuple(e.kind for e in events))
+    return Table("events", EACH_EVENT, (onset, lasts, kind, trial, number, time, readings, data))
 
 
 def _event(cells: Sequence[str], places: Mapping[str, int]) -> LoggedEvent:

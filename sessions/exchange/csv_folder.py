@@ -11,14 +11,13 @@ from sessions.exchange import ExportSource, Progress
 from sessions.exchange.csv_text import plain, write_rows
 from sessions.exchange.exported import ExportedSession, head_of
 from sessions.exchange.readings_text import columns, read_rows, rows
-from sessions.exchange.session_tables import Column, Table, tables
+from sessions.exchange.session_tables import EACH_EVENT, Column, Table, event_columns, tables
 from sessions.file_access import read_limited
 from sessions.json_document import json_object
 from sessions.recording import LoggedEvent, Recording
 from sessions.recording.calibration_uncertainty import GAIN_ERROR, gain_error_content
 from sessions.recording.description import description
 from sessions.recording.event_shapes import event_data
-from sessions.recording.head import json_text
 from sessions.recording.schema import DESCRIPTION_FILE
 from sessions.strokes.decisions import DECISIONS, content_of
 
@@ -63,18 +62,9 @@ def read(path: Path) -> ExportedSession:
 
 def _events(recording: Recording) -> Table:
     events = recording.events
-    return Table(
-        "events",
-        "a row for each thing that happened, in order",
-        (
-            Column("number", "", "from 1", tuple(e.number for e in events)),
-            Column("time", "ns", "session clock", tuple(e.time_ns for e in events)),
-            Column("kind", "", "what happened, see docs/session-format.md", tuple(e.kind for e in events)),
-            Column("trial", "", "number of the trial it belongs to", tuple(e.trial for e in events)),
-            Column("readings", "", "how many readings were recorded before it", tuple(e.readings for e in events)),
-            Column("data", "", "what else is known, as JSON", tuple(json_text(dict(e.data)) for e in events)),
-        ),
-    )
+    number, time, trial, readings, data = event_columns(events)
+    kind = Column("kind", "", "what happened, see docs/session-format.md", tuple(e.kind for e in events))
+    return Table("events", EACH_EVENT, (number, time, kind, trial, readings, data))
 
 
 def _event(row: dict[str, str]) -> LoggedEvent:

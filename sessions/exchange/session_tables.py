@@ -17,7 +17,8 @@ from sessions.exchange.column_meanings import (
     STROKE,
 )
 from sessions.exchange.given_and_made import given, made_with
-from sessions.recording import Recording
+from sessions.recording import LoggedEvent, Recording
+from sessions.recording.head import json_text
 from sessions.recording.log import ANSWERS, OUTCOMES
 from sessions.strokes.bootstrap import NUMBERS
 
@@ -38,6 +39,8 @@ _PAIRS = {
     "matching_depth_interval": ("low", "high"),
     "mu_dynamic_interval": ("low", "high"),
 } | {f"{name}_bootstrap": ("low", "high") for name in NUMBERS}
+
+EACH_EVENT = "a row for each thing that happened, in order"
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,6 +163,17 @@ def trials(recording: Recording) -> Table:
                 for i, (axis, unit) in enumerate(AXES)
             ),
         ),
+    )
+
+
+def event_columns(events: Sequence[LoggedEvent]) -> tuple[Column, Column, Column, Column, Column]:
+    """Return number, time, trial, readings and data of each event."""
+    return (
+        Column("number", "", "from 1", tuple(e.number for e in events)),
+        Column("time", "ns", "session clock", tuple(e.time_ns for e in events)),
+        Column("trial", "", "number of the trial it belongs to", tuple(e.trial for e in events)),
+        Column("readings", "", "how many readings were recorded before it", tuple(e.readings for e in events)),
+        Column("data", "", "what else is known, as JSON", tuple(json_text(dict(e.data)) for e in events)),
     )
 
 

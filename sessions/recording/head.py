@@ -95,6 +95,9 @@ def json_text(value: object) -> str:
     return json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
 
 
+_IDENTITY = ("uri", "driver", "model", "serial", "simulated")
+
+
 def plan_to_dict(plan: SessionPlan) -> dict[str, Any]:
     """Return the plan as plain data."""
     return msgspec.to_builtins(plan)
@@ -105,16 +108,16 @@ def plan_from_dict(data: Mapping[str, Any]) -> SessionPlan:
     return converted(data, SessionPlan)
 
 
+def identity(info: TransducerInfo) -> dict[str, Any]:
+    """Return what tells a transducer from others, and its rate [Hz]; null where that is unknown."""
+    return {name: getattr(info, name) for name in _IDENTITY} | {"rate": _known(info.rate)}
+
+
 def info_to_dict(info: TransducerInfo) -> dict[str, Any]:
     """Return the transducer as plain data; null where a number is unknown (nan)."""
     calibration = info.calibration
     return {
-        "uri": info.uri,
-        "driver": info.driver,
-        "model": info.model,
-        "serial": info.serial,
-        "simulated": info.simulated,
-        "rate": _known(info.rate),
+        **identity(info),
         "counter_rate": _known(info.counter_rate),
         "settings": dict(info.settings),
         "harmless": info.status.harmless,
@@ -152,11 +155,7 @@ def info_from_dict(data: Mapping[str, Any]) -> TransducerInfo:
     if calibration_hash(calibration) != told.sha256:
         raise ValueError("the calibration matrix is not the one its SHA-256 was taken of")
     return TransducerInfo(
-        uri=info.uri,
-        driver=info.driver,
-        model=info.model,
-        serial=info.serial,
-        simulated=info.simulated,
+        **{name: getattr(info, name) for name in _IDENTITY},
         rate=_number(info.rate),
         counter_rate=_number(info.counter_rate),
         calibration=calibration,

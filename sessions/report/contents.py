@@ -1,13 +1,23 @@
 """What a report holds: plain data, ready for any export. Null numbers carry their reason."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
+from typing import TYPE_CHECKING, Any
 
 from sessions.prediction.sed_interval import Ends, SedInterval
 from sessions.prediction.variants import Alternative
 from sessions.statistics.multiverse import PathFinding
 from sessions.statistics.scores import MeanScore, Relation
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
 Numbers = tuple[float, ...]
+
+
+def same_fields(source: "DataclassInstance", kind: "type[DataclassInstance]") -> dict[str, Any]:
+    """Return what a record holds in the fields that another kind of record has too, by name."""
+    names = {field.name for field in fields(kind)}
+    return {field.name: getattr(source, field.name) for field in fields(source) if field.name in names}
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing, parameters
 from sessions.prediction.model_facts import model_facts
-from sessions.report.contents import Fact, Field, History, PredictionFinding
+from sessions.report.contents import Fact, Field, History, PredictionFinding, same_fields
 from sessions.strokes.contact_area import AreaLaw
 
 _NUMBER = re.compile(r"\d+(\.\d+)?(e[-+]?\d+)?")
@@ -113,36 +113,15 @@ def finding_of(row: TrialPrediction) -> PredictionFinding:
     for name, other in _FROM_ROW.items():
         if other in reasons:
             reasons.setdefault(name, reasons[other])
-    return PredictionFinding(
-        trial=row.trial,
-        stroke=None if row.stroke is None else row.stroke + 1,
-        experiment=row.block or "",
-        index=None if row.stimulus is None else row.stimulus.index,
-        code="" if row.stimulus is None else row.stimulus.code,
-        mu=row.mu,
-        mu_rule=row.mu_rule,
-        tau_max=row.tau_max,
-        indentation=row.indentation,
-        direction=row.direction,
-        sed=row.sed,
-        error_estimate=row.error_estimate,
-        normal_per_mm=row.normal_per_mm,
-        normal_force=row.normal_force,
-        tangential_force=row.tangential_force,
-        measured_normal=row.measured_normal,
-        measured_tangential=row.measured_tangential,
-        matching_depth=row.matching_depth,
-        opposite_sed=row.opposite_sed,
-        wall_s=row.wall_s,
-        history=None if history is None else History(_numbers(history.time), _numbers(history.sed_ending)),
-        reasons=reasons,
-        alternatives=row.alternatives,
-        opposite_error=row.opposite_error,
-        normal_force_error=row.normal_force_error,
-        tangential_force_error=row.tangential_force_error,
-        matching_depth_error=row.matching_depth_error,
-        matching_depth_interval=row.matching_depth_interval,
-    )
+    told: dict[str, Any] = {
+        "stroke": None if row.stroke is None else row.stroke + 1,
+        "experiment": row.block or "",
+        "index": None if row.stimulus is None else row.stimulus.index,
+        "code": "" if row.stimulus is None else row.stimulus.code,
+        "history": None if history is None else History(_numbers(history.time), _numbers(history.sed_ending)),
+        "reasons": reasons,
+    }
+    return PredictionFinding(**{**same_fields(row, PredictionFinding), **told})
 
 
 def _with_more(finding: PredictionFinding, row: TrialPrediction, firing: Firing | None) -> PredictionFinding:
@@ -152,7 +131,6 @@ def _with_more(finding: PredictionFinding, row: TrialPrediction, firing: Firing 
         finding = replace(finding, sed_interval=(interval.low, interval.high), interval_by=interval.method or "")
     elif interval is not None:
         finding = replace(finding, reasons={**finding.reasons, "sed_interval": interval.reason})
-    finding = replace(finding, opposite_interval=row.opposite_interval)
     if interval is not None:
         forces = interval.normal_force, interval.tangential_force
         finding = replace(finding, normal_force_interval=forces[0], tangential_force_interval=forces[1])

@@ -1,12 +1,13 @@
 """What the analysis found, as findings: strokes with their courses, flaws, forces over the whole recording."""
 
 import itertools
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sessions.recording.reader import Recording
-from sessions.report.contents import Course, Fact, StrokeFinding, Trace
+from sessions.report.contents import Course, Fact, StrokeFinding, Trace, same_fields
 from sessions.strokes.analysis import Analysis
 from sessions.strokes.bootstrap import NUMBERS, drawn_from, stroke_intervals
 from sessions.strokes.flaws import Flaw
@@ -26,38 +27,20 @@ def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ..
     for position, stroke in enumerate(analysis.strokes):
         trial = None if stroke.trial is None else planned.get(stroke.trial)
         intervals = stroke_intervals(stroke, position, drawn_from(analysis.settings))
-        found.append(
-            StrokeFinding(
-                number=position + 1,
-                trial=stroke.trial,
-                experiment="" if trial is None else trial.block,
-                index=None if trial is None else trial.stimulus.index,
-                code="" if trial is None else trial.stimulus.code,
-                onset=stroke.onset,
-                lift=stroke.lift,
-                steady=stroke.steady,
-                direction=stroke.direction,
-                speed=stroke.speed,
-                speed_error=stroke.speed_error,
-                mu_static=stroke.mu_static,
-                mu_dynamic=stroke.mu_dynamic,
-                mu_interval=stroke.mu_dynamic_interval,
-                mu_max=stroke.mu_max,
-                tau_max=stroke.tau_max,
-                normal_force=stroke.normal_force,
-                tangential_force=stroke.tangential_force,
-                flaws=stroke.flaws,
-                reasons=_reasons(stroke, position, analysis.flaws),
-                trace=_trace(stroke),
-                bootstrap={name: ends for name in NUMBERS if (ends := getattr(intervals, name)) is not None},
-                break_away=stroke.break_away,
-                slide_onset=stroke.slide_onset,
-                heading=stroke.heading,
-                direction_agrees=intervals.direction_agrees,
-                within=stroke.number,
-                decided=dict(stroke.decided),
-            )
-        )
+        told: dict[str, Any] = {
+            "number": position + 1,
+            "experiment": "" if trial is None else trial.block,
+            "index": None if trial is None else trial.stimulus.index,
+            "code": "" if trial is None else trial.stimulus.code,
+            "mu_interval": stroke.mu_dynamic_interval,
+            "reasons": _reasons(stroke, position, analysis.flaws),
+            "trace": _trace(stroke),
+            "bootstrap": {name: ends for name in NUMBERS if (ends := getattr(intervals, name)) is not None},
+            "direction_agrees": intervals.direction_agrees,
+            "within": stroke.number,
+            "decided": dict(stroke.decided),
+        }
+        found.append(StrokeFinding(**{**same_fields(stroke, StrokeFinding), **told}))
     return tuple(found)
 
 

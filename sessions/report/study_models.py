@@ -2,21 +2,20 @@
 
 from collections import defaultdict
 
-from sessions.report.study_cells import between, p_value, study_table
-from sessions.report.tables.cells import Cell, Table
-from sessions.report.wording import NONE, digits, plural, significant
+from sessions.report.tables.cells import Cell, Group, Row, Table, range_cell, table
+from sessions.report.wording import NONE, digits, p_value, plural, significant, three_figures
 from sessions.statistics.mixed_model import INTERCEPT, MixedModel
 from sessions.statistics.pooling.findings import LEVELS, NOISE, SED, UNITS, StudyFindings
 
 
-def models_table(study: StudyFindings) -> Table:
+def models_table(study: StudyFindings) -> Table | None:
     """Return the mixed models of scores on SED and on index, with how far subjects differ."""
     models = [
         (f"{one.descriptor}: score on {what}", model)
         for one in study.descriptors
         for what, model in (("SED", one.on_sed), ("index", one.on_index), ("index and µ", one.on_friction))
     ]
-    groups = [(f"{name}, {_fitted(model)}", _terms(model)) for name, model in models if not isinstance(model, str)]
+    groups = [Group(f"{name}, {_fitted(model)}", _terms(model)) for name, model in models if not isinstance(model, str)]
     caption = (
         "Mixed models of the score, fitted by restricted maximum likelihood: level and first slope differ between "
         "subjects; drift is the slope on the trials before in the block, carry-over that on the index stroked before. "
@@ -28,7 +27,7 @@ def models_table(study: StudyFindings) -> Table:
         "1990), of single scores by chi squared. A singular fit "
         "finds that subjects differ in fewer ways than it allows."
     )
-    return study_table("table-models", caption, ("term", "unit", "estimate", "95 % interval", "p"), groups)
+    return table("table-models", caption, "term | unit | estimate | 95 % interval | p", groups)
 
 
 def missing_models(study: StudyFindings) -> list[str]:
@@ -79,13 +78,13 @@ def _fitted(model: MixedModel) -> str:
     return f"{model.n} scores of {plural(model.subjects, 'subject')}{singular}"
 
 
-def _terms(model: MixedModel) -> tuple[tuple[Cell, ...], ...]:
+def _terms(model: MixedModel) -> tuple[Row, ...]:
     first = model.terms[1].name
     middle = f"{digits(model.middle, 3)} kPa" if first == SED else f"index {digits(50 + model.middle, 1)}"
 
-    def row(name: str, unit: str, estimate: float, low: float, high: float, p: float | None) -> tuple[Cell, ...]:
+    def row(name: str, unit: str, estimate: float, low: float, high: float, p: float | None) -> Row:
         told = NONE if p is None else p_value(p)
-        return Cell(name), Cell(unit), Cell(significant(estimate, 3)), Cell(between(low, high)), Cell(told)
+        return Cell(name), Cell(unit), Cell(significant(estimate, 3)), range_cell(low, high, three_figures), Cell(told)
 
     rows = [
         row(
@@ -108,7 +107,7 @@ def _terms(model: MixedModel) -> tuple[tuple[Cell, ...], ...]:
     return tuple(rows)
 
 
-def planted_table(study: StudyFindings) -> Table:
+def planted_table(study: StudyFindings) -> Table | None:
     """Return what was planted in a simulated study beside what was found."""
     rows = tuple(
         (
@@ -117,12 +116,12 @@ def planted_table(study: StudyFindings) -> Table:
             Cell(UNITS[one.effect]),
             Cell(significant(one.planted, 3)),
             Cell(significant(one.found, 3)),
-            Cell(between(one.low, one.high)),
+            range_cell(one.low, one.high, three_figures),
             Cell("yes" if one.covered else "no"),
         )
         for one in study.effects
     )
-    columns = ("descriptor", "effect", "unit", "planted", "found", "95 % interval", "inside")
+    columns = "descriptor | effect | unit | planted | found | 95 % interval | inside"
     caption = (
         "What was planted and what was found. Slopes of the score, spreads of levels and slopes, and noise, which are "
         "standard deviations: by the mixed model on index and µ, both of which the simulated people judged by. "
@@ -131,11 +130,11 @@ def planted_table(study: StudyFindings) -> Table:
         "friction (the noise of judgement is added by its variance). Every interval is for other people on these "
         "surfaces; one in twenty misses."
     )
-    return study_table("table-planted", caption, columns, [("", rows)])
+    return table("table-planted", caption, columns, [Group("", rows)])
 
 
-def flaws_table(study: StudyFindings) -> Table:
+def flaws_table(study: StudyFindings) -> Table | None:
     """Return what was spoilt in a simulated study, and whether it was found."""
     rows = tuple((Cell(one.session), Cell(one.expected), Cell("yes" if one.found else "no")) for one in study.flaws)
     caption = "What was spoilt in the simulated sessions, and whether the analysis, which does not know of it, says so."
-    return study_table("table-planted-flaws", caption, ("session", "planted", "found"), [("", rows)])
+    return table("table-planted-flaws", caption, "session | planted | found", [Group("", rows)])

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterable
 
 from sessions.prediction.sed_interval import Ends
-from sessions.report.study_cells import model_in_short
-from sessions.report.tables.cells import Cell, Column, Group, Notes, Table
+from sessions.report.predictions import model_in_short
+from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, table
 from sessions.report.wording import places, sed, significant, tau
 from sessions.statistics.pooling.exclusions import decided
 from sessions.statistics.pooling.findings import StudyFindings
@@ -20,16 +20,8 @@ def trials_table(study: StudyFindings) -> Table | None:
         return None
     notes = Notes()
     columns = (
-        Column("trial"),
-        Column("index"),
-        Column("score", "0–100"),
-        Column("µ", "1"),
-        Column("τ max", "kPa"),
-        Column("N", "N"),
-        Column("speed", "mm/s"),
-        Column("SED", "kPa"),
-        Column("estimated error", "%"),
-        Column("flaws"),
+        "trial | index | score [0–100] | µ [1] | τ max [kPa] | N [N] | speed [mm/s] | SED [kPa] | "
+        "estimated error [%] | flaws"
     )
     groups = tuple(
         Group(
@@ -41,14 +33,15 @@ def trials_table(study: StudyFindings) -> Table | None:
     )
     known = dict.fromkeys(visit.calibration for visit in study.visits if visit.calibration)
     calibrations = f" (calibration: {'; '.join(known)})" if known else ""
+    model = model_in_short(study.options.prediction, study.options.area)
     caption = (
         "Every trial, from which all numbers above come. µ: what the model got; τ max, normal force N and speed of the "
         f"stroke, each over its 95 % interval by block bootstrap{calibrations}. SED: at "
-        f"{model_in_short(study)}, over what the uncertainty of friction makes of it; error: that estimated from its "
+        f"{model}, over what the uncertainty of friction makes of it; error: that estimated from its "
         "mesh. A dash says why. Means, correlations and models above take each number as it "
         "stands: their own intervals come from how subjects and trials differ, which holds these errors too."
     )
-    return Table("table-trials", caption, columns, groups, notes.listed())
+    return table("table-trials", caption, columns, groups, notes)
 
 
 def _left_out(study: StudyFindings, visit: Visit, descriptor: str) -> str:
@@ -57,13 +50,13 @@ def _left_out(study: StudyFindings, visit: Visit, descriptor: str) -> str:
     return "" if decided(study.excluded, visit.subject, descriptor) is None else " (left out of every number above)"
 
 
-def _rows(visit: Visit, descriptor: str, notes: Notes) -> Iterable[tuple[Cell, ...]]:
+def _rows(visit: Visit, descriptor: str, notes: Notes) -> Iterable[Row]:
     for row in visit.rows:
         if row.descriptor == descriptor:
             yield _row(row, notes)
 
 
-def _row(row: TrialRow, notes: Notes) -> tuple[Cell, ...]:
+def _row(row: TrialRow, notes: Notes) -> Row:
     given = row.score if row.score is not None else row.estimate
     why = row.why or "withheld: the flaws say why"
 

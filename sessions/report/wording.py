@@ -127,3 +127,17 @@ def identifier(name: str) -> str:
     'relation_20_a_22_b'
     """
     return re.sub(r"[^A-Za-z0-9-]", lambda found: f"_{ord(found[0]):x}_", name)
+
+
+def p_value(p: float) -> str:
+    """Return a p value as people write it.
+
+    >>> p_value(0.0321), p_value(1e-9)
+    ('0.032', '< 0.001')
+    """
+    return "< 0.001" if p < 0.001 else digits(p, 3)
+
+
+def three_figures(value: float) -> str:
+    """Return a number with three significant figures."""
+    return significant(value, 3)

@@ -166,30 +166,25 @@ class _RecordedClock:
         """Pass no time: the steps do."""
 
 
+@dataclass(eq=False)
 class _Player:
-    """Transducer, experimenter and subject of a part of a recording. One look of the runner is one step of the log."""
+    """Transducer, experimenter and subject of a part of a recording. One look of the runner is one step of the log.
 
-    def __init__(
-        self,
-        info: TransducerInfo | None,
-        log: Sequence[LoggedEvent],
-        readings: RecordedReadings,
-        limit: int | None,
-        clock: _RecordedClock,
-        settings: RunnerSettings,
-        speed: float | None,
-        progress: Progress,
-    ) -> None:
-        """Play the part whose log is `log`, its readings from where `readings` stands up to number `limit`."""
-        self._steps = steps(log)
-        self._clock = clock
-        self._settings = settings
-        self._readings = readings
-        self._limit = limit
-        self._info = info
-        self._speed = speed
-        self._progress = progress
-        self._first_ns = log[0].time_ns if log else 0
+    It plays the part whose log is `log`, its readings from where `readings` stands up to number `limit`.
+    """
+
+    transducer: TransducerInfo | None
+    log: Sequence[LoggedEvent]
+    readings: RecordedReadings
+    limit: int | None
+    clock: _RecordedClock
+    settings: RunnerSettings
+    speed: float | None  # of the recording's time; None: as fast as it goes
+    progress: Progress
+
+    def __post_init__(self) -> None:
+        self._steps = steps(self.log)
+        self._first_ns = self.log[0].time_ns if self.log else 0
         self._began = time.monotonic()
         self._next = 0
         self._step: Step | None = None  # None while waiting for the next
@@ -213,7 +208,7 @@ class _Player:
             return None
         self._step = step
         self._next += 1
-        self._progress(self._next / len(self._steps), "replaying")
+        self.progress(self._next / len(self._steps), "replaying")
         match step.end:
             case None | {"cause": "device" | "program"}:
                 return None
@@ -235,22 +230,22 @@ class _Player:
         if step.end is not None and step.end.get("cause") == "program":
             name, _, message = str(step.end.get("reason", "")).partition(": ")
             raise type(name, (_Again,), {})(message)
-        self._clock.move(step.instant_ns)
+        self.clock.move(step.instant_ns)
         return () if step.act is None else (step.act,)
 
     # ---- as a transducer
 
     @property
     def info(self) -> TransducerInfo:
-        if self._info is None:
+        if self.transducer is None:
             raise AssertionError("a visit without a transducer has none to ask")
-        return self._info
+        return self.transducer
 
     @property
     def health(self) -> Health:
         if self._health is not None:
             return self._health
-        return replace(health_of(self._reported), received=self._readings.position)
+        return replace(health_of(self._reported), received=self.readings.position)
 
     def start(self) -> None:
         """Begin."""
@@ -259,19 +254,19 @@ class _Player:
         """Return the readings of this step; once stopped, all that are left."""
         step = self._step
         if self._stopped:
-            return self._readings.up_to(self._limit)
+            return self.readings.up_to(self.limit)
         if step is None:
             return ReadingBlock.empty()
         if step.end is not None and step.end.get("cause") == "device":
             raise LinkLost(str(step.end.get("reason", "")))
         if step.losses is not None:
             self._reported.append(step.losses)
-            self._move_past("losses", step, self._settings.losses_every)
+            self._move_past("losses", step, self.settings.losses_every)
         elif step.told:
-            self._move_past("told", step, self._settings.zero_patience)
+            self._move_past("told", step, self.settings.zero_patience)
         elif step.act is None:
-            self._clock.move(step.instant_ns)
-        return self._readings.up_to(step.readings)
+            self.clock.move(step.instant_ns)
+        return self.readings.up_to(step.readings)
 
     def stop(self) -> None:
         """End: the health at the end is known where the recording has one."""
@@ -285,9 +280,9 @@ class _Player:
 
     def _waiting(self, step: Step) -> bool:
         """Wait a little for a step whose time has not come, and say so."""
-        if self._speed is None:
+        if self.speed is None:
             return False
-        due = self._began + (step.instant_ns - self._first_ns) * 1e-9 / self._speed
+        due = self._began + (step.instant_ns - self._first_ns) * 1e-9 / self.speed
         left = due - time.monotonic()
         if left > 0.0:
             time.sleep(min(left, SLICE))
@@ -297,8 +292,8 @@ class _Player:
         """Go on to the step, and so far that the runner, which tells such things now and then, tells it once more."""
         last_ns = self._said_ns.get(what)
         instant = step.instant_ns if last_ns is None else max(step.instant_ns, last_ns + round(every * 1e9))
-        self._clock.move(instant)
-        self._said_ns[what] = self._clock.now_ns()
+        self.clock.move(instant)
+        self._said_ns[what] = self.clock.now_ns()
 
 
 def recorded_settings(log: Sequence[LoggedEvent]) -> RunnerSettings:
@@ -324,24 +319,16 @@ def _run(
             def shown(part: float, what: str, number: int = number) -> None:
                 progress((number + part) / len(logs), what)
 
-            settings = recorded_settings(log)
-            player = _Player(recording.info, log, readings, limit, clock, settings, speed, shown)
+            player = _Player(recording.info, log, readings, limit, clock, recorded_settings(log), speed, shown)
             resumed = None if number == 0 else _resumed(recording.plan, writer.made, log)
             writer.follow_part(log)
-            _run_part(recording.plan, player, writer, clock, settings, resumed)
+            _run_part(recording.plan, player, writer, resumed)
     finally:
         writer.finish()
 
 
-def _run_part(
-    plan: SessionPlan,
-    player: _Player,
-    writer: _Rewriter,
-    clock: _RecordedClock,
-    settings: RunnerSettings,
-    resumed: Resumed | None,
-) -> None:
-    transducer = player if plan.forces else None
+def _run_part(plan: SessionPlan, player: _Player, writer: _Rewriter, resumed: Resumed | None) -> None:
+    transducer, clock, settings = player if plan.forces else None, player.clock, player.settings
     with suppress(_CutShort, _Again):  # as the part ends
         end = run_session(
             plan, writer, player, transducer, clock, settings=settings, resumed=resumed, stop=player.go_on

@@ -116,35 +116,27 @@ def run_session(
         return run.to_the_end(interrupted, stop)
 
 
+@dataclass(eq=False)
 class _Run:
     """The one thing that changes while a session runs."""
 
-    def __init__(
-        self,
-        plan: SessionPlan,
-        writer: SessionWriter,
-        operator: Operator,
-        transducer: Transducer | None,
-        clock: Clock,
-        detector: Callable[[DetectorSettings], Detector],
-        settings: RunnerSettings,
-        progress: Callable[[Status], None],
-    ) -> None:
-        self._plan = plan
-        self._writer = writer
-        self._operator = operator
-        self._transducer = transducer
-        self._clock = clock
-        self._detector = detector
-        self._settings = settings
-        self._progress = progress
-        self._state, self._first_commands = start(plan)
+    plan: SessionPlan
+    writer: SessionWriter
+    operator: Operator
+    transducer: Transducer | None
+    clock: Clock
+    detector: Callable[[DetectorSettings], Detector]
+    settings: RunnerSettings
+    progress: Callable[[Status], None]
+
+    def __post_init__(self) -> None:
+        self._state, self._first_commands = start(self.plan)
         self._watch: TakeWatch | None = None
-        self._readings = writer.acknowledged.readings
+        self._readings = self.writer.acknowledged.readings
         self._resumed: Resumed | None = None
         self._seam: Seam | None = None
         self._reported = Health()
-        self._due_ns: dict[str, int] = dict.fromkeys(("losses", "status", "zero"), clock.now_ns())
+        self._due_ns: dict[str, int] = dict.fromkeys(("losses", "status", "zero"), self.clock.now_ns())
         self._rested_ns: int | None = None  # when the rest is over [session clock]
 
     def go_on(self, resumed: Resumed) -> None:
@@ -156,18 +148,18 @@ class _Run:
         """Run, and write the end whatever it was."""
         try:
             self._write_beginning()
-            if self._transducer is not None:
+            if self.transducer is not None:
                 with interrupted.raised():  # a device that does not answer may take its time
-                    self._transducer.start()
+                    self.transducer.start()
             cause, reason = self._go_round(lambda: ("stopped", STOPPED) if interrupted.heard else stop())
         except (LinkLost, DeviceFault) as error:
             cause, reason = "device", str(error)
         except KeyboardInterrupt:
             cause, reason = "stopped", STOPPED
         except RecordingError:
-            if self._transducer is not None:
-                self._transducer.stop()
-            self._writer.close()
+            if self.transducer is not None:
+                self.transducer.stop()
+            self.writer.close()
             raise
         except BaseException as error:
             self._end("program", f"{type(error).__name__}: {error}")
@@ -176,43 +168,43 @@ class _Run:
 
     def _write_beginning(self) -> None:
         """Write down how the session is run; of one that goes on also the gap, and the take that was open."""
-        settings = {"settings": _with_origin(self._settings)}
+        settings = {"settings": _with_origin(self.settings)}
         if self._resumed is None:
-            self._writer.event("started", data=settings)
+            self.writer.event("started", data=settings)
             return
         for line in self._resumed.at.owed:
-            self._writer.event(*line, commit=False)
-        self._writer.event("resumed", data={**self._resumed.data, "run": settings["settings"]})
+            self.writer.event(*line, commit=False)
+        self.writer.event("resumed", data={**self._resumed.data, "run": settings["settings"]})
 
     def _go_round(self, stop: Callable[[], Ending | None]) -> Ending:
         """Look at transducer and operator again and again, until there is a reason to end."""
         self._carry_out(self._first_commands)
         while True:
-            began_ns = self._clock.now_ns()
+            began_ns = self.clock.now_ns()
             if (ending := stop()) is not None:
                 return ending
-            if self._writer.must_end is not None:
-                return "disk", self._writer.must_end
+            if self.writer.must_end is not None:
+                return "disk", self.writer.must_end
             self._listen()
             if isinstance(self._state, Resting) and self._rest_is_over():
                 self._take(RestOver())
-            for event in self._operator.poll():
+            for event in self.operator.poll():
                 self._take(event)
             if isinstance(self._state, Ended):
                 return ("finished" if self._state.complete else "aborted"), self._state.reason
             self._tell_status()
-            self._clock.sleep(max(self._settings.tick - (self._clock.now_ns() - began_ns) * 1e-9, 0.0))
+            self.clock.sleep(max(self.settings.tick - (self.clock.now_ns() - began_ns) * 1e-9, 0.0))
 
     def _listen(self) -> None:
         """Record what the transducer gives, and let the machine know what it tells."""
-        if self._transducer is None:
+        if self.transducer is None:
             return
-        block = self._going_on(self._transducer.read(self._settings.tick))
+        block = self._going_on(self.transducer.read(self.settings.tick))
         self._keep(block)
         if self._watch is not None:
             for event in self._watch.feed(block):
                 self._take(event)
-        if isinstance(self._state, Taring) and self._due("zero", self._settings.zero_patience):
+        if isinstance(self._state, Taring) and self._due("zero", self.settings.zero_patience):
             self._show(Tell("the zero cannot be measured while something moves or touches; take hands off"))
         self._report_losses()
 
@@ -222,11 +214,11 @@ class _Run:
             return block
         if self._seam is None:
             self._seam = self._resumed.joins(self._resumed.last, block)
-            self._writer.event("readings_joined", data=asdict(self._seam), commit=False)
+            self.writer.event("readings_joined", data=asdict(self._seam), commit=False)
         return self._seam.joined(block)
 
     def _keep(self, block: ReadingBlock) -> None:
-        self._writer.readings(block)
+        self.writer.readings(block)
         self._readings += len(block)
 
     def _take(self, event: Event) -> None:
@@ -236,10 +228,10 @@ class _Run:
         refusals = [command for command in commands if isinstance(command, Refuse)]
         if refusals:
             data = {"event": kind_of(event), "sentence": refusals[0].sentence, "given": data_of(event)}
-            self._writer.event("refused", trial_in_hand(before), data)
-            self._operator.show(refusals[0])
+            self.writer.event("refused", trial_in_hand(before), data)
+            self.operator.show(refusals[0])
             return
-        logged = self._writer.event(kind_of(event), trial_in_hand(before), data_of(event), commit=False)
+        logged = self.writer.event(kind_of(event), trial_in_hand(before), data_of(event), commit=False)
         self._begin_rest(commands, logged.time_ns)
         if not isinstance(self._state, Taring | Ready | Stroking | Scoring | Settling):
             self._watch = None
@@ -252,46 +244,46 @@ class _Run:
                 self._rested_ns = None if command.duration is None else at_ns + round(command.duration * 1e9)
 
     def _rest_is_over(self) -> bool:
-        return self._rested_ns is not None and self._clock.now_ns() >= self._rested_ns
+        return self._rested_ns is not None and self.clock.now_ns() >= self._rested_ns
 
     def _carry_out(self, commands: Sequence[Command]) -> None:
         """Write commands down, make that safe, and only then let anybody see them."""
         for command in commands:
             if (line := line_of(command)) is not None:
-                self._writer.event(*line, commit=False)
-        self._writer.commit()
+                self.writer.event(*line, commit=False)
+        self.writer.commit()
         for command in commands:
             if isinstance(command, MeasureZero):
                 self._begin_watch()
-            self._operator.show(command)
-        self._due_ns["status"] = self._clock.now_ns()
+            self.operator.show(command)
+        self._due_ns["status"] = self.clock.now_ns()
 
     def _begin_watch(self) -> None:
-        transducer = self._transducer
+        transducer = self.transducer
         if transducer is None:
             raise AssertionError("a zero is measured only where there is a transducer")
-        settings = self._settings
+        settings = self.settings
         self._watch = TakeWatch(
             transducer.info,
-            self._plan.frame,
+            self.plan.frame,
             settings.zero_duration,
             settings.detection,
-            self._detector,
+            self.detector,
             settings.after_lift,
         )
-        self._due_ns["zero"] = self._clock.now_ns() + round(settings.zero_patience * 1e9)
+        self._due_ns["zero"] = self.clock.now_ns() + round(settings.zero_patience * 1e9)
 
     def _show(self, command: Tell) -> None:
-        self._writer.event("told", trial_in_hand(self._state), {"sentence": command.sentence})
-        self._operator.show(command)
+        self.writer.event("told", trial_in_hand(self._state), {"sentence": command.sentence})
+        self.operator.show(command)
 
     def _report_losses(self, *, now: bool = False) -> None:
         """Write down what the driver lost, repeated or found wrong since the last report."""
-        if self._transducer is None:
+        if self.transducer is None:
             return
-        health = self._transducer.health
+        health = self.transducer.health
         counts = {name: getattr(health, name) - getattr(self._reported, name) for name in LOSSES}
-        if any(counts.values()) and (now or self._due("losses", self._settings.losses_every)):
+        if any(counts.values()) and (now or self._due("losses", self.settings.losses_every)):
             told = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
             flagged = {words: count - self._reported.flagged.get(words, 0) for words, count in health.flagged.items()}
             flagged = {words: count for words, count in flagged.items() if count}
@@ -300,30 +292,30 @@ class _Run:
             sentence = f"readings: {told}" + (f" ({'; '.join(causes)})" if causes else "")
             data: dict[str, Any] = {**counts, "rate_words": health.rate_words} if counts["off_rate"] else {**counts}
             data |= {"flagged": flagged} if flagged else {}
-            self._writer.event("losses", trial_in_hand(self._state), {**data, "sentence": sentence})
+            self.writer.event("losses", trial_in_hand(self._state), {**data, "sentence": sentence})
             self._reported = health
 
     def _due(self, what: str, every: float) -> bool:
         """Say whether it is time for something, and when it is, set the next time."""
-        now_ns = self._clock.now_ns()
+        now_ns = self.clock.now_ns()
         if now_ns < self._due_ns[what]:
             return False
         self._due_ns[what] = now_ns + round(every * 1e9)
         return True
 
     def _tell_status(self) -> None:
-        if not self._due("status", self._settings.status_every):
+        if not self._due("status", self.settings.status_every):
             return
-        health = self._transducer.health if self._transducer is not None else Health()
-        self._progress(
+        health = self.transducer.health if self.transducer is not None else Health()
+        self.progress(
             Status(
                 type(self._state).__name__.lower(),
                 trial_in_hand(self._state),
-                len(self._plan.trials),
+                len(self.plan.trials),
                 self._readings,
                 health.lost,
                 health.lag_ms,
-                self._writer.acknowledged,
+                self.writer.acknowledged,
             )
         )
 
@@ -334,25 +326,25 @@ class _Run:
             self._state, commands = advance(self._state, Abort(reason))
             for command in commands:
                 if (line := line_of(command)) is not None:
-                    self._writer.event(*line, commit=False)
+                    self.writer.event(*line, commit=False)
         complete = isinstance(self._state, Ended) and self._state.complete
         self._report_losses(now=True)
         end = SessionEnd(reason, cause, complete, self._readings, health)
-        self._writer.event("ended", data=asdict(end))
-        self._writer.close()
+        self.writer.event("ended", data=asdict(end))
+        self.writer.close()
         return end
 
     def _last_readings(self) -> Health:
         """Stop the transducer and take what had still arrived."""
-        if self._transducer is None:
+        if self.transducer is None:
             return Health()
-        self._transducer.stop()
+        self.transducer.stop()
         try:
-            while len(block := self._going_on(self._transducer.read(0.0))):
+            while len(block := self._going_on(self.transducer.read(0.0))):
                 self._keep(block)
         except (LinkLost, DeviceFault):
             pass  # all that had arrived was handed over before it says so
-        return self._transducer.health
+        return self.transducer.health
 
 
 def _with_origin(settings: RunnerSettings) -> dict[str, Any]:

@@ -31,7 +31,7 @@ from sessions.statistics.within_subjects import repeated_correlation
 from sessions.strokes import Analysis, FrictionParameters, analyse
 from sessions.strokes.contact_area import FIXED, HERTZ, AreaLaw
 from sessions.strokes.friction import Rule
-from sessions.strokes.settings import AnalysisSettings, WindowRule
+from sessions.strokes.settings import AnalysisSettings, FilterSettings, SteadySettings, WindowRule
 
 Kinematics = Literal["small", "finite"]
 Seds = tuple[float | None, ...]  # along each of `PATHS`, or only those at small strain [MPa]
@@ -134,10 +134,11 @@ def _analyses(recording: Recording) -> Mapping[tuple[str, str, AreaLaw], Analysi
     """Return the analysis by filter, window and law of the area; with other laws than the first for one window only."""
     first, *others = dict.fromkeys(law for law, _ in AREAS.values())
     asked = [*product(FILTERS, WINDOWS, [first]), *product(FILTERS, list(WINDOWS)[:1], others)]
-    return {
-        (f, w, law): analyse(recording, AnalysisSettings(cut_off=FILTERS[f], steady_rule=WINDOWS[w], area=law))
-        for f, w, law in asked
-    }
+    return {(f, w, law): analyse(recording, _settings(FILTERS[f], WINDOWS[w], law)) for f, w, law in asked}
+
+
+def _settings(cut_off: float, rule: WindowRule, law: AreaLaw) -> AnalysisSettings:
+    return AnalysisSettings(filter=FilterSettings(cut_off=cut_off), steady=SteadySettings(steady_rule=rule), area=law)
 
 
 def _varied(

@@ -9,14 +9,13 @@ import numpy as np
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan, Trial
-from sessions.strokes.contacts import Contact, contacts, split_at_valleys
+from sessions.strokes.contacts import Contact, contacts, split_at_reversals, split_at_valleys
 from sessions.strokes.decisions import OF_SESSION, Decided, Decision, Decisions, read
 from sessions.strokes.flaws import Flaw, FlawName
 from sessions.strokes.friction import FrictionParameters, friction_parameters
 from sessions.strokes.onset import Baseline, onset_threshold
-from sessions.strokes.reversals import split_at_turns
 from sessions.strokes.settings import AnalysisSettings
-from sessions.strokes.signal_quality import soundness
+from sessions.strokes.signal_quality import signal_quality
 from sessions.strokes.span import Span, ZeroInForce, recorded_zero, span_of, zero_for
 from sessions.strokes.stroke import Stroke
 from sessions.strokes.stroke_measures import measured
@@ -28,8 +27,6 @@ if TYPE_CHECKING:  # the runner imports the detector from here: it must not pay 
 ZERO_SETTING = "zero"  # of `TransducerInfo.settings`: who says that the recording's own zero is true
 ZERO_STATED = "as recorded, stated to be true"
 RAW_WRENCH = "N, N mm"  # raw unit of readings that came as a wrench
-
-_BESIDE = 2.5  # readings: a contact so near to unsound ones may go on in them
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +58,7 @@ class Analysis:
             "tilt": None if self.tilt is None else self.tilt.to_dict(),
             "filter": self.filtered,
             "interval": self.settings.interval_kind,
-            "settings": asdict(self.settings),
+            "settings": self.settings.to_dict(),
             "settings_origin": "default" if self.settings == AnalysisSettings() else "set",
         }
 
@@ -187,7 +184,7 @@ def _of_part(
     if len(block) < settings.detector.baseline_readings:
         sentence = f"Only {len(block)} readings: too few for a stroke."
         return _Part((), (Flaw(FlawName.NO_STROKE, sentence, "refused"),), "")
-    sound = soundness(block, info, settings)
+    sound = signal_quality(block, info, settings)
     flaws = [Flaw(name, sentence, grade) for name, sentence, grade in sound.flaws]
     if sound.refused:
         return _Part((), tuple(flaws), "")
@@ -215,7 +212,7 @@ def _strokes(
     if implausible is not None:
         return (), [implausible], ()
     unknown = general.flaw is FlawName.NO_UNLOADED_STRETCH
-    threshold = settings.light_share * float(np.percentile(normal, 99.9))
+    threshold = settings.contact.light_share * float(np.percentile(normal, 99.9))
     noise = threshold / settings.detector.onset_noise if unknown else float(general.noise[2])
     touching = contacts(span.time, normal, Baseline(0.0, noise), settings)
     smooth = -(span.smooth[:, 2] - general.level[2])
@@ -239,7 +236,7 @@ def _strokes(
     presses: list[Press] = []
     for at, piece in enumerate(kept):
         zero = general if stated else zero_for(span, piece, idle, settings) or recorded_zero(span, stated=False)
-        stroke, more = measured(span, piece, zero, plan.frame, plan.contact_area, settings, trial, at + 1, decided[at])
+        stroke, more = measured(span, piece, zero, plan, settings, trial, at + 1, decided[at])
         flaws += [replace(flaw, stroke=len(strokes)) for flaw in more]
         strokes.append(stroke)
         if stroke.mu_dynamic is None and zero.flaw is not FlawName.NO_UNLOADED_STRETCH:
@@ -253,14 +250,14 @@ def _ways(piece: Contact, span: Span, zero: ZeroInForce | None, settings: Analys
     """Cut a contact where the finger turns, as far as its zero tells that."""
     if zero is None:
         return (piece,)
-    return split_at_turns(piece, span.time, span.smooth - zero.level, zero.unsure[0], settings)
+    return split_at_reversals(piece, span.time, span.smooth - zero.level, zero.unsure[0], settings)
 
 
 def _general_zero(span: Span, info: TransducerInfo, settings: AnalysisSettings, *, stated: bool) -> ZeroInForce | None:
     """Return the zero that contacts are looked for with; None where nothing tells one."""
     if stated:
         return recorded_zero(span, stated=True)
-    first = span.windows.after(-np.inf, settings.zero_stretch)
+    first = span.windows.after(-np.inf, settings.zero.zero_stretch)
     if first is not None:
         return ZeroInForce(first.level, first.noise, first.noise[:3], 0.0, first.error, "", None, (0.0, 0.0), None)
     return recorded_zero(span, stated=False) if info.calibration.raw_unit == RAW_WRENCH else None
@@ -312,15 +309,15 @@ def _worth_measuring(
     """Leave out taps and light touches, and name them."""
     peaks = [float(np.nanmax(smooth[piece.start : piece.stop], initial=0.0)) for piece in pieces]
     greatest = max(peaks, default=0.0)
-    near = _BESIDE / span.rate
+    near = settings.contact.gap_beside / span.rate
     kept: list[Contact] = []
     flaws: list[Flaw] = []
     for piece, peak in zip(pieces, peaks, strict=True):
         start, stop = span.time[piece.start], span.time[piece.stop - 1]
-        if stop - start >= settings.shortest_stroke and peak >= settings.light_share * greatest:
+        if stop - start >= settings.contact.shortest_stroke and peak >= settings.contact.light_share * greatest:
             kept.append(piece)
             continue
-        beside = [gap for gap in span.soundness.gaps if abs(gap.stop - start) < near or abs(gap.start - stop) < near]
+        beside = [gap for gap in span.quality.gaps if abs(gap.stop - start) < near or abs(gap.start - stop) < near]
         if beside:
             sentence = (
                 f"What presses from {start:.2f} to {stop:.2f} s goes on where readings are not sound "
@@ -328,7 +325,7 @@ def _worth_measuring(
             )
             flaws.append(Flaw(beside[0].cause, sentence, "doubtful"))
         else:
-            tapped = stop - start < settings.shortest_stroke
+            tapped = stop - start < settings.contact.shortest_stroke
             what, name = ("tap", FlawName.TAP) if tapped else ("light touch", FlawName.LIGHT_TOUCH)
             sentence = f"A {what} from {start:.2f} to {stop:.2f} s, up to {peak:.2g} N, is no stroke."
             flaws.append(Flaw(name, sentence, "note"))

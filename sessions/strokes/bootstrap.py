@@ -16,14 +16,11 @@ from sessions.strokes.event_uncertainty import break_away_draws, onset_draws, sl
 from sessions.strokes.friction import Rule
 from sessions.strokes.onset import DetectorSettings
 from sessions.strokes.settings import ASSUMED_GAIN_ERROR, AnalysisSettings
-from sessions.strokes.steady import strays
+from sessions.strokes.sliding import strays
 from sessions.strokes.stroke import Interval, Stroke, StrokeCurve
 
 Array = NDArray[np.float64]
 
-_FEWEST_BLOCKS = 4
-_FEWEST_QUIET = 10  # readings before onset from which noise is told
-_BEFORE = 0.02  # from here on before the onset a reading may be the touch's already [s]
 NUMBERS = (  # of a stroke that have an interval
     "mu_static",
     "mu_dynamic",
@@ -40,7 +37,6 @@ NUMBERS = (  # of a stroke that have an interval
     "slide_onset",
 )
 _RANGES = ("onset", "slide_onset")
-_TOP = 0.97  # of the peak: readings above this share of it may be the peak
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +51,10 @@ class BootstrapSettings:
     gain_error: float = ASSUMED_GAIN_ERROR  # standard uncertainty of each axis' gain [-]
     gain_error_origin: str = "assumed"  # nobody stated it for this transducer; "set" where somebody did
     confidence: float = 0.95
+    fewest_blocks: int = 4  # of which a spread is told
+    fewest_quiet: int = 10  # readings before the onset of which noise is told ...
+    quiet_before: float = 0.02  # ... which end so long before it: later ones may be the touch's already [s]
+    top_share: float = 0.97  # readings above this share of the peak may be the peak [-]
 
     @property
     def kind(self) -> str:
@@ -225,7 +225,7 @@ class _Repeats:
 
         Noise has raised the one told about as far as noise drawn once more raises that on average.
         """
-        high = force[force >= _TOP * np.nanmax(force)]
+        high = force[force >= self._settings.top_share * np.nanmax(force)]
         every = max(1, round(self._settings.block / 4 / self._step))  # filtered readings nearer than this are alike
         high = high[::every]
         tops = (high + noise * self._draw.standard_normal((self._settings.repeats, len(high)))).max(axis=1)
@@ -253,7 +253,7 @@ class _Repeats:
         length = max(1, round(settings.block / self._step))
         held = columns[inside]
         count = len(held) // length
-        if count < _FEWEST_BLOCKS:
+        if count < settings.fewest_blocks:
             return None
         blocks = held[: count * length].reshape(count, length, columns.shape[1]).mean(axis=1)
         chosen, weight, kept = self._chosen(count)
@@ -317,9 +317,9 @@ class _Repeats:
         onset, curve = self._stroke.onset, self._curve
         if onset is None or "onset" in self._stroke.decided:
             return {}
-        quiet = curve.felt[curve.time < onset - _BEFORE]
+        quiet = curve.felt[curve.time < onset - self._settings.quiet_before]
         quiet = quiet[np.isfinite(quiet)]
-        if len(quiet) < _FEWEST_QUIET:
+        if len(quiet) < self._settings.fewest_quiet:
             return {}
         noise = float(quiet.std())
         # How large the noise is, and with it the threshold, is told from these readings too.

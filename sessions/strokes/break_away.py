@@ -74,11 +74,11 @@ def break_away(time: Array, ratio: Array, settings: AnalysisSettings, *, peaked:
     """
     held = np.isfinite(ratio)
     t, y = few(time[held]), few(ratio[held])
-    fit = climb(t, y, settings.block, peaked=peaked)
+    fit = climb(t, y, settings.filter.block, peaked=peaked)
     if fit is None:
         return None
-    climbing = fit.rise + fit.peak >= settings.stick_rise * (fit.rest + fit.rise) > 0.0
-    return fit.meets if climbing and _left(fit, t, y) <= settings.stick_left * float(y.var()) else None
+    climbing = fit.rise + fit.peak >= settings.ratio.stick_rise * (fit.rest + fit.rise) > 0.0
+    return fit.meets if climbing and _left(fit, t, y) <= settings.ratio.stick_left * float(y.var()) else None
 
 
 def climb(t: Array, y: Array, block: float, *, peaked: bool) -> Climb | None:

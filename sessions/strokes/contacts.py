@@ -1,7 +1,8 @@
-"""Contacts of a recording, and the strokes in them."""
+"""Contacts of a recording, and the strokes in them: cut at valleys of the force and where the finger turns."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,14 +50,16 @@ def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: Ana
     no force beside a gap that may hide a lift, and no valley elsewhere, as in stretches too short for the filter.
     """
     inside = slice(contact.start, contact.stop)
-    force = np.maximum(_bridged(time[inside], normal[inside], settings.longest_gap), 0.0)
+    force = np.maximum(_bridged(time[inside], normal[inside], settings.contact.longest_gap), 0.0)
     padded = np.concatenate([[0.0], force, [0.0]])
     places, prominences = peaks(padded)
-    standing = places[prominences >= (1.0 - settings.valley) * padded[places]] - 1
-    standing = standing[force[standing] >= settings.light_share * force.max(initial=0.0)]
+    standing = places[prominences >= (1.0 - settings.contact.valley) * padded[places]] - 1
+    standing = standing[force[standing] >= settings.contact.light_share * force.max(initial=0.0)]
     between = [(a, b, int(a + np.argmin(force[a:b]))) for a, b in pairwise(standing)]
     # Peaks of exactly the same height stand out of everything but one another.
-    valleys = [contact.start + at for a, b, at in between if force[at] < settings.valley * min(force[a], force[b])]
+    valleys = [
+        contact.start + at for a, b, at in between if force[at] < settings.contact.valley * min(force[a], force[b])
+    ]
     if not valleys:
         return (contact,)
     bounds = [contact.start, *valleys, contact.stop]
@@ -79,7 +82,7 @@ def _piece(contact: Contact, start: int, stop: int, time: Array, normal: Array, 
     """Return the stroke between two borders; where a border is a valley it is cut back to a share of its peak."""
     valleys = tuple(border for border in (start, stop) if border not in (contact.start, contact.stop))
     force = np.nan_to_num(normal[start:stop])
-    pressed = np.flatnonzero(force >= settings.valley * force.max())
+    pressed = np.flatnonzero(force >= settings.contact.valley * force.max())
     onset, lift = contact.onset, contact.lift
     if start != contact.start:
         start += int(pressed[0])
@@ -88,3 +91,103 @@ def _piece(contact: Contact, start: int, stop: int, time: Array, normal: Array, 
         stop -= len(force) - 1 - int(pressed[-1])
         lift = float(time[stop])
     return Contact(start, stop, onset, lift, valleys)
+
+
+class _Way(NamedTuple):
+    """Readings in which the drag points one way, or turns slowly."""
+
+    first: int
+    last: int
+    push: Array  # sum of the drag over its blocks (2,) [N]
+    blocks: int
+
+    @property
+    def drag(self) -> float:
+        """Its mean [N]."""
+        return float(np.hypot(*self.push)) / self.blocks
+
+
+def split_at_reversals(
+    contact: Contact, time: Array, wrench: Array, unsure: float, settings: AnalysisSettings
+) -> tuple[Contact, ...]:
+    """Return the strokes of a contact, cut where the drag turns to the other side and stays there.
+
+    `wrench` (n, 6) [N, N mm] of all readings at `time` (n,) [s] is zeroed, in the face frame and filtered; its zero may
+    be `unsure` [N] sideways. The drag has turned where it points more than a right angle off the way it had just before
+    (hysteresis: with T/N beyond a share of its median, T beyond twice what the zero leaves open, for about as long as
+    the shortest stroke and a share of the longest way, and no light touch beside the others). A drag that turns slowly,
+    as in circles, is not cut.
+    """
+    part = wrench[contact.start : contact.stop]
+    ways = _ways(part, time[contact.start : contact.stop], unsure, settings)
+    turns = [contact.start + _turn(part, one, other) for one, other in pairwise(ways)]
+    if not turns:
+        return (contact,)
+    bounds = [contact.start, *turns, contact.stop]
+    return tuple(
+        replace(
+            contact,
+            start=start,
+            stop=stop,
+            onset=contact.onset if start == contact.start else float(time[start]),
+            lift=contact.lift if stop == contact.stop else float(time[stop]),
+            turns=tuple(turn for turn in turns if turn in (start, stop)),
+            around=(contact.start, contact.stop),
+        )
+        for start, stop in pairwise(bounds)
+    )
+
+
+def _ways(wrench: Array, time: Array, unsure: float, settings: AnalysisSettings) -> list[_Way]:
+    """Return the ways of the drag in a wrench (n, 6); those that are too short or too weak are left out."""
+    normal = -wrench[:, 2]
+    floor = max(settings.ratio.force_floor, settings.ratio.force_floor_share * float(np.nanmax(normal, initial=0.0)))
+    with np.errstate(invalid="ignore"):
+        held = np.flatnonzero(normal >= floor)
+    if len(held) < 2:
+        return []
+    firsts = np.flatnonzero(np.diff(np.floor((time[held] - time[held[0]]) / settings.contact.turn_block), prepend=-1.0))
+    counts = np.diff(np.append(firsts, len(held)))
+    force, pressed = (np.add.reduceat(column[held], firsts, axis=0).T / counts for column in (wrench[:, :2], normal))
+    drag = np.hypot(*force)
+    if unsure > settings.zero.drift_refused * float(np.median(drag)):  # nothing of the drag will be told
+        return []
+    strong = np.flatnonzero(
+        (drag >= settings.contact.turn_share * float(np.median(drag / pressed)) * pressed)
+        & (drag > settings.contact.turn_unsure * unsure)
+    )
+    lasts = held[np.append(firsts[1:], len(held)) - 1]
+    runs: list[list[int]] = []  # of blocks
+    for block in strong.tolist():
+        if runs and float(force[:, runs[-1][-settings.contact.turn_recent :]].sum(axis=1) @ force[:, block]) >= 0.0:
+            runs[-1].append(block)
+        else:
+            runs.append([block])
+    found = [_Way(int(held[firsts[run[0]]]), int(lasts[run[-1]]), force[:, run].sum(axis=1), len(run)) for run in runs]
+    greatest = max((way.drag for way in found), default=0.0)
+    longest = max((float(time[way.last] - time[way.first]) for way in found), default=0.0)
+    shortest = max(
+        settings.contact.shortest_stroke - settings.contact.turn_block, settings.contact.turn_shortest * longest
+    )
+    ways: list[_Way] = []
+    dropped = False  # since the last way
+    for way in found:
+        if time[way.last] - time[way.first] < shortest or way.drag < settings.contact.light_share * greatest:
+            dropped = True
+        elif ways and dropped and float(ways[-1].push @ way.push) >= 0.0:
+            ways[-1] = _Way(ways[-1].first, way.last, ways[-1].push + way.push, ways[-1].blocks + way.blocks)
+            dropped = False
+        else:
+            ways.append(way)
+            dropped = False
+    return ways
+
+
+def _turn(wrench: Array, one: _Way, other: _Way) -> int:
+    """Return the reading of a wrench (n, 6) from which on the drag points the `other` way."""
+    across = other.push / np.hypot(*other.push) - one.push / np.hypot(*one.push)
+    between = wrench[one.first : other.last + 1, :2] @ across
+    until = between[: other.first - one.first + 1]
+    with np.errstate(invalid="ignore"):
+        before = np.flatnonzero(until < 0.0)
+    return one.first + int(before[-1]) + 1

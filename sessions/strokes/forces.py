@@ -13,7 +13,6 @@ Array = NDArray[np.float64]
 _AXES = {"x": 0, "y": 1, "z": 2}
 # -3 dB of a second-order Butterworth run forwards and backwards lies at its own -3 dB frequency divided by this.
 _TWO_PASSES = (np.sqrt(2.0) - 1.0) ** -0.25
-_SHORTEST_SEGMENT = 12  # readings; fewer have no filtered value
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +20,7 @@ class Filter:
     """A zero-phase low-pass Butterworth filter: second order, forwards and backwards."""
 
     cut_off: float  # -3 dB of both passes together [Hz]
+    shortest_segment: int  # readings; fewer have no filtered value
 
     @property
     def sentence(self) -> str:
@@ -37,7 +37,7 @@ class Filter:
         design = rate / np.pi * np.arctan(_TWO_PASSES * np.tan(np.pi * self.cut_off / rate))
         for segment in segments:
             length = segment.stop - segment.start
-            if length >= _SHORTEST_SEGMENT:
+            if length >= self.shortest_segment:
                 padding = min(length - 1, int(np.ceil(3.0 * rate / self.cut_off)))
                 filtered[segment] = low_passed(values[segment], design, rate, padding)
         return filtered

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+NORMAL_STEP = 1.4826 / sqrt(2)  # standard deviation of white noise over the median absolute step between neighbours
+
 
 @dataclass(frozen=True, slots=True)
 class DetectorSettings:
@@ -190,13 +192,12 @@ def onset_threshold(noise: float, settings: DetectorSettings) -> float:
 def is_quiet(stretch: list[float], settings: DetectorSettings) -> bool:
     """Say whether a stretch of forces [N] spreads no more than noise does.
 
-    Noise is told from the steps between neighbours, which a slow movement hardly changes (median absolute step; for
-    white noise the standard deviation is 1.4826/sqrt(2) times it).
+    Noise is told from the median step between neighbours, which a slow movement hardly changes.
     """
     if len(stretch) < settings.baseline_readings:
         return False
     steps = [abs(b - a) for a, b in pairwise(stretch)]
-    noise = 1.4826 / sqrt(2) * median(steps)
+    noise = NORMAL_STEP * median(steps)
     return _spread(stretch) <= max(settings.quiet_noise * noise, settings.quiet_floor)
 
 

@@ -1,7 +1,10 @@
-"""Every number the analysis was set by; stored and shown with what came out."""
+"""Every number the analysis was set by; stored and shown with what came out.
 
-from dataclasses import dataclass, field
-from typing import Literal
+Where no source stands beside a threshold, its reason does. Names of fields are unique among all groups.
+"""
+
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
 
 from sessions.strokes.contact_area import FIXED, AreaLaw
 from sessions.strokes.onset import DetectorSettings
@@ -12,73 +15,158 @@ WindowRule = Literal["widened", "least variance", "middle half", "whole slide"]
 
 
 @dataclass(frozen=True, slots=True)
-class AnalysisSettings:
-    """How strokes are found and measured."""
+class SignalSettings:
+    """Which readings cannot be used."""
 
-    detector: DetectorSettings = field(default_factory=DetectorSettings)
+    missing_step: float = 1.8  # a step so many times the usual lacks a reading: two steps, less a tenth of jitter [-]
+    uneven: float = 0.05  # spread of the time steps that makes the rate irregular [-]
+    frozen_shortest: float = 0.05  # as long as this the same six numbers mean a frozen sensor [s] ...
+    frozen_readings: int = 8  # ... and in so many readings
+    frozen_refused: float = 0.5  # share of frozen readings from which on nothing is analysed [-]
+    frozen_off: float = 0.1  # frozen to the end: so far from every rest before, as a share of an axis' range [-]
+    coarse_steps: float = 3.0  # coarse: half an axis' changes are no more than so many of its least steps [-]
+    coarse_jump: float = 2.0  # a jump of coarse steps: so many times the change that an axis seldom exceeds [-]
+    flat_top: float = 0.02  # an axis so long at its own greatest or least value is clipped [s] ...
+    flat_readings: int = 4  # ... in so many readings ...
+    flat_jump: float = 3.5  # ... that it enters or leaves by so many least steps: a slow turn does neither [-] ...
+    flat_around: float = 0.15  # ... while others move over so long: where nothing presses they only make noise [s] ...
+    flat_moves: float = 3.0  # ... by a spread so many times their noise [-]
+    long_run: float = 20.0  # frozen at another value, if so many times longer than its usual repeats [-]
+    wild_noise: float = 10.0  # a wild reading stands beyond its neighbours by so many standard deviations of noise [-]
+    wild_steps: float = 3.0  # ... and so many times the greatest step around it [-] ...
+    wild_coarse: float = 4.0  # ... and so many least steps of a coarse axis [-]
+    wild_widest: int = 2  # readings; a force that lasts longer may be a touch
+    wild_neighbours: int = 2  # readings on each side that a wild one stands out of
+    wild_around: int = 20  # readings on each side whose steps tell what is usual there
+    wild_fewest: int = 8  # such steps; fewer tell nothing
+
+
+@dataclass(frozen=True, slots=True)
+class FilterSettings:
+    """How readings are smoothed and averaged."""
+
     cut_off: float = 20.0  # of the zero-phase filter of forces and torques [Hz]
     speed_cut_off: float = 5.0  # of the filter of the centre of pressure's speed [Hz]
-    force_floor: float = 0.3  # T/N means nothing below this normal force [N] ...
-    force_floor_share: float = 0.2  # ... nor below this share of the stroke's peak [-]
+    shortest_segment: int = 12  # readings; fewer have no filtered value, for the filter's ends reach across them
+    smoothing: float = 0.1  # the maximum of T/N is that of the force means over so long [s]
+    block: float = 0.1  # intervals and standard errors are those of the means over so long [s]
+    fewest_blocks: int = 4  # of which a standard error is told
+
+
+@dataclass(frozen=True, slots=True)
+class ZeroSettings:
+    """Where nothing presses, and how far that is trusted."""
+
     quiet_share: float = 0.002  # a spread below this share of the range of N is quiet whatever the noise [-]
     # ... and torques spread by less than this times the range of N: a standard deviation of 1 mm in 0.3 s is a centre
     # of pressure that moves at 11.5 mm/s, slower than the slowest published stroke (13 mm/s) [mm]
     quiet_moves: float = 1.0
+    quiet_gap: float = 1.5  # a window that takes so many times its length holds a gap [-]
     zero_stretch: float = 0.6  # most of the unloaded stretch that gives the zero [s]
     near: float = 1.0  # unloaded forces so near a stroke tell how far its zero can be trusted [s]
     unloaded_share: float = 0.3  # a quiet stretch higher than this share of the range of N is a steady press [-]
+    drift_doubted: float = 0.05  # doubtful: drift may have changed mu by this share [-]
+    drift_refused: float = 0.10  # refused: by this one [-]
+
+
+@dataclass(frozen=True, slots=True)
+class ContactSettings:
+    """Which contacts are strokes, and where they are cut."""
+
     valley: float = 0.2  # two strokes are told apart where N falls below this share of the lower peak [-]
     turn_share: float = 0.5  # to and fro: the drag counts beyond this share of the median T/N each way [-] ...
+    turn_unsure: float = 2.0  # ... and beyond so many times what the zero leaves open [-] ...
     turn_shortest: float = 0.1  # ... and each way lasts so long beside the longest [-]
+    turn_block: float = 0.05  # the drag is followed in means over so long [s] ...
+    turn_recent: int = 4  # ... of which so many tell the way it pointed last
     light_share: float = 0.2  # a contact whose peak is below this share of the greatest is a light touch [-]
     shortest_stroke: float = 0.2  # a shorter contact is a tap [s]
-    sliding_share: float = 0.5  # sliding: the centre of pressure is faster than this share of its greatest speed [-]
-    slide_share: float = 0.2  # the slide has begun: faster than this share of the steady speed [-]
-    steady_rule: WindowRule = "widened"  # how the steady window is chosen: see `steady.steady_window`
+    longest_gap: float = 0.05  # a peak may hide in a longer gap [s]
+    gap_beside: float = 2.5  # readings: a contact so near to unsound ones may go on in them
+    slow_onset: float = 0.5  # from onset to a fifth of the peak; a finger takes a tenth of it [s]
+    greatest_force: float = 200.0  # a greater normal force is no finger's [N]
+
+
+@dataclass(frozen=True, slots=True)
+class SteadySettings:
+    """Where T/N is steady."""
+
+    steady_rule: WindowRule = "widened"  # how the steady window is chosen: see `sliding.steady_window`
     steady_seed: float = 0.5  # share of the slide over which the variance of T/N is least, before it is widened [-]
     steady_spread: float = 0.10  # steady: standard deviation of T/N over its mean [-] ...
     steady_trend: float = 0.05  # ... and the means of its four quarters differ from it by no more than this [-]
     steady_share: float = 0.25  # shortest steady window, as a share of the stroke [-] ...
-    steady_shortest: float = 0.05  # ... and in time [s]
-    static_share: float = 0.05  # a static peak stands so far above the 0.2 s after it [-] ...
-    static_noise: float = 3.0  # ... and so many standard deviations of the noise of T/N [-]
-    stick_rise: float = 0.1  # a stick phase: T/N climbs by this share of its level before it stays there [-] ...
-    stick_left: float = 0.5  # ... and the climb leaves no more than this share of its variance [-]
-    smoothing: float = 0.1  # the maximum of T/N is that of the force means over so long [s]
-    block: float = 0.1  # intervals and standard errors are those of the means over so long [s]
-    confidence: float = 0.95
-    drift_doubted: float = 0.05  # doubtful: drift may have changed mu by this share [-]
-    drift_refused: float = 0.10  # refused: by this one [-]
+    steady_shortest: float = 0.05  # ... in time [s] ...
+    steady_readings: int = 5  # ... and in readings
+    steady_held: float = 0.95  # share of a window's readings that must have a ratio [-]
+
+
+@dataclass(frozen=True, slots=True)
+class SlideSettings:
+    """What shows that the contact slides, how fast and which way."""
+
+    sliding_share: float = 0.5  # sliding: the centre of pressure is faster than this share of its greatest speed [-]
+    slide_share: float = 0.2  # the slide has begun: faster than this share of the steady speed [-]
     shear: float = 3.0  # the centre of pressure may move so far while the skin only shears [mm]
     # A finger that only rolls moves it no further than a quarter turn of a finger 15 mm wide (the width the model has):
     # 7.5 mm * pi / 2. Further than that, something slid [mm]
     roll: float = 11.8
     shear_steps: float = 2.0  # and so many steps of coarse torques are no movement [-]
-    one_way: float = 0.9  # the tangential force keeps its direction: length of its mean unit vector [-]
+    one_way: float = 0.9  # the tangential force keeps its direction: length of its mean unit vector [-] ...
+    drag_share: float = 0.1  # ... where it exceeds this share of its greatest: the noise of less points anywhere [-]
+    along_share: float = 0.5  # a direction along x: the drag's, or the speed's, share along it; 60 degrees off [-]
     side_load: float = 0.3  # so much of the drag across the movement is a load from the side [-]
     speed_error: float = 0.10  # a speed with a greater relative standard error is refused [-]
     speed_line: float = 0.95  # so is one whose line explains less than this share of the movement [-]
     speed_step: float = 0.10  # so is one whose centre of pressure moves in steps of this share of the way [-]
     height_doubt: float = 20.0  # how wrong a face height that nobody stated may be [mm]
     farthest: float = 150.0  # a centre of pressure further out is no finger's [mm]
-    greatest_force: float = 200.0  # a greater normal force is no finger's [N]
-    longest_gap: float = 0.05  # a peak may hide in a longer gap [s]
-    frozen_shortest: float = 0.05  # as long as this the same six numbers mean a frozen sensor [s] ...
-    frozen_readings: int = 8  # ... and in so many readings
-    frozen_refused: float = 0.5  # share of frozen readings from which on nothing is analysed [-]
-    flat_top: float = 0.02  # an axis so long at its own greatest or least value is clipped [s] ...
-    long_run: float = 20.0  # ... or frozen at another, if so many times longer than its usual repeats [-]
-    wild_noise: float = 10.0  # a wild reading stands beyond its neighbours by so many standard deviations of noise [-]
-    wild_steps: float = 3.0  # ... and so many times the greatest step around it [-]
-    uneven: float = 0.05  # spread of the time steps that makes the rate irregular [-]
-    press_shortest: float = 0.5  # a contact held so long [s] ...
-    press_moves: float = 1.0  # ... whose centre of pressure moves no further [mm] ...
-    press_ratio: float = 0.2  # ... and whose T/N stays below this is a press, and tells how the face leans [-]
+
+
+@dataclass(frozen=True, slots=True)
+class RatioSettings:
+    """Where T/N means something, its static peak and its stick phase."""
+
+    force_floor: float = 0.3  # T/N means nothing below this normal force [N] ...
+    force_floor_share: float = 0.2  # ... nor below this share of the stroke's peak [-]
+    light_half: float = 0.5  # T/N above 1 only below this share of the peak of N is drift or a load from the side [-]
+    static_share: float = 0.05  # a static peak stands so far above what follows it [-] ...
+    static_noise: float = 3.0  # ... and so many standard deviations of the noise of T/N [-] ...
+    static_after: float = 0.2  # ... that follows it for so long [s]; ...
+    static_late: float = 0.1  # ... it may come so long after the slide began [s]
+    stick_rise: float = 0.1  # a stick phase: T/N climbs by this share of its level before it stays there [-] ...
+    stick_left: float = 0.5  # ... and the climb leaves no more than this share of its variance [-]
+
+
+@dataclass(frozen=True, slots=True)
+class PressSettings:
+    """Which contacts are presses, that tell how the face leans."""
+
+    press_held: float = 0.5  # held: above this share of its peak [-] ...
+    press_shortest: float = 0.5  # ... for so long [s] ...
+    press_moves: float = 1.0  # ... while its centre of pressure moves no further [mm] ...
+    press_ratio: float = 0.2  # ... and T/N stays below this [-]
+    press_fewest: int = 3  # presses, or blocks of one press, of which an interval is told
+
+
+@dataclass(frozen=True, slots=True)
+class AnalysisSettings:
+    """How strokes are found and measured."""
+
+    detector: DetectorSettings = field(default_factory=DetectorSettings)
+    signal: SignalSettings = field(default_factory=SignalSettings)
+    filter: FilterSettings = field(default_factory=FilterSettings)
+    zero: ZeroSettings = field(default_factory=ZeroSettings)
+    contact: ContactSettings = field(default_factory=ContactSettings)
+    steady: SteadySettings = field(default_factory=SteadySettings)
+    slide: SlideSettings = field(default_factory=SlideSettings)
+    ratio: RatioSettings = field(default_factory=RatioSettings)
+    press: PressSettings = field(default_factory=PressSettings)
     area: AreaLaw = FIXED  # by which tau_max is told
+    confidence: float = 0.95
     gain_error: float | None = None  # standard uncertainty of each axis' gain that somebody set [-]; None: assumed
     bootstrap_seed: int = 0  # of the intervals drawn
     tilt: tuple[float, float] = (0.0, 0.0)  # lean of the face's normal to +x and +y that is levelled [degrees]
-    slow_onset: float = 0.5  # from onset to a fifth of the peak; a finger takes a tenth of it [s]
 
     @property
     def gain_uncertainty(self) -> float:
@@ -89,8 +177,17 @@ class AnalysisSettings:
     def interval_kind(self) -> str:
         """What an interval of mu is."""
         return (
-            f"{100 * self.confidence:g} % t interval of the mean over the steady window from {self.block:g} s means, "
-            "neighbours being alike allowed for, widened by the zero's noise, its drift where that was seen, and the "
-            f"calibration ({100 * self.gain_uncertainty:g} % of each axis, "
+            f"{100 * self.confidence:g} % t interval of the mean over the steady window from {self.filter.block:g} s "
+            "means, neighbours being alike allowed for, widened by the zero's noise, its drift where that was seen, "
+            f"and the calibration ({100 * self.gain_uncertainty:g} % of each axis, "
             f"{'assumed' if self.gain_error is None else 'set'}): not by choice of window"
         )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return every setting by its group, and for one release each also under its name alone, as it was before."""
+        grouped = asdict(self)
+        alone = (grouped[group] for group in _GROUPS)
+        return {name: value for group in alone for name, value in group.items()} | grouped
+
+
+_GROUPS = ("signal", "filter", "zero", "contact", "steady", "slide", "ratio", "press")

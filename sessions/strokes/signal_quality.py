@@ -9,18 +9,20 @@ from numpy.typing import NDArray
 from drivers.readings import ReadingBlock
 from drivers.status import StatusCount, StatusTable, flagged_words
 from drivers.transducer import TransducerInfo
-from sessions.strokes.clipping import Stuck, at_the_same_value, stuck_axes
 from sessions.strokes.flaws import FlawName, Grade
+from sessions.strokes.invalid_readings import (
+    ConstantRun,
+    at_the_same_value,
+    constant_runs,
+    repeated_readings,
+    saturated_readings,
+    spikes,
+)
 from sessions.strokes.settings import AnalysisSettings
-from sessions.strokes.spikes import wild_readings
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_LONG = 1.8  # times the usual step: a reading is missing in between
-_COARSE = 3.0  # coarse: half an axis' changes are no more than so many of its least steps
-_JUMP = 2.0  # times the step that an axis' changes seldom exceed
-_OFF = 0.1  # share of an axis' range: so far from every rest before, a sensor that repeats itself to the end is frozen
 _AXIS_NAMES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 
 
@@ -34,7 +36,7 @@ class Gap:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Soundness:
+class SignalQuality:
     """What a block's readings are worth; n of them."""
 
     rate: float  # readings a second, from the median time step [Hz]
@@ -52,34 +54,34 @@ class Soundness:
         return any(grade == "refused" for _, _, grade in self.flaws)
 
 
-def soundness(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSettings) -> Soundness:
+def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSettings) -> SignalQuality:
     """Judge a block of at least two readings."""
     steps = np.diff(block.time)
     forward = steps[steps > 0.0]
     step = float(np.median(forward)) if len(forward) else np.nan
-    beyond = _saturated(block, info)
-    wild_axes = wild_readings(block.raw, settings) & ~beyond[:, None]
+    beyond = saturated_readings(block, info)
+    wild_axes = spikes(block.raw, settings.signal) & ~beyond[:, None]
     wild: Mask = np.asarray(wild_axes.any(axis=1), np.bool_)
-    repeated = _frozen(block, settings)
-    stuck = stuck_axes(block.time, block.raw, wild | beyond, settings)
+    repeated = repeated_readings(block, settings.signal)
+    stuck = constant_runs(block.time, block.raw, wild | beyond, settings.signal)
     frozen = repeated | at_the_same_value(block.raw, stuck, clipped=False)
     clipped = at_the_same_value(block.raw, stuck, clipped=True)
     saturated = beyond | clipped
     stalled = np.concatenate([[False], steps <= 0.0])
     good = ~(frozen | saturated | wild | stalled)
-    long = (np.diff(block.sequence) == 1) & (steps > _LONG * step)
+    long = (np.diff(block.sequence) == 1) & (steps > settings.signal.missing_step * step)
     # A few long steps are readings that a stream without numbers lost; as many as this are another rate.
-    another = bool(long.mean() > settings.uneven)
+    another = bool(long.mean() > settings.signal.uneven)
     widest = float(np.percentile(forward, 98)) if another else step
-    broken = (np.diff(block.sequence) != 1) | (steps > _LONG * widest) | (steps <= 0.0)
+    broken = (np.diff(block.sequence) != 1) | (steps > settings.signal.missing_step * widest) | (steps <= 0.0)
     neighbours = steps[~broken]
     spread = np.ptp(np.percentile(neighbours, [2, 98])) if len(neighbours) else np.inf
-    even = bool(not another and spread <= settings.uneven * step)
+    even = bool(not another and spread <= settings.signal.uneven * step)
     segments = _segments(good, broken)
     dead = tuple(
         name
         for name, column in zip(_AXIS_NAMES, block.raw[good].T, strict=True)
-        if len(column) > settings.frozen_readings and np.ptp(column) == 0.0
+        if len(column) > settings.signal.frozen_readings and np.ptp(column) == 0.0
     )
     missing = np.diff(block.sequence) - 1
     lost = int(missing[missing > 0].sum())
@@ -93,7 +95,7 @@ def soundness(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSetti
         *_dead_flaws(dead),
         *_time_flaws(step, even, int(stalled.sum())),
     ]
-    return Soundness(
+    return SignalQuality(
         1.0 / step if step > 0 else np.nan,
         even,
         good,
@@ -103,54 +105,6 @@ def soundness(block: ReadingBlock, info: TransducerInfo, settings: AnalysisSetti
         dead,
         tuple(flaws),
     )
-
-
-def _frozen(block: ReadingBlock, settings: AnalysisSettings) -> Mask:
-    """Mark every repeat of the same six numbers in a run that neither noise nor a rest in coarse steps explains."""
-    jumps = _jumps_of_coarse(block.raw)
-    same = np.concatenate([[False], (np.diff(block.raw, axis=0) == 0.0).all(axis=1), [False]])
-    edges = np.flatnonzero(np.diff(same.astype(np.int8)))
-    frozen = np.zeros(len(block), np.bool_)
-    rests: list[int] = []
-    for start, last in edges.reshape(-1, 2).tolist():  # repeats of the reading at `start`
-        if last - start >= settings.frozen_readings and (
-            block.time[last] - block.time[start] >= settings.frozen_shortest
-        ):
-            jumped = not len(jumps) or bool(jumps[max(start - 1, 0) : start].any() or jumps[last : last + 1].any())
-            ends = last == len(block) - 1
-            frozen[start + 1 : last + 1] = jumped or (ends and _off_every_rest(block.raw, start, rests))
-            rests += [] if frozen[last] else [start]
-    return frozen
-
-
-def _off_every_rest(raw: Array, at: int, rests: list[int]) -> bool:
-    """Say whether some axis of a reading lies far from where it lay in each rest before: it is pressed, or was."""
-    off = np.abs(raw[rests] - raw[at]) > _OFF * np.ptp(raw, axis=0)
-    return bool(rests) and bool(off.any(axis=1).all())
-
-
-def _jumps_of_coarse(raw: Array) -> Mask:
-    """Mark the steps (n - 1,) that no axis in coarse steps makes by itself; empty where the steps are fine.
-
-    Steps are coarse where an axis that changes does so by its least step or little more: at rest such a sensor repeats
-    all six numbers, and leaves them step by step, where a frozen one that lives again jumps.
-    """
-    steps = np.abs(np.diff(raw, axis=0))
-    changes = [column[column > 0.0] for column in steps.T]
-    known = [each for each in changes if len(each)]
-    if not known or any(float(np.median(each)) > _COARSE * float(each.min()) for each in known):
-        return np.zeros(0, np.bool_)
-    large = np.array([_JUMP * float(np.percentile(each, 95)) if len(each) else np.inf for each in changes])
-    return np.asarray((steps > large).any(axis=1), np.bool_)
-
-
-def _saturated(block: ReadingBlock, info: TransducerInfo) -> Mask:
-    """Mark readings the device called invalid, and those outside the rated range, where one is stated."""
-    calibration = info.calibration
-    wrench = calibration.own(calibration.wrench(block.raw, np.zeros(6)))
-    with np.errstate(invalid="ignore"):
-        beyond = (np.abs(wrench) > calibration.rated).any(axis=1)
-    return info.status.doubtful(block.status) | beyond
 
 
 def _segments(good: Mask, broken: Mask) -> tuple[slice, ...]:
@@ -188,7 +142,7 @@ def _loss_flaws(lost: int, arrived: int) -> _Found:
 
 def _frozen_flaws(repeated: Mask, frozen: Mask, time: Array, settings: AnalysisSettings) -> _Found:
     """Name readings that repeat all six numbers; from a share of frozen ones on, of any axis, refuse the rest too."""
-    refused = float(frozen.mean()) >= settings.frozen_refused
+    refused = float(frozen.mean()) >= settings.signal.frozen_refused
     found: _Found = []
     if repeated.any():
         sentence = (
@@ -204,7 +158,7 @@ def _frozen_flaws(repeated: Mask, frozen: Mask, time: Array, settings: AnalysisS
     return found
 
 
-def _stuck_flaws(stuck: tuple[Stuck, ...], time: Array) -> _Found:
+def _stuck_flaws(stuck: tuple[ConstantRun, ...], time: Array) -> _Found:
     """Name each axis that was clipped or frozen by the first run that shows it."""
     found: _Found = []
     for axis, clipped in dict.fromkeys((one.axis, one.clipped) for one in stuck):

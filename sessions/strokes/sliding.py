@@ -1,16 +1,201 @@
-"""Where a stroke slides steadily, how fast and which way; and what forbids saying so."""
+"""The steady slide of a stroke: its window, mean and interval, speed and direction, and what forbids them."""
+
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sessions.plan.plan import Frame
 from sessions.strokes.flaws import FlawName
 from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.span import Span
-from sessions.strokes.steady import FEWEST, Movement, block_means, displacement, movement, steady_window
 from sessions.strokes.stroke_findings import COEFFICIENTS, DIRECTION, SPEED, Findings
 from sessions.strokes.track import Track, mean_vector
 
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Places = NDArray[np.int64]
+
+_EDGES = 121  # windows begin and end on a grid of so many instants
+_QUARTERS = 4
+_ALIKE = 0.8  # most that neighbours may be alike: more cannot be told from so few
+_LEAST_FREE = 2.0  # degrees of freedom, likewise
+_MANY_FREE = 1e6  # Student's t is normal to seven digits from there on
 _ROUNDING = 1e-9  # instants are told to the last bit, or rounded by people [s]
+
+
+def steady_window(ratio: Array, rate: float, whole: int, settings: AnalysisSettings) -> slice | None:
+    """Return the stretch over which T/N is steady, by the rule the settings name, or None.
+
+    `ratio` (n,) [-] is nan where the finger does not slide or T/N means nothing; `whole` is how many readings the
+    stroke has. Steady: the standard deviation is below 10 % of the mean and no quarter's mean lies more than 5 % from
+    it (settings), beyond what the scatter of few readings explains. Of the steady stretches half as long as the slide
+    that of least variance is taken as it is ("least variance"), or widened to the longest steady stretch that holds it
+    ("widened"). "middle half" and "whole slide" ask for no steadiness.
+    """
+    shortest = max(
+        settings.steady.steady_share * whole, settings.steady.steady_shortest * rate, settings.steady.steady_readings
+    )
+    first, last, variance, steady = _stretches(ratio, shortest, settings)
+    if not len(first):
+        return None
+    length = last - first
+    if settings.steady.steady_rule in ("middle half", "whole slide"):
+        most = int(np.argmax(length))
+        sliding = first[most] + np.flatnonzero(np.isfinite(ratio[first[most] : last[most]]))
+        aside = len(sliding) // 4 if settings.steady.steady_rule == "middle half" else 0
+        return slice(int(sliding[aside]), int(sliding[-1 - aside]) + 1)
+    if not steady.any():
+        return None
+    best = _least(
+        length, variance, steady, max(settings.steady.steady_seed * np.isfinite(ratio).sum(), shortest), len(ratio)
+    )
+    if settings.steady.steady_rule == "least variance":
+        return slice(int(first[best]), int(last[best]))
+    around = np.flatnonzero(steady & (first <= first[best]) & (last >= last[best]))
+    best = around[np.lexsort((variance[around], -length[around]))[0]]
+    return _trimmed(ratio, slice(int(first[best]), int(last[best])), settings)
+
+
+def _stretches(ratio: Array, shortest: float, settings: AnalysisSettings) -> tuple[Places, Places, Array, Mask]:
+    """Return where each sliding stretch of a grid begins and ends, the variance of T/N in it, and if it is steady."""
+    edges = np.unique(np.linspace(0, len(ratio), _EDGES).round().astype(int))
+    held = np.isfinite(ratio)
+    value = np.where(held, ratio, 0.0)
+    count, total, squares = (np.concatenate([[0.0], np.cumsum(each)]) for each in (held, value, value**2))
+    first, last = (edges[index] for index in np.triu_indices(len(edges), 1))
+    long_enough = last - first >= shortest
+    first, last = first[long_enough], last[long_enough]
+    n = count[last] - count[first]
+    full = n >= settings.steady.steady_held * (last - first)
+    first, last, n = first[full], last[full], n[full]
+    mean = (total[last] - total[first]) / n
+    variance = np.maximum((squares[last] - squares[first]) / n - mean**2, 0.0)
+    allowed = settings.steady.steady_trend * mean + 2.0 * np.sqrt(_QUARTERS * variance / n) * (
+        n < _QUARTERS * settings.steady.steady_readings
+    )
+    steady = np.sqrt(variance) < settings.steady.steady_spread * mean
+    for quarter in range(_QUARTERS):
+        a = first + (last - first) * quarter // _QUARTERS
+        b = first + (last - first) * (quarter + 1) // _QUARTERS
+        here = (total[b] - total[a]) / np.maximum(count[b] - count[a], 1.0)
+        steady &= np.abs(here - mean) <= allowed
+    return first, last, variance, steady
+
+
+def _least(length: Places, variance: Array, steady: Mask, wanted: float, readings: int) -> int:
+    """Return which steady stretch of the wanted length varies least; of the longest, where all are shorter."""
+    enough = length[steady & (length >= wanted)]
+    least = int(enough.min()) if len(enough) else int(length[steady].max())
+    alike = np.flatnonzero(steady & (length >= least) & (length <= least + readings / (_EDGES - 1)))
+    return int(alike[np.argmin(variance[alike])])
+
+
+def _trimmed(ratio: Array, window: slice, settings: AnalysisSettings) -> slice:
+    """Return the window without ends that lie off its median: a quarter's mean hides the end of a ramp."""
+    part = ratio[window]
+    level = float(np.nanmedian(part))
+    scatter = 1.4826 * float(np.nanmedian(np.abs(part - level)))
+    with np.errstate(invalid="ignore"):
+        inside = np.flatnonzero(np.abs(part - level) <= max(settings.steady.steady_trend * level, 2.0 * scatter))
+    return slice(window.start + int(inside[0]), window.start + int(inside[-1]) + 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Mean:
+    """A mean over a window."""
+
+    value: float
+    sd: float  # standard deviation of the readings
+    readings: int
+    interval: tuple[float, float] | None  # t interval from block means; None where there are too few blocks
+
+
+def mean_of(values: Array, rate: float, common: float, settings: AnalysisSettings) -> Mean:
+    """Return the mean of values (n,), leaving out nan, with an interval that allows for neighbours being alike.
+
+    `common` is the standard uncertainty that all values share.
+    """
+    held = values[np.isfinite(values)]
+    mean = float(held.mean())
+    blocks = block_means(values[:, None], rate, settings)[:, 0]
+    interval = None
+    if len(blocks) >= settings.filter.fewest_blocks:
+        from scipy.special import stdtrit  # slow to load, and neither window nor recorder has need of it
+
+        further, free = strays(blocks)
+        error = further * float(blocks.std(ddof=1)) / len(blocks) ** 0.5
+        whole = float(np.hypot(error, common))
+        # Only the blocks' part has few degrees of freedom (Welch 1947 and Satterthwaite 1946, as in JCGM 100, G.4.1).
+        free *= (whole / error) ** 4 if error > 0.0 else np.inf
+        half = float(stdtrit(min(free, _MANY_FREE), 0.5 + settings.confidence / 2) * whole)
+        interval = (mean - half, mean + half)
+    return Mean(mean, float(held.std(ddof=1)), len(held), interval)
+
+
+def strays(blocks: Array) -> tuple[float, float]:
+    """Return how much further than that of independent blocks (k,) their mean strays, and its degrees of freedom.
+
+    Neighbours that are alike count for fewer: of a first-order autoregression n (1 - r) / (1 + r) are independent
+    (Bayley and Hammersley 1946, Suppl. J. R. Stat. Soc. 8:184). Found in n blocks about their own mean, r comes out too
+    small by (1 + 4 r) / n (Marriott and Pope 1954, Biometrika 41:390; Kendall 1954, 41:403), which is put right here.
+    """
+    n = len(blocks)
+    off = blocks - blocks.mean()
+    squares = float(off @ off)
+    found = 0.0 if squares == 0.0 else float(off[1:] @ off[:-1]) / squares
+    alike = min(max((found + 1.0 / n) / (1.0 - 4.0 / n), 0.0), _ALIKE) if n > 4 else _ALIKE
+    further = ((1.0 + alike) / (1.0 - alike)) ** 0.5
+    return further, max(n / further**2 - 1.0, _LEAST_FREE)
+
+
+@dataclass(frozen=True, slots=True)
+class Movement:
+    """Straight movement over a window."""
+
+    along: tuple[float, float]  # velocity along x and y [mm/s]
+    speed: float  # [mm/s]
+    error: float  # standard error of the speed [mm/s]
+    explained: float  # share of the movement's variance that the straight line explains [-]
+
+
+def movement(time: Array, position: Array, rate: float, settings: AnalysisSettings) -> Movement | None:
+    """Return the regression of position (n, 2) [mm] on time (n,) [s] over block means; None where there are too few."""
+    blocks = block_means(np.column_stack([time, position]), rate, settings)
+    if len(blocks) < settings.filter.fewest_blocks:
+        return None
+    t = blocks[:, 0] - blocks[:, 0].mean()
+    moved = blocks[:, 1:] - blocks[:, 1:].mean(axis=0)
+    spread = float(t @ t)
+    slope = t @ moved / spread
+    rest = moved - t[:, None] * slope
+    speed = float(np.hypot(*slope))
+    # Scatter along the path is what makes the speed uncertain.
+    direction = slope / speed if speed > 0.0 else np.array([1.0, 0.0])
+    error = float(np.sqrt(((rest @ direction) ** 2).sum() / (len(blocks) - 2) / spread))
+    variance = float((moved**2).sum())
+    explained = 1.0 - float((rest**2).sum()) / variance if variance > 0.0 else 0.0
+    return Movement((float(slope[0]), float(slope[1])), speed, error, explained)
+
+
+def displacement(position: Array) -> float:
+    """Return how far position (n, 2) [mm] lies apart between the first and the last fifth of its readings.
+
+    nan where it is not known.
+    """
+    held = position[np.isfinite(position).all(axis=1)]
+    fifth = max(1, len(held) // 5)
+    if len(held) < 2 * fifth:
+        return float("nan")
+    return float(np.hypot(*(held[-fifth:].mean(axis=0) - held[:fifth].mean(axis=0))))
+
+
+def block_means(values: Array, rate: float, settings: AnalysisSettings) -> Array:
+    """Return the means (k, m) of values (n, m) over whole blocks, leaving out readings with nan."""
+    held = values[np.isfinite(values).all(axis=1)]
+    length = max(1, round(settings.filter.block * rate))
+    whole = len(held) // length
+    return held[: whole * length].reshape(whole, length, values.shape[1]).mean(axis=1)
 
 
 def slide(
@@ -29,9 +214,9 @@ def slide(
     """
     window = None
     if decided is not None:
-        window = _asked(track, decided)
+        window = _asked(track, decided, settings.steady.steady_readings)
     elif np.isfinite(track.speed).any():
-        limit = settings.sliding_share * float(np.nanpercentile(track.speed, 90))
+        limit = settings.slide.sliding_share * float(np.nanpercentile(track.speed, 90))
         with np.errstate(invalid="ignore"):
             sliding = np.where(track.speed >= limit, track.ratio, np.nan)
         window = steady_window(sliding, track.rate, len(track.time), settings)
@@ -58,17 +243,17 @@ def slide(
     elif moved is not None:
         found.numbers |= {"speed": moved.speed, "speed_error": moved.error}
         _slide_onset(found, track, moved, settings)
-    _direction(found, track, window, moved if trouble is None else None)
+    _direction(found, track, window, moved if trouble is None else None, settings.slide.along_share)
     if trouble is None and moved is not None:
         _side_load(found, track, window, moved, settings)
     return window
 
 
-def _asked(track: Track, decided: tuple[float, float]) -> slice | None:
+def _asked(track: Track, decided: tuple[float, float], fewest: int) -> slice | None:
     """Return the readings between two instants; None where too few of them have a ratio."""
     start = int(np.searchsorted(track.time, decided[0] - _ROUNDING))
     stop = int(np.searchsorted(track.time, decided[1] + _ROUNDING, "right"))
-    return slice(start, stop) if np.isfinite(track.ratio[start:stop]).sum() >= FEWEST else None
+    return slice(start, stop) if np.isfinite(track.ratio[start:stop]).sum() >= fewest else None
 
 
 def _rest(
@@ -82,12 +267,12 @@ def _rest(
     step = span.torque_step / float(np.nanmean(track.normal[window]))
     if np.isfinite(way):
         where = float(np.nanmedian(np.hypot(position[:, 0], position[:, 1])))
-        if where > settings.farthest:
+        if where > settings.slide.farthest:
             return FlawName.UNITS_IMPLAUSIBLE, (
                 f"The centre of pressure lies {where:.3g} mm from the axis, where no finger is: check the units of the "
                 "torques and the face's height; nothing shows that the contact slides, so no friction is given."
             )
-        if way > max(settings.shear, settings.shear_steps * step):
+        if way > max(settings.slide.shear, settings.slide.shear_steps * step):
             return _rolled(track, whole, float(np.nanmean(track.ratio[window])), settings)
     moves = f"moves by {way:.2g} mm" if np.isfinite(way) else "is not known"
     return FlawName.NO_STEADY_SLIDING, (
@@ -103,14 +288,14 @@ def _rolled(track: Track, whole: Track, level: float, settings: AnalysisSettings
     a contact slips nowhere below that.
     """
     with np.errstate(invalid="ignore"):
-        at_level = np.abs(whole.ratio - level) <= 2.0 * settings.steady_spread * level
+        at_level = np.abs(whole.ratio - level) <= 2.0 * settings.steady.steady_spread * level
     places = block_means(np.where(at_level[:, None], whole.position, np.nan), track.rate, settings)
     way = float(np.hypot(*np.ptp(places, axis=0))) if len(places) else 0.0
-    if way > settings.roll:
+    if way > settings.slide.roll:
         return None
     return FlawName.ROLLED, (
         f"The centre of pressure moves by {way:.2g} mm while T/N holds, and a finger that rolls without slip moves it "
-        f"by up to {settings.roll:g} mm: nothing shows a slide, so no friction is given; stroke further."
+        f"by up to {settings.slide.roll:g} mm: nothing shows a slide, so no friction is given; stroke further."
     )
 
 
@@ -133,21 +318,21 @@ def _speed_trouble(
         return name, "The centre of pressure is known at too few instants of the steady window for a speed."
     way = moved.speed * float(track.time[window.stop - 1] - track.time[window.start])
     step = span.torque_step / float(np.nanmean(track.normal[window]))
-    if step > settings.speed_step * way:
+    if step > settings.slide.speed_step * way:
         return name, f"The torques come in steps that move the centre of pressure by {step:.2g} mm: no speed is told."
-    if moved.error > settings.speed_error * moved.speed:
+    if moved.error > settings.slide.speed_error * moved.speed:
         return name, f"The centre of pressure moves at {moved.speed:.2g} ± {moved.error:.2g} mm/s: no speed is told."
-    if moved.explained < settings.speed_line:
+    if moved.explained < settings.slide.speed_line:
         share = 100 * moved.explained
         return name, f"A straight line explains {share:.0f} % of the centre of pressure's movement: no speed is told."
     if frame.height_origin == "default":
         lever = movement(
             track.time[window], -track.wrench[window, :2] / track.normal[window, None], track.rate, settings
         )
-        wrong = settings.height_doubt * (lever.speed if lever else 0.0)
-        if wrong > settings.speed_error * moved.speed:
+        wrong = settings.slide.height_doubt * (lever.speed if lever else 0.0)
+        if wrong > settings.slide.speed_error * moved.speed:
             return FlawName.HEIGHT_UNKNOWN, (
-                f"Nobody stated the face's height: were it wrong by {settings.height_doubt:g} mm the speed of "
+                f"Nobody stated the face's height: were it wrong by {settings.slide.height_doubt:g} mm the speed of "
                 f"{moved.speed:.3g} mm/s would change by {wrong:.2g} mm/s, so none is given."
             )
     return None
@@ -157,7 +342,7 @@ def _slide_onset(found: Findings, track: Track, moved: Movement, settings: Analy
     """Give the first instant from which the centre of pressure keeps a share of its steady speed."""
     start = int(np.searchsorted(track.time, float(found.numbers["steady"][0])))
     with np.errstate(invalid="ignore"):
-        slow = ~(track.speed[: start + 1] >= settings.slide_share * moved.speed)
+        slow = ~(track.speed[: start + 1] >= settings.slide.slide_share * moved.speed)
     last_slow = np.flatnonzero(slow)
     first = int(last_slow[-1]) + 1 if len(last_slow) else 0
     if first <= start:
@@ -170,7 +355,7 @@ def _side_load(found: Findings, track: Track, window: slice, moved: Movement, se
     along = np.array(moved.along) / moved.speed
     across = float(abs(drag[0] * along[1] - drag[1] * along[0]))
     share = across / float(np.hypot(*drag))
-    if share > settings.side_load:
+    if share > settings.slide.side_load:
         sentence = (
             f"{100 * share:.0f} % of the tangential force lies across the finger's movement: a load from the side, a "
             "face that leans, or axes that are turned; T/N holds it, and friction along the movement is less."
@@ -178,12 +363,15 @@ def _side_load(found: Findings, track: Track, window: slice, moved: Movement, se
         found.flaw(FlawName.SIDE_LOAD, sentence, "doubtful")
 
 
-def _direction(found: Findings, track: Track, window: slice, moved: Movement | None) -> None:
-    """Give the direction along x: from the movement, else from the drag, which points the way the finger moves."""
+def _direction(found: Findings, track: Track, window: slice, moved: Movement | None, share: float) -> None:
+    """Give the direction along x: from the movement, else from the drag, which points the way the finger moves.
+
+    Either must lie along x by a `share` of its length.
+    """
     drag = mean_vector(track.wrench[window, :2])
-    by_drag = int(np.sign(drag[0])) if abs(drag[0]) >= 0.5 * np.hypot(*drag) else None
+    by_drag = int(np.sign(drag[0])) if abs(drag[0]) >= share * np.hypot(*drag) else None
     by_movement = None
-    if moved is not None and abs(moved.along[0]) >= 0.5 * moved.speed:
+    if moved is not None and abs(moved.along[0]) >= share * moved.speed:
         by_movement = int(np.sign(moved.along[0]))
     if by_movement is not None and by_drag is not None and by_movement != by_drag:
         sentence = (

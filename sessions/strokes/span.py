@@ -11,8 +11,9 @@ from sessions.plan.plan import Frame
 from sessions.strokes.contacts import Contact
 from sessions.strokes.flaws import FlawName
 from sessions.strokes.forces import Filter, in_face_frame, levelled
+from sessions.strokes.onset import NORMAL_STEP
 from sessions.strokes.settings import AnalysisSettings
-from sessions.strokes.signal_quality import Soundness
+from sessions.strokes.signal_quality import SignalQuality
 from sessions.strokes.zero import QuietWindows, Zero, quiet_windows
 
 Array = NDArray[np.float64]
@@ -29,13 +30,13 @@ class Span:
     rate: float  # [Hz]
     filtered: str  # what the filter did
     windows: QuietWindows
-    soundness: Soundness
+    quality: SignalQuality
     saturated_at: Array  # times of readings left out because they were saturated [s]
     torque_step: float  # least step of a torque [N mm]; 0 where it is too fine to matter
 
 
 def span_of(
-    block: ReadingBlock, sound: Soundness, calibration: Calibration, frame: Frame, settings: AnalysisSettings
+    block: ReadingBlock, sound: SignalQuality, calibration: Calibration, frame: Frame, settings: AnalysisSettings
 ) -> Span:
     """Return the sound readings of a block."""
     good = sound.good
@@ -43,7 +44,7 @@ def span_of(
     wrench = levelled(in_face_frame(calibration.wrench(block.raw[good], np.zeros(6)), frame), settings.tilt)
     place = np.concatenate([[0], np.cumsum(good)])
     segments = [slice(int(place[s.start]), int(place[s.stop])) for s in sound.segments]
-    smoother = Filter(settings.cut_off)
+    smoother = Filter(settings.filter.cut_off, settings.filter.shortest_segment)
     if not sound.even:
         smooth, filtered = wrench, "not filtered: the time steps are uneven"
     elif not smoother.fits(sound.rate):
@@ -94,8 +95,8 @@ def zero_for(span: Span, contact: Contact, idle: Mask, settings: AnalysisSetting
     `idle` (n,) marks the readings in which nothing presses.
     """
     onset, lift = contact.onset, contact.lift
-    before = None if onset is None else span.windows.before(onset, settings.zero_stretch)
-    after = None if lift is None else span.windows.after(lift, settings.zero_stretch)
+    before = None if onset is None else span.windows.before(onset, settings.zero.zero_stretch)
+    after = None if lift is None else span.windows.after(lift, settings.zero.zero_stretch)
     if before is not None and after is not None:
         # Taken to be half-way; it may lie anywhere between the two, hence a rectangular distribution's deviation. What
         # noise alone makes of the difference is no drift.
@@ -139,7 +140,7 @@ def _unsure(
 ) -> tuple[float, float]:
     """Return how far from a zero the forces lie near a contact where nothing presses, and in the valleys beside it."""
     first, last = span.time[contact.start], span.time[contact.stop - 1]
-    near = idle & (span.time >= first - settings.near) & (span.time <= last + settings.near)
+    near = idle & (span.time >= first - settings.zero.near) & (span.time <= last + settings.zero.near)
     near[list(contact.valleys)] = True
     away = span.smooth[near, :3] - level[:3]
     away = away[np.isfinite(away).all(axis=1)]
@@ -153,7 +154,7 @@ def _unsure(
 def recorded_zero(span: Span, *, stated: bool) -> ZeroInForce:
     """Return the recording's own zero, which counts only where somebody stated that nothing touched when it was set."""
     steps = np.abs(np.diff(span.wrench, axis=0))
-    noise = 1.4826 / np.sqrt(2.0) * np.median(steps, axis=0) if len(steps) else np.zeros(6)
+    noise = NORMAL_STEP * np.median(steps, axis=0) if len(steps) else np.zeros(6)
     origin = "as recorded, stated to be true" if stated else "as recorded, unknown"
     flaw = None if stated else FlawName.NO_UNLOADED_STRETCH
     return ZeroInForce(np.zeros(6), noise, noise[:3], 0.0, np.zeros(6), origin, None, (0.0, 0.0), flaw)

@@ -4,23 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from sessions.plan.plan import PROXIMAL_TO_DISTAL, Frame, Trial
+from sessions.plan.plan import PROXIMAL_TO_DISTAL, SessionPlan, Trial
 from sessions.strokes.break_away import break_away
 from sessions.strokes.contacts import Contact
 from sessions.strokes.decisions import Decided
 from sessions.strokes.flaws import Flaw, FlawName
 from sessions.strokes.settings import AnalysisSettings
-from sessions.strokes.sliding import slide
+from sessions.strokes.sliding import mean_of, slide
 from sessions.strokes.span import Span, ZeroInForce
-from sessions.strokes.steady import mean_of
 from sessions.strokes.stroke import Stroke
 from sessions.strokes.stroke_findings import COEFFICIENTS, DIRECTION, EVERYTHING, PEAKS, SPEED, Findings
 from sessions.strokes.track import Track, curve_of, mean_vector, track_of
 
-_AFTER_PEAK = 0.2  # what a static peak is held against [s]
-_LATE_PEAK = 0.1  # a static peak may come so long after the slide began [s]
 _SLIDES_BEFORE = "the contact slides before T/N stops climbing"
-_DRAG = 0.1  # share of the greatest tangential force from which on its direction is asked [-]
 _NO_PEAK = "no static peak stands out"
 _STICK_WITHOUT = (_NO_PEAK, FlawName.NO_STEADY_SLIDING, FlawName.RATIO_ABOVE_ONE)  # a stick phase needs none of these
 
@@ -29,25 +25,24 @@ def measured(
     span: Span,
     contact: Contact,
     zero: ZeroInForce,
-    frame: Frame,
-    contact_area: float,
+    plan: SessionPlan,
     settings: AnalysisSettings,
     trial: Trial | None = None,
     number: int = 1,
     decided: Decided | None = None,
 ) -> tuple[Stroke, tuple[Flaw, ...]]:
-    """Return a contact's stroke and its flaws. `contact_area` [mm2] is what tau_max is told for.
+    """Return a contact's stroke and its flaws; `plan` tells the face's frame and the area that tau_max is of.
 
     `number` is that of the stroke within its trial; what was `decided` of it goes before what is found.
     """
-    found = Findings()
+    found, frame = Findings(), plan.frame
     decided = decided or Decided({})
     track = track_of(span, contact, zero, frame.height, settings)
     _judge_ends(found, contact, track, settings)
     _judge_zero(found, zero, track)
     if zero.flaw is not FlawName.NO_UNLOADED_STRETCH:
         _judge_gaps(found, span, contact, settings)
-        _judge_loads(found, track, contact_area, settings)
+        _judge_loads(found, track, plan.contact_area, settings)
         whole = None
         if contact.around is not None:
             first, last = contact.around
@@ -102,8 +97,8 @@ def _judge_ends(found: Findings, contact: Contact, track: Track, settings: Analy
         )
         found.flaw(FlawName.TURNED, sentence, "note")
     peak = float(np.nanmax(track.normal, initial=0.0))
-    risen = np.flatnonzero(track.normal >= settings.force_floor_share * peak)
-    if contact.onset is not None and len(risen) and track.time[risen[0]] - contact.onset > settings.slow_onset:
+    risen = np.flatnonzero(track.normal >= settings.ratio.force_floor_share * peak)
+    if contact.onset is not None and len(risen) and track.time[risen[0]] - contact.onset > settings.contact.slow_onset:
         sentence = (
             f"The force crept for {track.time[risen[0]] - contact.onset:.2f} s from leaving its zero to a fifth of its "
             "peak: the onset marks where it left, which may not be the touch."
@@ -130,9 +125,9 @@ def _judge_gaps(found: Findings, span: Span, contact: Contact, settings: Analysi
     if ((span.saturated_at >= first) & (span.saturated_at <= last)).any():
         sentence = "Readings of this stroke are saturated or come with a fault of the device: its peaks are not known."
         found.flaw(FlawName.SATURATED, sentence, "doubtful", PEAKS)
-    inside = [gap for gap in span.soundness.gaps if first <= gap.start and gap.stop <= last]
+    inside = [gap for gap in span.quality.gaps if first <= gap.start and gap.stop <= last]
     widest = max(inside, key=lambda gap: gap.stop - gap.start, default=None)
-    if widest is not None and widest.stop - widest.start > settings.longest_gap + 1.0 / span.rate:
+    if widest is not None and widest.stop - widest.start > settings.contact.longest_gap + 1.0 / span.rate:
         sentence = (
             f"No sound readings from {widest.start:.2f} to {widest.stop:.2f} s of this stroke ({widest.cause}), which "
             "may hide its peaks."
@@ -158,22 +153,25 @@ def _judge_loads(found: Findings, track: Track, contact_area: float, settings: A
         "contact_area": area,
     }
     found.numbers["mu_max"] = _greatest_ratio(track, track.floor, settings)
-    if peak < settings.force_floor:
-        sentence = f"The normal force reaches {peak:.2g} N: below {settings.force_floor:g} N friction means nothing."
+    if peak < settings.ratio.force_floor:
+        sentence = (
+            f"The normal force reaches {peak:.2g} N: below {settings.ratio.force_floor:g} N friction means nothing."
+        )
         found.flaw(FlawName.TOO_LITTLE_FORCE, sentence, "refused", (*COEFFICIENTS, *SPEED, *DIRECTION))
-    if peak > settings.greatest_force:
+    if peak > settings.contact.greatest_force:
         sentence = f"The normal force reaches {peak:.3g} N, which is no finger's: check the units of the forces."
         found.flaw(FlawName.UNITS_IMPLAUSIBLE, sentence, "doubtful")
+    half = settings.ratio.light_half * peak
     with np.errstate(invalid="ignore"):
-        light = (track.ratio > 1.0) & (track.normal < 0.5 * peak)
-        pressed = track.ratio[track.normal >= 0.5 * peak]
+        light = (track.ratio > 1.0) & (track.normal < half)
+        pressed = track.ratio[track.normal >= half]
     if light.any() and np.isfinite(pressed).any() and np.nanmedian(pressed) < 1.0:
         sentence = (
             f"T/N exceeds 1 while N is below half its peak ({peak:.3g} N), and not above: drift or a side load makes "
             "the ratio there; its maximum is that above half the peak."
         )
         found.flaw(FlawName.RATIO_ABOVE_ONE, sentence, "doubtful", ("mu_static",))
-        found.numbers["mu_max"] = _greatest_ratio(track, 0.5 * peak, settings)
+        found.numbers["mu_max"] = _greatest_ratio(track, half, settings)
 
 
 def _greatest_traction(track: Track, planned: float, settings: AnalysisSettings) -> tuple[float | None, float | None]:
@@ -195,7 +193,7 @@ def _greatest_ratio(track: Track, floor: float, settings: AnalysisSettings) -> f
 
     Forces are averaged, not the ratio: noise then raises the maximum far less.
     """
-    length = max(1, round(settings.smoothing * track.rate))
+    length = max(1, round(settings.filter.smoothing * track.rate))
     if len(track.time) < length:
         return None
     with np.errstate(invalid="ignore"):
@@ -203,7 +201,10 @@ def _greatest_ratio(track: Track, floor: float, settings: AnalysisSettings) -> f
     normal = np.where(pressed, track.normal, np.nan)
     box = np.ones(length) / length
     means = np.convolve(track.tangential, box, "valid") / np.convolve(normal, box, "valid")
-    whole = track.time[length - 1 :] - track.time[: len(track.time) - length + 1] < 1.5 * length / track.rate
+    whole = (
+        track.time[length - 1 :] - track.time[: len(track.time) - length + 1]
+        < settings.zero.quiet_gap * length / track.rate
+    )
     means = means[np.isfinite(means) & whole]
     return float(means.max()) if len(means) else None
 
@@ -239,9 +240,9 @@ def _judge_drift(found: Findings, zero: ZeroInForce, settings: AnalysisSettings)
     tangential = found.numbers.get("tangential_force", found.numbers["peak_tangential"])
     normal = found.numbers.get("normal_force", found.numbers["peak_normal"])
     share = sideways / tangential + pressing / normal if tangential > 0.0 and normal > 0.0 else float("inf")
-    if share <= settings.drift_doubted:
+    if share <= settings.zero.drift_doubted:
         return
-    refused = share > settings.drift_refused
+    refused = share > settings.zero.drift_refused
     sentence = (
         f"With nothing pressing, the forces around this stroke lie {sideways:.2g} N sideways and {pressing:.2g} N "
         f"along the normal from its zero: mu may be wrong by {100 * share:.0f} %"
@@ -266,19 +267,19 @@ def _static_peak(
     The filter overshoots a sudden change by 3.5 % of it, which is twice the level where the finger `turned`.
     """
     began = found.numbers.get("slide_onset", track.time[window.start])
-    last = int(np.searchsorted(track.time, float(began + _LATE_PEAK)))
+    last = int(np.searchsorted(track.time, float(began + settings.ratio.static_late)))
     before = track.ratio[:last]
     found.reasons.setdefault("mu_static", _NO_PEAK)
     if not np.isfinite(before).any():
         return
     top = int(np.nanargmax(before))
-    end = int(np.searchsorted(track.time, float(track.time[top] + _AFTER_PEAK)))
+    end = int(np.searchsorted(track.time, float(track.time[top] + settings.ratio.static_after)))
     follows = track.ratio[top : end + 1]
     level = float(np.nanmedian(follows))
     noise = float(np.hypot(*zero.noise[:2])) / np.sqrt(2.0)
     sd = np.hypot(noise, level * float(zero.noise[2])) / float(track.normal[top])
-    share = settings.static_share * (2.0 if turned else 1.0)
-    if before[top] - level > max(settings.static_noise * sd, share * level):
+    share = settings.ratio.static_share * (2.0 if turned else 1.0)
+    if before[top] - level > max(settings.ratio.static_noise * sd, share * level):
         found.numbers["mu_static"] = float(before[top])
         if found.reasons["mu_static"] == _NO_PEAK:
             del found.reasons["mu_static"]
@@ -290,7 +291,7 @@ def _break_away(found: Findings, track: Track, window: slice, settings: Analysis
     away = break_away(track.time[: window.stop], track.ratio[: window.stop], settings, peaked=peaked)
     found.numbers["break_away"] = away
     # The speed's filter may tell the onset of a slide early by half of its period.
-    if away is not None and away > found.numbers.get("slide_onset", np.inf) + 0.5 / settings.speed_cut_off:
+    if away is not None and away > found.numbers.get("slide_onset", np.inf) + 0.5 / settings.filter.speed_cut_off:
         found.reasons["break_away"] = _SLIDES_BEFORE
 
 
@@ -325,13 +326,15 @@ def _judge_way(found: Findings, track: Track, window: slice, settings: AnalysisS
 
     A finger that rests has hardly a drag, and its noise points anywhere.
     """
-    held = np.isfinite(track.ratio) & (track.tangential >= _DRAG * np.nanmax(track.tangential, initial=0.0))
+    held = np.isfinite(track.ratio) & (
+        track.tangential >= settings.slide.drag_share * np.nanmax(track.tangential, initial=0.0)
+    )
     way = track.wrench[:, :2] / np.where(held, track.tangential, np.nan)[:, None]
     inside = float(np.linalg.norm(mean_vector(way[window])))
     overall = float(np.linalg.norm(mean_vector(way)))
-    if inside < settings.one_way:
+    if inside < settings.slide.one_way:
         sentence = "The tangential force turns within the steady window: no one direction, no speed along it."
         found.flaw(FlawName.DIRECTION_TURNS, sentence, "doubtful", (*SPEED, *DIRECTION))
-    elif overall < settings.one_way:
+    elif overall < settings.slide.one_way:
         sentence = "The tangential force turns during the contact: speed and direction are those of the steady window."
         found.flaw(FlawName.DIRECTION_TURNS, sentence, "doubtful")

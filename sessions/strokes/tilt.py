@@ -14,14 +14,11 @@ import numpy as np
 from sessions.plan.plan import Frame
 from sessions.strokes.contacts import Contact
 from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.sliding import block_means, displacement
 from sessions.strokes.span import Span, ZeroInForce
-from sessions.strokes.steady import block_means, displacement
 from sessions.strokes.track import track_of
 
 Pair = tuple[float, float]
-
-_FEWEST = 3  # presses, or blocks of one press, of which an interval is told
-_PRESSED = 0.5  # share of its peak above which a press is held
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,21 +53,21 @@ def press_of(
     """Return the press in a contact; None where it slides, is short, or drags more than a press does."""
     track = track_of(span, contact, zero, frame.height, settings)
     peak = float(np.nanmax(track.normal, initial=0.0))
-    if peak < settings.force_floor:
+    if peak < settings.ratio.force_floor:
         return None
     with np.errstate(invalid="ignore"):
-        held = np.flatnonzero(track.normal >= _PRESSED * peak)
+        held = np.flatnonzero(track.normal >= settings.press.press_held * peak)
     hold = slice(int(held[0]), int(held[-1]) + 1)
     lasted = float(track.time[hold.stop - 1] - track.time[hold.start])
     moved = displacement(track.position[hold])
-    if lasted < settings.press_shortest or not moved <= settings.press_moves:
+    if lasted < settings.press.press_shortest or not moved <= settings.press.press_moves:
         return None
     values = np.column_stack([track.wrench[hold, :2], track.normal[hold]])
     blocks = block_means(values, track.rate, settings)
-    if len(blocks) < _FEWEST:
+    if len(blocks) < settings.press.press_fewest:
         return None
     ratio = -blocks[:, :2] / blocks[:, 2:]
-    if np.hypot(*ratio.mean(axis=0)) > settings.press_ratio:
+    if np.hypot(*ratio.mean(axis=0)) > settings.press.press_ratio:
         return None
     scatter = ratio.std(axis=0, ddof=1) / np.sqrt(len(ratio))
     error = np.degrees(np.hypot(scatter, zero.error[:2] / float(blocks[:, 2].mean())))
@@ -95,7 +92,7 @@ def tilt_of(presses: Sequence[Press], settings: AnalysisSettings) -> Tilt | None
     leans = np.array([press.lean for press in presses])
     mean = leans.mean(axis=0)
     per_cent = f"{100 * settings.confidence:g} %"
-    if len(presses) >= _FEWEST:
+    if len(presses) >= settings.press.press_fewest:
         error = leans.std(axis=0, ddof=1) / np.sqrt(len(presses))
         half = stdtrit(len(presses) - 1, 0.5 + settings.confidence / 2) * error
         kind = f"{per_cent} t interval of the mean of {len(presses)} presses"

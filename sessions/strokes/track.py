@@ -37,11 +37,11 @@ def track_of(span: Span, contact: Contact, zero: ZeroInForce, height: float, set
     wrench = span.smooth[part] - zero.level
     normal = -wrench[:, 2]
     peak = float(np.nanmax(normal, initial=0.0))
-    floor = max(settings.force_floor, settings.force_floor_share * peak)
+    floor = max(settings.ratio.force_floor, settings.ratio.force_floor_share * peak)
     tangential = np.hypot(wrench[:, 0], wrench[:, 1])
     ratio = friction_ratio(wrench, floor)
     position = np.where(np.isfinite(ratio)[:, None], centre_of_pressure(wrench, height), np.nan)
-    if any(name.startswith("T") for name in span.soundness.dead):
+    if any(name.startswith("T") for name in span.quality.dead):
         position = np.full_like(position, np.nan)
     speed = _speed(span.time[part], position, span, settings)
     return Track(span.time[part], wrench, normal, tangential, ratio, position, speed, floor, span.rate)
@@ -55,9 +55,9 @@ def mean_vector(vectors: Array) -> Array:
 def _speed(time: Array, position: Array, span: Span, settings: AnalysisSettings) -> Array:
     """Return the speed (n,) [mm/s] of a position (n, 2) [mm], filtered within each unbroken stretch."""
     speed = np.full(len(time), np.nan)
-    smoother = Filter(settings.speed_cut_off)
+    smoother = Filter(settings.filter.speed_cut_off, settings.filter.shortest_segment)
     held = np.isfinite(position[:, 0]) & np.isfinite(position[:, 1])
-    joined = held[1:] & held[:-1] & (np.diff(time) < 1.8 / span.rate)
+    joined = held[1:] & held[:-1] & (np.diff(time) < settings.signal.missing_step / span.rate)
     starts = np.flatnonzero(held & ~np.concatenate([[False], joined]))
     stops = np.flatnonzero(held & ~np.concatenate([joined, [False]])) + 1
     for start, stop in zip(starts, stops, strict=True):
@@ -65,7 +65,7 @@ def _speed(time: Array, position: Array, span: Span, settings: AnalysisSettings)
             continue
         part = slice(int(start), int(stop))
         path = position[part]
-        if span.soundness.even and smoother.fits(span.rate):
+        if span.quality.even and smoother.fits(span.rate):
             path = smoother.applied(path, span.rate, [slice(0, len(path))])
         velocity = np.gradient(path, time[part], axis=0)
         speed[part] = np.hypot(velocity[:, 0], velocity[:, 1])

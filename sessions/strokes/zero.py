@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.strokes.onset import onset_threshold
+from sessions.strokes.onset import NORMAL_STEP, onset_threshold
 from sessions.strokes.settings import AnalysisSettings
 
 Array = NDArray[np.float64]
@@ -13,7 +13,6 @@ Array = NDArray[np.float64]
 _HOPS = 6  # windows start at every sixth of their length
 _FORCES = slice(0, 3)
 _TORQUES = slice(3, 5)  # about x and y: those that tell the centre of pressure
-_WHOLE = 1.5  # a window that takes so many times its length holds a gap
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,16 +77,16 @@ def _quiet(time: Array, wrench: Array, length: int, rate: float, settings: Analy
     starts = np.arange(0, len(wrench) - length + 1, max(1, length // _HOPS))
     spread, noise = _spread(wrench[:, _FORCES], starts, length)
     low, high = np.percentile(-wrench[:, 2], [0.5, 99.5])
-    floor = max(settings.detector.quiet_floor, settings.quiet_share * float(high - low))
+    floor = max(settings.detector.quiet_floor, settings.zero.quiet_share * float(high - low))
     quiet = (spread <= np.maximum(settings.detector.quiet_noise * noise, floor)).all(axis=1)
     # A finger that slides with a steady force moves the centre of pressure, and with it the torques alone.
     turned, shaking = _spread(wrench[:, _TORQUES], starts, length)
-    still = settings.quiet_moves * float(high - low)
+    still = settings.zero.quiet_moves * float(high - low)
     quiet &= (turned <= np.maximum(settings.detector.quiet_noise * shaking, still)).all(axis=1)
     level = np.lib.stride_tricks.sliding_window_view(-wrench[:, 2], length)[starts].mean(axis=1)
     threshold = onset_threshold(float(np.median(noise[:, 2])), settings.detector)
-    unloaded = level - low <= max(settings.unloaded_share * (high - low), threshold)
-    whole = time[starts + length - 1] - time[starts] <= _WHOLE * length / rate
+    unloaded = level - low <= max(settings.zero.unloaded_share * (high - low), threshold)
+    whole = time[starts + length - 1] - time[starts] <= settings.zero.quiet_gap * length / rate
     chosen = starts[quiet & unloaded & whole]
     return np.column_stack([chosen, chosen + length]).astype(np.int64)
 
@@ -95,8 +94,8 @@ def _quiet(time: Array, wrench: Array, length: int, rate: float, settings: Analy
 def _spread(axes: Array, starts: NDArray[np.int64], length: int) -> tuple[Array, Array]:
     """Return the standard deviations (k, m) of axes (n, m) in windows from `starts` (k,), and their noise (k, m).
 
-    For white noise the standard deviation is 1.4826/sqrt(2) times the median step; slow movement hardly changes it.
+    Noise is told from the median step, which slow movement hardly changes.
     """
     windows = np.lib.stride_tricks.sliding_window_view(axes, length, axis=0)[starts]  # (k, m, length)
-    noise = 1.4826 / np.sqrt(2.0) * np.median(np.abs(np.diff(windows, axis=2)), axis=2)
+    noise = NORMAL_STEP * np.median(np.abs(np.diff(windows, axis=2)), axis=2)
     return windows.std(axis=2, ddof=1), noise

@@ -3,12 +3,12 @@
 import time
 
 from sessions.plan.plan import Frame
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols import VisitSetting, plan, protocol
 from sessions.run.steps import AskBegin, AskFinish, AskMount, AskScore, Begin, Finish, Scored, StimulusMounted
 
 PACE = 20.0
 DEADLINE = 60.0  # of a machine that hangs, not of a slow one [s]
-PLAN = plan(protocol("sensotact-friction"), "S01", 3, frame=Frame("-z", "set", 20.0, "set"))
+PLAN = plan(protocol("sensotact-friction"), "S01", 3, setting=VisitSetting(frame=Frame("-z", "set", 20.0, "set")))
 
 
 class Desk:

@@ -13,7 +13,8 @@ import pytest
 
 from daq_app.cli.main import run
 from sessions.recording.schema import COLUMNS
-from sessions.strokes import AnalysisSettings, forces
+from sessions.strokes import forces
+from sessions.strokes.settings import FilterSettings
 
 
 @pytest.fixture(scope="session")
@@ -83,16 +84,16 @@ def test_verify_names_a_derived_number_that_comes_out_otherwise(session, capsys)
 
 def test_verify_names_every_number_that_a_changed_constant_of_the_analysis_changes(session, capsys, monkeypatch):
     run(["analyse", str(session)])
-    names = [field.name for field in fields(AnalysisSettings)]
-    defaults = list(AnalysisSettings.__init__.__defaults__)
+    names = [field.name for field in fields(FilterSettings)]
+    defaults = list(FilterSettings.__init__.__defaults__)
     place = names.index("smoothing") - len(names)
     assert defaults[place] == 0.1
     defaults[place] = 0.2
-    monkeypatch.setattr(AnalysisSettings.__init__, "__defaults__", tuple(defaults))
+    monkeypatch.setattr(FilterSettings.__init__, "__defaults__", tuple(defaults))
     capsys.readouterr()
     assert run(["verify", str(session), "--json"]) == 3
     problems = printed(capsys)["problems"]
-    assert "analysis.json.settings.smoothing was stored as 0.1 and comes out as 0.2 (+100 %)" in problems
+    assert "analysis.json.settings.filter.smoothing was stored as 0.1 and comes out as 0.2 (+100 %)" in problems
     assert any("mu_max was stored as" in problem for problem in problems)
     assert any("analysis.json was made by the same versions as now" in problem for problem in problems)
 

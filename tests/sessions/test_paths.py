@@ -19,6 +19,7 @@ from sessions.statistics.multiverse import (
     trial_paths,
 )
 from sessions.strokes import AnalysisSettings, analyse
+from sessions.strokes.settings import SteadySettings
 
 STEADY = PredictionOptions(course="steady")
 SMALL = [path for path in PATHS if path.kinematics == "small"]
@@ -73,7 +74,11 @@ def test_a_path_that_shared_its_solve_comes_to_what_its_own_solve_gives(recordin
 def test_each_window_has_the_sed_of_the_mean_over_that_window(recording, analysis, along):
     (deepest, scene), trial = scenes_of(analysis, recording.plan, STEADY).values(), 2  # slipperiness: the mean
     mus = [
-        next(one.mu_dynamic for one in analyse(recording, AnalysisSettings(steady_rule=rule)).strokes if one.trial == 2)
+        next(
+            one.mu_dynamic
+            for one in analyse(recording, AnalysisSettings(steady=SteadySettings(steady_rule=rule))).strokes
+            if one.trial == 2
+        )
         for rule in WINDOWS.values()
     ]
     assert len(set(mus)) > 2  # the whole of this slide is steady

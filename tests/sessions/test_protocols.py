@@ -4,7 +4,7 @@ from itertools import pairwise
 import pytest
 
 from sessions.plan.plan import Blinded, Finger, Frame
-from sessions.plan.protocols import Body, StudyPlace, plan, protocol, protocol_names
+from sessions.plan.protocols import Body, StudyPlace, VisitSetting, plan, protocol, protocol_names
 from sessions.plan.protocols.protocol import FOLDER
 from sessions.toml_file import SettingsError
 
@@ -59,7 +59,8 @@ def test_what_nobody_stated_is_marked_as_default_and_what_was_stated_is_not(tmp_
 
 
 def test_a_frame_and_an_area_given_for_the_session_replace_the_protocols():
-    made = plan(protocol(PAPER), "S01", 1, frame=Frame(height=20.0, height_origin="set"), contact_area=90.0)
+    setting = VisitSetting(frame=Frame(height=20.0, height_origin="set"), contact_area=90.0)
+    made = plan(protocol(PAPER), "S01", 1, setting=setting)
     assert made.frame.height == 20.0
     assert (made.contact_area, made.contact_area_origin) == (90.0, "set")
 

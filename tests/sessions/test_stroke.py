@@ -25,10 +25,14 @@ from scipy.signal import lfilter
 
 from sessions.plan.plan import Frame
 from sessions.strokes.forces import Filter, centre_of_pressure, friction_ratio, in_face_frame, normal_force
-from sessions.strokes.steady import mean_of, movement, steady_window
+from sessions.strokes.sliding import mean_of, movement, steady_window
 
 T = times()
 PLAIN = stroke(T)
+
+
+def steadily(**changes):
+    return replace(SETTINGS, steady=replace(SETTINGS.steady, **changes))
 
 
 def test_a_plain_stroke_comes_back_without_a_flaw():
@@ -195,19 +199,19 @@ def test_the_ratio_means_nothing_below_the_floor():
 def test_the_filter_is_down_three_decibels_at_its_cut_off_without_delay():
     t = times(10.0)
     wave = np.cos(2 * np.pi * 20.0 * (t - 5.0))[:, None]
-    out = Filter(20.0).applied(wave, 200.0, [slice(0, len(t))])[:, 0]
+    out = Filter(20.0, 12).applied(wave, 200.0, [slice(0, len(t))])[:, 0]
     assert out[1000] == pytest.approx(1 / np.sqrt(2), rel=2e-3)  # the crest stays where it was
     assert np.argmax(out[995:1006]) == 5
 
 
 def test_the_filter_keeps_a_constant_and_never_reaches_across_a_gap():
     values = np.concatenate([np.zeros(100), np.ones(100)])[:, None]
-    out = Filter(20.0).applied(values, 200.0, [slice(0, 100), slice(100, 200)])
+    out = Filter(20.0, 12).applied(values, 200.0, [slice(0, 100), slice(100, 200)])
     assert np.allclose(out, values, atol=1e-12)
 
 
 def test_too_short_a_stretch_has_no_filtered_value():
-    assert np.isnan(Filter(20.0).applied(np.ones((8, 1)), 200.0, [slice(0, 8)])).all()
+    assert np.isnan(Filter(20.0, 12).applied(np.ones((8, 1)), 200.0, [slice(0, 8)])).all()
 
 
 # Steady windows, means and speed
@@ -235,7 +239,7 @@ def two_levels():
 
 def test_the_steady_window_grows_from_that_part_of_the_slide_in_which_the_ratio_varies_least():
     """The longest steady stretch would be the first level."""
-    window = steady_window(two_levels(), 200.0, 600, replace(SETTINGS, steady_seed=0.4))
+    window = steady_window(two_levels(), 200.0, 600, steadily(steady_seed=0.4))
     assert 310 <= window.start <= 325
     assert window.stop == 600
     even = 0.5 + 0.01 * np.random.default_rng(4).standard_normal(600)
@@ -246,7 +250,7 @@ def test_the_steady_window_grows_from_that_part_of_the_slide_in_which_the_ratio_
 def test_the_stretch_of_least_variance_has_the_wanted_length_and_no_other_of_that_length_varies_less():
     draw = np.random.default_rng(5)
     ratio = 0.5 + 0.02 * (1.5 + np.sin(np.arange(600) / 70.0)) * draw.standard_normal(600)
-    window = steady_window(ratio, 200.0, 600, replace(SETTINGS, steady_rule="least variance"))
+    window = steady_window(ratio, 200.0, 600, steadily(steady_rule="least variance"))
     assert 295 <= window.stop - window.start <= 306
     every = [ratio[start : start + 300].var() for start in range(0, 301, 5)]
     assert ratio[window].var() == pytest.approx(min(every), rel=0.02)
@@ -255,7 +259,7 @@ def test_the_stretch_of_least_variance_has_the_wanted_length_and_no_other_of_tha
 def test_the_middle_half_and_the_whole_slide_ask_for_no_steadiness():
     ratio = np.concatenate([np.full(100, np.nan), np.linspace(0.2, 0.8, 400), np.full(100, np.nan)])
     windows = {
-        rule: steady_window(ratio, 200.0, 600, replace(SETTINGS, steady_rule=rule))
+        rule: steady_window(ratio, 200.0, 600, steadily(steady_rule=rule))
         for rule in ("middle half", "whole slide", "least variance", "widened")
     }
     assert (windows["least variance"], windows["widened"]) == (None, None)

@@ -19,6 +19,7 @@ from drivers.readings import ReadingBlock
 from drivers.serial_link import serial_ports
 from drivers.status import flagged_words
 from drivers.transducer import Transducer
+from sessions.recording.head import identity
 
 EXAMPLE = "daq-app devices probe sim:"
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
@@ -69,12 +70,7 @@ def _described(device: Found) -> dict[str, Any]:
         return {"uri": device.uri, "problem": device.problem}
     info = device.info
     return {
-        "uri": info.uri,
-        "driver": info.driver,
-        "model": info.model,
-        "serial": info.serial,
-        "simulated": info.simulated,
-        "rate": info.rate if np.isfinite(info.rate) else None,
+        **identity(info),
         "calibration": info.calibration.source,
         "life": None if (life := life_of(info.serial)) is None else asdict(life),
     }

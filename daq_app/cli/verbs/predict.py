@@ -13,6 +13,7 @@ from typing import Any
 from daq_app.batch.derived import analysed, predicted, visit
 from daq_app.cli.area_option import add_area, area_law
 from daq_app.cli.calibration_option import add_calibration, calibration_error
+from daq_app.cli.model_option import add_kinematics, add_tau
 from daq_app.console import Console, WrongValue, number, span, table
 from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction, finger_in
 from sessions.prediction.afferent import AfferentSettings, firing_document, settings_with
@@ -31,17 +32,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the session and what may be asked of the model."""
     parser.add_argument("session", type=Path, metavar="SESSION|STUDY")
     parser.add_argument("--subject", metavar="CODE", help="of a study: whose visit with forces")
-    parser.add_argument(
-        "--kinematics",
-        choices=["small", "finite"],
-        default="small",
-        help="small strain (the paper's), or finite strain, where some sticky surfaces have no settled sliding",
+    add_kinematics(
+        parser, "small strain (the paper's), or finite strain, where some sticky surfaces have no settled sliding"
     )
-    parser.add_argument(
-        "--tau",
-        choices=["computed", "as-printed"],
-        default="computed",
-        help="reading of the traction bound: force over area, or a hundredth of it, as the paper's tables are headed",
+    add_tau(
+        parser, "reading of the traction bound: force over area, or a hundredth of it, as the paper's tables are headed"
     )
     parser.add_argument(
         "--scene",

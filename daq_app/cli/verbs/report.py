@@ -10,6 +10,7 @@ from pathlib import Path
 from daq_app.batch.derived import afferent_before, analysed, asked_before, predicted, visit
 from daq_app.cli.area_option import add_area, area_law
 from daq_app.cli.calibration_option import add_calibration, calibration_error
+from daq_app.cli.model_option import add_paths
 from daq_app.console import Console
 from sessions.plan.plan import Blinded
 from sessions.plan.study_file import is_study
@@ -33,13 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--subject", metavar="CODE", help="of a study: whose visit with forces; all its scores join in")
     parser.add_argument("-o", "--out", type=Path, metavar="FILE.html", help="the page (SESSION/report.html)")
     parser.add_argument("--scores", type=Path, nargs="+", default=[], metavar="SESSION", help="further visits")
-    parser.add_argument(
-        "--paths",
-        nargs="?",
-        const="small",
-        choices=["small", "finite"],
-        metavar="finite",
-        help="also along every other reasonable choice of the analysis; with 'finite' at finite strain too (a minute)",
+    add_paths(
+        parser,
+        "also along every other reasonable choice of the analysis; with 'finite' at finite strain too (a minute)",
+        None,
     )
     parser.add_argument(
         "--beside",

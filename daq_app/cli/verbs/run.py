@@ -18,7 +18,7 @@ from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import People, StartSession
 from drivers.status import flagged_words
 from sessions.plan.plan import Frame, Phase
-from sessions.plan.protocols import Body, Protocol, StudyPlace, plan, protocol
+from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, plan, protocol
 from sessions.plan.study_file import open_study, study_key
 from sessions.recording import Setting
 from sessions.run.resuming import RESUMABLE
@@ -65,9 +65,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         options.subject,
         seed,
         forces=options.device is not None,
-        contact_area=options.contact_area,
-        stroking_hand=options.stroking_hand,
-        answering_hand=options.answering_hand,
+        setting=VisitSetting(None, options.contact_area, options.stroking_hand, options.answering_hand),
         phases=options.phases,
         body=body,
         place=place,

@@ -16,6 +16,7 @@ from typing import Any
 from daq_app.batch.pool import Shelf, visits
 from daq_app.cli.area_option import add_area, area_law
 from daq_app.cli.calibration_option import add_calibration, calibration_error
+from daq_app.cli.model_option import add_kinematics, add_paths, add_tau
 from daq_app.console import Console, WrongValue
 from sessions.atomic_file import json_text
 from sessions.file_access import read_limited
@@ -46,25 +47,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster you trust, such as tls://host:8786")
     parser.add_argument("--workers", type=int, metavar="N", help="processes on this computer (as many as cores)")
-    parser.add_argument(
-        "--kinematics",
-        choices=["small", "finite"],
-        default="small",
-        help="as for 'daq-app predict'; finite strain takes ten times as long",
+    add_kinematics(parser, "as for 'daq-app predict'; finite strain takes ten times as long")
+    add_paths(
+        parser,
+        "also along every other reasonable choice of the analysis: a second or two more a session; with 'finite' at "
+        "finite strain too, up to a minute more",
+        "none",
     )
-    parser.add_argument(
-        "--paths",
-        nargs="?",
-        const="small",
-        choices=["small", "finite"],
-        default="none",
-        metavar="finite",
-        help="also along every other reasonable choice of the analysis: a second or two more a session; with "
-        "'finite' at finite strain too, up to a minute more",
-    )
-    parser.add_argument(
-        "--tau", choices=["computed", "as-printed"], default="computed", help="as for 'daq-app predict'"
-    )
+    add_tau(parser, "as for 'daq-app predict'")
     parser.add_argument(
         "--intervals",
         action=argparse.BooleanOptionalAction,

@@ -1,6 +1,6 @@
 """The protocols we run, a validated TOML file each, their reader, and the plan of a session. The folder is the list."""
 
-from sessions.plan.protocols.planning import Body, StudyPlace, blinded, design_rows, plan
+from sessions.plan.protocols.planning import Body, StudyPlace, VisitSetting, blinded, design_rows, plan
 from sessions.plan.protocols.protocol import (
     BlockOutline,
     Face,
@@ -18,6 +18,7 @@ __all__ = [
     "Labels",
     "Protocol",
     "StudyPlace",
+    "VisitSetting",
     "blinded",
     "design_rows",
     "plan",

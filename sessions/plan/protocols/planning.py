@@ -46,28 +46,35 @@ class StudyPlace:
     key_sha256: str | None = None  # of the sealed key; None: not blinded
 
 
+@dataclass(frozen=True, slots=True)
+class VisitSetting:
+    """How one visit is held; frame and area of the face, where given, replace the protocol's."""
+
+    frame: Frame | None = None
+    contact_area: float | None = None  # [mm2]
+    stroking_hand: Hand | None = None  # None: nobody stated it
+    answering_hand: Hand | None = None
+
+
 def plan(
     protocol: Protocol,
     subject: str,
     seed: int,
     *,
     forces: bool = True,
-    frame: Frame | None = None,
-    contact_area: float | None = None,
-    stroking_hand: Hand | None = None,
-    answering_hand: Hand | None = None,
+    setting: VisitSetting | None = None,
     phases: Sequence[Phase] | None = None,
     body: Body | None = None,
     place: StudyPlace | None = None,
 ) -> SessionPlan:
     """Return the plan of one session.
 
-    `forces` is False for a visit that only scores. `frame`, `contact_area` [mm2] and `phases`, where given, replace the
-    protocol's. Raises SettingsError where `subject` is no code or another value is out of range.
+    `forces` is False for a visit that only scores. `phases`, where given, replace the protocol's. Raises
+    SettingsError where `subject` is no code or another value is out of range.
     """
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", subject):
         raise SettingsError(f'subject = "{subject}" is not allowed: a code of letters, digits, - and _, never a name')
-    own = body or Body()
+    own, held = body or Body(), setting or VisitSetting()
     asked = protocol.phases if phases is None else phases
     try:
         check_seed("seed", seed)
@@ -75,7 +82,7 @@ def plan(
         check_body(own, protocol)
     except NotAllowed as error:
         raise SettingsError(str(error)) from error
-    area = protocol.face.contact_area if contact_area is None else contact_area
+    area = protocol.face.contact_area if held.contact_area is None else held.contact_area
     rows = design_rows(protocol)
     row = None if rows is None else (seed % rows if place is None else place.row - 1) % rows + 1
     design_seed = protocol.label_seed if place is None else place.seed
@@ -87,11 +94,11 @@ def plan(
         order_rule=protocol.order.rule if row is None else f"{protocol.order.rule}, row {row} of {rows}",
         blocks=tuple(blocks.of(asked)),
         forces=forces,
-        frame=frame or protocol.face.frame,
+        frame=held.frame or protocol.face.frame,
         contact_angle=protocol.contact_angle if own.contact_angle is None else own.contact_angle,
         contact_angle_origin="set" if own.contact_angle is None else "measured",
-        stroking_hand=stroking_hand,
-        answering_hand=answering_hand,
+        stroking_hand=held.stroking_hand,
+        answering_hand=held.answering_hand,
         finger=own.finger,
         rests=Rests(protocol.rests.after_trials, protocol.rests.between_blocks, protocol.rests.duration),
         shown=protocol.shown,
@@ -140,25 +147,25 @@ def check_body(body: Body, protocol: Protocol) -> None:
             raise NotAllowed(f"depth of {name}", depth, "it must lie above 0 and up to 10 mm")
 
 
+@dataclass(eq=False)
 class _Blocks:
     """Makes the blocks of a plan one after the other, trials numbered on."""
 
-    def __init__(
-        self, protocol: Protocol, seed: int, row: int | None, design_seed: int, body: Body, labels: Labels
-    ) -> None:
-        self._protocol = protocol
-        self._seed = seed
-        self._row = row
-        self._design_seed = design_seed
-        self._body = body
-        self._labels = labels
+    protocol: Protocol
+    seed: int
+    row: int | None
+    design_seed: int
+    body: Body
+    labels: Labels
+
+    def __post_init__(self) -> None:
         self._numbers = count(1)
 
     def of(self, phases: Sequence[Phase]) -> Iterator[Block]:
         """Yield the pre-evaluation of every descriptor, then each block after its practice."""
         if "pre-evaluation" in phases:
-            yield from (self._pre_evaluation(outline) for outline in self._protocol.blocks)
-        for outline in self._protocol.blocks:
+            yield from (self._pre_evaluation(outline) for outline in self.protocol.blocks)
+        for outline in self.protocol.blocks:
             if "practice" in phases and outline.practice:
                 yield self._practice(outline)
             if "main" in phases:
@@ -167,14 +174,14 @@ class _Blocks:
     def _pre_evaluation(self, outline: BlockOutline) -> Block:
         """Return the block in which every stimulus is judged once, shuffled."""
         name = f"{outline.name}, pre-evaluation"
-        told = self._protocol.pre_evaluation
+        told = self.protocol.pre_evaluation
         instruction = outline.instruction if told is None else told.instruction
         return self._block(outline, "pre-evaluation", name, [self._shuffled(outline, name)], instruction)
 
     def _practice(self, outline: BlockOutline) -> Block:
         """Return the practice of a block, in the order the protocol lists."""
         order = outline.practice
-        if self._protocol.scale.answer == "choice":
+        if self.protocol.scale.answer == "choice":
             order = tuple(index for pair in pairwise(order) for index in pair)
         return self._block(outline, "practice", f"{outline.name}, practice", [order], outline.instruction)
 
@@ -183,12 +190,12 @@ class _Blocks:
         made: list[tuple[int, ...]] = []
         for repetition in range(1, outline.repetitions + 1):
             name = outline.name if repetition == 1 else f"{outline.name}#{repetition}"
-            if self._protocol.scale.answer == "choice":
+            if self.protocol.scale.answer == "choice":
                 by_code = self._by_code(outline)
-                drawn_pairs = pairs(tuple(by_code), self._seed, name)
+                drawn_pairs = pairs(tuple(by_code), self.seed, name)
                 made.append(tuple(by_code[str(code)] for pair in drawn_pairs for code in pair))
-            elif self._row is not None:
-                made.append(self._row_of_design(outline, self._row - 1 + repetition - 1))
+            elif self.row is not None:
+                made.append(self._row_of_design(outline, self.row - 1 + repetition - 1))
             else:
                 made.append(self._shuffled(outline, name, [order[0] for order in made]))
         return made
@@ -198,9 +205,9 @@ class _Blocks:
         by_code = self._by_code(outline)
         order = drawn(
             tuple(by_code),
-            self._seed,
+            self.seed,
             name,
-            lambda codes: self._protocol.order.meets([by_code[str(code)] for code in codes], begun_with),
+            lambda codes: self.protocol.order.meets([by_code[str(code)] for code in codes], begun_with),
         )
         if order is None:
             raise SettingsError(f"no order of {outline.name} was found that meets the constraints; use another seed")
@@ -209,19 +216,19 @@ class _Blocks:
     def _row_of_design(self, outline: BlockOutline, row: int) -> tuple[int, ...]:
         """Return a row of the Williams design, whose letters chance deals to the codes for the whole study."""
         by_code = self._by_code(outline)
-        letters = shuffled(tuple(by_code), self._design_seed, f"{outline.name}/letters")
+        letters = shuffled(tuple(by_code), self.design_seed, f"{outline.name}/letters")
         rows = williams(len(letters))
         return tuple(by_code[str(letters[letter])] for letter in rows[row % len(rows)])
 
     def _by_code(self, outline: BlockOutline) -> dict[str, int]:
-        return {self._labels[outline.descriptor, index]: index for index in outline.indices}
+        return {self.labels[outline.descriptor, index]: index for index in outline.indices}
 
     def _block(
         self, outline: BlockOutline, phase: Phase, name: str, orders: Sequence[Sequence[int]], instruction: str
     ) -> Block:
-        own = self._body.indentations.get(outline.name)
+        own = self.body.indentations.get(outline.name)
         direction = DIRECTIONS[outline.direction]
-        answer = self._protocol.scale.answer
+        answer = self.protocol.scale.answer
         times: Counter[int] = Counter()
         trials: list[Trial] = []
         for index in (index for order in orders for index in order):
@@ -231,7 +238,7 @@ class _Blocks:
                 Trial(
                     number=next(self._numbers),
                     block=name,
-                    stimulus=Stimulus(outline.descriptor, index, self._labels[outline.descriptor, index]),
+                    stimulus=Stimulus(outline.descriptor, index, self.labels[outline.descriptor, index]),
                     direction=direction,
                     repetition=times[index],
                     phase=phase,
@@ -249,6 +256,6 @@ class _Blocks:
             phase=phase,
             question=outline.question,
             strokes_allowed=outline.strokes_allowed,
-            ticks=self._protocol.scale.ticks,
+            ticks=self.protocol.scale.ticks,
             indentation_origin="set" if own is None else "measured",
         )

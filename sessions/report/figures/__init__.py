@@ -61,8 +61,7 @@ def _friction(report: Report) -> Plate:
         "coefficient is averaged. Dashed: a stroke of which no coefficient is given, the tables say why. The ratio is "
         "left out where the normal force is too small to divide by."
     )
-    panels = [friction_panel(strokes, name, simulated=report.simulated) for name, strokes in _grouped(report)]
-    return Plate("friction", caption, tuple(panel for panel in panels if panel is not None))
+    return _of_strokes("friction", caption, friction_panel, report)
 
 
 def _speed(report: Report) -> Plate:
@@ -71,8 +70,13 @@ def _speed(report: Report) -> Plate:
         "by rolling and by skin shear as well as by sliding, most of all at onset; the tables give its mean slope "
         "over the steady window. Strokes whose speed was refused are left out."
     )
-    panels = [speed_panel(strokes, name, simulated=report.simulated) for name, strokes in _grouped(report)]
-    return Plate("speed", caption, tuple(panel for panel in panels if panel is not None))
+    return _of_strokes("speed", caption, speed_panel, report)
+
+
+def _of_strokes(name: str, caption: str, panel: Callable[..., Panel | None], report: Report) -> Plate:
+    """Return a figure with a panel for the strokes of each experiment of which something can be drawn."""
+    panels = [panel(strokes, experiment, simulated=report.simulated) for experiment, strokes in _grouped(report)]
+    return Plate(name, caption, tuple(each for each in panels if each is not None))
 
 
 def _fingers(report: Report) -> Plate:

@@ -4,9 +4,10 @@
 # matplotlib does not type the keyword arguments it passes on.
 
 import numpy as np
+from matplotlib.axes import Axes
 
-from sessions.report import Experiment
-from sessions.report.figures.style import GREY, INK, PALE, Panel, sheet, svg
+from sessions.report import Experiment, MeanScore
+from sessions.report.figures.style import GREY, INK, PALE, Panel, Sheet, sheet, svg
 
 _LONG, _HIGH = 22.0, 6.0  # of the words along the line and across it [points of either axis]
 _AWAY = 3.0  # that no dot may come nearer [points]
@@ -44,42 +45,13 @@ def score_panel(experiment: Experiment, *, simulated: bool) -> Panel:
     """Return mean score against index, with 95 % t intervals and every subject's answer beside them."""
     drawn = sheet(328, 280)
     (axes,) = drawn.axes
-    axes.plot([0, 100], [0, 100], color=PALE, linewidth=0.8, zorder=0)
-    place = _free_place(experiment)
-    if place is not None:
-        start, above = place
-        off = 1.5 if above else -1.5
-        axes.text(
-            start - off,
-            start + off,
-            "score = index",
-            color=GREY,
-            rotation=45,
-            rotation_mode="anchor",
-            transform_rotates_text=True,
-            va="bottom" if above else "top",
-            fontsize=7.5,
-        )
+    _draw_identity(axes, _free_place(experiment))
     for answers in experiment.answers:
-        places = [
-            index - 3.0 for index, score in zip(experiment.indices, answers.scores, strict=True) if score is not None
-        ]
-        given = [score for score in answers.scores if score is not None]
-        axes.plot(places, given, "o", markersize=2, color=GREY, alpha=0.55, markeredgewidth=0)
+        given = [(i, score) for i, score in zip(experiment.indices, answers.scores, strict=True) if score is not None]
+        places, scores = [index - 3.0 for index, _ in given], [score for _, score in given]
+        axes.plot(places, scores, "o", markersize=2, color=GREY, alpha=0.55, markeredgewidth=0)
     for mean in experiment.scores:
-        text = f"index {mean.index}: mean {mean.mean:.1f}, {mean.n} subjects"
-        if mean.low is not None and mean.high is not None:
-            text += f", 95 % interval {mean.low:.1f} to {mean.high:.1f}"
-            axes.errorbar(
-                mean.index,
-                mean.mean,
-                yerr=[[mean.mean - mean.low], [mean.high - mean.mean]],
-                color=INK,
-                linewidth=1.1,
-                capsize=3,
-                capthick=0.8,
-            )
-        axes.plot(mean.index, mean.mean, "o", markersize=5, color=INK, gid=drawn.note(text))
+        _draw_mean(drawn, axes, mean)
     axes.set_xlim(-9, 106)
     axes.set_ylim(min([-4.0, *(m.low - 2 for m in experiment.scores if m.low is not None)]), 109)
     axes.set_xticks(list(experiment.indices))
@@ -90,16 +62,41 @@ def score_panel(experiment: Experiment, *, simulated: bool) -> Panel:
     name, title = f"scores-{experiment.name}", f"Scores of {experiment.descriptor} against the stimuli's index"
     header = ("index", "subjects", "mean score", "standard deviation", "95 % interval low", "95 % interval high")
     header += tuple(f"score of {answers.subject}" for answers in experiment.answers)
-    rows = tuple(
-        (
-            m.index,
-            m.n,
-            m.mean,
-            m.sd,
-            m.low,
-            m.high,
-            *(a.scores[experiment.indices.index(m.index)] for a in experiment.answers),
-        )
-        for m in experiment.scores
-    )
+    rows = tuple((m.index, m.n, m.mean, m.sd, m.low, m.high, *_answers(experiment, m.index)) for m in experiment.scores)
     return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, rows)
+
+
+def _answers(experiment: Experiment, index: int) -> tuple[float | None, ...]:
+    """Return the score of each subject on one stimulus."""
+    at = experiment.indices.index(index)
+    return tuple(answers.scores[at] for answers in experiment.answers)
+
+
+def _draw_identity(axes: Axes, place: tuple[float, bool] | None) -> None:
+    """Draw the line on which score and index are equal, with its words where there is a place for them."""
+    axes.plot([0, 100], [0, 100], color=PALE, linewidth=0.8, zorder=0)
+    if place is None:
+        return
+    start, above = place
+    off = 1.5 if above else -1.5
+    axes.text(
+        start - off,
+        start + off,
+        "score = index",
+        color=GREY,
+        rotation=45,
+        rotation_mode="anchor",
+        transform_rotates_text=True,
+        va="bottom" if above else "top",
+        fontsize=7.5,
+    )
+
+
+def _draw_mean(drawn: Sheet, axes: Axes, mean: MeanScore) -> None:
+    """Draw one mean score with its interval; hovering tells its numbers."""
+    text = f"index {mean.index}: mean {mean.mean:.1f}, {mean.n} subjects"
+    if mean.low is not None and mean.high is not None:
+        text += f", 95 % interval {mean.low:.1f} to {mean.high:.1f}"
+        ends = [[mean.mean - mean.low], [mean.high - mean.mean]]
+        axes.errorbar(mean.index, mean.mean, yerr=ends, color=INK, linewidth=1.1, capsize=3, capthick=0.8)
+    axes.plot(mean.index, mean.mean, "o", markersize=5, color=INK, gid=drawn.note(text))

@@ -5,6 +5,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from matplotlib.axes import Axes
 
@@ -15,65 +16,65 @@ from sessions.report.figures.style import GREY, PURPLE, Panel, Sheet, shades, sh
 MOST_LABELLED = 12  # more curves in one picture cannot be told apart by labels
 
 
+class _Quantity(NamedTuple):
+    """What is drawn in the course of strokes."""
+
+    name: str  # of its figure
+    values: str  # its name in a trace, and in the title
+    level: str  # a stroke's number over the steady window
+    column: str  # with its unit
+    axis: str
+    word: str  # before a level
+    colour: str
+
+
+_MU = _Quantity("friction", "mu", "mu_dynamic", "mu [-]", "µ = T / N [–]", "µ", PURPLE)
+_SPEED = _Quantity("speed", "speed", "speed", "speed [mm/s]", "speed of the centre of pressure [mm/s]", "speed", GREY)
+
+
 def friction_panel(strokes: Sequence[StrokeFinding], name: str, *, simulated: bool) -> Panel | None:
     """Return mu(t) of the strokes of one experiment from contact onset on; None where nothing can be drawn."""
-    curves = [(stroke, stroke.trace, stroke.trace.mu) for stroke in strokes if stroke.trace is not None]
-    drawn = sheet(328, 290)
-    title = f"mu against time, {name or 'all strokes'}"
-    levels = {stroke.number: stroke.mu_dynamic for stroke in strokes}
-    drawn.axes[0].set_title(name)
-    drawn.axes[0].set_ylabel("µ = T / N [–]")
-    rows = _draw(drawn, curves, levels, PURPLE, "µ")
-    if not rows:
-        return None
-    name = f"friction-{name}" if name else "friction"
-    header = ("stroke", "index", "time since contact [s]", "mu [-]", "in steady window")
-    return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, rows)
+    return _panel(_MU, strokes, name, simulated=simulated)
 
 
 def speed_panel(strokes: Sequence[StrokeFinding], name: str, *, simulated: bool) -> Panel | None:
     """Return the speed of the centre of pressure likewise; strokes whose speed was refused are left out."""
-    curves = [
-        (stroke, stroke.trace, stroke.trace.speed)
-        for stroke in strokes
-        if stroke.trace is not None and stroke.speed is not None
-    ]
+    return _panel(_SPEED, [stroke for stroke in strokes if stroke.speed is not None], name, simulated=simulated)
+
+
+def _panel(of: _Quantity, strokes: Sequence[StrokeFinding], experiment: str, *, simulated: bool) -> Panel | None:
     drawn = sheet(328, 290)
-    title = f"speed against time, {name or 'all strokes'}"
-    levels = {stroke.number: stroke.speed for stroke in strokes}
-    drawn.axes[0].set_title(name)
-    drawn.axes[0].set_ylabel("speed of the centre of pressure [mm/s]")
-    rows = _draw(drawn, curves, levels, GREY, "speed")
+    (axes,) = drawn.axes
+    axes.set_title(experiment)
+    axes.set_ylabel(of.axis)
+    rows = _draw(drawn, of, [(stroke, stroke.trace) for stroke in strokes if stroke.trace is not None])
     if not rows:
         return None
-    fastest = max(stroke.speed for stroke, _, _ in curves if stroke.speed is not None)
-    low, high = drawn.axes[0].get_ylim()
-    drawn.axes[0].set_ylim(max(low, -0.3 * fastest), min(high, 2.0 * fastest))
-    name = f"speed-{name}" if name else "speed"
-    header = ("stroke", "index", "time since contact [s]", "speed [mm/s]", "in steady window")
+    if of is _SPEED:
+        fastest = max(stroke.speed for stroke in strokes if stroke.speed is not None and stroke.trace is not None)
+        low, high = axes.get_ylim()
+        axes.set_ylim(max(low, -0.3 * fastest), min(high, 2.0 * fastest))
+    name = f"{of.name}-{experiment}" if experiment else of.name
+    title = f"{of.values} against time, {experiment or 'all strokes'}"
+    header = ("stroke", "index", "time since contact [s]", of.column, "in steady window")
     return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, rows)
 
 
 Row = tuple[int, int | None, float, float, int]
 
 
-def _draw(
-    drawn: Sheet,
-    curves: Sequence[tuple[StrokeFinding, Trace, Sequence[float | None]]],
-    levels: dict[int, float | None],
-    colour: str,
-    what: str,
-) -> tuple[Row, ...]:
+def _draw(drawn: Sheet, of: _Quantity, curves: Sequence[tuple[StrokeFinding, Trace]]) -> tuple[Row, ...]:
     """Draw curves thin, thick in their steady windows, labelled at their steady level; return what was drawn."""
     (axes,) = drawn.axes
     ordered = sorted(curves, key=lambda c: (c[0].index is None, c[0].index or 0, c[0].number))
     rows: list[Row] = []
     labels: list[Label] = []
-    for (stroke, trace, values), shade in zip(ordered, shades(colour, max(len(ordered), 1)), strict=False):
+    for (stroke, trace), shade in zip(ordered, shades(of.colour, max(len(ordered), 1)), strict=False):
+        values: Sequence[float | None] = getattr(trace, of.values)
         inside = [in_window(stroke, t) for t in trace.time]
         y = [math.nan if v is None else v for v in values]
-        level = levels[stroke.number]
-        text = _name(stroke) + (f", {what} {level:.3g} over the steady window" if level is not None else "")
+        level: float | None = getattr(stroke, of.level)
+        text = _name(stroke) + (f", {of.word} {level:.3g} over the steady window" if level is not None else "")
         style = "solid" if level is not None else (0, (3, 2))
         axes.plot(trace.time, y, color=shade, linewidth=0.7, linestyle=style, gid=drawn.note(text))
         steady = [v if within else math.nan for v, within in zip(y, inside, strict=True)]

@@ -7,7 +7,7 @@ from sessions.report import Answers, Experiment
 from sessions.report.figures.multiverse import CAPTION, paths_panel
 from sessions.report.figures.scores import score_panel
 from sessions.report.figures.style import GREEN, GREY, Panel, Plate, look, sheet, svg
-from sessions.report.study_cells import model_in_short
+from sessions.report.predictions import model_in_short
 from sessions.report.wording import correlation
 from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
 
@@ -22,7 +22,9 @@ def study_plates(study: StudyFindings) -> tuple[Plate, ...]:
     paths = tuple(panel for panel in along if panel is not None)
     plates = (
         Plate("scores", SCORES, scores),
-        Plate("relation", f"{RELATION} Model: {model_in_short(study)}.", relations),
+        Plate(
+            "relation", f"{RELATION} Model: {model_in_short(study.options.prediction, study.options.area)}.", relations
+        ),
         Plate("paths", CAPTION, paths),
     )
     return tuple(plate for plate in plates if plate.panels)

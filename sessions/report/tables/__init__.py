@@ -1,7 +1,7 @@
 """The tables of a report: cells as text, and for every number that is missing the reason."""
 
 from sessions.report import Report
-from sessions.report.tables.cells import Cell, Column, Group, Table
+from sessions.report.tables.cells import Cell, Column, Group, Table, sections_of
 from sessions.report.tables.multiverse import paths_table
 from sessions.report.tables.predictions import (
     afferent_table,
@@ -34,4 +34,4 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
         "paths": (paths_table((e.name, e.paths) for e in report.experiments),),
         "planted": (planted_table(report),),
     }
-    return {name: tuple(table for table in made if table is not None) for name, made in sections.items()}
+    return sections_of(sections)

@@ -1,6 +1,6 @@
-"""Cells, columns and notes: what every table is made of."""
+"""Cells, columns and notes: what every table of a report is made of, of a session as of a study."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -33,7 +33,7 @@ class Group:
     """Rows under a heading of their own, "" for none."""
 
     name: str
-    rows: tuple[tuple[Cell, ...], ...]
+    rows: tuple["Row", ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +45,9 @@ class Table:
     columns: tuple[Column, ...]
     groups: tuple[Group, ...]
     notes: tuple[tuple[str, str], ...]  # mark, sentence
+
+
+Row = tuple[Cell, ...]
 
 
 @dataclass(slots=True)
@@ -76,33 +79,61 @@ class Notes:
         *,
         told: Callable[[float], str] | None = None,
         unit: float = 1.0,
-        star: bool = False,
     ) -> Cell:
         """Return the number over its interval, `without` which it has a note that says why; or a dash with its reason.
 
         `told` shows an end of the interval where `shown` shows more than a number; `unit` as for `wording.between`.
-        `star` marks an interval that was found otherwise than the others of its table.
         """
         if value is None:
             return self.number(None, shown, reason)
         if ends is None:
             why = f"no interval: {without or 'not computed'}"
             return Cell(shown(value), self.mark(why), why)
-        return Cell(shown(value), interval=between(*ends, told or shown, unit) + ("*" if star else ""))
+        return Cell(shown(value), interval=between(*ends, told or shown, unit))
+
+    def interval(
+        self, low: float | None, high: float | None, shown: Callable[[float], str], reason: str | None
+    ) -> Cell:
+        """Return the interval as a cell of its own, or a dash with its reason."""
+        missing = low is None or high is None
+        return self.number(None, shown, reason) if missing else range_cell(low, high, shown)
 
     def listed(self) -> tuple[tuple[str, str], ...]:
         """Return every note with its letter."""
         return tuple((mark, sentence) for sentence, mark in self.marks.items())
 
 
+def table(name: str, caption: str, columns: str, groups: Iterable[Group], notes: Notes | None = None) -> Table | None:
+    """Return a table without its empty groups; None where no group has rows.
+
+    `columns` are its heads with their units, as in "index | SED [kPa]".
+    """
+    kept = tuple(group for group in groups if group.rows)
+    if not kept:
+        return None
+    heads = (head.strip().removesuffix("]").partition(" [") for head in columns.split("|"))
+    return Table(
+        name, caption, tuple(Column(head, unit) for head, _, unit in heads), kept, notes.listed() if notes else ()
+    )
+
+
+def sections_of(made: Mapping[str, Iterable[Table | None]]) -> dict[str, tuple[Table, ...]]:
+    """Return the tables of each section that have rows."""
+    return {name: tuple(each for each in tables if each is not None) for name, tables in made.items()}
+
+
 def grouped(
     report: Report,
     things: Sequence[Thing],
     experiment: Callable[[Thing], str],
-    row: Callable[[Thing], tuple[Cell, ...]],
+    row: Callable[[Thing], Row],
 ) -> tuple[Group, ...]:
     """Return the rows of all things under the names of their experiments."""
     names = [e.name for e in report.experiments]
     groups = [Group(name, tuple(row(t) for t in things if experiment(t) == name)) for name in names]
-    groups.append(Group("", tuple(row(t) for t in things if experiment(t) not in names)))
-    return tuple(group for group in groups if group.rows)
+    return (*groups, Group("", tuple(row(t) for t in things if experiment(t) not in names)))
+
+
+def range_cell(low: float | None, high: float | None, shown: Callable[[float], str]) -> Cell:
+    """Return the cell of an interval, a dash where there is none."""
+    return Cell(NONE if low is None or high is None else f"{shown(low)} to {shown(high)}")

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from sessions.report.tables.cells import Cell, Column, Group, Table
+from sessions.report.tables.cells import Cell, Group, Row, Table, table
 from sessions.report.wording import NONE, correlation
 from sessions.statistics.multiverse import SAME, TOLD, PathFinding, Spread, by_choice, correlations, spread
 
@@ -12,19 +12,8 @@ Named = tuple[str, Sequence[PathFinding]]
 def paths_table(named: Iterable[Named]) -> Table | None:
     """Return the distribution of the correlation over all paths and over those with each choice, by descriptor."""
     groups = [Group(name, _rows(findings)) for name, findings in named if findings]
-    if not groups:
-        return None
     columns = (
-        "choice",
-        "",
-        "usual",
-        "paths with r",
-        "different r",
-        "least",
-        "lower quartile",
-        "median",
-        "upper quartile",
-        "greatest",
+        "choice |  | usual | paths with r | different r | least | lower quartile | median | upper quartile | greatest"
     )
     caption = (
         "The correlation of predicted SED with scores as a distribution over paths of the analysis: every choice below "
@@ -34,7 +23,7 @@ def paths_table(named: Iterable[Named]) -> Table | None:
         "how many are left where those that agree within "
         f"{SAME:g} count once. A path of which fewer than three surfaces have an SED gives no r."
     )
-    return Table("table-paths", caption, tuple(Column(name) for name in columns), tuple(groups), ())
+    return table("table-paths", caption, columns, groups)
 
 
 def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
@@ -49,7 +38,7 @@ def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
     )
 
 
-def _rows(findings: Sequence[PathFinding]) -> tuple[tuple[Cell, ...], ...]:
+def _rows(findings: Sequence[PathFinding]) -> tuple[Row, ...]:
     rows = [(Cell("all"), Cell(""), Cell(""), *_spread(spread(correlations(findings)), len(findings)))]
     before = ""
     for choice, name, of, usual in by_choice(findings):
@@ -60,7 +49,7 @@ def _rows(findings: Sequence[PathFinding]) -> tuple[tuple[Cell, ...], ...]:
     return tuple(rows)
 
 
-def _spread(of: Spread | None, paths: int) -> tuple[Cell, ...]:
+def _spread(of: Spread | None, paths: int) -> Row:
     if of is None:
         return (Cell(f"0 of {paths}"), *(Cell(NONE) for _ in range(6)))
     numbers = (of.least, of.lower, of.median, of.upper, of.greatest)

@@ -1,12 +1,12 @@
 """Tables of predictions: responses, forces beside measured ones, both directions."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from sessions.prediction.sed_interval import Ends, SedInterval
 from sessions.prediction.variants import Alternative
 from sessions.report import PredictionFinding, Report
-from sessions.report.tables.cells import Cell, Column, Group, Notes, Table, grouped
+from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, grouped, table
 from sessions.report.tables.strokes import model_mu
 from sessions.report.wording import direction, places, sed, significant, tau, with_error
 
@@ -16,19 +16,10 @@ def prediction_table(report: Report) -> Table | None:
     if not report.predictions:
         return None
     notes = Notes()
-    columns = (
-        *_who(report),
-        Column("µ", "1"),
-        Column("which µ"),
-        Column("τ max", "kPa"),
-        Column("depth", "mm"),
-        Column("SED", "kPa"),
-        Column("estimated error", "%"),
-        Column("solved in", "s"),
-    )
+    columns = "µ [1] | which µ | τ max [kPa] | depth [mm] | SED [kPa] | estimated error [%] | solved in [s]"
     strokes = {stroke.number: stroke for stroke in report.strokes}
 
-    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+    def row(p: PredictionFinding) -> Row:
         stroke = None if p.stroke is None else strokes.get(p.stroke)
         held = {} if stroke is None else stroke.bootstrap
         mu = held.get(model_mu(stroke, p)[0])
@@ -37,7 +28,6 @@ def prediction_table(report: Report) -> Table | None:
             bound = bound[0] * p.tau_max / stroke.tau_max, bound[1] * p.tau_max / stroke.tau_max  # as it was read
         missing = p.reasons.get("sed")
         return (
-            *_named(p),
             notes.estimate(p.mu, places(3), p.reasons.get("mu") or missing, mu, _SHORT),
             Cell({"mean over steady window": "mean"}.get(p.mu_rule, p.mu_rule)),
             notes.estimate(p.tau_max, tau, p.reasons.get("tau_max") or missing, bound, _SHORT, unit=1e3),
@@ -47,7 +37,6 @@ def prediction_table(report: Report) -> Table | None:
             notes.number(p.wall_s, lambda v: significant(v, 2), p.reasons.get("wall_s")),
         )
 
-    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
     caption = (
         "Predictions: SED averaged over the ending in the settled state (1 kPa = 1 mJ/cm³). Which µ: the mean over the "
         "steady window, or the maximum; under µ and τ max their bootstrap intervals. Under the SED: the 95 % interval "
@@ -55,7 +44,7 @@ def prediction_table(report: Report) -> Table | None:
         "estimated error: of one SED, from the mesh; differences between stimuli, which share the mesh, are more "
         f"accurate. Model: {report.model}."
     )
-    return Table("table-predictions", caption, columns, groups, notes.listed())
+    return _table(report, "table-predictions", caption, columns, _rows(report, row), notes)
 
 
 _HOW = "by derivatives (the solver's converged tangent), or where marked * by solving draws"
@@ -79,8 +68,12 @@ def _sed(
     *,
     star: bool,
 ) -> Cell:
-    """Return an SED in kPa, ± its relative error from the mesh, over the interval that friction makes."""
-    return notes.estimate(value, _with(error, 3, 1e3), reason, ends, without, told=sed, unit=1e3, star=star)
+    """Return an SED in kPa, ± its relative error from the mesh, over the interval that friction makes.
+
+    `star` marks an interval that was found otherwise than the others of its table.
+    """
+    cell = notes.estimate(value, _with(error, 3, 1e3), reason, ends, without, told=sed, unit=1e3)
+    return replace(cell, interval=f"{cell.interval}*") if star and cell.interval else cell
 
 
 def _with(error: float | None, least: int, unit: float = 1.0) -> Callable[[float], str]:
@@ -100,15 +93,14 @@ def afferent_table(report: Report) -> Table | None:
     if all(p.settled_rate is None for p in report.predictions):
         return None
     notes = Notes()
-    columns = (*_who(report), Column("SED", "kPa"), Column("peak rate", "imp/s"), Column("settled rate", "imp/s"))
+    columns = "SED [kPa] | peak rate [imp/s] | settled rate [imp/s]"
 
-    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+    def row(p: PredictionFinding) -> Row:
         told = ((p.peak_rate, p.peak_rate_interval), (p.settled_rate, p.settled_rate_interval))
         why, without = p.reasons.get("sed"), p.reasons.get("sed_interval")
         rates = (notes.estimate(rate, places(1), why, ends, without) for rate, ends in told)
-        return (*_named(p), _stroked_sed(p, notes), *rates)
+        return (_stroked_sed(p, notes), *rates)
 
-    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
     caption = (
         "Firing of an SA-II afferent: an illustration. No fitted map from SED to the rate of a human SA-II afferent is "
         "known; every parameter is told below, assumed unless it says that somebody set it. The order of the settled "
@@ -117,7 +109,7 @@ def afferent_table(report: Report) -> Table | None:
         "friction makes of it, parameters and reference as given; ±: the SED's error from the mesh. Model of the SED: "
         f"{report.model}."
     )
-    return Table("table-afferent", caption, columns, groups, notes.listed())
+    return _table(report, "table-afferent", caption, columns, _rows(report, row), notes)
 
 
 def beside_table(report: Report) -> Table | None:
@@ -141,8 +133,8 @@ def beside_table(report: Report) -> Table | None:
         "mesh. Under it: the 95 % interval that the uncertainty of friction makes, and of the force where that drives "
         f"the model, {_HOW}. At one strain all trials of a column share a mesh. A dash says why."
     )
-    columns = (*_who(report), *(Column(f"({n})", "kPa") for n in range(1, len(ways) + 1)))
-    return Table("table-beside", caption, columns, _by_strain(report, cell), notes.listed())
+    columns = " | ".join(f"({n}) [kPa]" for n in range(1, len(ways) + 1))
+    return _table(report, "table-beside", caption, columns, _by_strain(report, cell), notes)
 
 
 def beside_forces_table(report: Report) -> Table | None:
@@ -171,8 +163,8 @@ def beside_forces_table(report: Report) -> Table | None:
         "to. ±: the solver's estimate of its error, from the mesh. Under it: the 95 % interval that the uncertainty of "
         "friction makes, and of the force where that drives the model, by derivatives."
     )
-    columns = (*_who(report), *(Column(f"({n})", units[way]) for n, way in enumerate(ways, 1)))
-    return Table("table-beside-forces", caption, columns, _by_strain(report, cell), notes.listed())
+    columns = " | ".join(f"({n}) [{units[way]}]" for n, way in enumerate(ways, 1))
+    return _table(report, "table-beside-forces", caption, columns, _by_strain(report, cell), notes)
 
 
 def _ways(report: Report) -> tuple[str, ...]:
@@ -187,11 +179,10 @@ def _by_strain(report: Report, cell: Callable[[Alternative], Cell]) -> tuple[Gro
     groups: list[Group] = []
     for strain in dict.fromkeys(one.variant.kinematics for one in first):
 
-        def row(p: PredictionFinding, strain: str = strain) -> tuple[Cell, ...]:
-            return (*_named(p), *(cell(one) for one in p.alternatives if one.variant.kinematics == strain))
+        def row(p: PredictionFinding, strain: str = strain) -> Row:
+            return tuple(cell(one) for one in p.alternatives if one.variant.kinematics == strain)
 
-        found = grouped(report, report.predictions, lambda p: p.experiment, row)
-        groups += [Group(f"{group.name or 'trials'}, at {strain} strain", group.rows) for group in found]
+        groups += [Group(f"{group.name or 'trials'}, at {strain} strain", group.rows) for group in _rows(report, row)]
     return tuple(groups)
 
 
@@ -201,18 +192,12 @@ def force_table(report: Report) -> Table | None:
         return None
     notes = Notes()
     columns = (
-        *_who(report),
-        Column("model N", "N/mm"),
-        Column("model N × width", "N"),
-        Column("measured N", "N"),
-        Column("model T × width", "N"),
-        Column("measured T", "N"),
-        Column("depth of the model", "mm"),
-        Column("depth to match", "mm"),
+        "model N [N/mm] | model N × width [N] | measured N [N] | model T × width [N] | "
+        "measured T [N] | depth of the model [mm] | depth to match [mm]"
     )
     strokes = {stroke.number: stroke.bootstrap for stroke in report.strokes}
 
-    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+    def row(p: PredictionFinding) -> Row:
         held = {} if p.stroke is None else strokes.get(p.stroke, {})
         normal = p.normal_force_interval
         per_mm = None if normal is None or not report.width else (normal[0] / report.width, normal[1] / report.width)
@@ -223,7 +208,6 @@ def force_table(report: Report) -> Table | None:
 
         why = p.reasons.get("sed_interval")
         return (
-            *_named(p),
             cell("normal_per_mm", p.normal_force_error, per_mm, why, 4),
             cell("normal_force", p.normal_force_error, normal, why),
             cell("measured_normal", None, held.get("normal_force"), _SHORT),
@@ -241,8 +225,7 @@ def force_table(report: Report) -> Table | None:
         "of friction makes, and of the measured force where that is to be matched, by derivatives; the width is taken "
         f"as given. Under what was measured: its bootstrap interval. Model: {report.model}."
     )
-    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
-    return Table("table-forces", caption, columns, groups, notes.listed())
+    return _table(report, "table-forces", caption, columns, _rows(report, row), notes)
 
 
 _ROUGH = "found on a rough mesh; under the measured force trials are solved with tau_max computed (--beside small)"
@@ -253,21 +236,13 @@ def direction_table(report: Report) -> Table | None:
     if all(p.opposite_sed is None for p in report.predictions):
         return None
     notes = Notes()
-    columns = (
-        *_who(report),
-        Column("depth", "mm"),
-        Column("stroked"),
-        Column("SED as stroked", "kPa"),
-        Column("SED the other way", "kPa"),
-        Column("d → p over p → d", "1"),
-    )
+    columns = "depth [mm] | stroked | SED as stroked [kPa] | SED the other way [kPa] | d → p over p → d [1]"
 
-    def row(p: PredictionFinding) -> tuple[Cell, ...]:
+    def row(p: PredictionFinding) -> Row:
         back, without, star = _of(p.opposite_interval)
         why = p.reasons.get("opposite_sed") or p.reasons.get("sed")
         ratio, ends = _ratio(p, back)
         return (
-            *_named(p),
             _depth(p, notes),
             Cell(direction(p.direction)),
             _stroked_sed(p, notes),
@@ -282,8 +257,7 @@ def direction_table(report: Report) -> Table | None:
         "the least and greatest that both intervals allow: no narrower than 95 %, for both move with one friction. "
         f"Model: {report.model}."
     )
-    groups = grouped(report, report.predictions, lambda p: p.experiment, row)
-    return Table("table-directions", caption, columns, groups, notes.listed())
+    return _table(report, "table-directions", caption, columns, _rows(report, row), notes)
 
 
 def _ratio(p: PredictionFinding, back: Ends | None) -> tuple[float | None, Ends | None]:
@@ -297,14 +271,22 @@ def _ratio(p: PredictionFinding, back: Ends | None) -> tuple[float | None, Ends 
     return upper / lower, (over[0] / under[1], over[1] / under[0])
 
 
-def _who(report: Report) -> tuple[Column, ...]:
-    """Return the columns that name a row: trial and index, or the stroke where there are no trials."""
+def _table(
+    report: Report, name: str, caption: str, columns: str, groups: Iterable[Group], notes: Notes
+) -> Table | None:
+    """Return a table whose rows are named by trial and index, or by the stroke where there are no trials."""
     planned = any(p.trial is not None for p in report.predictions)
-    return (Column("trial"), Column("index")) if planned else (Column("stroke"),)
+    return table(name, caption, f"{'trial | index' if planned else 'stroke'} | {columns}", groups, notes)
 
 
-def _named(p: PredictionFinding) -> tuple[Cell, ...]:
-    return (Cell(str(p.stroke)),) if p.trial is None else (Cell(str(p.trial)), Cell(str(p.index)))
+def _rows(report: Report, row: Callable[[PredictionFinding], Row]) -> tuple[Group, ...]:
+    """Return the named rows of all trials by experiment; `row` gives the cells after the name."""
+
+    def named(p: PredictionFinding) -> Row:
+        name = (Cell(str(p.stroke)),) if p.trial is None else (Cell(str(p.trial)), Cell(str(p.index)))
+        return (*name, *row(p))
+
+    return grouped(report, report.predictions, lambda p: p.experiment, named)
 
 
 def _depth(p: PredictionFinding, notes: Notes) -> Cell:

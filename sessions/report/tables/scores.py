@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from sessions.report import Report
-from sessions.report.tables.cells import Cell, Column, Group, Notes, Table
+from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, range_cell, table
 from sessions.report.wording import NONE, correlation, digits, identifier, places, significant
 from sessions.statistics.scores import MeanScore, Relation, sd_interval, slope_interval
 
@@ -11,36 +11,24 @@ from sessions.statistics.scores import MeanScore, Relation, sd_interval, slope_i
 def score_table(report: Report) -> Table | None:
     """Return mean scores with their intervals."""
     notes = Notes()
-    groups = tuple(Group(e.name, tuple(_score_row(m, notes) for m in e.scores)) for e in report.experiments if e.scores)
-    if not groups:
-        return None
-    columns = (
-        Column("index"),
-        Column("subjects"),
-        Column("mean score", "0–100"),
-        Column("95 % interval of the mean", "0–100"),
-        Column("standard deviation", "0–100"),
-    )
+    groups = tuple(Group(e.name, tuple(score_cells(m, notes) for m in e.scores)) for e in report.experiments)
+    columns = "index | subjects | mean score [0–100] | 95 % interval of the mean [0–100] | standard deviation [0–100]"
     caption = (
         "Scores: mean ± t(0.975, n − 1) s / √n, n subjects. Repeats of one subject are averaged first. Under the "
         "standard deviation s: its 95 % interval by chi squared."
     )
-    return Table("table-scores", caption, columns, groups, notes.listed())
+    return table("table-scores", caption, columns, groups, notes)
 
 
-def _score_row(mean: MeanScore, notes: Notes) -> tuple[Cell, ...]:
-    if mean.low is None or mean.high is None:
-        interval = notes.number(None, str, mean.reason)
-    else:
-        text = f"{digits(mean.low, 1)} to {digits(mean.high, 1)}"
-        interval = Cell(text)
-        if mean.bootstrap is not None:
-            within = f"{digits(mean.bootstrap[0], 1)} to {digits(mean.bootstrap[1], 1)}"
-            why = (
-                "The t interval leaves the scale, where no score can be. Resampling the subjects gives instead, "
-                f"for index {mean.index} of {mean.descriptor}, {within}."
-            )
-            interval = Cell(text, notes.mark(why), why)
+def score_cells(mean: MeanScore, notes: Notes) -> Row:
+    """Return index, subjects, mean score, its interval and standard deviation; of a session as of a study."""
+    interval = notes.interval(mean.low, mean.high, places(1), mean.reason)
+    if mean.bootstrap is not None:
+        why = (
+            "The t interval leaves the scale, where no score can be. Resampling the subjects gives instead, "
+            f"for index {mean.index} of {mean.descriptor}, {range_cell(*mean.bootstrap, places(1)).text}."
+        )
+        interval = Cell(interval.text, notes.mark(why), why)
     return (
         Cell(str(mean.index)),
         Cell(str(mean.n)),
@@ -58,20 +46,18 @@ def spread_cell(
     return notes.estimate(sd, shown, reason, ends, unit=unit)
 
 
-def answer_tables(report: Report) -> tuple[Table, ...]:
+def answer_tables(report: Report) -> tuple[Table | None, ...]:
     """Return every subject's scores, a table an experiment."""
-    tables: list[Table] = []
+    tables: list[Table | None] = []
     for e in report.experiments:
         if e.answers:
             notes = Notes()
             rows = tuple(
                 (Cell(a.subject), *(notes.number(s, places(1), "no score") for s in a.scores)) for a in e.answers
             )
-            columns = (Column("subject"), *(Column(f"index {index}") for index in e.indices))
+            columns = " | ".join(["subject", *(f"index {index}" for index in e.indices)])
             caption = f"Every score of {e.descriptor} [0–100]; repeats of one subject averaged."
-            tables.append(
-                Table(f"table-answers-{identifier(e.name)}", caption, columns, (Group("", rows),), notes.listed())
-            )
+            tables.append(table(f"table-answers-{identifier(e.name)}", caption, columns, [Group("", rows)], notes))
     return tuple(tables)
 
 
@@ -81,21 +67,10 @@ def relation_table(report: Report) -> Table | None:
     groups: list[Group] = []
     for e in report.experiments:
         related = [("mean score", e.score_relation), ("index", e.index_relation)]
-        rows = tuple(_relation_row(name, r, notes) for name, r in related if r is not None)
-        if rows:
-            groups.append(Group(e.name, rows))
-    if not groups:
-        return None
+        groups.append(Group(e.name, tuple(_relation_row(name, r, notes) for name, r in related if r is not None)))
     columns = (
-        Column("SED against"),
-        Column("stimuli"),
-        Column("Pearson's r"),
-        Column("95 % interval"),
-        Column("Spearman's rho"),
-        Column("rho's 95 % interval"),
-        Column("exact p of rho"),
-        Column("slope", "Pa a point"),
-        Column("r without one"),
+        "SED against | stimuli | Pearson's r | 95 % interval | Spearman's rho | rho's 95 % interval | "
+        "exact p of rho | slope [Pa a point] | r without one"
     )
     caption = (
         f"Relation of the predicted SED ({report.model}) to scores and to the stimuli's indices. The forces are those "
@@ -103,21 +78,17 @@ def relation_table(report: Report) -> Table | None:
         "counted over all orders. Slope: of the SED on the score or index, over its t interval. Last column: r when "
         "the stimulus of that index is left out."
     )
-    return Table("table-relation", caption, columns, tuple(groups), notes.listed())
+    return table("table-relation", caption, columns, groups, notes)
 
 
-def _rank(related: Relation, notes: Notes) -> Cell:
-    if related.spearman_low is None or related.spearman_high is None:
-        alike = "no interval of a perfect rho" if related.n > 3 else f"no interval of rho from {related.n} points"
-        return notes.number(None, str, alike if related.spearman is not None else related.reason)
-    return Cell(f"{correlation(related.spearman_low)} to {correlation(related.spearman_high)}")
+def rank_interval(related: Relation, notes: Notes) -> Cell:
+    """Return the interval of Spearman's rho, or why it has none."""
+    alike = "no interval of a perfect rho" if related.n > 3 else f"no interval of rho from {related.n} points"
+    why = alike if related.spearman is not None else related.reason
+    return notes.interval(related.spearman_low, related.spearman_high, correlation, why)
 
 
-def _relation_row(name: str, related: Relation, notes: Notes) -> tuple[Cell, ...]:
-    if related.low is None or related.high is None:
-        interval = notes.number(None, str, related.reason)
-    else:
-        interval = Cell(f"{correlation(related.low)} to {correlation(related.high)}")
+def _relation_row(name: str, related: Relation, notes: Notes) -> Row:
     left_out = ", ".join(
         f"{label}:\N{NO-BREAK SPACE}{NONE if r is None else correlation(r)}" for label, r in related.without
     )
@@ -125,9 +96,9 @@ def _relation_row(name: str, related: Relation, notes: Notes) -> tuple[Cell, ...
         Cell(name),
         Cell(str(related.n)),
         notes.number(related.pearson, correlation, related.reason),
-        interval,
+        notes.interval(related.low, related.high, correlation, related.reason),
         notes.number(related.spearman, correlation, related.reason),
-        _rank(related, notes),
+        rank_interval(related, notes),
         notes.number(related.spearman_p, places(3), related.reason or "too many orders to count"),
         notes.estimate(
             related.slope,

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from sessions.report import Planted, PredictionFinding, Report, StrokeFinding
-from sessions.report.tables.cells import Cell, Column, Notes, Table, grouped
+from sessions.report.tables.cells import Cell, Notes, Row, Table, grouped, table
 from sessions.report.wording import NONE, places, signed, tau, with_error
 
 Told = Callable[[float], str]
@@ -26,26 +26,15 @@ def stroke_table(report: Report) -> Table | None:
     if not report.strokes:
         return None
     notes = Notes()
-    planned = any(stroke.trial is not None for stroke in report.strokes)
-    columns = (
-        *_who(planned=planned),
-        Column("µ static", "1"),
-        Column("µ dynamic", "1"),
-        Column("µ maximum", "1"),
-        Column("τ max", "kPa"),
-        Column("speed", "mm/s"),
-        Column("direction"),
-        Column("flaws"),
-    )
+    columns = "µ static [1] | µ dynamic [1] | µ maximum [1] | τ max [kPa] | speed [mm/s] | direction | flaws"
 
-    def row(stroke: StrokeFinding) -> tuple[Cell, ...]:
+    def row(stroke: StrokeFinding) -> Row:
         def cell(name: str, shown: Told, ends: Told | None = None, unit: float = 1.0) -> Cell:
             return _estimate(notes, stroke, name, shown, ends, unit)
 
         half = None if stroke.mu_interval is None else (stroke.mu_interval[1] - stroke.mu_interval[0]) / 2
         error = stroke.speed_error
         return (
-            *_named(stroke, notes, planned=planned),
             cell("mu_static", places(3)),
             cell("mu_dynamic", lambda v: with_error(v, half, 3), places(3)),
             cell("mu_max", places(3)),
@@ -57,7 +46,6 @@ def stroke_table(report: Report) -> Table | None:
             Cell(", ".join(name.replace("_", " ") for name in stroke.flaws) or "none"),
         )
 
-    groups = grouped(report, report.strokes, lambda s: s.experiment, row)
     kind = f" Under each number: {report.interval_kind}." if report.interval_kind else ""
     caption = (
         "Strokes. µ dynamic: mean over the steady window (± half its 95 % interval: noise, zero, gains); µ static: "
@@ -65,7 +53,7 @@ def stroke_table(report: Report) -> Table | None:
         "the contact area, which is taken as given; speed: slope of the centre of pressure (± its standard error)."
         f"{kind}"
     )
-    return Table("table-strokes", caption, columns, groups, notes.listed())
+    return _table(report, "table-strokes", caption, columns, row, notes)
 
 
 def course_table(report: Report) -> Table | None:
@@ -73,25 +61,17 @@ def course_table(report: Report) -> Table | None:
     if not any(stroke.bootstrap for stroke in report.strokes):
         return None
     notes = Notes()
-    planned = any(stroke.trial is not None for stroke in report.strokes)
     columns = (
-        *_who(planned=planned),
-        Column("normal force", "N"),
-        Column("tangential force", "N"),
-        Column("heading", "°"),
-        Column("agree", "1"),
-        Column("onset", "s"),
-        Column("break-away", "s"),
-        Column("slide onset", "s"),
+        "normal force [N] | tangential force [N] | heading [°] | agree [1] | "
+        "onset [s] | break-away [s] | slide onset [s]"
     )
 
-    def row(stroke: StrokeFinding) -> tuple[Cell, ...]:
+    def row(stroke: StrokeFinding) -> Row:
         def cell(name: str, shown: Told) -> Cell:
             return _estimate(notes, stroke, name, shown)
 
         why = stroke.reasons.get("direction") or _TOO_SHORT
         return (
-            *_named(stroke, notes, planned=planned),
             cell("normal_force", places(2)),
             cell("tangential_force", places(2)),
             cell("heading", places(1)),
@@ -109,19 +89,22 @@ def course_table(report: Report) -> Table | None:
         "Slide onset: from when the centre of pressure keeps a fifth of its steady speed. What each interval holds: "
         f"{kinds}."
     )
-    groups = grouped(report, report.strokes, lambda s: s.experiment, row)
-    return Table("table-courses", caption, columns, groups, notes.listed())
+    return _table(report, "table-courses", caption, columns, row, notes)
 
 
-def _who(*, planned: bool) -> tuple[Column, ...]:
-    return (Column("stroke"), *((Column("trial"), Column("index")) if planned else ()))
+def _table(
+    report: Report, name: str, caption: str, columns: str, row: Callable[[StrokeFinding], Row], notes: Notes
+) -> Table | None:
+    """Return a table of strokes by experiment, each named with its trial and index where there are trials."""
+    planned = any(stroke.trial is not None for stroke in report.strokes)
 
+    def named(stroke: StrokeFinding) -> Row:
+        asked = (stroke.trial, stroke.index) if planned else ()
+        where = (notes.number(v, places(0), "no trial asks for it") for v in asked)
+        return (Cell(str(stroke.number)), *where, *row(stroke))
 
-def _named(stroke: StrokeFinding, notes: Notes, *, planned: bool) -> tuple[Cell, ...]:
-    if not planned:
-        return (Cell(str(stroke.number)),)
-    asked = (notes.number(v, places(0), "no trial asks for it") for v in (stroke.trial, stroke.index))
-    return (Cell(str(stroke.number)), *asked)
+    groups = grouped(report, report.strokes, lambda s: s.experiment, named)
+    return table(name, caption, f"{'stroke | trial | index' if planned else 'stroke'} | {columns}", groups, notes)
 
 
 def _estimate(
@@ -142,21 +125,11 @@ def planted_table(report: Report) -> Table | None:
     found = {stroke.trial: stroke for stroke in reversed(report.strokes) if stroke.trial is not None}
     given = {prediction.trial: prediction for prediction in report.predictions}
     columns = (
-        Column("trial"),
-        Column("index"),
-        Column("µ planted", "1"),
-        Column("µ found", "1"),
-        Column("off by", "%"),
-        Column("τ max planted", "kPa"),
-        Column("τ max found", "kPa"),
-        Column("off by", "%"),
-        Column("speed planted", "mm/s"),
-        Column("speed found", "mm/s"),
-        Column("off by", "%"),
-        Column("direction"),
+        "trial | index | µ planted [1] | µ found [1] | off by [%] | τ max planted [kPa] | "
+        "τ max found [kPa] | off by [%] | speed planted [mm/s] | speed found [mm/s] | off by [%] | direction"
     )
 
-    def row(p: Planted) -> tuple[Cell, ...]:
+    def row(p: Planted) -> Row:
         stroke = found.get(p.trial)
         cells: list[Cell] = [
             Cell(str(p.trial)),
@@ -185,7 +158,7 @@ def planted_table(report: Report) -> Table | None:
         "Planted friction beside what the analysis found: the µ and τ max that the model gets, and the speed. The "
         "analysis does not know what was planted. Under what was found: its 95 % bootstrap interval."
     )
-    return Table("table-planted", caption, columns, groups, notes.listed())
+    return table("table-planted", caption, columns, groups, notes)
 
 
 def model_mu(stroke: StrokeFinding | None, prediction: PredictionFinding | None) -> tuple[str, float | None]:

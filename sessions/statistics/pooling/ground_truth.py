@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, cast
 
 import msgspec
@@ -54,14 +55,17 @@ class _Stroke(msgspec.Struct):
     mu: float
 
 
-class _Spoilt(msgspec.Struct):
-    expected: str
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spoilt:
+    """What goes wrong in one subject's visit, by number of the trial; 0: nowhere."""
+
     lost: int = 0
     frozen: int = 0
     light: int = 0
     unanswered: int = 0
     aborted: int = 0
     reversed: bool = False
+    expected: str  # what the analysis should say
 
 
 class _Planted(msgspec.Struct):
@@ -70,7 +74,7 @@ class _Planted(msgspec.Struct):
     strokes: list[_Stroke]
     calibration_sd: float = 0.0
     relation: dict[str, _Relation] = {}
-    spoilt: dict[str, _Spoilt] = {}
+    spoilt: dict[str, Spoilt] = {}
     seed: int | None = None
 
 

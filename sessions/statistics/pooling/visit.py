@@ -7,7 +7,7 @@ from typing import Any, Literal
 import msgspec
 
 from sessions.plan.plan import Block
-from sessions.prediction import PredictionOptions, SessionPrediction, predict
+from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction, predict
 from sessions.prediction.model_facts import model_facts
 from sessions.prediction.sealed_predictions import NUMBERS, sealed_sentence
 from sessions.prediction.uncertainty import with_intervals
@@ -19,7 +19,7 @@ from sessions.recording.schema import LIVE_FILE
 from sessions.recording.unblinding import revealed
 from sessions.statistics.multiverse import Seds, trial_paths
 from sessions.statistics.scores import Score, ScoreTable
-from sessions.strokes import Analysis, AnalysisSettings, analyse
+from sessions.strokes import Analysis, AnalysisSettings, FrictionParameters, analyse
 from sessions.strokes.bootstrap import drawn_from, stroke_intervals
 from sessions.strokes.contact_area import FIXED, AreaLaw
 
@@ -192,13 +192,19 @@ def _row(
         missing = "The visit recorded no forces." if answer is None else answer.reasons.get("sed", "")
         missing = "The trial was not done." if record.outcome == "open" else missing
         return replace(row, flaws=flaws, why=missing)
+    row = replace(_with_friction(row, friction, analysis), flaws=flaws)
+    return row if answer is None else _with_prediction(row, answer)
+
+
+def _with_friction(row: TrialRow, friction: FrictionParameters, analysis: Analysis) -> TrialRow:
+    """Return the row with what was measured in the trial's stroke."""
     stroke = analysis.strokes[friction.stroke]
     intervals = stroke_intervals(stroke, friction.stroke, drawn_from(analysis.settings))
     mu_low, mu_high = (intervals.mu_max if friction.rule == "maximum" else intervals.mu_dynamic) or (None, None)
     tau_max_low, tau_max_high = intervals.tau_max or (None, None)
     speed_low, speed_high = intervals.speed or (None, None)
     normal_low, normal_high = intervals.normal_force or (None, None)
-    row = replace(
+    return replace(
         row,
         rule=friction.rule,
         mu=friction.mu,
@@ -215,10 +221,11 @@ def _row(
         normal_force=stroke.normal_force,
         normal_force_low=normal_low,
         normal_force_high=normal_high,
-        flaws=flaws,
     )
-    if answer is None:
-        return row
+
+
+def _with_prediction(row: TrialRow, answer: TrialPrediction) -> TrialRow:
+    """Return the row with what the model predicts of the trial."""
     interval = answer.interval
     return replace(
         row,

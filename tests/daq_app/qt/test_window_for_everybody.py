@@ -281,5 +281,5 @@ def test_the_bar_of_how_hard_the_finger_presses_shows_the_mean_of_the_last_momen
 
 
 def _filled(bar):
-    image, colour = bar.grab().toImage(), QColor(bar._tokens.act)
+    image, colour = bar.grab().toImage(), QColor(bar.tokens.act)
     return sum(image.pixelColor(x, image.height() // 2) == colour for x in range(image.width()))

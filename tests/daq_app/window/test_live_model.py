@@ -13,11 +13,11 @@ from daq_app.window.live_model import Forces, Provisional, Settle, Settled, Use,
 from daq_app.window.live_model_process import LiveModel
 from daq_app.window.view_model import ModelTrace, model_words
 from sessions.plan.plan import Frame
-from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols import VisitSetting, plan, protocol
 from sessions.strokes import FrictionParameters
 from solver import NoSteadyState, solve
 
-PLAN = plan(protocol("sensotact-friction"), "S01", 3, frame=Frame("-z", "set", 20.0, "set"))
+PLAN = plan(protocol("sensotact-friction"), "S01", 3, setting=VisitSetting(frame=Frame("-z", "set", 20.0, "set")))
 MU, NORMAL, AREA = 0.6, 2.0, PLAN.contact_area
 FRICTION = FrictionParameters(1, 0, MU, None, MU * NORMAL / AREA, AREA, 20.0, 1, "maximum", ())
 NOTHING = (0.0,) * 6

@@ -1,22 +1,20 @@
-"""Tables of a study's page."""
+"""Tables of a study's page: visits, scores, surfaces and correlations."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
 
-from sessions.report.study_cells import between, correlations, interval, model_in_short, p_value, study_table
+from sessions.report.predictions import model_in_short
 from sessions.report.study_models import flaws_table, models_table, planted_table
 from sessions.report.study_trials import trials_table
-from sessions.report.tables.cells import Cell, Column, Notes, Table
+from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, range_cell, sections_of, table
 from sessions.report.tables.multiverse import paths_table
-from sessions.report.tables.scores import spread_cell
-from sessions.report.wording import NONE, correlation, digits, significant
+from sessions.report.tables.scores import rank_interval, score_cells, spread_cell
+from sessions.report.wording import NONE, correlation, digits, p_value, places, significant, three_figures
 from sessions.statistics.pooling.averages import Average
 from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.pooling.visit import Visit
-from sessions.statistics.scores import MeanScore, Relation
+from sessions.statistics.scores import Relation
 from sessions.statistics.within_subjects import RepeatedCorrelation
-
-POINTS = "0–100"  # unit of scores
 
 
 def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
@@ -30,19 +28,17 @@ def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
         "planted": (planted_table(study), flaws_table(study)),
         "trials": (trials_table(study),),
     }
-    return {
-        name: tuple(table for table in made if table is not None and table.groups) for name, made in sections.items()
-    }
+    return sections_of(sections)
 
 
-def _visits(study: StudyFindings) -> Table:
+def _visits(study: StudyFindings) -> Table | None:
     rows = tuple(_visit_row(visit, study) for visit in study.visits)
-    columns = ("session", "subject", "answers", "strokes with SED", "ended as planned", "flawed trials", "counted")
+    columns = "session | subject | answers | strokes with SED | ended as planned | flawed trials | counted"
     caption = "Visits in the order of their names; flawed: doubtful or worse, the table of trials names each flaw."
-    return study_table("table-visits", caption, columns, [("", rows)])
+    return table("table-visits", caption, columns, [Group("", rows)])
 
 
-def _visit_row(visit: Visit, study: StudyFindings) -> tuple[Cell, ...]:
+def _visit_row(visit: Visit, study: StudyFindings) -> Row:
     out = ["nothing"] if visit.session in dict(study.copies) else []
     out += [e.descriptor or "nothing" for e in study.excluded if e.subject == visit.subject]
     counted = "yes" if not out else ("no" if "nothing" in out else f"without {', '.join(out)}")
@@ -57,29 +53,20 @@ def _visit_row(visit: Visit, study: StudyFindings) -> tuple[Cell, ...]:
     )
 
 
-def _scores(study: StudyFindings) -> Table:
+def _scores(study: StudyFindings) -> Table | None:
     notes = Notes()
 
-    def rows(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
+    def rows(one: DescriptorFindings) -> Iterable[Row]:
         within = {mean.index: mean for mean in one.within}
         for mean in one.scores:
             inner = within.get(mean.index)
-            yield (
-                Cell(str(mean.index)),
-                Cell(str(mean.n)),
-                Cell(digits(mean.mean, 1)),
-                _of_scores(mean, notes),
-                interval(None, None, 1) if inner is None else interval(inner.low, inner.high, 1),
-                spread_cell(mean.sd, mean.n, lambda v: digits(v, 1), mean.reason, notes),
-            )
+            *cells, spread = score_cells(mean, notes)
+            low, high = (None, None) if inner is None else (inner.low, inner.high)
+            yield (*cells, range_cell(low, high, places(1)), spread)
 
     columns = (
-        Column("index"),
-        Column("subjects"),
-        Column("mean score", POINTS),
-        Column("95 % interval of the mean", POINTS),
-        Column("within subjects", POINTS),
-        Column("standard deviation", POINTS),
+        "index | subjects | mean score [0–100] | 95 % interval of the mean [0–100] | "
+        "within subjects [0–100] | standard deviation [0–100]"
     )
     complete = ", ".join(f"{one.within[0].n} for {one.descriptor}" for one in study.descriptors if one.within)
     caption = (
@@ -88,20 +75,10 @@ def _scores(study: StudyFindings) -> Table:
         "the standard deviation: its 95 % interval by chi squared."
     )
     groups = _by_descriptor(study, rows)
-    return study_table("table-scores", caption, columns, groups, notes)
+    return table("table-scores", caption, columns, groups, notes)
 
 
-def _of_scores(mean: MeanScore, notes: Notes) -> Cell:
-    """Return the t interval of a mean score; where that leaves the scale, with what cannot."""
-    told = interval(mean.low, mean.high, 1)
-    if mean.bootstrap is None:
-        return told
-    low, high = (digits(end, 1) for end in mean.bootstrap)
-    where = f"{mean.descriptor} {mean.index}: the t interval leaves the scale; resampling the subjects {low} to {high}"
-    return Cell(told.text, notes.mark(where))
-
-
-def _agreement(study: StudyFindings) -> Table:
+def _agreement(study: StudyFindings) -> Table | None:
     rows = tuple(
         (
             Cell(one.descriptor),
@@ -113,16 +90,16 @@ def _agreement(study: StudyFindings) -> Table:
         for one in study.descriptors
         if (found := one.agreement) is not None
     )
-    columns = ("descriptor", "subjects", "Kendall's W", "Friedman's p", "Page's p")
+    columns = "descriptor | subjects | Kendall's W | Friedman's p | Page's p"
     caption = (
         "Agreement on the order of the surfaces; Friedman: that they differ; Page: that scores rise with the index. "
         "Exploratory: neither p is corrected, and neither belongs to a family that is."
     )
-    return study_table("table-agreement", caption, columns, [("", rows)])
+    return table("table-agreement", caption, columns, [Group("", rows)])
 
 
-def _normalised(study: StudyFindings) -> Table:
-    def rows(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
+def _normalised(study: StudyFindings) -> Table | None:
+    def rows(one: DescriptorFindings) -> Iterable[Row]:
         raw = {mean.index: mean for mean in one.scores}
         for index, mean in one.normalised.means.items():
             given = raw[index]
@@ -130,61 +107,48 @@ def _normalised(study: StudyFindings) -> Table:
                 Cell(str(index)),
                 Cell(str(given.n)),
                 Cell(digits(given.mean, 1)),
-                interval(given.low, given.high, 1),
+                range_cell(given.low, given.high, places(1)),
                 Cell(str(mean.n)),
                 Cell(digits(mean.mean, 2)),
-                interval(mean.low, mean.high, 2),
+                range_cell(mean.low, mean.high, places(2)),
             )
 
     columns = (
-        Column("index"),
-        Column("subjects"),
-        Column("as given", POINTS),
-        Column("95 % interval", POINTS),
-        Column("subjects"),
-        Column("standardised", "1"),
-        Column("95 % interval", "1"),
+        "index | subjects | as given [0–100] | 95 % interval [0–100] | subjects | standardised [1] | 95 % interval [1]"
     )
     caption = (
         "Scores as they were given and standardised: each subject's own mean taken away and the rest divided by its "
         "own standard deviation over the surfaces, which takes away what part of the scale a subject uses; of the "
         "subjects who scored every surface. t intervals of the mean over subjects."
     )
-    return study_table("table-normalised", caption, columns, _by_descriptor(study, rows))
+    return table("table-normalised", caption, columns, _by_descriptor(study, rows))
 
 
-def _differences(study: StudyFindings) -> Table:
-    def rows(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
+def _differences(study: StudyFindings) -> Table | None:
+    def rows(one: DescriptorFindings) -> Iterable[Row]:
         for pair in one.differences:
             yield (
                 Cell(f"{pair.high_index} − {pair.low_index}"),
                 Cell(str(pair.n)),
                 Cell(digits(pair.mean, 1)),
-                interval(pair.low, pair.high, 1),
+                range_cell(pair.low, pair.high, places(1)),
                 Cell(p_value(pair.p)),
                 Cell(p_value(pair.p_holm)),
             )
 
-    columns = (
-        Column("index"),
-        Column("subjects"),
-        Column("difference of scores", POINTS),
-        Column("95 % interval", POINTS),
-        Column("p"),
-        Column("p, Holm"),
-    )
+    columns = "index | subjects | difference of scores [0–100] | 95 % interval [0–100] | p | p, Holm"
     caption = (
         "How much higher one surface was scored than another, within subjects: mean and t interval of the differences, "
         "paired t test, and its p corrected for all pairs of the descriptor (Holm 1979), a family of its own for each "
         "descriptor. Exploratory; the intervals are not corrected."
     )
-    return study_table("table-differences", caption, columns, _by_descriptor(study, rows))
+    return table("table-differences", caption, columns, _by_descriptor(study, rows))
 
 
-def _estimates(study: StudyFindings) -> Table:
+def _estimates(study: StudyFindings) -> Table | None:
     notes = Notes()
 
-    def rows(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
+    def rows(one: DescriptorFindings) -> Iterable[Row]:
         if one.estimates is None:
             return
         for index, given in one.estimates.geometric.items():
@@ -195,10 +159,10 @@ def _estimates(study: StudyFindings) -> Table:
                 if mean.low is None or mean.high is None:
                     cells.append(notes.number(None, str, "one subject alone has no interval"))
                 else:
-                    cells.append(Cell(between(math.exp(mean.low), math.exp(mean.high))))
+                    cells.append(range_cell(math.exp(mean.low), math.exp(mean.high), three_figures))
             yield tuple(cells)
 
-    columns = ("index", "subjects", "geometric mean", "95 % interval", "at one modulus", "95 % interval")
+    columns = "index | subjects | geometric mean | 95 % interval | at one modulus | 95 % interval"
     out = [f"{name}: {', '.join(s)}" for name, s in _without_logarithm(study)]
     left = f" Left out for an estimate that is not above 0: {'; '.join(out)}." if out else ""
     caption = (
@@ -206,17 +170,17 @@ def _estimates(study: StudyFindings) -> Table:
         f"the logarithms, as they were given and with every subject's own modulus taken away (Stevens 1957).{left}"
     )
     groups = _by_descriptor(study, rows)
-    return study_table("table-estimates", caption, columns, groups, notes)
+    return table("table-estimates", caption, columns, groups, notes)
 
 
 def _without_logarithm(study: StudyFindings) -> list[tuple[str, tuple[str, ...]]]:
     return [(o.descriptor, o.estimates.left_out) for o in study.descriptors if o.estimates and o.estimates.left_out]
 
 
-def _surfaces(study: StudyFindings) -> Table:
+def _surfaces(study: StudyFindings) -> Table | None:
     notes = Notes()
 
-    def row(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
+    def row(one: DescriptorFindings) -> Iterable[Row]:
         for s in one.surfaces:
             kilopascal = None if s.sed is None else _scaled(s.sed, 1e3)
             yield (
@@ -228,21 +192,18 @@ def _surfaces(study: StudyFindings) -> Table:
             )
 
     columns = (
-        Column("index"),
-        Column("subjects"),
-        Column("µ", "1"),
-        Column("95 % interval", "1"),
-        Column("SED", "kPa"),
-        Column("95 % interval", "kPa"),
-        Column("standard deviation", "kPa"),
+        "index | subjects | µ [1] | 95 % interval [1] | SED [kPa] | 95 % interval [kPa] | standard deviation [kPa]"
     )
+    model = model_in_short(study.options.prediction, study.options.area)
     caption = (
         "Friction that the model got, and predicted SED: means over subjects, each from its own strokes, with t "
         "intervals; standard deviation of the SED with its interval by chi squared. "
-        f"Model: {model_in_short(study)}."
+        f"Model: {model}."
     )
-    groups = [(one.descriptor, tuple(row(one))) for one in study.descriptors if any(s.subjects for s in one.surfaces)]
-    return study_table("table-surfaces", caption, columns, groups, notes)
+    groups = [
+        Group(one.descriptor, tuple(row(one))) for one in study.descriptors if any(s.subjects for s in one.surfaces)
+    ]
+    return table("table-surfaces", caption, columns, groups, notes)
 
 
 def _spread(mean: Average | None, notes: Notes) -> Cell:
@@ -251,10 +212,10 @@ def _spread(mean: Average | None, notes: Notes) -> Cell:
     return spread_cell(mean.sd, mean.n, lambda v: significant(v, 2), "one subject alone has no spread", notes)
 
 
-def _forces(study: StudyFindings) -> Table:
+def _forces(study: StudyFindings) -> Table | None:
     notes = Notes()
 
-    def row(one: DescriptorFindings) -> Iterable[tuple[Cell, ...]]:
+    def row(one: DescriptorFindings) -> Iterable[Row]:
         for s in one.surfaces:
             if s.normal_force is not None or s.model_normal_force is not None:
                 numbers = (s.normal_force, s.model_normal_force, s.matching_depth)
@@ -265,23 +226,18 @@ def _forces(study: StudyFindings) -> Table:
                 )
 
     columns = (
-        Column("index"),
-        Column("subjects"),
-        Column("measured N", "N"),
-        Column("95 % interval", "N"),
-        Column("model N", "N"),
-        Column("95 % interval", "N"),
-        Column("depth to match", "mm"),
-        Column("95 % interval", "mm"),
+        "index | subjects | measured N [N] | 95 % interval [N] | model N [N] | 95 % interval [N] | "
+        "depth to match [mm] | 95 % interval [mm]"
     )
+    model = model_in_short(study.options.prediction, study.options.area)
     caption = (
         "Model against measurement: normal force over the steady window, the force of the model pressed to the depth "
         "of its block (times the finger's width, assumed unless it was measured), and the depth at which the model "
         "would press as hard as the subject did (on a rough mesh, to some tenths of a per cent). Means over "
-        f"subjects with t intervals, which hold what errs from trial to trial. Model: {model_in_short(study)}."
+        f"subjects with t intervals, which hold what errs from trial to trial. Model: {model}."
     )
-    return study_table(
-        "table-forces", caption, columns, [(one.descriptor, tuple(row(one))) for one in study.descriptors], notes
+    return table(
+        "table-forces", caption, columns, [Group(one.descriptor, tuple(row(one))) for one in study.descriptors], notes
     )
 
 
@@ -299,69 +255,26 @@ def _mean(mean: Average | None, decimals: int, notes: Notes) -> tuple[Cell, Cell
         return missing, missing
     if mean.low is None or mean.high is None:
         return Cell(digits(mean.mean, decimals)), notes.number(None, str, "one subject alone has no interval")
-    return Cell(digits(mean.mean, decimals)), interval(mean.low, mean.high, decimals)
+    return Cell(digits(mean.mean, decimals)), range_cell(mean.low, mean.high, places(decimals))
 
 
-def _relation(study: StudyFindings) -> Table:
+def _relation(study: StudyFindings) -> Table | None:
     notes = Notes()
 
-    def or_why(cell: Cell, why: str | None) -> Cell:
-        return notes.number(None, str, why) if cell.text == NONE else cell
-
-    def means(name: str, related: Relation | None) -> Iterable[tuple[Cell, ...]]:
-        if related is not None and related.pearson is not None:
-            rho = NONE if related.spearman is None else correlation(related.spearman)
-            yield (
-                Cell(name),
-                Cell(f"{related.n} surfaces"),
-                Cell(correlation(related.pearson)),
-                or_why(correlations(related.low, related.high), related.reason),
-                Cell(rho),
-                or_why(correlations(related.spearman_low, related.spearman_high), _no_rank_interval(related)),
-                Cell(NONE if related.spearman_p is None else p_value(related.spearman_p)),
-                Cell(NONE),
-                _without([(f"index {label}", r) for label, r in related.without if r is not None]),
-            )
-
-    def within(
-        name: str, found: RepeatedCorrelation | None, adjusted: float | None, without: Sequence[tuple[str, float]]
-    ) -> Iterable[tuple[Cell, ...]]:
-        if found is not None:
-            yield (
-                Cell(name),
-                Cell(f"{found.dof} d.f."),
-                Cell(correlation(found.r)),
-                correlations(*(found.people or (None, None))),
-                Cell(NONE),
-                Cell(NONE),
-                Cell(NONE if found.people_p is None else p_value(found.people_p)),
-                Cell(NONE if adjusted is None else p_value(adjusted)),
-                _without(without),
-            )
-
-    def rows(one: DescriptorFindings) -> tuple[tuple[Cell, ...], ...]:
+    def rows(one: DescriptorFindings) -> tuple[Row, ...]:
         estimated = None if one.estimates is None else one.estimates.repeated
         return (
-            *means("means", one.mean_relation),
-            *means("means, standardised", one.normalised.mean_relation),
-            *within("within subjects", one.repeated, one.repeated_holm, one.without_subject),
-            *within("within, standardised", one.normalised.repeated, None, ()),
-            *within("within, log estimates", estimated, None, ()),
+            *_of_means("means", one.mean_relation, notes),
+            *_of_means("means, standardised", one.normalised.mean_relation, notes),
+            *_within_subjects("within subjects", one.repeated, one.repeated_holm, one.without_subject),
+            *_within_subjects("within, standardised", one.normalised.repeated),
+            *_within_subjects("within, log estimates", estimated),
         )
 
-    columns = (
-        "scores",
-        "n",
-        "r",
-        "95 % interval",
-        "rho",
-        "95 % interval of rho",
-        "p",
-        "p, Holm",
-        "r with one left out",
-    )
+    columns = "scores | n | r | 95 % interval | rho | 95 % interval of rho | p | p, Holm | r with one left out"
+    model = model_in_short(study.options.prediction, study.options.area)
     caption = (
-        f"Predicted SED ({model_in_short(study)}) with scores. Means: Pearson's r of means over the subjects who have "
+        f"Predicted SED ({model}) with scores. Means: Pearson's r of means over the subjects who have "
         "both, interval by Fisher's z; Spearman's rho with an interval likewise (Bonett and Wright 2000) and exact p. "
         "Within subjects: repeated-measures correlation of each subject's scores with the SEDs of its own strokes "
         "(Bakdash and Marusich 2017), with an interval and a p for other people who meet these very surfaces "
@@ -372,12 +285,49 @@ def _relation(study: StudyFindings) -> Table:
         "nor are the intervals. Last column: least and greatest r when one surface, or one subject, is left out, and "
         "which."
     )
-    groups = [(one.descriptor, rows(one)) for one in study.descriptors]
-    return study_table("table-relation", caption, columns, groups, notes)
+    groups = [Group(one.descriptor, rows(one)) for one in study.descriptors]
+    return table("table-relation", caption, columns, groups, notes)
 
 
-def _no_rank_interval(related: Relation) -> str:
-    return "no interval of a perfect rho" if related.n > 3 else f"no interval of rho from {related.n} points"
+def _of_means(name: str, related: Relation | None, notes: Notes) -> Iterable[Row]:
+    """Return the row of the correlation of means over subjects, where there is one."""
+    if related is not None and related.pearson is not None:
+        yield (
+            Cell(name),
+            Cell(f"{related.n} surfaces"),
+            Cell(correlation(related.pearson)),
+            notes.interval(related.low, related.high, correlation, related.reason),
+            _or_dash(related.spearman, correlation),
+            rank_interval(related, notes),
+            _or_dash(related.spearman_p, p_value),
+            Cell(NONE),
+            _without([(f"index {label}", r) for label, r in related.without if r is not None]),
+        )
+
+
+def _within_subjects(
+    name: str,
+    found: RepeatedCorrelation | None,
+    adjusted: float | None = None,
+    without: Sequence[tuple[str, float]] = (),
+) -> Iterable[Row]:
+    """Return the row of the correlation within subjects, where there is one."""
+    if found is not None:
+        yield (
+            Cell(name),
+            Cell(f"{found.dof} d.f."),
+            Cell(correlation(found.r)),
+            range_cell(*(found.people or (None, None)), correlation),
+            Cell(NONE),
+            Cell(NONE),
+            _or_dash(found.people_p, p_value),
+            _or_dash(adjusted, p_value),
+            _without(without),
+        )
+
+
+def _or_dash(value: float | None, shown: Callable[[float], str]) -> Cell:
+    return Cell(NONE if value is None else shown(value))
 
 
 def _without(left_out: Sequence[tuple[str, float]]) -> Cell:
@@ -387,7 +337,5 @@ def _without(left_out: Sequence[tuple[str, float]]) -> Cell:
     return Cell(", ".join(f"{correlation(r)} ({name})" for name, r in (least, greatest)))
 
 
-def _by_descriptor(
-    study: StudyFindings, rows: Callable[[DescriptorFindings], Iterable[tuple[Cell, ...]]]
-) -> list[tuple[str, tuple[tuple[Cell, ...], ...]]]:
-    return [(one.descriptor, tuple(rows(one))) for one in study.descriptors]
+def _by_descriptor(study: StudyFindings, rows: Callable[[DescriptorFindings], Iterable[Row]]) -> list[Group]:
+    return [Group(one.descriptor, tuple(rows(one))) for one in study.descriptors]

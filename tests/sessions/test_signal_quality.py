@@ -23,8 +23,7 @@ from made_strokes import (
     wrench,
 )
 
-from sessions.strokes.clipping import stuck_axes
-from sessions.strokes.spikes import wild_readings
+from sessions.strokes.invalid_readings import constant_runs, spikes
 
 T = times(10.0)
 BEGINS = (1.0, 4.0, 7.0)
@@ -121,8 +120,8 @@ def test_coarse_steps_are_neither_clipped_nor_frozen_nor_wild(step, noise):
     steps = step * np.array([1.0] * 3 + [100.0] * 3)
     rough = clean + noise * steps * np.random.default_rng(1).standard_normal(clean.shape)
     raw = np.round(rough / steps) * steps
-    assert stuck_axes(T, raw, np.zeros(len(T), bool), SETTINGS) == ()
-    assert not wild_readings(raw, SETTINGS).any()
+    assert constant_runs(T, raw, np.zeros(len(T), bool), SETTINGS.signal) == ()
+    assert not spikes(raw, SETTINGS.signal).any()
 
 
 def in_coarse_steps(frozen=None):
@@ -181,7 +180,7 @@ def test_twelve_spikes_of_eighty_newtons_hide_no_good_stroke(seed, spike):
 def test_twelve_spikes_close_together_are_told_apart_from_the_stroke_they_lie_in(first, apart):
     raw = CLEAN.copy()
     raw[first : first + 12 * apart : apart, FZ] -= 80.0
-    marked = wild_readings(raw, SETTINGS)
+    marked = spikes(raw, SETTINGS.signal)
     assert np.flatnonzero(marked[:, FZ]).tolist() == list(range(first, first + 12 * apart, apart))
     found = of(raw)
     assert len(found.strokes) == 3

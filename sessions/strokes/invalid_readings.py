@@ -1,0 +1,211 @@
+"""Readings that cannot be used: spikes, frozen or clipped axes, repeats of a frozen sensor, saturation."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.readings import ReadingBlock
+from drivers.transducer import TransducerInfo
+from sessions.strokes.onset import NORMAL_STEP
+from sessions.strokes.settings import SignalSettings
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def spikes(raw: Array, settings: SignalSettings) -> Mask:
+    """Mark the wild readings of each axis (n, k): beyond all neighbours by far more than these differ themselves."""
+    marked = np.zeros(raw.shape, np.bool_)
+    for axis in range(raw.shape[1]):
+        column = raw[:, axis]
+        steps = np.abs(np.diff(column))
+        moving = steps[steps > 0.0]
+        if not len(moving):
+            continue
+        floor = max(
+            settings.wild_noise * NORMAL_STEP * float(np.median(steps)),
+            settings.wild_coarse * float(moving.min()),
+        )
+        found = [
+            (at, w)
+            for w in range(1, settings.wild_widest + 1)
+            for at in _candidates(np.diff(column), w, floor, settings).tolist()
+        ]
+        alike = np.zeros(len(column), np.bool_)  # these may be wild: none of them says what is usual around another
+        for at, width in found:
+            alike[at : at + width] = True
+        for at, width in found:
+            if not marked[at : at + width, axis].any() and _stands_out(column, alike, at, width, settings):
+                marked[at : at + width, axis] = True
+    return marked
+
+
+def _candidates(steps: Array, width: int, floor: float, settings: SignalSettings) -> NDArray[np.int64]:
+    """Return where `width` readings begin that more than `floor` leads to and back from, with neighbours beside."""
+    there, back = steps[:-width], steps[width:]
+    found = np.flatnonzero((np.minimum(np.abs(there), np.abs(back)) > floor) & (there * back < 0.0)) + 1
+    return found[(found >= settings.wild_neighbours) & (found + width + settings.wild_neighbours <= len(steps) + 1)]
+
+
+def _stands_out(column: Array, alike: Mask, at: int, width: int, settings: SignalSettings) -> bool:
+    """Say whether readings stand out by far more than any step around them between readings that are not `alike`."""
+    before = _sound(column, alike, range(at - 1, max(-1, at - 1 - settings.wild_around), -1))
+    after = _sound(column, alike, range(at + width, min(len(column), at + width + settings.wild_around)))
+    usual = np.abs(np.concatenate([np.diff(before), np.diff(after)]))
+    if len(usual) < settings.wild_fewest or min(len(before), len(after)) < settings.wild_neighbours:
+        return False
+    beside = np.concatenate([before[: settings.wild_neighbours], after[: settings.wild_neighbours]])
+    inside = column[at : at + width]
+    height = max(float(inside.min() - beside.max()), float(beside.min() - inside.max()))
+    return height > settings.wild_steps * float(usual.max())
+
+
+def _sound(column: Array, alike: Mask, places: range) -> Array:
+    """Return the readings at places, in their order, without those that are `alike`."""
+    held = np.array(places, np.int64)
+    return column[held[~alike[held]]]
+
+
+@dataclass(frozen=True, slots=True)
+class ConstantRun:
+    """One axis at one value; the other axes move meanwhile."""
+
+    axis: int
+    clipped: bool  # at its own least or greatest value; else frozen
+    first: int  # reading
+    last: int
+    value: float  # raw
+
+
+def constant_runs(time: Array, raw: Array, ignored: Mask, settings: SignalSettings) -> tuple[ConstantRun, ...]:
+    """Return the runs of one value on single axes of raw (n, k) at `time` (n,) [s].
+
+    A run counts where it is long against the runs that its axis shows elsewhere, so that coarse steps are no fault.
+    Readings `ignored` (n,) are no axis' greatest or least value.
+    """
+    return tuple(found for axis in range(raw.shape[1]) for found in _of_axis(axis, time, raw, ignored, settings))
+
+
+def at_the_same_value(raw: Array, found: tuple[ConstantRun, ...], *, clipped: bool) -> Mask:
+    """Mark the readings (n,) of frozen runs; or, `clipped`, all those at a value at which an axis was clipped."""
+    marked = np.zeros(len(raw), np.bool_)
+    for one in found:
+        if one.clipped != clipped:
+            continue
+        if clipped:
+            marked |= raw[:, one.axis] == one.value
+        else:
+            marked[one.first + 1 : one.last + 1] = True
+    return marked
+
+
+def _of_axis(axis: int, time: Array, raw: Array, ignored: Mask, settings: SignalSettings) -> list[ConstantRun]:
+    column = raw[:, axis]
+    firsts = np.flatnonzero(np.concatenate([[True], np.diff(column) != 0.0]))
+    lasts = np.concatenate([firsts[1:], [len(column)]]) - 1
+    lengths = lasts - firsts + 1
+    lasting = time[lasts] - time[firsts]
+    # Times are sums of ticks, so a run as long as the limit may seem a little shorter.
+    candidates = np.flatnonzero((lengths >= settings.flat_readings) & (lasting > settings.flat_top - 1e-9))
+    if not len(candidates) or len(firsts) == 1:
+        return []
+    sound = column[~ignored]
+    ends = (float(sound.min()), float(sound.max())) if len(sound) else ()
+    found: list[ConstantRun] = []
+    for value in np.unique(column[firsts[candidates]]).tolist():
+        runs = candidates[column[firsts[candidates]] == value]
+        moving = np.array([_others_move(axis, time, raw, (int(firsts[at]), int(lasts[at])), settings) for at in runs])
+        if lasting[runs[moving]].sum() <= lasting[runs].sum() / 2.0:  # what the axis reads where nothing presses
+            continue
+        for at in runs[moving].tolist():
+            clipped = value in ends
+            frozen = lengths[at] > settings.frozen_readings and lasting[at] >= settings.frozen_shortest
+            elsewhere = lengths[~np.isin(column[firsts], ends)] if clipped else lengths[2 * lengths < lengths[at]]
+            long = lengths[at] > settings.long_run * (_usual(elsewhere) - 1.0)
+            if (clipped or frozen) and long and _jumps(column, int(firsts[at]), int(lasts[at]), settings):
+                found.append(ConstantRun(axis, clipped, int(firsts[at]), int(lasts[at]), value))
+    return found
+
+
+def _usual(lengths: NDArray[np.int64]) -> float:
+    """Return the length of run that nine tenths of all readings do not exceed; without readings none is unusual."""
+    if not len(lengths):
+        return np.inf
+    ordered = np.sort(lengths)
+    return float(ordered[np.searchsorted(np.cumsum(ordered), 0.9 * ordered.sum())])
+
+
+def _jumps(column: Array, first: int, last: int, settings: SignalSettings) -> bool:
+    """Say whether a run begins or ends by more than a few of its axis' least steps: a slow turn does neither."""
+    steps = np.abs(np.diff(column))
+    least = float(steps[steps > 0.0].min())
+    ends = [float(steps[at]) for at in (first - 1, last) if 0 <= at < len(steps)]
+    return max(ends, default=0.0) > settings.flat_jump * least
+
+
+def _others_move(axis: int, time: Array, raw: Array, run: tuple[int, int], settings: SignalSettings) -> bool:
+    """Say whether other axes live during a run, and some of them moves by more than its noise around it."""
+    first, last = run
+    others = np.delete(raw, axis, axis=1)
+    alive = (np.diff(others[first : last + 1], axis=0) != 0.0).any(axis=1)
+    if alive.mean() < 0.5:
+        return False
+    lacking = max(0.0, settings.flat_around - (time[last] - time[first])) / 2.0
+    window = others[(time >= time[first] - lacking) & (time <= time[last] + lacking)]
+    steps = np.abs(np.diff(window, axis=0))
+    noise = NORMAL_STEP * np.median(steps, axis=0)
+    least = np.array([float(each[each > 0.0].min(initial=np.inf)) for each in steps.T])
+    return bool((window.std(axis=0) > np.maximum(settings.flat_moves * noise, least)).any())
+
+
+def repeated_readings(block: ReadingBlock, settings: SignalSettings) -> Mask:
+    """Mark every repeat of the same six numbers in a run that neither noise nor a rest in coarse steps explains."""
+    jumps = _jumps_of_coarse(block.raw, settings)
+    same = np.concatenate([[False], (np.diff(block.raw, axis=0) == 0.0).all(axis=1), [False]])
+    edges = np.flatnonzero(np.diff(same.astype(np.int8)))
+    frozen = np.zeros(len(block), np.bool_)
+    rests: list[int] = []
+    for start, last in edges.reshape(-1, 2).tolist():  # repeats of the reading at `start`
+        if last - start >= settings.frozen_readings and (
+            block.time[last] - block.time[start] >= settings.frozen_shortest
+        ):
+            jumped = not len(jumps) or bool(jumps[max(start - 1, 0) : start].any() or jumps[last : last + 1].any())
+            ends = last == len(block) - 1
+            frozen[start + 1 : last + 1] = jumped or (
+                ends and _off_every_rest(block.raw, start, rests, settings.frozen_off)
+            )
+            rests += [] if frozen[last] else [start]
+    return frozen
+
+
+def _off_every_rest(raw: Array, at: int, rests: list[int], far: float) -> bool:
+    """Say whether some axis of a reading lies far from where it lay in each rest before: it is pressed, or was."""
+    off = np.abs(raw[rests] - raw[at]) > far * np.ptp(raw, axis=0)
+    return bool(rests) and bool(off.any(axis=1).all())
+
+
+def _jumps_of_coarse(raw: Array, settings: SignalSettings) -> Mask:
+    """Mark the steps (n - 1,) that no axis in coarse steps makes by itself; empty where the steps are fine.
+
+    Steps are coarse where an axis that changes does so by its least step or little more: at rest such a sensor repeats
+    all six numbers, and leaves them step by step, where a frozen one that lives again jumps.
+    """
+    steps = np.abs(np.diff(raw, axis=0))
+    changes = [column[column > 0.0] for column in steps.T]
+    known = [each for each in changes if len(each)]
+    if not known or any(float(np.median(each)) > settings.coarse_steps * float(each.min()) for each in known):
+        return np.zeros(0, np.bool_)
+    large = np.array(
+        [settings.coarse_jump * float(np.percentile(each, 95)) if len(each) else np.inf for each in changes]
+    )
+    return np.asarray((steps > large).any(axis=1), np.bool_)
+
+
+def saturated_readings(block: ReadingBlock, info: TransducerInfo) -> Mask:
+    """Mark readings the device called invalid, and those outside the rated range, where one is stated."""
+    calibration = info.calibration
+    wrench = calibration.own(calibration.wrench(block.raw, np.zeros(6)))
+    with np.errstate(invalid="ignore"):
+        beyond = (np.abs(wrench) > calibration.rated).any(axis=1)
+    return info.status.doubtful(block.status) | beyond
