@@ -6,9 +6,9 @@ from itertools import chain
 from sessions.report.figures.study import study_plates
 from sessions.report.html import data_address, drawn, text_address
 from sessions.report.study_csv import columns_csv, trials_csv
-from sessions.report.study_models import missing_models, missing_scores
 from sessions.report.study_prose import again, command, excluded, modelled, remarks, sealed, summary, versions, who
 from sessions.report.tables.study import study_tables
+from sessions.report.tables.study_models import missing_models, missing_scores
 from sessions.report.templates import template
 from sessions.statistics.pooling.findings import StudyFindings
 

@@ -10,9 +10,9 @@ from study_example import study, visit
 
 from sessions.prediction import PredictionOptions
 from sessions.report.study_csv import trials_csv
-from sessions.report.study_models import missing_scores
 from sessions.report.study_page import study_page
 from sessions.report.study_prose import command, excluded, remarks, summary
+from sessions.report.tables.study_models import missing_scores
 from sessions.statistics.multiverse import PATHS
 from sessions.statistics.pooling.exclusions import Exclusion, exclusions_in
 from sessions.statistics.pooling.findings import CARRY_OVER, DRIFT, FRICTION, INDEX, SED, WITHIN

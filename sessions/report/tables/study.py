@@ -4,11 +4,11 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 
 from sessions.report.predictions import model_in_short
-from sessions.report.study_models import flaws_table, models_table, planted_table
-from sessions.report.study_trials import trials_table
 from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, range_cell, sections_of, table
 from sessions.report.tables.multiverse import paths_table
 from sessions.report.tables.scores import rank_interval, score_cells, spread_cell
+from sessions.report.tables.study_models import flaws_table, models_table, planted_table
+from sessions.report.tables.study_trials import trials_table
 from sessions.report.wording import NONE, correlation, digits, p_value, places, significant, three_figures
 from sessions.statistics.pooling.averages import Average
 from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
