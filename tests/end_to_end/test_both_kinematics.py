@@ -4,12 +4,12 @@ import json
 import shutil
 
 import pytest
-from daq_app.cli.console import Console
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.shown import session_pictures
 from daq_app.analyst.work import Work
 from daq_app.cli.main import run
+from daq_app.console import Console
 from daq_app.simulation.synthetic import synthetic_study
 from sessions.exchange import FORMATS
 

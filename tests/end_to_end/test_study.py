@@ -17,8 +17,9 @@ from daq_app.batch.session_numbers import computed, computed_from, content_of
 from daq_app.cli.main import run
 from daq_app.console import Console
 from daq_app.simulation.synthetic import synthetic_study
+from sessions import atomic_file
 from sessions.prediction import PredictionOptions
-from sessions.recording import RecordingError, atomic_file
+from sessions.recording import RecordingError
 from sessions.recording.provenance import software_versions
 from sessions.statistics.pooling.visit import Visit, VisitOptions
 
