@@ -148,8 +148,8 @@ def _on_rough(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near
     try:
         slide = roughly(finger, scene.undragged(), stop, near)
     except SolveFailure:
-        return course(scene, finger, stop)[-1]  # the drag may be met before sliding would fold the skin
-    return slide if drag >= NEARLY * abs(slide.force[0]) else course(scene, finger, stop)[-1]
+        return course(scene, finger, stop).last  # the drag may be met before sliding would fold the skin
+    return slide if drag >= NEARLY * abs(slide.force[0]) else course(scene, finger, stop).last
 
 
 def risen(

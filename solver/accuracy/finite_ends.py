@@ -25,8 +25,8 @@ def relaxes(scene: Scene) -> bool:
 def end(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], times: float = 1.0) -> Shape:
     """Return the end of a course, in so many `times` the usual load steps. Raises NotConverged, Cancelled."""
     if relaxes(scene):
-        return RelaxingCourse(scene, finger, stop, times=times).shapes[-1]
-    return course(scene, finger, stop, times)[-1]
+        return RelaxingCourse(scene, finger, stop, times=times).last
+    return course(scene, finger, stop, times).last
 
 
 def steps_asked(scene: Scene, finger: FiniteFinger, shape: Shape, stop: Callable[[], bool]) -> Steps | None:

@@ -13,8 +13,8 @@ from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium import full_slip as sliding
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.force_control import balanced
+from solver.equilibrium.load_path import Aim, Way, press_and_drag
 from solver.equilibrium.loads import pull_of, sliding_pull
-from solver.equilibrium.march import march
 from solver.equilibrium.newton import BY_DEPTH, Given, Newton, Pull, Shape
 from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.progress import tell
@@ -45,7 +45,7 @@ def settled(
     if scene.normal_force is not None:
         return _settled_under(finger, scene, scene.normal_force, stop, start, times)
     if scene.loading.direction == 0 and scene.friction.mu > 0.0:
-        return course(scene, finger, stop, times)[-1]
+        return course(scene, finger, stop, times).last
     return steady(finger, sliding_pull(scene), start=start, stop=stop)
 
 
@@ -93,11 +93,11 @@ def _settled_under(
     """Return the settled state under the forces of a scene, depth and shift found. Raises as `settled`."""
     direction, drag = scene.loading.direction, scene.tangential_force
     if direction == 0 and scene.friction.mu > 0.0:
-        return course(scene, finger, stop, times)[-1]
+        return course(scene, finger, stop, times).last
     if start is not None and start.pull.sense == 0:  # the end of a course, and no slide to start from
         start = None
         try:
-            return course(scene, finger, stop, times)[-1]
+            return course(scene, finger, stop, times).last
         except NotConverged:
             pass
     try:
@@ -105,13 +105,13 @@ def _settled_under(
     except SolveFailure as failure:
         if drag is None:
             raise _under_force(scene, force, failure) from failure
-        return course(scene, finger, stop, times)[-1]  # the drag may be met before sliding would fold the skin
+        return course(scene, finger, stop, times).last  # the drag may be met before sliding would fold the skin
     most = abs(float(slides.force[0]))
     if drag is None or most * (1.0 - ALL_SLIPS) <= drag <= most * (1.0 + ALL_SLIPS):
         return slides
     if drag > most:
         raise beyond_friction(drag, most, force)
-    return course(scene, finger, stop, times)[-1]
+    return course(scene, finger, stop, times).last
 
 
 def _under_force(scene: Scene, force: float, failure: SolveFailure) -> SolveFailure:
@@ -214,92 +214,40 @@ def _risen_to(finger: FiniteFinger, shape: Shape, proof: reach.Reach, force: flo
     return shape
 
 
-def presses(times: float) -> int:
-    """Return the load steps of the pre-indentation, or of a drag, so many `times` the usual."""
-    return round(PRESSES * times)
-
-
 def depends_on_way(scene: Scene, shape: Shape) -> bool:
     """Return whether a state is the end of a course and not a settled slide, found directly."""
     return shape.pull.sense == 0 and scene.friction.mu > 0.0
 
 
-def course(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], times: float = 1.0) -> list[Shape]:
-    """Return the states from first touch to the last settled slide, or to the end of the press or drag.
+def course(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], times: float = 1.0) -> Way:
+    """Return the way from first touch to the last settled slide, or to the end of the press or drag.
 
     `times` the usual load steps are taken.
     """
-    drag = scene.tangential_force
     for leg in scene.earlier_slides():  # one that never settles is refused with its limits
         settled(finger, leg, stop)
-    if scene.normal_force is None:
-        way = _Driven(scene, finger, stop, times)
-    else:
-        way = _Forced(scene, scene.normal_force, finger, stop, times)
-        if drag is not None:
-            way.drag(-scene.loading.direction * drag)
-            return way.shapes
-    for direction in scene.loading.directions:
-        _settle(way, scene, direction)
-    return way.shapes
+    loading, count = scene.loading_per_mm, round(PRESSES * times)
+    good = GOOD if scene.normal_force is not None else min(GOOD, CLOSE * loading.depth)
+    way = Way(finger.newton, pull_of(scene), loading, good, stop)
+    press_and_drag(way, loading, lambda part: tell("pressing and dragging step by step", part), count, count)
+    if not loading.dragged:
+        for direction in loading.directions:
+            _settle(way, finger, direction * loading.speed, times)
+    return way
 
 
-def _settle(way: "_Driven | _Forced", scene: Scene, direction: int) -> None:
+def _settle(way: Way, finger: FiniteFinger, speed: float, times: float) -> None:
     """Slide until the response does not change any more. Raises NotConverged where it still does."""
-    depth = way.shapes[-1].pull.depth
-    sed = way.finger.sed_ending(way.shapes[-1])
-    longest = int(LONGEST / STRIDE * way.times)
+    depth, friction = way.last.pull.depth, way.last.pull.mu
+    sed, step = finger.sed_ending(way.last), STRIDE / times * depth
+    longest = int(LONGEST / STRIDE * times)
     for number in range(longest):
         tell("sliding until nothing changes", number / longest)
-        way.slide(direction * STRIDE / way.times * depth)
-        before, sed = sed, way.finger.sed_ending(way.shapes[-1])
-        if not (way.shapes[-1].state == STICK).any() and abs(sed - before) * way.times <= SETTLED * sed:
+        way.go(Aim(way.aim.time + step / abs(speed), way.aim.press, way.aim.along + float(np.sign(speed)) * step))
+        before, sed = sed, finger.sed_ending(way.last)
+        if not (way.last.state == STICK).any() and abs(sed - before) * times <= SETTLED * sed:
             return
     raise NotConverged(
-        f"After {LONGEST * depth:.3g} mm of sliding at {depth:.3g} mm of indentation and mu = {scene.friction.mu:.3g} "
+        f"After {LONGEST * depth:.3g} mm of sliding at {depth:.3g} mm of indentation and mu = {friction:.3g} "
         "the response still changes: no settled state was reached; ask for less friction or depth."
     )
-
-
-class _Driven:
-    """A course driven by depth and travel, pressed when made."""
-
-    def __init__(self, scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], times: float) -> None:
-        self.finger, self._stop, self.times = finger, stop, times
-        self._pull = pull_of(scene)
-        count = presses(times)
-        pulls = [self._pull._replace(depth=self._pull.depth * (i + 1) / count) for i in range(count)]
-        self._good = min(GOOD, CLOSE * self._pull.depth)
-        self.shapes = list(march(self.finger.newton, pulls, None, self._good, self._stop))
-
-    def slide(self, distance: float) -> None:
-        """Move the bone by `distance` along +x [mm]."""
-        self._pull = self._pull._replace(travel=self._pull.travel - distance)
-        self.shapes += march(self.finger.newton, [self._pull], self.shapes[-1], self._good, self._stop)
-
-
-class _Forced:
-    """A course under a given normal force, and a given travel or drag; pressed when made."""
-
-    def __init__(
-        self, scene: Scene, normal: float, finger: FiniteFinger, stop: Callable[[], bool], times: float
-    ) -> None:
-        self.finger, self._stop, self.times = finger, stop, times
-        self._given = Given(0.0, 0.0 if scene.loading.dragged else None)
-        self.shapes = [finite_forced.untouched(finger.newton, float(scene.friction.mu), scene.friction.cap)]
-        count = presses(times)
-        self._go([self._given._replace(normal=normal * (i + 1) / count) for i in range(count)])
-        del self.shapes[0]
-
-    def _go(self, aims: list[Given]) -> None:
-        self.shapes += finite_forced.march(self.finger.newton, self.shapes[-1], self._given, aims, self._stop)
-        self._given = aims[-1]
-
-    def slide(self, distance: float) -> None:
-        """Move the bone by `distance` along +x [mm]."""
-        self._go([self._given._replace(travel=self._given.travel - distance)])
-
-    def drag(self, pull: float) -> None:
-        """Let the surface's pull along +x grow to `pull` [N/mm]."""
-        count = presses(self.times)
-        self._go([self._given._replace(tangential=pull * (i + 1) / count) for i in range(count)])

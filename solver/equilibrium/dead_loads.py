@@ -10,10 +10,9 @@ import numpy as np
 
 from solver.arrays import Array
 from solver.body.validation import check_loads
+from solver.equilibrium.load_stepping import StepControl, advance
 from solver.equilibrium.newton import FiniteNewton, Pull, Shape
 from solver.failures import NotConverged
-
-SMALLEST = 1.0 / 256.0  # part of the loads below which a failing step is given up
 
 
 def loaded(
@@ -43,20 +42,18 @@ def loaded(
     held_at = shape.u[driven]
     moved = 0.0 if prescribed is None else prescribed[driven] - held_at
     before = newton.finite.load.copy()
-    done, part = 0.0, 1.0 / steps
-    while done < 1.0:
-        aim = min(done + part, 1.0)
-        newton.finite.load[:] = before + aim * (vector - before)
+
+    def step(part: float) -> None:
+        nonlocal shape
+        newton.finite.load[:] = before + part * (vector - before)
         u = shape.u.copy()
-        u[driven] = held_at + aim * moved
-        try:
-            shape = newton.settle(replace(shape, u=u), pull)
-        except NotConverged as reason:
-            part /= 2.0
-            if part < SMALLEST:
-                raise NotConverged(f"no equilibrium was found beyond {done:.3g} of the loads: {reason}") from reason
-        else:
-            done = aim
+        u[driven] = held_at + part * moved
+        shape = newton.settle(replace(shape, u=u), pull)
+
+    def refusal(done: float, _part: float, reason: NotConverged) -> NotConverged:
+        return NotConverged(f"no equilibrium was found beyond {done:.3g} of the loads: {reason}")
+
+    advance(step, refusal, StepControl(first=1.0 / steps))
     return shape
 
 

@@ -19,22 +19,15 @@ from solver.body.validation import check_moduli, check_terms
 from solver.constitutive import overstress
 from solver.constitutive.linear import Prony
 from solver.constitutive.overstress import Past
-from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.load_path import (
-    DRAGGING_STEPS,
-    DRAGGING_TIME,
-    HALVINGS,
-    LONG,
-    PRESSING_STEPS,
-    PRESSING_TIME,
-    Aim,
-)
-from solver.equilibrium.newton import FiniteNewton, Given, Newton, Shape, lowered
+from solver.equilibrium.load_path import DRAGGING_STEPS, LONG, PRESSING_STEPS, Aim, Way, press_and_drag
+from solver.equilibrium.load_stepping import never
+from solver.equilibrium.loads import pull_of
+from solver.equilibrium.newton import FiniteNewton, Newton, Shape
 from solver.equilibrium.relaxation import RELAXED, wait
-from solver.failures import Cancelled, NotConverged, followed_to
+from solver.failures import NotConverged
 from solver.progress import tell
-from solver.scene import Scene
+from solver.scene import Loading, Scene
 
 FIRST, LARGEST = 0.02, 0.1  # steps of a slide, by the indentation; each a fifth longer than the one before
 GOOD, CLOSE = 1e-8, 1e-7  # tolerance of displacements [mm], and by the indentation where that is less
@@ -128,64 +121,61 @@ class _Watched:
         return float(energy @ probes.weights / probes.weights.sum())
 
 
-class RelaxingCourse:
-    """A course from first touch on: `shapes`, and at each of them `times` [s] and `sed` of ending and point [MPa]."""
+class RelaxingCourse(Way):
+    """A course from first touch on: its `instants`, and `sed` of ending and point at each of them [MPa]."""
 
     def __init__(
         self,
         scene: Scene,
         finger: FiniteFinger,
-        stop: Callable[[], bool] = lambda: False,
+        stop: Callable[[], bool] = never,
         aims: Sequence[Aim] | None = None,
         times: float = 1.0,
     ) -> None:
         """March the whole course in `times` the usual steps, or to `aims` alone. Raises NotConverged, Cancelled."""
-        self._laws = relaxing_laws(scene.materials)
-        self.newton = RelaxingNewton(finger.newton.body, self._laws)
-        self._watched = [_Watched(probes, self.newton.body, self._laws) for probes in (finger.ending, finger.point)]
-        self._scene, self._stop, self._times = scene, stop, times
-        self._aim, self._sense = Aim(0.0, 0.0, 0.0), 0
-        mu, tau = float(scene.friction.mu), scene.friction.cap
-        self.shapes = [finite_forced.untouched(self.newton, mu, tau)]
-        self.times, self.sed = [0.0], [(0.0, 0.0)]
+        laws, loading = relaxing_laws(scene.materials), scene.loading_per_mm
+        self.relaxing = RelaxingNewton(finger.newton.body, laws)
+        good = GOOD if scene.normal_force is not None else min(GOOD, CLOSE * loading.depth)
+        super().__init__(self.relaxing, pull_of(scene), loading, good, stop)
+        self._watched = [_Watched(probes, self.relaxing.body, laws) for probes in (finger.ending, finger.point)]
+        self._longest, self._times, self._sense = scene.materials.longest_creep, times, 0
+        self.sed: list[tuple[float, float]] = []
         if aims is None:
-            self._march()
+            self._march(loading)
         else:
             for aim in aims:
-                self._go(aim)
-        del self.shapes[0], self.times[0], self.sed[0]
+                self.go(aim)
 
-    def _march(self) -> None:
-        loading, drag = self._scene.loading, self._scene.tangential_force
-        force = self._scene.normal_force
-        press = loading.depth if force is None else force
-        count = round(PRESSING_STEPS * self._times)
-        for number in range(1, count + 1):
-            part = number / count
-            tell("pressing step by step, since the tissues relax", part)
-            self._go(Aim(PRESSING_TIME * part, press * part, 0.0))
-        if drag is not None:
-            pull = -loading.direction * drag
-            count = round(DRAGGING_STEPS * self._times)
-            for number in range(1, count + 1):
-                part = number / count
-                tell("dragging step by step, since the tissues relax", part)
-                self._go(Aim(PRESSING_TIME + DRAGGING_TIME * part, press, pull * part))
-        else:
+    def found(self, before: Shape, aim: Aim) -> Shape:
+        """Return the state at `aim`, and let the body come to it. Raises NotConverged."""
+        step = aim.time - self.aim.time
+        self.relaxing.ready(step)
+        shape = super().found(replace(before, pull=before.pull._replace(sense=self._sense)), aim)
+        self.relaxing.took(shape, step)
+        ending, point = (watched.follow(shape, step) for watched in self._watched)
+        self.sed.append((ending, point))
+        return shape
+
+    def _march(self, loading: Loading) -> None:
+        def report(part: float) -> None:
+            tell("pressing and dragging step by step, since the tissues relax", part)
+
+        press_and_drag(self, loading, report, round(PRESSING_STEPS * self._times), round(DRAGGING_STEPS * self._times))
+        if not loading.dragged:
             for direction in loading.directions:
                 self._slide(direction * loading.speed)
-        self._wait(0.0 if drag is not None else loading.direction * loading.speed)
+        self._wait(0.0 if loading.dragged else loading.direction * loading.speed)
 
     def _slide(self, speed: float) -> None:
         """Slide until every touching point slips. Raises NotConverged where some never do."""
-        depth = self.shapes[-1].pull.depth
+        depth = self.instants[-1].depth
         step, distance = FIRST / self._times * depth, 0.0
         while distance < LONG * depth:
             tell("sliding step by step until nothing sticks, since the tissues relax", distance / (LONG * depth))
-            self._go(Aim(self._aim.time + step / abs(speed), self._aim.press, self._aim.along + np.sign(speed) * step))
+            self.go(Aim(self.aim.time + step / abs(speed), self.aim.press, self.aim.along + np.sign(speed) * step))
             distance += step
             step = min(1.2 * step, LARGEST / self._times * depth)
-            if not (self.shapes[-1].state == STICK).any():
+            if not (self.instants[-1].state.state == STICK).any():
                 return
         raise NotConverged(
             f"after {distance:.3g} mm of sliding some skin still stuck: no settled state was reached; ask for less "
@@ -195,44 +185,11 @@ class RelaxingCourse:
     def _wait(self, speed: float) -> None:
         """Go on until all terms have relaxed."""
         self._sense = -int(np.sign(speed))  # by now all that touches slips, whatever comes to touch
-
-        begun, longest = self.times[-1], RELAXED * self._scene.materials.longest_creep
+        begun, longest = self.aim.time, RELAXED * self._longest
 
         def go(step: float) -> None:
-            part = min((self.times[-1] - begun) / longest, 1.0)
+            part = min((self.aim.time - begun) / longest, 1.0)
             tell("waiting step by step until the tissues have relaxed", part)
-            self._go(Aim(self._aim.time + step, self._aim.press, self._aim.along + speed * step))
+            self.go(Aim(self.aim.time + step, self.aim.press, self.aim.along + speed * step))
 
-        wait(go, self.times[-1] - self.times[-2], self._scene.materials.longest_creep, self.sed, self._times)
-
-    def _go(self, aim: Aim, halvings: int = HALVINGS) -> None:
-        """Append the state at `aim`, in smaller steps where one of that size fails."""
-        if self._stop():
-            raise Cancelled
-        step = aim.time - self._aim.time
-        self.newton.ready(step)
-        try:
-            shape = self._found(aim)
-        except NotConverged as reason:
-            if halvings == 0:
-                last = self.shapes[-1].pull
-                raise followed_to(last.depth, last.travel, reason) from reason
-            self._go(self._aim.towards(aim, 0.5), halvings - 1)
-            self._go(aim, halvings - 1)
-            return
-        self.newton.took(shape, step)
-        self.shapes.append(shape)
-        self.times.append(aim.time)
-        ending, point = (watched.follow(shape, step) for watched in self._watched)
-        self.sed.append((ending, point))
-        self._aim = aim
-
-    def _found(self, aim: Aim) -> Shape:
-        """Return the state at `aim`, coming from the last one."""
-        last = self.shapes[-1]
-        last = replace(last, pull=last.pull._replace(sense=self._sense))
-        if self._scene.normal_force is None:
-            good = min(GOOD, CLOSE * self._scene.loading.depth)
-            return self.newton.settle(last, last.pull._replace(depth=aim.press, travel=-aim.along), good)
-        given = Given(aim.press, aim.along) if self._scene.loading.dragged else Given(aim.press, None, -aim.along)
-        return finite_forced.balanced(self.newton, lowered(self.newton.condensed, last), given)
+        wait(go, self.instants[-1].time - self.instants[-2].time, self._longest, self.sed, self._times)

@@ -9,12 +9,11 @@ from dataclasses import replace
 
 from solver._kernels import STICK
 from solver.arrays import Array
+from solver.equilibrium.load_stepping import advance
 from solver.equilibrium.newton import EQUILIBRIUM, Given, Newton, Pull, Shape, lowered
 from solver.equilibrium.root import UNMET, met
-from solver.failures import Cancelled, ContactLost, NotConverged, followed_to
+from solver.failures import ContactLost, NotConverged, followed_to
 from solver.progress import tell
-
-HALVINGS = 8  # how often a step that failed is cut in two before it is given up
 
 
 def corrected(
@@ -108,19 +107,12 @@ def march(
     for number, aim in enumerate(aims := [aim.checked() for aim in course]):
         if len(aims) > 1:
             tell("letting the forces grow step by step", number / len(aims))
-        done, part = 0.0, 1.0
-        while done < 1.0:
-            if stop():
-                raise Cancelled
-            try:
-                there = min(done + part, 1.0)
-                shape = balanced(newton, lowered(newton.condensed, shape), begin.towards(aim, there))
-            except NotConverged as reason:
-                part /= 2.0
-                if part < 0.5**HALVINGS:
-                    raise followed_to(shape.pull.depth, shape.pull.travel, reason) from reason
-            else:
-                done = there
+
+        def step(part: float, begin: Given = begin, aim: Given = aim) -> None:
+            nonlocal shape
+            shape = balanced(newton, lowered(newton.condensed, shape), begin.towards(aim, part))
+
+        advance(step, lambda _done, _part, why: followed_to(shape.pull.depth, shape.pull.travel, why), stop=stop)
         begin = aim
         yield shape
 

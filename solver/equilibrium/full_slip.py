@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
+from solver.equilibrium.load_stepping import StepControl, advance
 from solver.equilibrium.newton import Given, Newton, Pull, Shape
-from solver.failures import Cancelled, ContactLost, NotConverged
+from solver.failures import ContactLost, NotConverged
 from solver.progress import tell
 
 HERTZ = 0.5  # part of the depth below which skin is first thought to touch: half as deep is half the overlap's square
@@ -37,26 +38,23 @@ def settled(
         return _at_once(newton, pull, start)
     shape = Shape.undeformed(newton.condensed) if start is None else start
     begin = shape.pull if start is not None else Pull(0.0, pull.mu, pull.tau, pull.sense)
-    done, part = 0.0, 1.0
-    used, most = 0, newton.systems + WORK
-    while done < 1.0:
-        if stop():
-            raise Cancelled
+    most = newton.systems + WORK
+
+    def step(part: float) -> None:
+        nonlocal shape
         if part < 1.0:
-            tell(f"coming to sliding at mu = {pull.mu:.3g} in small steps", done)
-        aim = min(done + part, 1.0)
-        try:
-            shape = newton.settle(shape, _between(begin, pull, aim), tolerance if aim == 1.0 else FIRST_TOLERANCE)
-        except NotConverged as reason:
-            part /= 2.0
-            used += 1
-            if part < SMALLEST or used > 12 or begin == pull or newton.systems > most:
-                raise NotConverged(
-                    f"no sliding state was found beyond {_between(begin, pull, done).depth:.3g} mm of indentation at "
-                    f"mu = {_between(begin, pull, done).mu:.3g}: {reason}, in steps of 1/{1 / part:.0f} of the way"
-                ) from reason
-        else:
-            done = aim
+            tell(f"coming to sliding at mu = {pull.mu:.3g} in small steps", part)
+        shape = newton.settle(shape, _between(begin, pull, part), tolerance if part == 1.0 else FIRST_TOLERANCE)
+
+    def refusal(done: float, part: float, reason: NotConverged) -> NotConverged:
+        last = _between(begin, pull, done)
+        return NotConverged(
+            f"no sliding state was found beyond {last.depth:.3g} mm of indentation at mu = {last.mu:.3g}: {reason}, in "
+            f"steps of 1/{1 / part:.0f} of the way"
+        )
+
+    control = StepControl(smallest=1.0 if begin == pull else SMALLEST)
+    advance(step, refusal, control, stop, exhausted=lambda: newton.systems > most)
     return shape
 
 

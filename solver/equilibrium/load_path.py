@@ -8,6 +8,7 @@ import numpy as np
 
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
 from solver.equilibrium.force_control import balanced
+from solver.equilibrium.load_stepping import StepControl, advance, never
 from solver.equilibrium.newton import Given, Newton, Pull, Shape, lowered
 from solver.failures import Cancelled, NotConverged, followed_to
 from solver.scene import Loading
@@ -18,7 +19,8 @@ DRAGGING_TIME = 1.0  # within which a given tangential force grows [s]
 DRAGGING_STEPS = 25
 LONG = 25.0  # travel within which all but slides near the wedging limit settle, in indentations
 FURTHEST = 100.0  # and after which a slide that has not settled is given up
-HALVINGS = 13  # how often a step that failed is cut in two before it is given up
+CONTROL = StepControl(smallest=2.0**-13, growth=2.0)
+TOLERANCE = 1e-10  # of displacements [mm]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,21 +72,30 @@ def march(
 
 def course(way: "Way", loading: Loading, progress: Progress | None = None, times: float = 1.0) -> None:
     """Press, and slide or drag, along `way`, in so many `times` the usual steps. Raises as `march`."""
-    presses, drags = round(PRESSING_STEPS * times), round(DRAGGING_STEPS * times)
-    press = loading.depth if loading.normal_force is None else loading.normal_force
-    for number in range(1, presses + 1):
-        part = number / presses
-        way.go(Aim(PRESSING_TIME * part, press * part, 0.0))
-        _report(progress, part / 2.0)
-    if loading.tangential_force is not None:
-        pull = -loading.direction * loading.tangential_force
-        for number in range(1, drags + 1):
-            part = number / drags
-            way.go(Aim(PRESSING_TIME + DRAGGING_TIME * part, press, pull * part))
-            _report(progress, (1.0 + part) / 2.0)
-    else:
+
+    def report(part: float) -> None:
+        _report(progress, part if loading.dragged else part / 2.0)
+
+    press_and_drag(way, loading, report, round(PRESSING_STEPS * times), round(DRAGGING_STEPS * times))
+    if not loading.dragged:
         for direction in loading.directions:
             slide(way, direction, loading.speed, progress, times)
+
+
+def press_and_drag(way: "Way", loading: Loading, report: Callable[[float], None], pressing: int, dragging: int) -> None:
+    """Press along `way` in so many steps, and let a given drag grow in so many; `report` the part done, 0 to 1."""
+    press = loading.depth if loading.normal_force is None else loading.normal_force
+    count = pressing + (dragging if loading.dragged else 0)
+    for number in range(1, pressing + 1):
+        part = number / pressing
+        way.go(Aim(PRESSING_TIME * part, press * part, 0.0))
+        report(number / count)
+    if loading.tangential_force is not None:
+        pull = -loading.direction * loading.tangential_force
+        for number in range(1, dragging + 1):
+            part = number / dragging
+            way.go(Aim(PRESSING_TIME + DRAGGING_TIME * part, press, pull * part))
+            report((pressing + number) / count)
 
 
 def _report(progress: Progress | None, part: float) -> None:
@@ -95,35 +106,55 @@ def _report(progress: Progress | None, part: float) -> None:
 class Way:
     """The states so far, and how the next one is found."""
 
-    def __init__(self, newton: Newton, friction: Pull, loading: Loading) -> None:
-        """Start untouched, with mu and bound of `friction`; `loading` says what is driven and what is found."""
-        self.newton = newton
+    def __init__(
+        self,
+        newton: Newton,
+        friction: Pull,
+        loading: Loading,
+        tolerance: float = TOLERANCE,
+        stop: Callable[[], bool] = never,
+    ) -> None:
+        """Start untouched, with mu and bound of `friction`; `loading` says what is driven and what is found.
+
+        Displacements are found to a `tolerance` [mm] where depth and travel are given.
+        """
+        self.newton, self._tolerance, self._stop = newton, tolerance, stop
         self.frictionless = friction.frictionless
         self.by_force = loading.normal_force is not None
         # without friction there is no drag to speak of, and nothing that it could hold
-        self.by_drag = loading.tangential_force is not None and not self.frictionless
+        self.by_drag = loading.dragged and not self.frictionless
         rest = replace(Shape.undeformed(newton.condensed), pull=Pull(0.0, friction.mu, friction.tau).checked())
         self.instants = [Instant(0.0, rest)]
         self.aim = Aim(0.0, 0.0, 0.0)
 
-    def go(self, aim: Aim, halvings: int = HALVINGS) -> None:
-        """Append the state at `aim`, in smaller steps where one of that size fails."""
-        before = self.instants[-1].state
-        try:
-            state = self.found(before, aim)
-        except NotConverged as lost:
-            if halvings == 0:
-                raise followed_to(before.pull.depth, before.pull.travel, lost) from lost
-            self.go(self.aim.towards(aim, 0.5), halvings - 1)
-            self.go(aim, halvings - 1)
-            return
-        self.instants.append(Instant(aim.time, state))
-        self.aim = aim
+    @property
+    def last(self) -> Shape:
+        """The state reached."""
+        return self.instants[-1].state
+
+    @property
+    def states(self) -> list[Shape]:
+        """The states after rest."""
+        return [instant.state for instant in self.instants[1:]]
+
+    def go(self, aim: Aim) -> None:
+        """Append the state at `aim`, and those of smaller steps where one of that size fails."""
+        begin = self.aim
+
+        def step(part: float) -> None:
+            there = aim if part == 1.0 else begin.towards(aim, part)
+            self.instants.append(Instant(there.time, self.found(self.last, there)))
+            self.aim = there
+
+        advance(step, self._refusal, CONTROL, self._stop)
+
+    def _refusal(self, _done: float, _part: float, reason: NotConverged) -> NotConverged:
+        return followed_to(self.last.pull.depth, self.last.pull.travel, reason)
 
     def found(self, before: Shape, aim: Aim) -> Shape:
         """Return the state at `aim`, coming from `before`. Raises NotConverged."""
         if not self.by_force:
-            return self.newton.settle(before, before.pull._replace(depth=aim.press, travel=-aim.along))
+            return self.newton.settle(before, before.pull._replace(depth=aim.press, travel=-aim.along), self._tolerance)
         given = Given(aim.press, aim.along) if self.by_drag else Given(aim.press, None, -aim.along)
         return balanced(self.newton, lowered(self.newton.condensed, before), given)
 

@@ -2,11 +2,10 @@
 
 from collections.abc import Callable, Iterable, Iterator
 
+from solver.equilibrium.load_stepping import advance
 from solver.equilibrium.newton import Newton, Pull, Shape
-from solver.failures import Cancelled, NotConverged, followed_to
+from solver.failures import followed_to
 from solver.progress import tell
-
-SMALLEST = 1.0 / 256.0  # part of a step below which a failing one is given up
 
 
 def press_and_slide(
@@ -40,23 +39,17 @@ def march(
     for number, pull in enumerate(pulls := [pull.checked() for pull in course]):
         if len(pulls) > 1:
             tell("pressing and sliding step by step", number / len(pulls))
-        begin, done, part = shape.pull, 0.0, 1.0
-        while done < 1.0:
-            if stop():
-                raise Cancelled
-            aim = min(done + part, 1.0)
-            try:
-                shape = newton.settle(shape, _between(begin, pull, aim), tolerance)
-            except NotConverged as reason:
-                part /= 2.0
-                if part < SMALLEST:
-                    raise followed_to(shape.pull.depth, shape.pull.travel, reason) from reason
-            else:
-                done = aim
+        begin = shape.pull
+
+        def step(part: float, begin: Pull = begin, pull: Pull = pull) -> None:
+            nonlocal shape
+            shape = newton.settle(shape, between(begin, pull, part), tolerance)
+
+        advance(step, lambda _done, _part, why: followed_to(shape.pull.depth, shape.pull.travel, why), stop=stop)
         yield shape
 
 
-def _between(begin: Pull, end: Pull, part: float) -> Pull:
+def between(begin: Pull, end: Pull, part: float) -> Pull:
     """Return the pull `part` of the way along a step, whose friction is that of its end."""
     if part == 1.0:
         return end

@@ -20,13 +20,13 @@ from solver.accuracy.audits import forces_missed, refuse_unsound, rounding, unba
 from solver.accuracy.finite_audits import audits, course_audits
 from solver.accuracy.finite_ends import times_on_way
 from solver.accuracy.finite_errors import error_estimates
-from solver.arrays import Array
 from solver.contact.law import NAMES
 from solver.continuation.existence import doubts
-from solver.continuation.finite_states import course, presses
+from solver.continuation.finite_states import course
 from solver.equilibrium.expected_depth import within_reach
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.finite_relaxation import RelaxingCourse
+from solver.equilibrium.load_path import Way
 from solver.equilibrium.newton import EQUILIBRIUM, FiniteNewton, Shape
 from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
@@ -115,18 +115,18 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
     setup = sum(state.setup_s for state in (way_up.foot, way_up.first, at) if state is not None)
     steps = way_up.steps
     times = times_on_way(scene, way_up.foot.finger, stop) if steps is None else steps.times
-    way: list[Shape] = []
+    way: Way | None = None
     relaxing: RelaxingCourse | None = None
     if scene.solve.course == "history":
         relaxing = RelaxingCourse(scene, finger, stop, times=times) if scene.materials.relax else None
-        way = course(scene, finger, stop, times) if relaxing is None else relaxing.shapes
-        shape = way[-1]
+        way = relaxing or course(scene, finger, stop, times)
+        shape = way.last
     if not shape.touching.any():
         raise NotConverged(f"No contact was found at {shape.pull.depth:g} mm of indentation: ask for more depth.")
     within_reach(scene, shape.pull.depth)
     driven = scene.driven(shape.pull.depth)
     body = finger.newton.body
-    newton = finger.newton if relaxing is None else relaxing.newton
+    newton = finger.newton if relaxing is None else relaxing.relaxing
     shape, checks = _balanced(newton, shape, lambda found: audits(driven, finger, found, newton))
     refuse_unsound(checks, shape.pull.depth)
     numbers = finger.all_numbers(shape)
@@ -134,7 +134,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
     skin = _skin(finger, shape)
     checks |= forces_missed(scene, float(shape.force[1]), float(shape.force[0]))
     if way:
-        checks |= course_audits(newton, way)
+        checks |= course_audits(newton, way.states)
     if way and (relaxing is None or _sticking(shape) == 0.0):  # stuck and relaxing, the end depends on the way
         checks["course_against_direct"] = abs(finger.sed_ending(at.shape) / sed - 1.0)
     held = scene.loading.dragged and _sticking(shape) > 0.0  # sliding, a finger may have shifted by anything
@@ -173,7 +173,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         skin=skin,
         geometry=finger.geometry,
         displacement=shape.u,
-        history=_history(scene, finger, way, relaxing, times) if way else None,
+        history=_history(scene, finger, way, relaxing) if way else None,
         warnings=(*evidence.warnings(driven, model["left_out"]), *doubts(finger, shape, stop), *rounding(checks)),
     )
 
@@ -229,39 +229,21 @@ def _contradicting(checks: dict[str, float]) -> float:
     return max(checks[name] for name in ("penetration", "tension", "cone_violation"))
 
 
-def _history(
-    scene: Scene, finger: FiniteFinger, way: Sequence[Shape], relaxing: RelaxingCourse | None, times: float
-) -> History:
-    travel = np.array([-shape.pull.travel for shape in way])
-    depth = np.array([shape.pull.depth for shape in way])
-    slipping = np.array([1.0 - _sticking(shape) if shape.touching.any() else 0.0 for shape in way])
+def _history(scene: Scene, finger: FiniteFinger, way: Way, relaxing: RelaxingCourse | None) -> History:
+    states = way.states
     if relaxing is None:
-        time = _times(scene, travel, presses(times))
-        point = [float(finger.point.average(finger.newton.body, shape.u)[0]) for shape in way]
-        sed = np.stack([[finger.sed_ending(shape) for shape in way], point], axis=1)
+        point = [float(finger.point.average(finger.newton.body, shape.u)[0]) for shape in states]
+        sed = np.stack([[finger.sed_ending(shape) for shape in states], point], axis=1)
     else:
-        time, sed = np.array(relaxing.times), np.array(relaxing.sed)
+        sed = np.array(relaxing.sed)
     return History(
-        time=time,
-        bone_x=travel,
-        bone_y=-depth,
+        time=np.array([instant.time for instant in way.instants[1:]]),
+        bone_x=np.array([-shape.pull.travel for shape in states]),
+        bone_y=np.array([-shape.pull.depth for shape in states]),
         sed_ending=sed[:, 0],
         sed_point=sed[:, 1],
-        normal_force=np.array([float(shape.force[1]) for shape in way]),
-        tangential_force=np.array([drag(scene, float(shape.force[0])) for shape in way]),
-        contact_width=np.array([finger.contact_width(shape) for shape in way]),
-        slipping=slipping,
+        normal_force=np.array([float(shape.force[1]) for shape in states]),
+        tangential_force=np.array([drag(scene, float(shape.force[0])) for shape in states]),
+        contact_width=np.array([finger.contact_width(shape) for shape in states]),
+        slipping=np.array([1.0 - _sticking(shape) if shape.touching.any() else 0.0 for shape in states]),
     )
-
-
-def _times(scene: Scene, travel: Array, count: int) -> Array:
-    """Return when a finger that does not relax was where its bone has gone to by `travel` (m,) [mm].
-
-    It was pressed in `count` steps, and dragged in as many.
-    """
-    if scene.loading.dragged:
-        after = np.arange(1, len(travel) - count + 1) / count
-    else:
-        gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(travel)))])
-        after = gone[count:] / scene.loading.speed
-    return np.concatenate([np.arange(1, count + 1) / count, 1.0 + after])

@@ -1,0 +1,45 @@
+"""The one cut-back: steps that fail are halved, and what cannot be stepped over is refused with where it began."""
+
+import pytest
+
+from solver import Cancelled, NotConverged
+from solver.equilibrium.load_stepping import StepControl, advance
+
+
+def brought_on(longest, control, wall=2.0):
+    """Bring on a load that takes steps up to `longest` and does not go beyond `wall`; return where it went."""
+    reached, failed = [0.0], []
+
+    def step(part):
+        if part - reached[-1] > longest or part > wall:
+            failed.append(part)
+            raise NotConverged("too far")
+        reached.append(part)
+
+    advance(step, lambda done, part, why: NotConverged(f"{done} {part} {why}"), control)
+    return reached[1:], failed
+
+
+def test_a_path_that_goes_at_once_is_one_step():
+    assert brought_on(1.0, StepControl()) == ([1.0], [])
+
+
+def test_a_step_that_fails_is_halved_and_the_rest_goes_in_steps_of_that_size():
+    assert brought_on(0.3, StepControl()) == ([0.25, 0.5, 0.75, 1.0], [1.0, 0.5])
+
+
+def test_steps_grow_again_where_they_are_told_to():
+    assert brought_on(0.3, StepControl(growth=2.0)) == ([0.25, 0.5, 0.75, 1.0], [1.0, 0.5, 0.75, 1.0])
+
+
+def test_what_the_smallest_step_does_not_pass_is_refused_with_where_it_began():
+    with pytest.raises(NotConverged, match=r"0\.5 0\.125 too far"):
+        brought_on(1.0, StepControl(smallest=0.25), wall=0.6)
+
+
+def test_a_path_stops_between_two_steps():
+    stops = iter([False, False, True])
+    taken = []
+    with pytest.raises(Cancelled):
+        advance(taken.append, lambda *_: NotConverged(""), StepControl(first=0.25), lambda: next(stops))
+    assert taken == [0.25, 0.5]
