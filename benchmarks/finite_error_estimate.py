@@ -28,12 +28,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks.error_estimate import of_answers, other_finger, shares
-from daq_app.accuracy.methods import overkill
 from solver import Finger, Friction, Loading, Material, Materials, Scene, Solve, SolveFailure
 from solver.accuracy.adaptivity import MARGIN, ascended, sized
 from solver.accuracy.error_estimate import FINENESS, coarsest_for, estimates
 from solver.accuracy.finite_errors import compared
 from solver.mesh.mesher import AT_CUT, Sizing
+from solver.verification.methods import overkill
 
 NAMES = ("SED of the ending", "normal force", "drag")
 MESHES = FINENESS["finite"][:4]

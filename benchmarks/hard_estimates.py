@@ -29,7 +29,6 @@ from typing import Any
 import numpy as np
 
 from benchmarks.error_estimate import on_mesh, random_scene
-from daq_app.accuracy.methods import overkill
 from solver import (
     Finger,
     Friction,
@@ -47,6 +46,7 @@ from solver import (
 from solver.accuracy.adaptivity import MARGIN, sized
 from solver.arrays import Array
 from solver.mesh.mesher import Sizing
+from solver.verification.methods import overkill
 
 NAMES = ("SED of the ending", "normal force", "drag")
 ASKED = (None, 0.01, 0.003)

@@ -8,26 +8,26 @@ from time import perf_counter
 
 import pytest
 
-from daq_app.accuracy import estimates, targets
-from daq_app.accuracy.asked import Asked, Found, LeftOut, timed, within
-from daq_app.accuracy.costs import Cost, shares
-from daq_app.accuracy.estimates import Estimate, Guaranteed
-from daq_app.accuracy.growth import Growth, exponent
-from daq_app.accuracy.hard_cases import HardCase
-from daq_app.accuracy.machine import Machine
-from daq_app.accuracy.measuring import Measured, measured, restored
-from daq_app.accuracy.methods import FINITE, PLAIN
-from daq_app.accuracy.orders import Order
-from daq_app.accuracy.page import page, write
-from daq_app.accuracy.published.problems import Problem
-from daq_app.accuracy.random_scenes import random_scene
-from daq_app.accuracy.speed import Speed
-from daq_app.accuracy.subjects import Subject
-from daq_app.accuracy.tables import Table, tables
-from daq_app.accuracy.truth import JUDGED, Truth, cases
-from daq_app.accuracy.warm import Warm
+from daq_app.accuracy_page.page import page, write
+from daq_app.accuracy_page.tables import Table, tables
 from solver import solve
 from solver.accuracy.error_estimate import DEFAULT
+from solver.verification import estimates, targets
+from solver.verification.asked import Asked, Found, LeftOut, timed, within
+from solver.verification.costs import Cost, shares
+from solver.verification.estimates import Estimate, Guaranteed
+from solver.verification.growth import Growth, exponent
+from solver.verification.hard_cases import HardCase
+from solver.verification.machine import Machine
+from solver.verification.measuring import Measured, measured, restored
+from solver.verification.methods import FINITE, PLAIN
+from solver.verification.orders import Order
+from solver.verification.published.problems import Problem
+from solver.verification.random_scenes import random_scene
+from solver.verification.speed import Speed
+from solver.verification.subjects import Subject
+from solver.verification.truth import JUDGED, Truth, cases
+from solver.verification.warm import Warm
 
 FOREVER = Asked(quick=True, until=perf_counter() + 1e6)
 OVER = Asked(quick=True, until=perf_counter() - 1.0)
@@ -244,14 +244,14 @@ def quiet(*_):
 
 @pytest.fixture
 def unloaded(monkeypatch):
-    monkeypatch.setattr("daq_app.accuracy.measuring.loaded", quiet)
+    monkeypatch.setattr("solver.verification.measuring.loaded", quiet)
 
 
 @pytest.mark.usefixtures("unloaded")
 def test_ctrl_c_keeps_what_was_measured_and_names_what_was_not():
     first, second = ROWS["growth"][:2]
     parts = [subject("one", first), subject("two", second, KeyboardInterrupt), subject("three", first)]
-    found = measured(True, quiet, parts, seconds=5.0)
+    found = measured(True, quiet, {}, parts, seconds=5.0)
     assert found.stopped
     assert found.rows == {"one": (first,), "two": (second,)}
     assert found.left_out == ("Stopped during: the two.", "Stopped before: the three.")
@@ -262,7 +262,7 @@ def test_ctrl_c_keeps_what_was_measured_and_names_what_was_not():
 def test_a_subject_that_breaks_off_loses_nothing_of_the_others():
     first, second = ROWS["growth"][:2]
     parts = [subject("one", first, ValueError("bad luck")), subject("two", second)]
-    found = measured(True, quiet, parts, seconds=5.0)
+    found = measured(True, quiet, {}, parts, seconds=5.0)
     assert found.rows == {"one": (first,), "two": (second,)}
     assert found.left_out == ("The one broke off: bad luck",)
 
@@ -278,7 +278,7 @@ def test_time_within_a_part_of_the_solver_counts_for_that_part_and_that_outside_
 
 @pytest.mark.slow
 def test_a_quick_run_measures_something_of_every_subject(tmp_path):
-    found = measured(True, quiet, seconds=1.0)
+    found = measured(True, quiet, {}, seconds=1.0)
     assert {name for name, rows in found.rows.items() if not rows} == set()
     assert not [told for told in found.left_out if "broke off" in told]
     write(found, tmp_path)

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from daq_app.accuracy import processes
 from daq_app.analyst.messages import Problem
 from daq_app.analyst.process import Analyst
 from daq_app.batch.pool import _in_pool
@@ -18,6 +17,7 @@ from daq_app.recorder.messages import Connect, Device, Failed, Gone
 from daq_app.window.live_model_process import LiveModel
 from daq_app.window.take_watch import Judge
 from sessions.statistics.pooling.visit import VisitOptions
+from solver.verification import processes
 
 PROGRAM = Path(__file__).parents[2]
 OURS = {"daq_app", "drivers", "sessions", "simulators", "solver"}

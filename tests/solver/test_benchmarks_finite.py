@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from daq_app.accuracy.published.bodies import distorted
-from daq_app.accuracy.published.finite_contacts import ELEMENT, light_finite
-from daq_app.accuracy.published.problems import CAPPED, FINITE_PARTS
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import LAWS, energy, stress
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import Pull
 from solver.mesh.blocks import block
 from solver.mesh.grid import quality
+from solver.verification.published.bodies import distorted
+from solver.verification.published.finite_contacts import ELEMENT, light_finite
+from solver.verification.published.problems import CAPPED, FINITE_PARTS
 from tests.solver.finite_examples import finger
 from tests.solver.oracle import finite as oracle
 

@@ -6,11 +6,11 @@ K. L. Johnson, Contact Mechanics, Cambridge 1985, chapters 4, 5 and 7. The bodie
 import numpy as np
 import pytest
 
-from daq_app.accuracy.published import contacts
-from daq_app.accuracy.published.contacts import ELEMENT
-from daq_app.accuracy.published.problems import BELOW, CAPPED, HERTZ, PARTS
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
 from solver.contact.law import FrictionLaw
+from solver.verification.published import contacts
+from solver.verification.published.contacts import ELEMENT
+from solver.verification.published.problems import BELOW, CAPPED, HERTZ, PARTS
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,8 @@
 
 import pytest
 
-from daq_app.accuracy.published.locking import cook, widened, widening
-from daq_app.accuracy.published.problems import COOK
+from solver.verification.published.locking import cook, widened, widening
+from solver.verification.published.problems import COOK
 
 PRINTED = {0.3: 4.582500e-3, 0.48: 5.017200e-3, 0.49: 5.039925e-3, 0.499: 5.060249e-3, 0.4999: 5.062275e-3}
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from daq_app.accuracy.published.bodies import distorted
 from solver._kernels import SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody, edge_load
 from solver.body.stiffness import Probes
@@ -16,6 +15,7 @@ from solver.equilibrium.newton import Newton, Pull, Shape
 from solver.mesh import Mesh
 from solver.mesh.blocks import block
 from solver.mesh.grid import quality
+from solver.verification.published.bodies import distorted
 
 GRADIENT = np.array([[0.01, 0.03], [-0.02, -0.01]])  # keeps volume, as an incompressible body asks
 

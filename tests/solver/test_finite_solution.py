@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from daq_app.accuracy.methods import climbed_twice
 from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve, solve, solve_many
 from solver.accuracy import finite_errors
 from solver.accuracy.adaptivity import ascended
@@ -17,6 +16,7 @@ from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import Pull
 from solver.response.solution import UNKNOWN
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
+from solver.verification.methods import climbed_twice
 from tests.solver.finite_examples import published
 
 # Ending-averaged SED [MPa], normal and tangential force [N/mm] of the published finger: means of two independent codes

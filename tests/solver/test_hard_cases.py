@@ -7,10 +7,6 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from daq_app.accuracy.hard_cases import cases, judged
-from daq_app.accuracy.hard_cases.light import of_light_touch
-from daq_app.accuracy.hard_cases.outcome import of_scene
-from daq_app.accuracy.hard_cases.suite import TELLING, Case
 from solver import (
     Finger,
     Friction,
@@ -24,6 +20,10 @@ from solver import (
     solve,
     solve_many,
 )
+from solver.verification.hard_cases import cases, judged
+from solver.verification.hard_cases.light import of_light_touch
+from solver.verification.hard_cases.outcome import of_scene
+from solver.verification.hard_cases.suite import TELLING, Case
 
 SUITE = {(case.kinematics, case.name): case for kind in ("small", "finite") for case in cases(kind)}
 

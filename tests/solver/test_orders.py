@@ -2,7 +2,7 @@
 
 import pytest
 
-from daq_app.accuracy import orders
+from solver.verification import orders
 
 
 def held(rows):

@@ -5,8 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from daq_app.accuracy.published.bodies import ring
-from daq_app.accuracy.published.locking import INNER, OUTER, YOUNG, widening
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.body.validation import BodyError
@@ -17,6 +15,8 @@ from solver.equilibrium.march import march
 from solver.equilibrium.newton import FiniteNewton, Newton, Pull
 from solver.mesh import Mesh
 from solver.mesh.blocks import block as round_block
+from solver.verification.published.bodies import ring
+from solver.verification.published.locking import INNER, OUTER, YOUNG, widening
 from tests.solver.finite_examples import block
 
 NO_SKIN = np.zeros((0, 2))

@@ -5,10 +5,15 @@ asked of the speed is met. Ctrl-C stops it and keeps what was measured until the
 """
 
 import argparse
+import json
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from daq_app.console import Console, table
+from daq_app.console import Console, WrongValue, table
+
+if TYPE_CHECKING:
+    from solver.verification.measuring import Measured
 
 EXAMPLE = "daq-app accuracy --quick --out accuracy"
 
@@ -17,25 +22,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare how much is measured, and where it goes."""
     parser.add_argument("--quick", action="store_true", help="20 seconds instead of three minutes, and coarser truths")
     parser.add_argument("--out", type=Path, default=Path("accuracy"), metavar="DIR", help="the folder (accuracy)")
+    parser.add_argument("--docs", type=Path, metavar="DIR", help="also write the tables into the pages of these docs")
+    parser.add_argument(
+        "--data", type=Path, metavar="accuracy.json", help="page and tables of an earlier run; nothing is measured"
+    )
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Measure, write and tell."""
     # Before arrays are loaded: threads cost more than they bring at these sizes, and one thread is what is asked.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from daq_app.accuracy.measuring import measured
-    from daq_app.accuracy.page import PAGE, write
-    from daq_app.accuracy.tables import tables
+    from daq_app.accuracy_page.docs_tables import fill
+    from daq_app.accuracy_page.page import PAGE, write
+    from daq_app.accuracy_page.tables import tables
 
     console.progress(0.0, "loading")
     options.out.mkdir(parents=True, exist_ok=True)  # said before three minutes are spent
-    found = measured(options.quick, console.progress)
+    found = _found(options, console)
     if found.stopped:
         console.note("stopped; drawing what was measured until now")
     console.progress(0.99, "drawing")
     write(found, options.out)
     console.result({"page": str(options.out / PAGE), **found.to_dict()})
     made = tables(found)
+    if options.docs is not None:
+        fill(options.docs, made)
     if "targets" in made:
         rows = [[cell for n, cell in enumerate(row) if n != 7] for row in made["targets"].rows]
         console.say(table(rows, head=list(made["targets"].header[:7])))
@@ -46,3 +57,17 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.note(f"note: {sentence}")
     console.say(f"{options.out / PAGE}")
     return 130 if found.stopped else 0
+
+
+def _found(options: argparse.Namespace, console: Console) -> "Measured":
+    """Return what is measured, or what an earlier run measured. Raises WrongValue for a file that is none."""
+    from sessions.file_access import read_limited
+    from sessions.recording.provenance import software_versions
+    from solver.verification.measuring import measured, restored
+
+    if options.data is None:
+        return measured(options.quick, console.progress, software_versions())
+    try:
+        return restored(json.loads(read_limited(options.data)))
+    except (ValueError, KeyError, TypeError) as error:
+        raise WrongValue(f"{options.data} is no accuracy.json of this program ({error}); give another file") from error

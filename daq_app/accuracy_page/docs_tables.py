@@ -1,0 +1,38 @@
+"""The tables of `daq-app accuracy`, written into the pages of the docs between their marks."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from daq_app.accuracy_page.tables import Table
+
+PAGES: Mapping[str, tuple[str, ...]] = {
+    "benchmarks.md": ("targets", "estimates", "machine"),
+    "benchmarks/published-problems.md": ("problems",),
+    "benchmarks/convergence.md": ("orders",),
+    "benchmarks/hard-cases-small.md": ("hard-small",),
+    "benchmarks/hard-cases-finite.md": ("hard-finite",),
+}
+
+
+def filled(text: str, name: str, made: str) -> str:
+    r"""Return the page with the table put between its marks. Raises ValueError where the marks are not there.
+
+    >>> filled("a <!-- x: begin -->old<!-- x: end --> b", "x", "new")
+    'a <!-- x: begin -->\nnew\n<!-- x: end --> b'
+    """
+    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+    head, _, rest = text.partition(begin)
+    _, found, tail = rest.partition(end)
+    if not found:
+        raise ValueError(f"The page has no marks for {name}.")
+    return f"{head}{begin}\n{made}\n{end}{tail}"
+
+
+def fill(docs: Path, made: Mapping[str, Table]) -> None:
+    """Write the tables into the pages below `docs`. Raises OSError, and ValueError for a page without marks."""
+    for page, names in PAGES.items():
+        text = (docs / page).read_text(encoding="utf-8")
+        for name in names:
+            if name in made:
+                text = filled(text, name, f"{made[name].caption}\n\n{made[name].markdown()}")
+        (docs / page).write_text(text, encoding="utf-8")

@@ -1,0 +1,298 @@
+"""The pictures of the accuracy page, each with the numbers it shows."""
+
+# pyright: reportUnknownMemberType=false
+# matplotlib does not type the keyword arguments it passes on.
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from sessions.report.figures.style import (
+    GREEN,
+    GREY,
+    INK,
+    PALE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    Panel,
+    Plate,
+    look,
+    sheet,
+    svg,
+)
+from solver.verification.costs import Cost
+from solver.verification.estimates import Estimate
+from solver.verification.growth import FEWEST, Growth, exponent
+from solver.verification.measuring import Measured
+from solver.verification.methods import PLAIN
+from solver.verification.orders import Order
+from solver.verification.speed import Speed
+from solver.verification.truth import JUDGED, NUMBERS, Truth
+
+COLOURS = {"small": GREEN, "finite": VERMILLION}
+MARKS = {"small": "o", "finite": "s"}
+WIDE, SQUARE = (900, 320), (328, 300)  # [CSS px]
+
+
+def plates(found: Measured) -> dict[str, Plate]:
+    """Return the figures that there are numbers for, by name."""
+    made: tuple[Callable[[Measured], Plate], ...] = (
+        speed_plate, benchmark_plate, estimate_plate, order_plate, cost_plate, growth_plate
+    )  # fmt: skip
+    with look():
+        drawn = [make(found) for make in made]
+    return {plate.name: plate for plate in drawn if plate.panels}
+
+
+def speed_plate(found: Measured) -> Plate:
+    """Draw time against true error, one curve a way of solving."""
+    rows: list[Speed] = found.of(Speed)
+    truths: list[Truth] = [truth for truth in found.of(Truth) if truth.case in JUDGED]
+    doubt = {kind: max((t.doubt[0] for t in truths if t.kinematics == kind), default=0.0) for kind in COLOURS}
+    panels = [
+        _speed_panel(rows, doubt, "first_s", "one surface from undeformed"),
+        _speed_panel(rows, doubt, "next_s", "each further surface"),
+    ]
+    caption = (
+        f"Time against true error: largest error of the SED on {len(JUDGED)} surfaces (slipperiness 0 to 100, "
+        "stickiness 0), median time of a solve, mesh and estimate not included. One point a mesh; hollow where the "
+        "error is below three times the doubt of the truth."
+    )
+    return Plate("speed", caption, tuple(panel for panel in panels if panel is not None))
+
+
+def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, title: str) -> Panel | None:
+    drawn = sheet(*SQUARE)
+    axes = drawn.axes[0]
+    table: list[tuple[str | float, ...]] = []
+    for method in dict.fromkeys(row.method for row in rows):
+        points = [(r.judged_error, getattr(r, time), r) for r in rows if r.method == method]
+        known = [(error, 1e3 * span, r) for error, span, r in points if error is not None and span is not None]
+        if not known:
+            continue
+        kinematics = known[0][2].kinematics
+        colour, mark = GREY if method == PLAIN.name else COLOURS[kinematics], MARKS[kinematics]
+        axes.plot([100 * e for e, _, _ in known], [s for _, s, _ in known], color=colour, linewidth=0.8)
+        for error, span, row in known:
+            words = f"{row.method}: {row.dofs} unknowns, {100 * error:.2g} %, {span:.3g} ms"
+            face = "white" if error < 3.0 * doubt[row.kinematics] else colour
+            gid = drawn.note(words)
+            axes.plot(100 * error, span, mark, color=colour, markerfacecolor=face, markersize=4.5, gid=gid)
+            table.append((row.method, row.element, row.order, row.linear_solver, row.dofs, error, 1e-3 * span))
+        error, span, row = known[-1]
+        axes.annotate(method, (100 * error, span), xytext=(4, 5), textcoords="offset points", color=colour)
+    if not table:
+        return None
+    _logarithmic(axes)
+    axes.set_xlabel("true error of the SED [%]")
+    axes.set_ylabel("time [ms]")
+    axes.set_title(title)
+    name = f"speed-{time.removesuffix('_s')}"
+    header = ("way", "element", "order", "linear solver", "unknowns", "largest true error [-]", "median time [s]")
+    return Panel(
+        name, f"Time against true error, {title}", svg(drawn, name, title, simulated=False), header, tuple(table)
+    )
+
+
+def benchmark_plate(found: Measured) -> Plate:
+    """Draw time against true error on the published problems."""
+    panel = _order_panel(found.of(Order), "benchmarks", "time of a solve [s]", lambda row: row.took_s)
+    caption = (
+        "Time against true error on problems with a known answer, mesh included: thick cylinder, Cook's membrane, "
+        "half-plane under a round body, and the finger at its ending. The table of orders names every point."
+    )
+    return Plate("benchmarks", caption, () if panel is None else (panel,))
+
+
+def order_plate(found: Measured) -> Plate:
+    """Draw errors against element size."""
+    panel = _order_panel(found.of(Order), "orders", "error [–]", None)
+    caption = (
+        "Errors of sequences of meshes against the size of their elements; the slope is the order of convergence, "
+        "which the table gives. Where contact is involved, the root mean square over meshes of nearly one size."
+    )
+    return Plate("orders", caption, () if panel is None else (panel,))
+
+
+def _order_panel(
+    rows: Sequence[Order], name: str, label: str, time: Callable[[Order], tuple[float, ...]] | None
+) -> Panel | None:
+    if not rows:
+        return None
+    drawn = sheet(*WIDE)
+    axes = drawn.axes[0]
+    table: list[tuple[str | float, ...]] = []
+    shown = {"displacement": SKY, "stress": PURPLE, "energy": GREY, "force": VERMILLION}
+    for row in rows:
+        across = row.errors if time is not None else row.sizes
+        up = time(row) if time is not None else row.errors
+        words = f"{row.problem}, {row.quantity}: order {row.order:.2f}"
+        style = "--" if row.kinematics == "finite" else "-"
+        axes.plot(
+            across, up, style, marker=_mark(row.problem), color=shown.get(row.quantity, GREEN), markersize=3.5,
+            linewidth=0.9, gid=drawn.note(words),
+        )  # fmt: skip
+        table += [
+            (row.problem, row.quantity, row.kinematics, size, error, took)
+            for size, error, took in zip(row.sizes, row.errors, row.took_s, strict=True)
+        ]
+    for quantity in dict.fromkeys(row.quantity for row in rows):
+        axes.plot([], [], "-", color=shown.get(quantity, GREEN), label=quantity)
+    for kind in dict.fromkeys(row.problem.split(",")[0] for row in rows):
+        axes.plot([], [], " ", marker=_mark(kind), color=GREY, markersize=3.5, label=kind)
+    if any(row.kinematics == "finite" for row in rows):
+        axes.plot([], [], "--", color=GREY, label="finite strain")
+    axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    _logarithmic(axes)
+    axes.set_xlabel("error [–]" if time is not None else "element size, by the unit of each problem [–]")
+    axes.set_ylabel(label)
+    header = ("problem", "quantity", "kinematics", "element size", "error [-]", "time of a solve [s]")
+    title = "Time against true error on published problems" if time is not None else "Error against element size"
+    return Panel(name, title, svg(drawn, name, title, simulated=False), header, tuple(table))
+
+
+def _mark(problem: str) -> str:
+    """Return the mark of a problem, whatever its parameters."""
+    marks = {"thick cylinder": "o", "Cook's membrane": "s", "finger": "D", "half-plane under a round body": "^"}
+    return marks.get(problem.split(",")[0], "x")
+
+
+def estimate_plate(found: Measured) -> Plate:
+    """Draw estimates against true errors, a panel a number."""
+    rows: list[Estimate] = found.of(Estimate)
+    panels = [_estimate_panel([r for r in rows if r.number == number], number) for number in NUMBERS]
+    caption = (
+        "Estimated against true error, of every answer that was asked for with a tolerance. Above the line the "
+        "estimate is safe; below the dashed line (ten times the larger of true error and 0.02 %) it is near. Hollow: "
+        "the truth is too doubtful to tell."
+    )
+    return Plate("estimates", caption, tuple(panel for panel in panels if panel is not None))
+
+
+def _estimate_panel(rows: Sequence[Estimate], number: str) -> Panel | None:
+    if not rows:
+        return None
+    drawn = sheet(*SQUARE)
+    axes = drawn.axes[0]
+    for row in rows:
+        face = COLOURS[row.kinematics] if row.above is not None else "none"
+        words = f"{row.case}, {row.kinematics}: estimate {100 * row.estimate:.2g} %, true {100 * row.error:.2g} %"
+        axes.plot(
+            100 * max(row.error, 1e-7), 100 * row.estimate, MARKS[row.kinematics], color=COLOURS[row.kinematics],
+            markerfacecolor=face, markersize=4, markeredgewidth=0.7, gid=drawn.note(words),
+        )  # fmt: skip
+    _logarithmic(axes)
+    low, high = axes.get_xlim()
+    line = np.geomspace(low, max(high, axes.get_ylim()[1]), 50)
+    axes.plot(line, line, color=GREY, linewidth=0.8)
+    axes.plot(line, 10 * np.maximum(line, 0.02), "--", color=GREY, linewidth=0.8)
+    axes.set_xlim(low, high)
+    for kinematics in dict.fromkeys(row.kinematics for row in rows):
+        axes.plot([], [], MARKS[kinematics], color=COLOURS[kinematics], markersize=4, label=f"{kinematics} strain")
+    axes.legend(frameon=False, loc="lower right")
+    axes.set_xlabel("true error [%]")
+    axes.set_ylabel("estimated error [%]")
+    axes.set_title(number)
+    name = "estimate-" + number.split()[0].lower()
+    header = ("kinematics", "case", "tolerance", "unknowns", "estimate [-]", "true error [-]", "doubt of the truth [-]")
+    table = tuple((r.kinematics, r.case, r.tolerance, r.dofs, r.estimate, r.error, r.doubt) for r in rows)
+    title = f"Estimated against true error of the {number}"
+    return Panel(name, title, svg(drawn, name, title, simulated=False), header, table)
+
+
+def cost_plate(found: Measured) -> Plate:
+    """Draw where the time of one solve goes."""
+    rows: list[Cost] = found.of(Cost)
+    caption = "Where the time of one solve through the front door goes, mesh and error estimate included."
+    if not rows:
+        return Plate("costs", caption, ())
+    drawn = sheet(WIDE[0], max(190, 60 + 45 * len(rows)))
+    axes = drawn.axes[0]
+    parts = list(dict.fromkeys(name for row in rows for name in row.parts))
+    colours = dict(zip(parts, _distinct(len(parts)), strict=True))
+    table: list[tuple[str | float, ...]] = []
+    for number, row in enumerate(rows):
+        left = 0.0
+        for name in parts:
+            share = row.parts.get(name, 0.0)
+            span = 1e3 * share * row.took_s
+            axes.barh(number, span, left=left, color=colours[name], height=0.6)
+            left += span
+            table.append((row.kinematics, row.tolerance, row.dofs, name, share, share * row.took_s))
+    axes.set_yticks(range(len(rows)))
+    axes.set_yticklabels([f"{row.kinematics} strain, {100 * row.tolerance:g} %\n{row.dofs} unknowns" for row in rows])
+    axes.invert_yaxis()
+    for name in parts:
+        axes.barh(0, 0, color=colours[name], label=name)
+    axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.05))
+    axes.set_xlabel("time [ms]")
+    header = ("kinematics", "tolerance", "unknowns", "part", "share [-]", "time [s]")
+    title = "Where the time of a solve goes"
+    panel = Panel("costs", title, svg(drawn, "costs", title, simulated=False), header, tuple(table))
+    return Plate("costs", caption, (panel,))
+
+
+def _distinct(count: int) -> list[str]:
+    base = [GREEN, VERMILLION, SKY, PURPLE, "#E69F00", "#0072B2", "#F0E442", GREY, PALE, "#8C564B", INK]
+    return [base[n % len(base)] for n in range(count)]
+
+
+def growth_plate(found: Measured) -> Plate:
+    """Draw the time of one linear system against its unknowns."""
+    rows: list[Growth] = found.of(Growth)
+    caption = (
+        "Time of one assembly, factorisation and solve against the number of unknowns; the exponent is that of the "
+        f"meshes from {FEWEST:,} unknowns on. Grey: the power 1.5."
+    )
+    if not rows:
+        return Plate("growth", caption, ())
+    drawn = sheet(*SQUARE)
+    axes = drawn.axes[0]
+    for kinematics in dict.fromkeys(row.kinematics for row in rows):
+        mine = [row for row in rows if row.kinematics == kinematics]
+        power = exponent(mine)
+        words = f"{kinematics} strain" + ("" if power is None else f": power {power:.2f}")
+        axes.plot(
+            [r.dofs for r in mine], [1e3 * r.floor_s for r in mine], label=words, color=COLOURS[kinematics],
+            marker=MARKS[kinematics], markersize=4, linewidth=0.9,
+        )  # fmt: skip
+    _power_line(axes, rows)
+    _logarithmic(axes)
+    axes.legend(frameon=False, loc="upper left")
+    axes.set_xlabel("unknowns")
+    axes.set_ylabel("time [ms]")
+    header = ("kinematics", "fineness", "unknowns", "set-up [s]", "assembly, factorisation and solve [s]")
+    table = tuple((r.kinematics, r.fineness, r.dofs, r.setup_s, r.floor_s) for r in rows)
+    title = "Growth of the time with the unknowns"
+    panel = Panel("growth", title, svg(drawn, "growth", title, simulated=False), header, table)
+    return Plate("growth", caption, (panel,))
+
+
+def _logarithmic(axes: Axes) -> None:
+    """Make both axes logarithmic, from a power of ten to another, so that their labels are few and short."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlim(_decades(axes.get_xlim()))
+    axes.set_ylim(_decades(axes.get_ylim()))
+    for axis in (axes.xaxis, axes.yaxis):  # powers of ten as plain numbers: read at a glance, and drawn twice as fast
+        axis.set_major_formatter(FuncFormatter(_plain))
+        axis.set_minor_formatter(NullFormatter())
+
+
+def _plain(value: float, _place: int) -> str:
+    return f"{value:g}"
+
+
+def _decades(limits: tuple[float, float]) -> tuple[float, float]:
+    """Return the powers of ten at or beyond both ends, but for a hair; never one twice."""
+    low, high = np.floor(np.log10(limits[0]) + 0.05), np.ceil(np.log10(limits[1]) - 0.05)
+    return float(10.0**low), float(10.0 ** max(high, low + 1.0))
+
+
+def _power_line(axes: Axes, rows: Sequence[Growth]) -> None:
+    largest = max(rows, key=lambda row: row.dofs)
+    ends = np.array([min(row.dofs for row in rows), largest.dofs])
+    axes.plot(ends, 1e3 * largest.floor_s * (ends / largest.dofs) ** 1.5, color=GREY, linewidth=0.7)

@@ -1,0 +1,143 @@
+"""The solver's own error estimates against true errors, and what an answer with a guaranteed tolerance takes.
+
+All through the front door: scenes in, `tolerance` asked for, answers with their estimates out. The published surfaces,
+solved together, and random scenes, each alone.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.failures import SolveFailure
+from solver.prediction import Prediction
+from solver.response.solution import solve_many
+from solver.scene import Scene, Solve
+from solver.verification.asked import Asked, Found, LeftOut, clock, within
+from solver.verification.methods import Kinematics
+from solver.verification.random_scenes import random_scene
+from solver.verification.truth import KINEMATICS, NUMBERS, cases, judged, known, overkill
+
+TOLERANCES = (0.01, 0.003, 0.001)
+SMALL = 2e-4  # relative error below which nobody minds by how much an estimate is too large
+MOST = 10.0  # times the true error that an estimate may be
+RANDOM: dict[Kinematics, int] = {"small": 12, "finite": 6}  # scenes, as far as time allows
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """One number of one answer: how far it was said to be off at most, and how far it is."""
+
+    kinematics: Kinematics
+    case: str
+    number: str
+    tolerance: float  # asked of the SED
+    dofs: int
+    estimate: float  # relative
+    error: float  # relative
+    doubt: float  # of the truth, relative
+
+    @property
+    def above(self) -> bool | None:
+        """Whether the estimate lies above the true error; None where the truth is too doubtful to tell."""
+        return self.estimate >= self.error if self.doubt <= self.estimate / 3.0 else None
+
+    @property
+    def near(self) -> bool | None:
+        """Whether the estimate lies below ten times max(true error, 0.02 %); None where the truth cannot tell."""
+        bound = MOST * max(self.error, SMALL)
+        return self.estimate < bound if self.doubt <= bound / 3.0 else None
+
+    @property
+    def met(self) -> bool | None:
+        """Whether the true error lies below the tolerance asked for; None where the truth cannot tell."""
+        return self.error <= self.tolerance if self.doubt <= self.tolerance / 3.0 else None
+
+
+@dataclass(frozen=True, slots=True)
+class Guaranteed:
+    """What it takes to be sure of a tolerance, in compiled loops: every mesh tried and every estimate included."""
+
+    kinematics: Kinematics
+    tolerance: float
+    surfaces: int  # solved together
+    dofs: int
+    took_s: float  # from scenes to answers
+    wall_s: float  # of it, the solves on the last mesh
+    setup_s: float  # its mesh and tables
+    estimate_s: float  # its estimates
+    worst_estimate: float
+    worst_error: float | None  # where the truth is known
+
+
+def measure(asked: Asked, found: Found) -> Iterator[Estimate | Guaranteed | LeftOut]:
+    """Yield the published surfaces at each tolerance, then random scenes until time is over."""
+    for kinematics in KINEMATICS:
+        yield from _published(asked, found, kinematics)
+    for kinematics in KINEMATICS:
+        yield from _random(asked, kinematics)
+
+
+def _published(asked: Asked, found: Found, kinematics: Kinematics) -> Iterator[Estimate | Guaranteed | LeftOut]:
+    truths = known(found, kinematics)
+    chosen = [scene for scene in cases(kinematics) if scene.title in truths]
+    for tolerance in within(asked, asked.pick(TOLERANCES, TOLERANCES[:1]), f"tolerances at {kinematics} strain"):
+        if isinstance(tolerance, LeftOut) or not chosen:
+            yield tolerance if isinstance(tolerance, LeftOut) else LeftOut(f"No truth is known at {kinematics} strain.")
+            return
+        begun = clock()
+        found_all = solve_many([replace(s, solve=Solve(kinematics, tolerance=tolerance)) for s in chosen])
+        took = clock() - begun
+        rows: list[Estimate] = []
+        good = [a for a in found_all if isinstance(a, Prediction)]
+        for answer in good:
+            truth = truths[answer.scene.title]
+            rows += _compared(kinematics, tolerance, answer, np.array(truth.numbers), np.array(truth.doubt))
+        yield from rows
+        if good:
+            yield Guaranteed(
+                kinematics, tolerance, len(chosen), max(a.dofs for a in good), took, sum(a.wall_s for a in good),
+                good[0].setup_s, sum(a.estimate_s for a in good), max(a.error_estimate for a in good),
+                max((r.error for r in rows if r.number == NUMBERS[0]), default=None),
+            )  # fmt: skip
+
+
+def _random(asked: Asked, kinematics: Kinematics) -> Iterator[Estimate | LeftOut]:
+    wanted = 2 if asked.quick else RANDOM[kinematics]
+    refused = 0
+    for number in within(asked, range(wanted), f"random scenes at {kinematics} strain"):
+        if isinstance(number, LeftOut):
+            yield number
+            break
+        scene = random_scene(number, kinematics)
+        (answer,) = solve_many([replace(scene, solve=Solve(kinematics, tolerance=TOLERANCES[0]))])
+        truth = _truth(scene)
+        if isinstance(answer, SolveFailure) or truth is None:
+            refused += 1
+            continue
+        yield from _compared(kinematics, TOLERANCES[0], answer, *truth)
+    if refused:
+        yield LeftOut(f"{refused} of {wanted} random scenes at {kinematics} strain have no settled state to compare.")
+
+
+def _truth(scene: Scene) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the true numbers (3,) of a scene and their doubts (3,), relative; None where a mesh has no state."""
+    try:
+        solves, _ = overkill(scene, quick=True)(scene)
+    except SolveFailure:
+        return None
+    return judged(solves)
+
+
+def _compared(
+    kinematics: Kinematics, tolerance: float, answer: Prediction, truth: np.ndarray, doubt: np.ndarray
+) -> list[Estimate]:
+    numbers = (answer.sed_ending, answer.normal_force, answer.tangential_force)
+    estimates = (answer.error_estimate, answer.normal_force_error, answer.tangential_force_error)
+    return [
+        Estimate(
+            kinematics, answer.scene.title, name, tolerance, answer.dofs, estimate, abs(value / true - 1.0), float(far)
+        )
+        for name, value, estimate, true, far in zip(NUMBERS, numbers, estimates, truth.tolist(), doubt, strict=True)
+        if estimate is not None and true > 0.0
+    ]

@@ -1,0 +1,65 @@
+"""How time grows with the number of unknowns: one assembly, factorisation and solve, up to 100,000 of them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from math import log
+from statistics import median
+
+from solver.verification.asked import Asked, Found, LeftOut
+from solver.verification.methods import PLAIN, SMALL
+from solver.verification.truth import cases
+
+MESHES = (3.0, 4.0, 6.0, 9.0, 13.0, 18.0, 26.0, 34.0, 46.0)
+QUICK = (3.0, 6.0, 10.0)
+FEWEST = 3000  # unknowns from which the exponent is taken: below, the time is not yet that of the arithmetic
+SHARE = 0.4  # of the time left that the next mesh may be expected to take
+
+
+@dataclass(frozen=True, slots=True)
+class Growth:
+    """One mesh: what making it and one linear system take."""
+
+    kinematics: str
+    fineness: float
+    dofs: int
+    setup_s: float
+    floor_s: float  # one assembly, factorisation and solve: median
+
+
+def measure(asked: Asked, found: Found) -> Iterator[Growth | LeftOut]:
+    """Yield a row for each kinematics and mesh, until the next would take too long."""
+    del found
+    for method in (SMALL, PLAIN):
+        scene = cases(method.kinematics)[0]
+        last: Growth | None = None
+        for fineness in asked.pick(MESHES, QUICK):
+            if last is not None and not asked.quick:
+                larger = last.dofs * (fineness / last.fineness) ** 1.6
+                awaited = (last.setup_s + 5.0 * last.floor_s) * (larger / last.dofs) ** 2.2
+                if awaited > SHARE * asked.left:
+                    yield LeftOut(
+                        f"Growth at {method.kinematics} strain was not followed beyond {last.dofs} unknowns: no time."
+                    )
+                    break
+            mesh = method.meshed(scene, fineness, False)
+            mesh.floor()  # the first is given new memory, which takes as long as the work, and longer on large meshes
+            floor = median(mesh.floor() for _ in range(5 if mesh.dofs < 20000 else 3))
+            last = Growth(method.kinematics, fineness, mesh.dofs, mesh.setup_s, floor)
+            yield last
+
+
+def between(rows: list[Growth]) -> list[float]:
+    """Return the same power between each of the larger meshes and the next."""
+    large = [row for row in rows if row.dofs >= FEWEST]
+    return [log(b.floor_s / a.floor_s) / log(b.dofs / a.dofs) for a, b in pairwise(large)]
+
+
+def exponent(rows: list[Growth]) -> float | None:
+    """Return the power of the number of unknowns by which the time grows, by least squares; None from too few rows."""
+    import numpy as np
+
+    large = [row for row in rows if row.dofs >= FEWEST]
+    if len(large) < 2:
+        return None
+    return float(np.polyfit(np.log([r.dofs for r in large]), np.log([r.floor_s for r in large]), 1)[0])

@@ -1,0 +1,77 @@
+"""Light touches held against Hertz: a cylinder of the tip's radius on its epidermis, far thicker than the contact."""
+
+from dataclasses import dataclass, replace
+from functools import cache
+from math import log, pi, sqrt
+
+from solver.failures import SolveFailure
+from solver.prediction import Prediction
+from solver.response.solution import solve_many
+from solver.scene import Scene
+from solver.verification.hard_cases.outcome import Outcome, of_answer
+
+KNOWN = 1e-3  # indentation at which contact spans many elements, and is still far thinner than the epidermis [mm]
+MODEL = 0.005  # what the rest of the finger changes in the two laws, from there to lighter touches
+
+
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """What the theory says of a light touch."""
+
+    force: float  # [N/mm]
+    sed: float  # [MPa]
+    width: float  # of the contact [mm]
+
+
+def of_light_touch(asked: Scene) -> Outcome:
+    """Solve a scene of a light touch; SED, normal force and width must be Hertz's within their estimates."""
+    (found,) = solve_many([asked])
+    outcome = of_answer(found)
+    if not isinstance(found, Prediction):
+        return outcome
+    true = hertz(asked)
+    pairs = (
+        ("SED", found.sed_ending, true.sed, found.error_estimate),
+        ("N", found.normal_force, true.force, found.normal_force_error or 0.0),
+        ("width", found.contact_width, true.width, found.contact_width_error or 0.0),
+    )
+    far = [
+        f"{name} {abs(number / exact - 1.0):.1%} from Hertz's"
+        for name, number, exact, off in pairs
+        if abs(number - exact) > off * number + MODEL * exact
+    ]
+    flaws = ", ".join(filter(None, [outcome.flaw, *far]))
+    told = f"{outcome.told}; SED by Hertz {true.sed:.4g}, width {found.contact_width:.3g} by Hertz {true.width:.3g}"
+    return replace(outcome, flaw=flaws, told=told)
+
+
+def hertz(asked: Scene) -> Touch:
+    """Return Hertz's touch at the depth of a scene (Johnson 1985, eqs 4.43 to 4.45 and 5.56).
+
+    Half the contact is sqrt(4 N R / (pi E*)), and d / N grows by ln(1 / N) / (pi E*) as the force N on a mm of width
+    falls. What the finger behind the contact adds to that, and the SED there by the force squared, are constants, taken
+    from the deeper touch, which every mesh resolves.
+    """
+    from scipy.optimize import brentq  # slow to load, and light touches alone have need of it
+
+    skin = asked.materials.of("epidermis")
+    modulus = skin.E / (1.0 - skin.nu**2)
+    yields, response = _finger(replace(asked, loading=replace(asked.loading, indentation=KNOWN)))
+    rest = yields[0] / yields[1] + log(yields[1]) / (pi * modulus)
+
+    def too_deep(power: float) -> float:
+        force = 10.0**power
+        return force * (rest - log(force) / (pi * modulus)) - asked.loading.depth
+
+    force = 10.0 ** float(brentq(too_deep, -20.0, 0.0))
+    return Touch(force, response * force**2, 2.0 * sqrt(4.0 * force * asked.finger.tip_radius / (pi * modulus)))
+
+
+@cache
+def _finger(deeper: Scene) -> tuple[tuple[float, float], float]:
+    """Return the depth [mm] and force [N/mm] of a touch, and its SED by the force squared [mm^2/(N^2) MPa]."""
+    (found,) = solve_many([deeper])
+    if isinstance(found, SolveFailure):
+        raise found
+    force = found.normal_force
+    return (deeper.loading.depth, force), found.sed_ending / force**2

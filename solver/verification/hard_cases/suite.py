@@ -1,0 +1,113 @@
+"""The suite as a list of cases, and the rows it gives."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from types import ModuleType
+
+from solver.verification.asked import Asked, Found, LeftOut, clock, within
+from solver.verification.hard_cases import finite, small
+from solver.verification.hard_cases.light import of_light_touch
+from solver.verification.hard_cases.outcome import Outcome, of_scene
+from solver.verification.hard_cases.scenes import ANSWER, Must, hard_scenes
+from solver.verification.methods import Kinematics
+
+TELLING = {  # what a quick run shows, and `make test` of finite strain
+    "nu 0.0", "nu 0.4999999", "bone 1e10 times stiffer than fat", "mu 0", "tau_max 0 MPa", "tau_max 1e+09 MPa",
+    "depth 1 mm", "depth 2 mm without friction", "angle 30 degrees", "angle 75 degrees, backwards",
+    "epidermis and dermis of 0.05 mm each", "a part 1e+10 times stiffer", "one node touching", "direction reversal",
+    "contact edge at a mesh node", "elements distorted to 0.45 of an edge", "elements of aspect 50",
+}  # fmt: skip
+_MODULES: dict[Kinematics, ModuleType] = {"small": small, "finite": finite}
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A named hard case."""
+
+    kinematics: Kinematics
+    name: str
+    must: Must
+    run: Callable[[], Outcome]
+    same_as: str = ""  # a case of the same kinematics whose first number this one's must be
+    within: float = 0.0  # relative
+    slow: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class HardCase:
+    """A row of the table."""
+
+    kinematics: Kinematics
+    case: str
+    must: str
+    answered: bool
+    flaw: str  # "" where what must happen happened
+    told: str
+    took_s: float
+
+
+def cases(kinematics: Kinematics) -> tuple[Case, ...]:
+    """Return the suite in one of the two kinematics."""
+    module = _MODULES[kinematics]
+    others: dict[str, Callable[[], Outcome]] = {
+        **{f"a part {ratio:g} times stiffer": partial(module.stiff_part, ratio) for ratio in (1e3, 1e6, 1e10)},
+        "one node touching": module.one_node,
+        "direction reversal": module.reversal,
+        "steps over four decades": module.steps,
+        "contact edge at a mesh node": module.edge_at_node,
+        "elements distorted to 0.45 of an edge": module.distorted_finger,
+        "elements of aspect 50": module.aspect,
+    }
+    scenes = (
+        Case(
+            kinematics,
+            s.name,
+            s.must,
+            partial(of_light_touch if s.light else of_scene, s.scene),
+            s.same_as,
+            s.within,
+            s.slow,
+        )
+        for s in hard_scenes(kinematics)
+    )
+    slow = {"steps over four decades"}
+    return (*scenes, *(Case(kinematics, name, ANSWER, run, slow=name in slow) for name, run in others.items()))
+
+
+def judged(case: Case, neighbour: Outcome | None = None) -> HardCase:
+    """Run one case and say what is wrong, if anything; `neighbour` is the outcome of the case it must be `same_as`."""
+    begun = clock()
+    return _row(case, case.run(), neighbour, begun)
+
+
+def _row(case: Case, found: Outcome, neighbour: Outcome | None, begun: float) -> HardCase:
+    flaws = [found.flaw] if found.flaw else []
+    if not found.answered and case.must == ANSWER:
+        flaws.append("no answer")
+    if not all(abs(number) < float("inf") for number in found.numbers):
+        flaws.append("a number is not finite")
+    if neighbour is not None and neighbour.numbers and found.numbers:
+        off = abs(found.numbers[0] / neighbour.numbers[0] - 1.0)
+        if off > case.within:
+            flaws.append(f"{off:.1g} from {case.same_as}, not {case.within:g}")
+    took = clock() - begun
+    return HardCase(case.kinematics, case.name, case.must, found.answered, "; ".join(flaws), found.told, took)
+
+
+def measure(asked: Asked, found: Found) -> Iterator[HardCase | LeftOut]:
+    """Yield a row for every case, or for those that tell most."""
+    del found
+    suite = [case for kinematics in ("small", "finite") for case in cases(kinematics)]
+    todo = [case for case in suite if not asked.quick or case.name in TELLING]
+    if len(todo) < len(suite):
+        yield LeftOut(f"{len(suite) - len(todo)} hard cases are left to a full run.")
+    kept: dict[tuple[Kinematics, str], Outcome] = {}
+    for case in within(asked, todo, "hard cases"):
+        if isinstance(case, LeftOut):
+            yield case
+            return
+        begun = clock()
+        outcome = case.run()
+        kept[case.kinematics, case.name] = replace(outcome, told="")
+        yield _row(case, outcome, kept.get((case.kinematics, case.same_as)), begun)

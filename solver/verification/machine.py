@@ -1,0 +1,42 @@
+"""What the numbers were measured on: machine, load, versions."""
+
+import os
+import platform
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from solver.verification.asked import Asked, Found
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """One machine at one moment. Times on a busy one are longer than the solver's own."""
+
+    system: str
+    processor: str
+    cores: int
+    threads: str  # that linear algebra may use, as the environment says
+    load: float | None  # processes that wanted a core, mean of the last minute; None where the system does not tell
+    versions: dict[str, str]
+
+
+def measure(asked: Asked, found: Found) -> Iterator[Machine]:
+    """Yield the one row."""
+    del found
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+    threads = os.environ.get("OPENBLAS_NUM_THREADS", "not limited")
+    yield Machine(
+        f"{platform.system()} {platform.release()}", _processor(), os.cpu_count() or 1, threads, load,
+        dict(asked.versions),
+    )  # fmt: skip
+
+
+def _processor() -> str:
+    """Return what the processor calls itself, where the system tells."""
+    told = Path("/proc/cpuinfo")
+    if told.exists():
+        for line in told.read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()

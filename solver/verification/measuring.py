@@ -1,0 +1,155 @@
+"""Run the subjects one after another, within the time there is, and keep what was found however it ends."""
+
+import datetime
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from math import isfinite
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from solver.failures import SolveFailure
+from solver.response.solution import solve
+from solver.response.stepper import stepper
+from solver.verification.asked import Asked, Found, LeftOut
+from solver.verification.costs import Cost
+from solver.verification.estimates import Estimate, Guaranteed
+from solver.verification.growth import Growth
+from solver.verification.hard_cases import HardCase
+from solver.verification.histories import Marched
+from solver.verification.machine import Machine
+from solver.verification.orders import Order
+from solver.verification.processes import Cold, Memory
+from solver.verification.published.problems import Problem
+from solver.verification.speed import Speed
+from solver.verification.subjects import SUBJECTS, Subject
+from solver.verification.targets import Target
+from solver.verification.truth import Truth, cases
+from solver.verification.warm import Warm
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+FULL_S, QUICK_S = 140.0, 12.5  # what the subjects may take; what was begun is ended, and drawing comes on top
+# every kind of row, by its name in the JSON file
+KINDS = {
+    kind.__name__: kind
+    for kind in (
+        Machine, Truth, Speed, Estimate, Guaranteed, Cost, Warm, Marched, Cold, Memory, Problem, Order, Growth,
+        HardCase, Target,
+    )
+}  # fmt: skip
+ALWAYS = ("machine", "targets")  # cost nothing, and are told of what there is even when stopped
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """All that one run found."""
+
+    begun: str  # date and time, UTC
+    quick: bool
+    stopped: bool  # by the user, before everything was measured
+    took_s: dict[str, float]  # by subject
+    rows: "Mapping[str, tuple[DataclassInstance, ...]]"  # by subject
+    left_out: tuple[str, ...]
+
+    def of(self, kind: type[Any]) -> list[Any]:
+        """Return all rows of one kind."""
+        return [row for rows in self.rows.values() for row in rows if isinstance(row, kind)]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for a JSON file; a number that is none is null."""
+        rows = {
+            name: [{"kind": type(row).__name__, **asdict(row)} for row in found] for name, found in self.rows.items()
+        }
+        return _plain(
+            {
+                "begun": self.begun, "quick": self.quick, "stopped": self.stopped, "took_s": self.took_s,
+                "left_out": list(self.left_out), **rows,
+            }
+        )  # fmt: skip
+
+
+def restored(document: dict[str, Any]) -> Measured:
+    """Return what `to_dict` made plain data of. Raises msgspec.ValidationError where it is something else."""
+    rows = {
+        subject.name: tuple(
+            msgspec.convert({name: value for name, value in row.items() if name != "kind"}, KINDS[row["kind"]])
+            for row in document[subject.name]
+        )
+        for subject in SUBJECTS
+        if subject.name in document
+    }
+    return Measured(
+        document["begun"], document["quick"], document["stopped"], document["took_s"], rows, tuple(document["left_out"])
+    )
+
+
+def measured(
+    quick: bool, progress: Progress, versions: Mapping[str, str], subjects: Sequence[Subject] = SUBJECTS,
+    seconds: float | None = None, clock: Callable[[], float] = perf_counter,
+) -> Measured:  # fmt: skip
+    """Return what the subjects find. Ctrl-C ends the measuring and keeps what was found until then.
+
+    `seconds` of `clock` are there for all: with one of processor time a busy machine measures as much as a quiet one.
+    """
+    begun = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+    loaded(progress)  # before the clock starts: the first run ever compiles what later ones load
+    start = clock()
+    end = start + (seconds or (QUICK_S if quick else FULL_S))
+    found = Found()
+    rows: dict[str, tuple[DataclassInstance, ...]] = {}
+    took: dict[str, float] = {}
+    left_out: list[str] = []
+    stopped = False
+    for number, subject in enumerate(subjects):
+        if stopped and subject.name not in ALWAYS:
+            left_out.append(f"Stopped before: {subject.told}.")
+            continue
+        part = _share(subject, quick) / max(sum(_share(s, quick) for s in subjects[number:]), 1e-9)
+        now = clock()
+        asked = Asked(quick, now + max(end - now, 0.0) * part, clock, versions)
+        mine: list[DataclassInstance] = []
+        try:
+            for row in subject.measure(asked, found):
+                progress(min((clock() - start) / (end - start), 0.99), subject.told)
+                if isinstance(row, LeftOut):
+                    left_out.append(row.told)
+                else:
+                    mine.append(row)
+                    found.rows.append(row)
+        except KeyboardInterrupt:
+            stopped = True
+            left_out.append(f"Stopped during: {subject.told}.")
+        except (SolveFailure, ArithmeticError, ValueError) as failure:
+            left_out.append(f"{subject.told.capitalize()} broke off: {failure}")
+        rows[subject.name], took[subject.name] = tuple(mine), clock() - now
+    return Measured(begun, quick, stopped, took, rows, tuple(left_out))
+
+
+def loaded(progress: Progress) -> None:
+    """Solve once in each kinematics and follow one reading, so that compiled loops are in memory and nothing waits."""
+    progress(0.0, "loading compiled loops")
+    for kinematics in ("small", "finite"):
+        scene = cases(kinematics)[-1]
+        asked = replace(scene, solve=replace(scene.solve, tolerance=0.1))
+        solve(asked)
+        if kinematics == "small":
+            solve(replace(asked, solve=replace(asked.solve, course="history")))
+        stepper(scene).step(1e-3, 0.0)
+
+
+def _share(subject: Subject, quick: bool) -> float:
+    return subject.quick_share if quick else subject.share
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401  whatever JSON may hold
+    if isinstance(value, dict):
+        return {str(name): _plain(item) for name, item in value.items()}  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]  # pyright: ignore[reportUnknownVariableType]
+    if isinstance(value, float) and not isfinite(value):
+        return None
+    return value

@@ -1,0 +1,152 @@
+"""Observed orders of convergence: sequences of meshes, their errors and times, and the slope between them."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from solver.continuation.finite_states import settled as finite_settled
+from solver.continuation.small_states import settled
+from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.finite_finger import FiniteFinger
+from solver.mesh.mesher import Sizing
+from solver.scene import Scene
+from solver.scene.published import SLIPPERINESS, STICKINESS, scene
+from solver.verification.asked import Asked, Found, LeftOut, clock, within
+from solver.verification.published import contacts, locking
+
+Errors = Sequence[float]
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """One quantity of one problem on ever finer meshes."""
+
+    problem: str
+    quantity: str
+    kinematics: str
+    element: str
+    sizes: tuple[float, ...]  # of the elements, by the coarsest
+    errors: tuple[float, ...]  # relative; root mean square over meshes of nearly one size where contact is involved
+    took_s: tuple[float, ...]  # of the solves that gave each error
+    order: float  # observed: slope of the best line through the logarithms
+    least: float  # what theory leads one to expect, less what three meshes leave open
+
+
+def slope(sizes: Errors, errors: Errors) -> float:
+    """Return the slope of the best line through the logarithms.
+
+    >>> slope([1.0, 0.5, 0.25], [4.0, 1.0, 0.25])
+    2.0
+    """
+    return round(float(np.polyfit(np.log(sizes), np.log(errors), 1)[0]), 12)
+
+
+def measure(asked: Asked, found: Found) -> Iterator[Order | LeftOut]:
+    """Yield a row for each quantity, until time is over."""
+    del found
+    works: list[Callable[[bool], Iterator[Order]]] = [cylinders, membranes, small_finger, finite_finger, pressed]
+    for work in within(asked, works, "problems whose order is observed"):
+        if isinstance(work, LeftOut):
+            yield work
+        else:
+            yield from work(asked.quick)
+
+
+def _row(
+    problem: str, quantity: str, kinematics: str, sizes: Errors, errors: Errors, took: Errors, least: float
+) -> Order:
+    return Order(
+        problem, quantity, kinematics, "Q2/P-1", tuple(sizes), tuple(errors), tuple(took), slope(sizes, errors), least
+    )
+
+
+def cylinders(quick: bool) -> Iterator[Order]:
+    """Yield thick cylinders under inner pressure, distorted meshes: displacement 3, stress 2, energy 4, at any nu."""
+    sizes = (1 / 16, 1 / 32) if quick else (1 / 8, 1 / 16, 1 / 32)
+    for nu in (0.3, 0.4999999):
+        errors: list[tuple[float, ...]] = []
+        took: list[float] = []
+        for size in sizes:
+            begun = clock()
+            errors.append(locking.cylinder_errors(nu, round(1 / size)))
+            took.append(clock() - begun)
+        for (quantity, least), column in zip(
+            (("displacement", 2.9), ("stress", 1.9), ("energy", 3.7)), zip(*errors, strict=True), strict=True
+        ):
+            yield _row(f"thick cylinder, nu {nu}", quantity, "small", sizes, column, took, least)
+
+
+def membranes(quick: bool) -> Iterator[Order]:
+    """Yield Cook's membrane, clamped meeting free at 108 degrees: the order is the singularity's, between 0.9 and 1.5.
+
+    The error of a mesh is what the next one, half as wide, adds to the displacement.
+    """
+    counts = (4, 8, 16, 32) if quick else (4, 8, 16, 32, 64)
+    risen: list[float] = []
+    took: list[float] = []
+    for count in counts:
+        begun = clock()
+        risen.append(locking.cook(240.565, 0.4999, 100.0, count)[0])
+        took.append(clock() - begun)
+    gained = np.diff(risen) / risen[-1]
+    sizes = [1 / count for count in counts[:-1]]
+    yield _row("Cook's membrane, nu 0.4999", "displacement", "small", sizes, gained.tolist(), took[:-1], 0.9)
+
+
+def pressed(quick: bool) -> Iterator[Order]:
+    """Yield the force on a half-plane under a round body: order 2, root mean square over meshes of nearly one size."""
+    sizes = (0.4, 0.2, 0.1) if quick else (0.4, 0.2, 0.1, 0.05)
+    true = float(np.mean([contacts.press(0.025 * s, 0.4999) for s in (1.0, 1.1)]))
+    errors: list[float] = []
+    took: list[float] = []
+    for size in sizes:
+        begun = clock()
+        errors.append(_rms([contacts.press(size * s, 0.4999) / true - 1 for s in np.linspace(0.9, 1.1, 4).tolist()]))
+        took.append((clock() - begun) / 4)
+    yield _row("half-plane under a round body", "force", "small", sizes, errors, took, 1.7)
+
+
+def small_finger(quick: bool) -> Iterator[Order]:
+    """Yield the SED of the finger's ending at small strain: order 2, over shifted meshes of nearly one size."""
+
+    def sed(asked: Scene, fineness: float, shift: bool) -> float:
+        model = FingerModel.of(asked, Sizing(fineness, 2.0, shift))
+        return float(model.numbers([settled(asked, model)])[0, 0])
+
+    overkill, finenesses = (14.0, (3.0, 4.0, 5.0, 7.0)) if quick else (20.0, (3.0, 4.0, 5.0, 7.0, 10.0))
+    for surface in (STICKINESS[0], STICKINESS[4]):
+        asked = scene(surface)
+        yield _finger(asked.title, "small", partial(sed, asked), overkill, finenesses, 1.8)
+
+
+def finite_finger(quick: bool) -> Iterator[Order]:
+    """Yield the same at finite strain."""
+    asked = scene(SLIPPERINESS[4])
+
+    def sed(fineness: float, shift: bool) -> float:
+        finger = FiniteFinger.of(asked, Sizing(fineness, asked.loading.depth, shift, margin=3.0))
+        return finger.sed_ending(finite_settled(finger, asked, lambda: False))
+
+    finenesses = (3.0, 4.0, 5.0) if quick else (3.0, 4.0, 5.0, 7.0)
+    yield _finger(asked.title, "finite", sed, 10.0 if quick else 15.0, finenesses, 1.3)
+
+
+def _finger(
+    title: str, kinematics: str, sed: Callable[[float, bool], float], overkill: float, meshes: Errors, least: float
+) -> Order:
+    true = float(np.mean([sed(overkill, shift) for shift in (False, True)]))
+    errors: list[float] = []
+    took: list[float] = []
+    for fineness in meshes:
+        near = [(fineness * part, shift) for part in (0.92, 1.0, 1.08) for shift in (False, True)]
+        begun = clock()
+        errors.append(_rms([sed(*mesh) / true - 1 for mesh in near]))
+        took.append((clock() - begun) / len(near))
+    sizes = [meshes[0] / fineness for fineness in meshes]
+    return _row(f"finger, {title}", "SED of the ending", kinematics, sizes, errors, took, least)
+
+
+def _rms(values: Errors) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

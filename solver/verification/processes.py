@@ -1,0 +1,130 @@
+"""What only a process of its own shows: the cold start of `daq-app solve`, and the memory of one solve."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+from solver.verification.asked import Asked, Found, LeftOut
+from solver.verification.methods import Kinematics
+
+SCENE = """[friction]
+mu = 0.24
+tau_max = 0.00877
+[loading]
+indentation = 1.5
+slide = "-x"
+[solve]
+kinematics = "{kinematics}"
+"""
+TOLERANCE = 0.0015  # of the solve whose memory is measured
+LONGEST = 60.0  # seconds after which a process is given up
+# Run alone: what the process holds, loops loaded, is idle; the peak is counted afresh from there (Linux alone lets it).
+MEMORY = """
+import json
+from dataclasses import replace
+from solver.scene.published import SLIPPERINESS, scene
+from solver.scene import Solve
+from solver.response.solution import solve
+asked = scene(SLIPPERINESS[4])
+solve(replace(asked, solve=Solve("{kinematics}", tolerance=0.05)))
+def held(name):
+    with open("/proc/self/status") as file:
+        return next(float(line.split()[1]) * 1024 / 1e6 for line in file if line.startswith(name))
+with open("/proc/self/clear_refs", "w") as file:
+    file.write("5")
+before = held("VmRSS")
+found = solve(replace(asked, solve=Solve("{kinematics}", tolerance={tolerance})))
+print(json.dumps([before, held("VmHWM") - before, found.dofs, found.error_estimate]))
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Cold:
+    """A process from start to end: medians."""
+
+    what: str
+    runs: int
+    took_s: float  # its processor time where the system tells it, else the time that passes
+    passed_s: float  # the time that passes, in which a busy machine does other things too
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """What one solve needs above the idle process."""
+
+    kinematics: Kinematics
+    tolerance: float
+    dofs: int
+    error_estimate: float
+    idle_mb: float
+    solve_mb: float  # largest, above idle
+
+
+def measure(asked: Asked, found: Found) -> Iterator[Cold | Memory | LeftOut]:
+    """Yield cold starts and the memory of a solve in each kinematics."""
+    del found
+    with tempfile.TemporaryDirectory() as folder:
+        for what, command in _commands(Path(folder)):
+            if asked.left <= 0.0 and not what.startswith("daq-app"):
+                continue
+            runs = 5 if not asked.quick else 2 if what.startswith("daq-app") else 1
+            try:
+                took, passed = zip(*(_run(command) for _ in range(runs)), strict=True)
+                yield Cold(what, runs, median(took), median(passed))
+            except (subprocess.SubprocessError, OSError) as bad:
+                yield LeftOut(f"The cold start of {what} could not be measured: {bad}.")
+    kinds: list[Kinematics] = ["small", "finite"]
+    for kinematics in kinds:
+        if asked.quick:
+            yield LeftOut(f"Memory of a solve at {kinematics} strain is left to a full run.")
+            continue
+        yield _memory(kinematics)
+
+
+def _commands(folder: Path) -> list[tuple[str, list[str]]]:
+    out: list[tuple[str, list[str]]] = [
+        ("Python alone", _python("-c", "pass")),
+        ("Python and its arrays", _python("-c", "import numpy, scipy.linalg")),
+    ]
+    for kinematics, loaded in (("small", "solver.response.solution"), ("finite", "solver.response.finite_solution")):
+        out.append((f"the solver loaded, {kinematics} strain", _python("-c", f"import {loaded}")))
+        scene = folder / f"{kinematics}.toml"
+        scene.write_text(SCENE.format(kinematics=kinematics), encoding="utf-8")
+        out.append((f"daq-app solve, {kinematics} strain", _python("-m", "daq_app", "solve", str(scene), "--json")))
+    return out
+
+
+def _run(command: list[str]) -> tuple[float, float]:
+    """Return the processor time of a process and the time that passed, the second twice where there is no first."""
+    begun, before = perf_counter(), _of_children()
+    subprocess.run(command, check=True, capture_output=True, timeout=LONGEST)
+    passed, spent = perf_counter() - begun, _of_children() - before
+    return (spent if spent > 0.0 else passed), passed
+
+
+def _of_children() -> float:
+    """Return the processor time of all processes that were started and have ended; 0 where the system does not tell."""
+    times = os.times()
+    return times.children_user + times.children_system
+
+
+def _memory(kinematics: Kinematics) -> Memory | LeftOut:
+    code = MEMORY.format(kinematics=kinematics, tolerance=TOLERANCE)
+    try:
+        done = subprocess.run(_python("-c", code), check=True, capture_output=True, text=True, timeout=LONGEST)
+    except (subprocess.SubprocessError, OSError) as bad:
+        return LeftOut(f"Memory of a solve at {kinematics} strain could not be measured here: {bad}.")
+    idle, solving, dofs, estimate = json.loads(done.stdout)
+    return Memory(kinematics, TOLERANCE, dofs, estimate, idle, solving)
+
+
+def _python(*words: str) -> list[str]:
+    """Return the command that starts this Python with some words; it looks for no modules in the current folder."""
+    return [sys.executable, "-P", *words]

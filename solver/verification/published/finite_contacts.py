@@ -1,0 +1,102 @@
+"""The contacts of the theory at finite strain: a half-plane touched so lightly that it must be the theory's."""
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+
+from solver._kernels import STICK
+from solver.arrays import Array
+from solver.body.finite import FiniteBody
+from solver.constitutive.hyperelastic import NeoHooke
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.march import march
+from solver.equilibrium.newton import FiniteNewton, Pull, Shape
+from solver.verification.published.bodies import graded, mirrored, mound
+from solver.verification.published.zones import half_above, half_width
+
+ELEMENT = 1 / 10  # of the half-width expected
+RADIUS = 1000.0  # in half-widths
+WIDE = 30.0  # of the body to each side, in half-widths: forces and widths do not feel it, depths would
+YOUNG, NU = 0.08, 0.4999  # nearly incompressible, so that normal and shear do not couple
+DEPTH = 2.3e-3  # in half-widths: gives a contact of about half-width 1
+STEP = 5e-5  # of the surface sideways, in half-widths
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LightFinite:
+    """A half-plane at finite strain and what a light press of it gives."""
+
+    newton: FiniteNewton
+    pressed: Shape
+    load: float  # [N/mm]
+
+    @property
+    def half_width(self) -> float:
+        """The half-width that the theory gives to this load."""
+        return float(np.sqrt(4 * self.load * RADIUS * (1 - NU**2) / (np.pi * YOUNG)))
+
+    @property
+    def peak(self) -> float:
+        """The peak pressure that the theory gives to this load [MPa]."""
+        return 2 * self.load / (np.pi * self.half_width)
+
+    @property
+    def x(self) -> Array:
+        """Where the skin's nodes lie undeformed (k,)."""
+        mesh = self.newton.body.mesh
+        return mesh.nodes[mesh.skin, 0]
+
+    @property
+    def length(self) -> Array:
+        """The skin each node stands for (k,): 1/6, 4/6, 1/6 of an edge."""
+        out = np.zeros(len(self.x))
+        ends = self.x[::2]
+        for number, (low, high) in enumerate(pairwise(ends)):
+            out[2 * number : 2 * number + 3] += (high - low) * np.array([1.0, 4.0, 1.0]) / 6.0
+        return out
+
+    def found_width(self) -> float:
+        """Return the half-width that the pressure's second moment tells, a = 2 sqrt(<x^2>)."""
+        return 2 * float(np.sqrt(self.pressed.reaction[:, 1] @ self.x**2 / self.load))
+
+    def found_peak(self) -> float:
+        """Return the pressure in the middle [MPa]."""
+        middle = len(self.x) // 2
+        return float(self.pressed.reaction[middle, 1] / self.length[middle])
+
+    def capped(self, mu: float, k: float) -> tuple[float, float]:
+        """Return Q/(mu P) in full slip under the bound k mu p0, and half the width by a in which mu p is above it."""
+        pull = self.pressed.pull._replace(mu=mu, tau=k * mu * self.peak, sense=1)
+        state = settled(self.newton, pull)
+        drag = float(state.force[0]) / (mu * float(state.force[1]))
+        width = half_above(self.x, state.reaction[:, 1] / self.length - k * self.peak)
+        return drag, width / self.half_width
+
+    def sheared(self, mu: float, part: float) -> tuple[float, float, float]:
+        """Return Q/(mu P) once the surface has moved so that `part` acts or more, half the stick by a, q(0)/(mu p0).
+
+        What friction could carry and does not, mu p - q, falls to nothing at the ends of the stick.
+        """
+        pull = self.pressed.pull._replace(mu=mu, sense=0)
+        (state,) = march(self.newton, [pull])
+        travel = 0.0
+        while float(state.force[0]) < part * mu * float(state.force[1]):
+            travel += STEP
+            (state,) = march(self.newton, [pull._replace(travel=travel)], state)
+        spare, middle = mu * state.reaction[:, 1] - state.reaction[:, 0], len(self.x) // 2
+        sticks = half_width(self.x, spare, state.state == STICK)
+        traction = float(state.reaction[middle, 0] / self.length[middle]) / (mu * self.peak)
+        drag = float(state.force[0]) / (mu * float(state.force[1]))
+        return drag, sticks / self.half_width, traction
+
+
+@cache
+def light_finite() -> LightFinite:
+    """Return the half-plane, pressed without friction."""
+    x = mirrored(graded(ELEMENT, 0.3, 1.2, WIDE))
+    y = graded(ELEMENT, 0.3, 0.0, WIDE)
+    newton = FiniteNewton(FiniteBody.of(mound(x, y, RADIUS, 3.0), [NeoHooke(YOUNG, NU)]))
+    pressed = settled(newton, Pull(DEPTH, 0.0, np.inf, 1), tolerance=1e-12)
+    return LightFinite(newton, pressed, float(pressed.force[1]))

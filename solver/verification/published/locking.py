@@ -1,0 +1,84 @@
+"""Thick cylinder (MacNeal and Harder 1985, Finite Elem. Anal. Des. 1, 3) and Cook's membrane: no locking at any nu."""
+
+import numpy as np
+
+from solver.arrays import Array, Indices
+from solver.body.linear import LinearBody, edge_load
+from solver.body.stiffness import Probes
+from solver.constitutive.linear import Hooke
+from solver.element import Q2P1
+from solver.mesh import Mesh
+from solver.verification.published.bodies import distorted, membrane, ring
+
+INNER, OUTER, YOUNG = 3.0, 9.0, 1000.0  # radii [mm] and modulus [MPa] of the cylinder, under an inner pressure of 1 MPa
+_SHARE = INNER**2 / (OUTER**2 - INNER**2)
+_POINTS = np.array([[0.31, -0.57], [-0.77, 0.11], [0.43, 0.83]])  # where stresses are compared, in an element
+
+
+def widening(nu: float) -> float:
+    """Return u(a) = (1 + nu)/E [(1 - 2 nu) A a + A b^2/a], A = p a^2/(b^2 - a^2) [mm].
+
+    >>> round(widening(0.49), 9)
+    0.005039925
+    """
+    return (1 + nu) / YOUNG * ((1 - 2 * nu) * _SHARE * INNER + _SHARE * OUTER**2 / INNER)
+
+
+def widened(nu: float, radial: int, around: int) -> float:
+    """Return the displacement of the hole that is found, mean over corner nodes [mm]."""
+    mesh, hole = ring(INNER, OUTER, radial, around)
+    at = mesh.nodes[hole]
+    loads = edge_load(mesh, hole, at / INNER)
+    body = LinearBody.of(mesh, [Hooke(YOUNG, nu)], loads, free=("x", "y", "turn"))
+    moved = _free(body)[hole]
+    return float(np.sum(moved * at, axis=1)[:-1:2].mean() / INNER)
+
+
+def _free(body: LinearBody) -> Array:
+    return body.displacement(body.condensed.untouched())
+
+
+def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
+    """Return the errors of displacement, stress (root mean squares) and energy on distorted elements."""
+    mesh, hole = ring(INNER, OUTER, radial, 4 * radial)
+    mesh = distorted(mesh, 0.2, 5)
+    loads = edge_load(mesh, hole, mesh.nodes[hole] / INNER)
+    body = LinearBody.of(mesh, [Hooke(YOUNG, nu)], loads, free=("x", "y", "turn"))
+    found = _free(body)
+    x, y = mesh.nodes.T
+    r2 = x * x + y * y
+    exact = ((1 + nu) / YOUNG * ((1 - 2 * nu) * _SHARE + _SHARE * OUTER**2 / r2))[:, None] * mesh.nodes
+    off = (found - exact).ravel()
+    one, zero = np.ones_like(x), np.zeros_like(x)
+    rigid = np.stack([np.stack(m, axis=1).ravel() for m in ((one, zero), (zero, one), (-y, x))], axis=1)
+    moved = np.asarray(np.linalg.lstsq(rigid, off, rcond=None)[0], np.float64)
+    off = np.asarray(off - rigid @ moved, np.float64)
+    element = np.repeat(np.arange(len(mesh.elements)), len(_POINTS))
+    probes = Probes.at(mesh, body.elastic, element, np.tile(_POINTS, (len(mesh.elements), 1)))
+    gradient = probes.displacement_gradient(mesh, found)
+    shear = (gradient + np.swapaxes(gradient, 1, 2))[:, 0, 1] * body.elastic.shear[element]
+    at = _placed(mesh, element)
+    closed = -2 * _SHARE * OUTER**2 * at[:, 0] * at[:, 1] / np.sum(at * at, axis=1) ** 2
+    energy = 0.5 * float(np.sum(loads * found))
+    true = 0.5 * 2 * np.pi * INNER * widening(nu)
+    return (
+        float(np.sqrt(np.mean(off**2))),
+        float(np.sqrt(np.mean(np.square(np.asarray(shear - closed, np.float64))))),
+        abs(energy / true - 1),
+    )
+
+
+def _placed(mesh: Mesh, element: Indices) -> Array:
+    values = Q2P1.shape(np.tile(_POINTS, (len(mesh.elements), 1)))[0]
+    return (values[:, None] @ mesh.nodes[mesh.elements[element]])[:, 0]
+
+
+def cook(young: float, nu: float, force: float, count: int) -> tuple[float, float]:
+    """Return by how much the right edge of Cook's membrane rises at its middle and upper end [mm].
+
+    `force` [N/mm] is spread evenly over the right edge, `count` elements lie along each side.
+    """
+    mesh = membrane(count, count)
+    loads = edge_load(mesh, mesh.skin, np.tile([0.0, force / 16.0], (len(mesh.skin), 1)))
+    risen = LinearBody.of(mesh, [Hooke(young, nu)], loads).condensed.untouched()[:, 1]
+    return float(risen[len(risen) // 2]), float(risen[-1])

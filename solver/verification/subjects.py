@@ -1,0 +1,53 @@
+"""Everything that is measured, in order: a later subject may use what an earlier one found."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from solver.verification import (
+    costs,
+    estimates,
+    growth,
+    hard_cases,
+    histories,
+    machine,
+    orders,
+    processes,
+    speed,
+    targets,
+    truth,
+    warm,
+)
+from solver.verification.asked import Asked, Found
+from solver.verification.published import problems
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """One file's measurement."""
+
+    name: str  # key in the JSON file
+    told: str  # while it runs
+    share: float  # of the time; what a subject does not use is left to the later ones
+    quick_share: float
+    measure: "Callable[[Asked, Found], Iterator[DataclassInstance]]"
+
+
+SUBJECTS = (
+    Subject("machine", "machine", 0.0, 0.0, machine.measure),
+    Subject("truth", "overkill solves for the truth", 30.0, 1.5, truth.measure),
+    Subject("speed", "time against true error", 38.0, 3.5, speed.measure),
+    Subject("estimates", "estimates against true errors", 25.0, 1.8, estimates.measure),
+    Subject("costs", "cost breakdown", 6.0, 0.6, costs.measure),
+    Subject("warm", "the warm stepper", 10.0, 1.5, warm.measure),
+    Subject("histories", "courses against direct states", 8.0, 0.3, histories.measure),
+    Subject("processes", "cold starts and memory", 15.0, 2.5, processes.measure),
+    Subject("problems", "published problems", 10.0, 1.6, problems.measure),
+    Subject("orders", "orders of convergence", 20.0, 1.3, orders.measure),
+    Subject("growth", "growth with the unknowns", 12.0, 1.2, growth.measure),
+    Subject("hard_cases", "hard cases", 35.0, 2.0, hard_cases.measure),
+    Subject("targets", "what was asked of the speed", 0.0, 0.0, targets.measure),
+)

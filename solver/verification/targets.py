@@ -1,0 +1,166 @@
+"""What was asked of the solver's speed, row by row: reach and aim, what was measured, met or missed.
+
+Speeds are at a true error, of the way that answers come from: the time is that of the cheapest mesh whose error on
+slipperiness 0 to 100 and stickiness 0 stays below it, without the cost of the estimate, mesh and tables apart. The
+floor is one assembly, factorisation and solve of the same system, timed in the same run.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from statistics import median
+
+from solver.verification.asked import Asked, Found
+from solver.verification.estimates import Guaranteed
+from solver.verification.growth import Growth, between, exponent
+from solver.verification.histories import Marched
+from solver.verification.methods import MAIN, Kinematics
+from solver.verification.processes import Cold, Memory
+from solver.verification.speed import MESHES, QUICK, Speed
+from solver.verification.truth import JUDGED, cases
+from solver.verification.warm import SURFACES, Warm
+
+AGREED = 1e-10  # a course and the direct state, relative
+PEAK = 0.02  # error of the warm stepper, by the peak
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """One row. Times in ms; `reach` and `aim` are None where a row only reports."""
+
+    work: str
+    at_error: str
+    unit: str
+    reach: float | None
+    aim: float | None
+    measured: float | None  # None: nothing measured met the error, or it was not measured
+    floors: float | None  # measured by the floor
+    how: str  # which way, mesh and error
+    tried: bool = True  # whether all that could have met it was measured: time may have been over before
+    part: str = ""  # what was measured, where that is not all that was asked
+
+    @property
+    def verdict(self) -> str:
+        """Say plainly whether it was met."""
+        if self.measured is None:
+            return "missed" if self.tried and self.how != "" else "not measured"
+        if self.reach is None:
+            return "reported"
+        where = f" by {self.part}" if self.part else ""
+        if self.aim is not None and self.measured <= self.aim:
+            return f"aim met{where}"
+        return f"reach met{where}" if self.measured <= self.reach else "missed"
+
+
+def measure(asked: Asked, found: Found) -> Iterator[Target]:
+    """Yield every row from what the other subjects found."""
+    meshes = QUICK if asked.quick else MESHES
+    yield _at_error(
+        found, meshes, "small strain, all ten surfaces, from scratch", "small", 0.01, 5.0, 2.0, lambda s: s.all_s
+    )
+    yield _at_error(
+        found, meshes, "finite strain, one surface from undeformed", "finite", 0.01, 12.0, 8.0, lambda s: s.first_s
+    )
+    yield _at_error(found, meshes, "finite strain, each further surface", "finite", 0.01, 4.0, 2.0, lambda s: s.next_s)
+    yield _at_error(
+        found, meshes, "finite strain, each further surface", "finite", 0.003, 12.0, 6.0, lambda s: s.next_s
+    )
+    yield _at_error(found, meshes, "finite strain, one surface", "finite", 0.0015, 150.0, 80.0, lambda s: s.first_s)
+    yield _at_error(found, meshes, "finite strain, one surface", "finite", 0.0006, 400.0, 100.0, lambda s: s.first_s)
+    yield _warm(found, "warm stepper, finite strain, p99 of a reading", "finite", 1.5, 1.0)
+    yield _warm(found, "warm stepper, small strain, p99 of a reading", "small", 0.3, 0.1)
+    yield _marched(found)
+    yield _cold(found)
+    for row in found.of(Guaranteed):
+        yield _guaranteed(row)
+    for row in found.of(Memory):
+        yield Target(
+            f"memory of a solve, {row.kinematics} strain, above idle", _percent(row.tolerance), "MB", 100.0, None,
+            row.solve_mb, None, f"{row.dofs} unknowns, estimate {_percent(row.error_estimate)}",
+        )  # fmt: skip
+    for kinematics in ("small", "finite"):
+        rows = [row for row in found.of(Growth) if row.kinematics == kinematics]
+        power = exponent(rows)
+        how = "" if power is None else f"up to {max(r.dofs for r in rows):,} unknowns; {_between(rows)}"
+        yield Target(
+            f"growth of the floor with unknowns, {kinematics} strain", "", "power", 1.5, None, power, None, how
+        )
+
+
+def _at_error(
+    found: Found,
+    meshes: dict[str, tuple[float, ...]],
+    work: str,
+    kinematics: Kinematics,
+    error: float,
+    reach: float,
+    aim: float,
+    time: Callable[[Speed], float | None],
+) -> Target:
+    rows = [row for row in found.of(Speed) if row.method == MAIN[kinematics].name]
+    good = [
+        (took, r)
+        for r in rows
+        if r.judged_error is not None and r.judged_error <= error and (took := time(r)) is not None
+    ]
+    if not good:
+        least = min((r.judged_error for r in rows if r.judged_error is not None), default=None)
+        how = "" if least is None else f"no mesh that was tried is below: the best is at {_percent(least)}"
+        tried = len(rows) >= len(meshes[MAIN[kinematics].name])
+        return Target(work, _percent(error), "ms", reach, aim, None, None, how, tried)
+    took, best = min(good, key=lambda pair: pair[0])
+    how = f"{best.method}, {best.dofs} unknowns, error {_percent(best.judged_error or 0.0)}"
+    part = f"{best.surfaces} of them" if kinematics == "small" and best.surfaces < len(cases("small")) else ""
+    return Target(work, _percent(error), "ms", reach, aim, 1e3 * took, took / best.floor_s, how, part=part)
+
+
+def _warm(found: Found, work: str, kinematics: str, reach: float, aim: float) -> Target:
+    rows = [row for row in found.of(Warm) if row.kinematics == kinematics]
+    at = f"{_percent(PEAK)} of peak"
+    if not rows:
+        return Target(work, at, "ms", reach, aim, None, None, "")
+    worst = max(row.worst_error for row in rows)
+    how = f"error {_percent(worst)} of peak, median {1e3 * median(r.median_s for r in rows):.3g} ms"
+    slowest = 1e3 * max(row.p99_s for row in rows)
+    part = _part(len(rows), len(SURFACES), "surfaces")
+    return Target(work, at, "ms", reach, aim, slowest if worst <= PEAK else None, None, how, part=part)
+
+
+def _marched(found: Found) -> Target:
+    work, rows = "a course of 200 substeps, by the direct solve", found.of(Marched)
+    if not rows:
+        return Target(work, "1e-10", "times", 60.0, 30.0, None, None, "")
+    off = max(abs(row.difference) for row in rows)
+    small = sum(row.kinematics == "small" for row in rows)
+    how = f"largest difference {off:.0e}; courses: {small} at small strain, {len(rows) - small} at finite strain"
+    times = max(row.marched_s / row.direct_s for row in rows)
+    part = _part(len(rows), 2 * len(JUDGED), "courses")
+    return Target(work, "1e-10", "times", 60.0, 30.0, times if off <= AGREED else None, None, how, part=part)
+
+
+def _cold(found: Found) -> Target:
+    work = "`daq-app solve` as a cold process, compiled code cached"
+    rows = [row for row in found.of(Cold) if row.what.startswith("daq-app")]
+    if not rows:
+        return Target(work, "", "ms", 1000.0, 400.0, None, None, "")
+    how = ", ".join(f"{row.what.removeprefix('daq-app solve, ')} {1e3 * row.took_s:.0f} ms" for row in rows)
+    return Target(work, "", "ms", 1000.0, 400.0, 1e3 * max(row.took_s for row in rows), None, how)
+
+
+def _guaranteed(row: Guaranteed) -> Target:
+    error = "" if row.worst_error is None else f", true error {_percent(row.worst_error)}"
+    how = f"{row.dofs} unknowns, estimate {_percent(row.worst_estimate)}{error}"
+    work = f"guaranteed tolerance, {row.kinematics} strain, {row.surfaces} surfaces, mesh to evidence included"
+    return Target(work, _percent(row.tolerance), "ms", None, None, 1e3 * row.took_s, None, how)
+
+
+def _between(rows: list[Growth]) -> str:
+    powers = between(rows)
+    return f"from mesh to mesh {min(powers):.2f} to {max(powers):.2f}"
+
+
+def _part(measured: int, asked: int, what: str) -> str:
+    return f"{measured} of {asked} {what}" if measured < asked else ""
+
+
+def _percent(part: float) -> str:
+    return f"{100 * part:.2g} %"

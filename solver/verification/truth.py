@@ -1,0 +1,123 @@
+"""The reference cases and their truth: overkill solves on meshes whose nodes lie elsewhere, made in the same run.
+
+The ten published surfaces, at small and at finite strain. The truth of a number is the mean of three solves on fine
+meshes: at finite strain one without lines at the edges of contact, which finds them, and two with lines there. How far
+they lie from their mean is its doubt. Where the free cut meets the bone each is carried on to elements of no length.
+Nothing is shipped and nothing comes from elsewhere, so the truth is never older than the solver. Where a surface has no
+settled sliding the solver's refusal stands instead.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from solver.failures import SolveFailure
+from solver.response.solution import solve_many
+from solver.scene import Scene, Solve
+from solver.scene.published import scenes
+from solver.verification.asked import Asked, Found, LeftOut, clock
+from solver.verification.methods import Kinematics, SmallMeshed, climbed_twice
+
+KINEMATICS: tuple[Kinematics, ...] = ("small", "finite")
+NUMBERS = ("SED of the ending", "normal force", "drag")
+# small strain: fineness of three meshes, and whether moved along the skin by half an element
+SHIFTED, SHIFTED_QUICK = ((26.0, False), (26.0, True), (23.0, False)), ((18.0, False), (18.0, True), (16.0, False))
+# finite strain: fineness of the plain mesh, and of two with lines at the edges of contact that it finds
+CLIMBED, CLIMBED_QUICK = (17.0, 23.0, 20.0), (14.0, 20.0, 17.0)
+Solves = Callable[[Scene], tuple[np.ndarray, tuple[int, ...]]]  # numbers (3 meshes, 3), and unknowns of the meshes
+# "slip 0-100 and stick 0": what speeds are asked at
+JUDGED = ("slipperiness 0", "slipperiness 20", "slipperiness 55", "slipperiness 75", "slipperiness 100", "stickiness 0")
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """What one case truly is, or why it has no answer."""
+
+    kinematics: Kinematics
+    case: str
+    numbers: tuple[float, ...]  # SED [MPa], normal force, drag [N/mm]; empty where refused
+    doubt: tuple[float, ...]  # of each, relative: how far the three solves lie from their mean, at most
+    dofs: tuple[int, ...]  # of the three meshes
+    took_s: float
+    refused: str  # the solver's sentence, "" where there is an answer
+
+
+def cases(kinematics: Kinematics) -> list[Scene]:
+    """Return the ten published scenes in one of the two kinematics."""
+    return [replace(scene, solve=Solve(kinematics)) for scene in scenes()]
+
+
+def measure(asked: Asked, found: Found) -> Iterator[Truth | LeftOut]:
+    """Yield the truth of every case; a quick run takes coarser overkill and only the cases speeds are asked at."""
+    del found
+    for kinematics in KINEMATICS:
+        chosen = [s for s in cases(kinematics) if s.title in JUDGED or not asked.quick]
+        yield from _truths(asked, kinematics, chosen)
+
+
+def overkill(deepest: Scene, *, quick: bool) -> Solves:
+    """Return what solves scenes of one finger, none deeper than `deepest`, on the three meshes of a truth."""
+    if deepest.solve.kinematics == "finite":
+        return partial(climbed_twice, finenesses=CLIMBED_QUICK if quick else CLIMBED)
+    meshes = [SmallMeshed(deepest, *mesh) for mesh in (SHIFTED_QUICK if quick else SHIFTED)]
+
+    def solves(scene: Scene) -> tuple[np.ndarray, tuple[int, ...]]:
+        return np.array([mesh.numbers(mesh.solve(scene)) for mesh in meshes]), tuple(mesh.dofs for mesh in meshes)
+
+    return solves
+
+
+def judged(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return mean and doubt (3,) of the numbers found on three meshes (3, 3)."""
+    mean = solves.mean(axis=0)
+    return mean, np.abs(solves / np.where(mean > 0.0, mean, 1.0) - 1.0).max(axis=0)
+
+
+def _truths(asked: Asked, kinematics: Kinematics, chosen: list[Scene]) -> Iterator[Truth | LeftOut]:
+    refused, todo = _sorted_out(kinematics, chosen)
+    yield from refused
+    begun = clock()
+    solves = overkill(max(chosen, key=lambda scene: scene.loading.depth), quick=asked.quick)
+    shared = (clock() - begun) / max(len(todo), 1)
+    for number, scene in enumerate(sorted(todo, key=lambda scene: scene.title not in JUDGED)):
+        if asked.left <= 0.0 and scene.title not in JUDGED:  # without those, nothing else can be told
+            yield LeftOut(
+                f"Time was over before the truth of {len(todo) - number} cases at {kinematics} strain was known."
+            )
+            return
+        yield _truth(kinematics, scene, solves, shared)
+
+
+def _truth(kinematics: Kinematics, scene: Scene, overkill: Solves, shared: float) -> Truth:
+    begun = clock()
+    try:
+        solves, dofs = overkill(scene)
+    except SolveFailure as failure:
+        return Truth(kinematics, scene.title, (), (), (), clock() - begun, f"On an overkill mesh: {failure}")
+    mean, doubt = judged(solves)
+    took = clock() - begun + shared
+    return Truth(kinematics, scene.title, tuple(mean.tolist()), tuple(doubt.tolist()), dofs, took, "")
+
+
+def _sorted_out(kinematics: Kinematics, chosen: list[Scene]) -> tuple[list[Truth], list[Scene]]:
+    """Return the cases that the solver refuses, each with its sentence, and the others."""
+    refused: list[Truth] = []
+    todo: list[Scene] = []
+    for scene in chosen:
+        if scene.title in JUDGED:  # known to have an answer; were it refused, the overkill meshes would tell
+            todo.append(scene)
+            continue
+        begun = clock()
+        (answer,) = solve_many([replace(scene, solve=Solve(kinematics, tolerance=0.02))])
+        if isinstance(answer, SolveFailure):
+            refused.append(Truth(kinematics, scene.title, (), (), (), clock() - begun, str(answer)))
+        else:
+            todo.append(scene)
+    return refused, todo
+
+
+def known(found: Found, kinematics: Kinematics) -> dict[str, Truth]:
+    """Return the cases whose truth is known, by name."""
+    return {t.case: t for t in found.of(Truth) if t.kinematics == kinematics and t.numbers}
