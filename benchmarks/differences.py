@@ -27,7 +27,7 @@ from typing import Any, Literal
 import numpy as np
 
 from solver import Finger, Friction, Loading, Material, Materials, Scene, Solve, SolveFailure, solve_many
-from solver.accuracy.adaptivity import ascended
+from solver.accuracy.adaptivity import nested_solution
 from solver.accuracy.contrasts import told
 from solver.continuation.small_states import numbers_on, settled
 from solver.continuation.wedging import WIDE
@@ -76,9 +76,9 @@ def on_mesh(scenes: Sequence[Scene], fineness: float, shift: bool) -> list[list[
     return np.abs(numbers_on(finger, contacts)).tolist()
 
 
-def climbed(scenes: Sequence[Scene], fineness: float) -> list[list[float]]:
+def solution_on(scenes: Sequence[Scene], fineness: float) -> list[list[float]]:
     """Return the same at finite strain, each surface on a mesh of its own."""
-    tops = [ascended(scene, scene.loading.depth, fineness, lambda: False).top for scene in scenes]
+    tops = [nested_solution(scene, scene.loading.depth, fineness, lambda: False).top for scene in scenes]
     return [np.abs(top.finger.numbers(top.shape)).tolist() for top in tops]
 
 
@@ -100,7 +100,7 @@ def measured(number: int, kinematics: Literal["small", "finite"]) -> dict[str, A
         if kinematics == "small":
             truth = [on_mesh(scenes, *mesh) for mesh in OVERKILL]
         else:
-            truth = [climbed(scenes, fineness) for fineness in CLIMBED]
+            truth = [solution_on(scenes, fineness) for fineness in CLIMBED]
     except SolveFailure:
         return {"number": number, "kinematics": kinematics}
     return {"number": number, "kinematics": kinematics, "answers": answers, "truth": truth}

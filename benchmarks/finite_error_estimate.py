@@ -29,7 +29,7 @@ import numpy as np
 
 from benchmarks.error_estimate import of_answers, other_finger, shares
 from solver import Finger, Friction, Loading, Material, Materials, Scene, Solve, SolveFailure
-from solver.accuracy.adaptivity import MARGIN, ascended, sized
+from solver.accuracy.adaptivity import MARGIN, nested_solution, sized
 from solver.accuracy.error_estimate import FINENESS, coarsest_for, estimates
 from solver.accuracy.finite_errors import compared
 from solver.mesh.mesher import AT_CUT, Sizing
@@ -82,7 +82,7 @@ def measured(number: int, **drawn: bool) -> dict[str, Any]:
             solves.append(over)
         meshes: dict[str, list[Any]] = {}
         for fineness in MESHES:
-            way_up = ascended(scene, depth, fineness, going_on)
+            way_up = nested_solution(scene, depth, fineness, going_on)
             found = compared(scene, fineness, way_up, way_up.top.finger.all_numbers(way_up.top.shape), going_on)
             meshes[f"{fineness:g}"] = [numbers[..., :3].tolist() for numbers in found[:3]]
     except SolveFailure:

@@ -159,7 +159,7 @@ class _Watched:
             self._said = bridge.model.said
             self.model_age.append(now - (1e-9 * self._said.received_ns - bridge.session_offset))
 
-    def tell(self, seconds: float, used: dict[str, float]) -> None:
+    def report_progress(self, seconds: float, used: dict[str, float]) -> None:
         """Print what was noted in so many seconds; `used` is processor time by process [s]."""
         said = self.window.bridge.model.predictions - self.predictions
         print(f"  frames: {len(self.painted) / seconds:.0f} a second, {_parts(np.diff(self.painted))} ms apart")

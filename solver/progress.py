@@ -33,13 +33,13 @@ def listening(listener: Listener) -> Generator[None]:
         _TOLD.reset(before)
 
 
-def tell(doing: str, part: float = 0.0) -> None:
+def report_progress(doing: str, part: float = 0.0) -> None:
     """Say what is being done, and which part of it is done.
 
     >>> heard = []
     >>> with listening(lambda doing, part: heard.append((doing, part))):
-    ...     tell("following sliding to its largest friction", 0.25)
-    >>> tell("to nobody")
+    ...     report_progress("following sliding to its largest friction", 0.25)
+    >>> report_progress("to nobody")
     >>> heard
     [('following sliding to its largest friction', 0.25)]
     """
@@ -55,7 +55,7 @@ def aside(doing: str) -> Generator[None]:
 
     >>> heard = []
     >>> with listening(lambda doing, part: heard.append(doing)):
-    ...     tell("solving", 0.5)
+    ...     report_progress("solving", 0.5)
     ...     with aside("compiling"):
     ...         pass
     >>> heard
@@ -63,9 +63,9 @@ def aside(doing: str) -> Generator[None]:
     """
     told = _TOLD.get()
     before = told.doing if told is not None else ""
-    tell(doing)
+    report_progress(doing)
     try:
         yield
     finally:
         if before:
-            tell(before)
+            report_progress(before)

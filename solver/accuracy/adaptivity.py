@@ -18,7 +18,7 @@ from solver.continuation.finite_states import course, nearby, roughly, settled
 from solver.continuation.limit_point import folded, sound
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.loads import sliding_pull
-from solver.equilibrium.newton import Shape
+from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import Steps
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.mesh.mesher import AT_CUT, SHORT_AT_CUT, Sizing, sharing, still_sharing
@@ -38,51 +38,51 @@ Maker = Callable[[Scene, Sizing], FiniteFinger]  # of meshes; whoever wants may 
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Climbed:
+class MeshSolution:
     """A settled state on the mesh made for it."""
 
     finger: FiniteFinger
-    shape: Shape
+    shape: EquilibriumState
     setup_s: float  # meshes and tables [s]
-    at_cut: float | None = None  # of meshes that are climbed from here, as in `Sizing`
+    at_cut: float | None = None  # of finer meshes made from here, as in `Sizing`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ascent:
+class NestedSolution:
     """What a scene was solved by: the state that found the edges of contact, and the one that counts."""
 
-    foot: Climbed
-    top: Climbed
-    first: Climbed | None = None  # of the top's fineness, before its lines were moved to the edges found on it
+    coarse: MeshSolution
+    top: MeshSolution
+    first: MeshSolution | None = None  # of the top's fineness, before its lines were moved to the edges found on it
     steps: Steps | None = None  # those that the course takes, where the state depends on its way
 
 
-def ascended(
+def nested_solution(
     scene: Scene,
     expected: float,
     fineness: float,
     stop: Callable[[], bool],
     make: Maker = FiniteFinger.of,
-    before: Ascent | None = None,
-) -> Ascent:
-    """Return the settled state of a scene on a mesh made for it; for the arguments see `foot`.
+    before: NestedSolution | None = None,
+) -> NestedSolution:
+    """Return the settled state of a scene on a mesh made for it; for the arguments see `coarse_solution`.
 
     It is begun at the undeformed finger, or at `before`, the ascent of a surface that shares the rough mesh: from there
     the rough state is two systems away, and what it has changed by leads to a state as near on the finer mesh. Raises
     NoSteadyState, NotConverged, Cancelled.
     """
-    low = foot(scene, expected, fineness, stop, make, None if before is None else before.foot)
-    return risen(scene, fineness, low, stop, make, before)
+    low = coarse_solution(scene, expected, fineness, stop, make, None if before is None else before.coarse)
+    return refine(scene, fineness, low, stop, make, before)
 
 
-def foot(
+def coarse_solution(
     scene: Scene,
     expected: float,
     fineness: float,
     stop: Callable[[], bool],
     make: Maker = FiniteFinger.of,
-    near: Climbed | None = None,
-) -> Climbed:
+    near: MeshSolution | None = None,
+) -> MeshSolution:
     """Return the settled state on a mesh that does not know the edges of contact, from which others can be climbed.
 
     `expected` is the depth [mm], or about it where forces are given. For a drag near the limit of friction, which lies
@@ -121,26 +121,28 @@ def foot(
 
 
 def _rough(
-    scene: Scene, depth: float, margin: float, stop: Callable[[], bool], make: Maker, near: Climbed | None
-) -> Climbed:
+    scene: Scene, depth: float, margin: float, stop: Callable[[], bool], make: Maker, near: MeshSolution | None
+) -> MeshSolution:
     begun = perf_counter()
     finger = make(scene, Sizing(ROUGH, depth, margin=margin, at_cut=_usual_at_cut(scene)))
     setup = perf_counter() - begun
     shape = _on_rough(finger, scene, stop, near.shape if near is not None and near.finger is finger else None)
-    return Climbed(finger, shape, setup, _at_cut(scene, finger, shape))
+    return MeshSolution(finger, shape, setup, _at_cut(scene, finger, shape))
 
 
-def _plain(scene: Scene, sizing: Sizing, stop: Callable[[], bool], make: Maker) -> Climbed:
+def _plain(scene: Scene, sizing: Sizing, stop: Callable[[], bool], make: Maker) -> MeshSolution:
     begun = perf_counter()
     finger = make(scene, sizing)
     setup = perf_counter() - begun
     shape = settled(finger, scene, stop)
     if sizing.margin < WIDER and finger.runs_out(shape):
         return _plain(scene, replace(sizing, margin=WIDER), stop, make)
-    return Climbed(finger, shape, setup, sizing.at_cut)
+    return MeshSolution(finger, shape, setup, sizing.at_cut)
 
 
-def _on_rough(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: Shape | None) -> Shape:
+def _on_rough(
+    finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: EquilibriumState | None
+) -> EquilibriumState:
     """Return the state on the rough mesh, or the slide where a given drag nearly makes the finger slide there."""
     drag = scene.tangential_force
     if drag is None:
@@ -152,29 +154,29 @@ def _on_rough(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near
     return slide if drag >= NEARLY * abs(slide.force[0]) else course(scene, finger, stop).last
 
 
-def risen(
+def refine(
     scene: Scene,
     fineness: float,
-    low: Climbed,
+    low: MeshSolution,
     stop: Callable[[], bool],
     make: Maker = FiniteFinger.of,
-    before: Ascent | None = None,
+    before: NestedSolution | None = None,
     sizing: Sizing | None = None,
-) -> Ascent:
-    """Return the settled state above `low`, `foot` of the same scene; for the arguments see `climbed`."""
+) -> NestedSolution:
+    """Return the settled state refined from `low`, the scene's coarse solution; for arguments see `solution_on`."""
     sizing = sizing or sized(fineness, low)
     steps = steps_asked(scene, low.finger, low.shape, stop)
     slides = scene.undragged() if scene.loading.dragged and low.shape.pull.sense != 0 else scene
-    top = climbed(slides, fineness, low, stop, make, before, sizing, 1 if steps is None else steps.times)
+    top = solution_on(slides, fineness, low, stop, make, before, sizing, 1 if steps is None else steps.times)
     if top.shape.pull.sense == 0 or not top.finger.bounded_at_an_edge(top.shape):
         if slides is not scene:  # a drag near the limit of friction, which the slide has told the edges of
-            top = climbed(scene, fineness, low, stop, make, None, sizing)
-        return Ascent(low, top, steps=steps)
+            top = solution_on(scene, fineness, low, stop, make, None, sizing)
+        return NestedSolution(low, top, steps=steps)
     again = still_sharing(scene.finger, scene.receptor, sized(fineness, top), sizing)
-    return Ascent(low, climbed(scene, fineness, top, stop, make, None, again), top)
+    return NestedSolution(low, solution_on(scene, fineness, top, stop, make, None, again), top)
 
 
-def sized(fineness: float, below: Climbed) -> Sizing:
+def sized(fineness: float, below: MeshSolution) -> Sizing:
     """Return the sizing of a mesh of `fineness` whose lines follow the edges of contact found `below`."""
     edges = below.finger.edges(below.shape)
     return Sizing(fineness, below.shape.pull.depth, margin=MARGIN, edges=edges, at_cut=below.at_cut)
@@ -189,7 +191,7 @@ def _usual_at_cut(scene: Scene) -> float | None:
     return AT_CUT if scene.loading.direction > 0 and not strains_the_cut(scene.materials) else None
 
 
-def _at_cut(scene: Scene, finger: FiniteFinger, shape: Shape) -> float | None:
+def _at_cut(scene: Scene, finger: FiniteFinger, shape: EquilibriumState) -> float | None:
     """Return the same for the meshes above a rough one: the shorter, the less this squeezes that corner.
 
     Where it is squeezed far, short elements collapse, and have more states than one. Ends of courses are not found from
@@ -202,7 +204,7 @@ def _at_cut(scene: Scene, finger: FiniteFinger, shape: Shape) -> float | None:
     return min(SHORT_AT_CUT * 2.0 ** (squeezed / DOUBLED), usual)
 
 
-def sized_together(scene: Scene, fineness: float, feet: Sequence[Climbed]) -> list[Sizing]:
+def sized_together(scene: Scene, fineness: float, feet: Sequence[MeshSolution]) -> list[Sizing]:
     """Return the same for surfaces that are pressed alike: one mesh for all, its lines moved to the edges of each.
 
     `scene` is that of any of them. Where contact is too short to tell its edges, a surface has a mesh of its own.
@@ -218,16 +220,16 @@ def sized_together(scene: Scene, fineness: float, feet: Sequence[Climbed]) -> li
     return sizings
 
 
-def climbed(
+def solution_on(
     scene: Scene,
     fineness: float,
-    below: Climbed,
+    below: MeshSolution,
     stop: Callable[[], bool],
     make: Maker = FiniteFinger.of,
-    before: Ascent | None = None,
+    before: NestedSolution | None = None,
     sizing: Sizing | None = None,
     times: int = 1,
-) -> Climbed:
+) -> MeshSolution:
     """Return the settled state on a mesh of `fineness` whose lines follow the edges of contact found `below`.
 
     With `sizing` on the mesh of `sized_together`. It is begun at the state `below`, or at what that has changed by
@@ -235,7 +237,7 @@ def climbed(
     course has so many `times` the usual load steps. Where friction is steep a mesh may have no state, its last node
     neither open nor touching: then one with nodes elsewhere is asked. Raises NoSteadyState, NotConverged, Cancelled.
     """
-    near = before if before is not None and before.foot.finger is below.finger else None
+    near = before if before is not None and before.coarse.finger is below.finger else None
     sizing = sizing or sized(fineness, below)
     if sizing.at_cut is not None and sizing.at_cut < AT_CUT:
         begun = _begun(scene, sizing, below, make, near)
@@ -253,7 +255,9 @@ def climbed(
     return replace(begun, shape=settled(begun.finger, scene, stop, begun.shape, times))
 
 
-def _begun(scene: Scene, sizing: Sizing, below: Climbed, make: Maker, before: Ascent | None) -> Climbed:
+def _begun(
+    scene: Scene, sizing: Sizing, below: MeshSolution, make: Maker, before: NestedSolution | None
+) -> MeshSolution:
     """Return a mesh above the state `below`, with the shape that a settled one is sought from."""
     begun = perf_counter()
     finger = make(scene, sizing)
@@ -262,7 +266,9 @@ def _begun(scene: Scene, sizing: Sizing, below: Climbed, make: Maker, before: As
             finger.bridge(other.finger)
     setup = perf_counter() - begun
     if before is None:
-        start = finger.brought(below.shape, below.finger)
+        start = finger.transfer(below.shape, below.finger)
     else:
-        start = finger.brought_on(below.shape, before.foot.shape, below.finger, before.top.shape, before.top.finger)
-    return Climbed(finger, start, setup, sizing.at_cut)
+        start = finger.transfer_change(
+            below.shape, before.coarse.shape, below.finger, before.top.shape, before.top.finger
+        )
+    return MeshSolution(finger, start, setup, sizing.at_cut)

@@ -8,7 +8,7 @@ from solver.arrays import Array
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.load_path import Instant
-from solver.equilibrium.newton import Shape
+from solver.equilibrium.newton import EquilibriumState
 from solver.failures import NotConverged
 from solver.scene import Scene
 
@@ -19,7 +19,9 @@ PIERCED = 1e-7  # part of the indentation by which skin may lie too low without 
 MIXED = "nearly incompressible tissues, or ones whose stiffnesses differ by many orders of magnitude,"
 
 
-def audits(model: FingerModel, law: FrictionLaw, contact: Shape, depth: float, displacement: Array) -> dict[str, float]:
+def audits(
+    model: FingerModel, law: FrictionLaw, contact: EquilibriumState, depth: float, displacement: Array
+) -> dict[str, float]:
     """Return the checks of one state of contact; `displacement` (nodes, 2) relative to the bone [mm].
 
     `equilibrium_x`, `equilibrium_y`: bone reaction plus contact force, by the contact force.

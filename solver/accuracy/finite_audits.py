@@ -10,11 +10,11 @@ from solver.body.finite_measures import deformation, element_forces, energy, ene
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.finite_relaxation import RelaxingNewton
-from solver.equilibrium.newton import FiniteNewton, Shape
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton
 from solver.scene import Scene
 
 
-def audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: FiniteNewton) -> dict[str, float]:
+def audits(scene: Scene, finger: FiniteFinger, shape: EquilibriumState, newton: FiniteNewton) -> dict[str, float]:
     """Return the checks of one state. Perfect is 0, save for `smallest_det_F` (of displacement at quadrature points).
 
     `newton` is the finger's own, or that of its tissues as they relax.
@@ -61,7 +61,7 @@ def audits(scene: Scene, finger: FiniteFinger, shape: Shape, newton: FiniteNewto
     }
 
 
-def course_audits(newton: FiniteNewton, way: Sequence[Shape]) -> dict[str, float]:
+def course_audits(newton: FiniteNewton, way: Sequence[EquilibriumState]) -> dict[str, float]:
     """Return the checks of a whole march from first touch on, relative to the bone's work.
 
     The bone's work and friction's take the mean of the forces at both ends of a step.
@@ -77,7 +77,7 @@ def course_audits(newton: FiniteNewton, way: Sequence[Shape]) -> dict[str, float
     included. It is positive but for the error of the steps.
     """
     body = newton.body
-    shapes = [Shape.undeformed(body), *way]
+    shapes = [EquilibriumState.undeformed(body), *way]
     reaction = np.array([shape.reaction for shape in shapes])  # (m, k, 2)
     skin = np.array([shape.u[body.skin] for shape in shapes])
     pull = np.array([[shape.pull.travel, shape.pull.depth] for shape in shapes])

@@ -10,7 +10,7 @@ from solver.arrays import Array
 from solver.continuation.finite_states import course, depends_on_way
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.finite_relaxation import RelaxingCourse
-from solver.equilibrium.newton import Shape
+from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import HALF, Steps
 from solver.scene import Scene
 
@@ -22,14 +22,14 @@ def relaxes(scene: Scene) -> bool:
     return scene.materials.relax and scene.solve.course == "history"
 
 
-def end(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], times: float = 1.0) -> Shape:
+def end(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], times: float = 1.0) -> EquilibriumState:
     """Return the end of a course, in so many `times` the usual load steps. Raises NotConverged, Cancelled."""
     if relaxes(scene):
         return RelaxingCourse(scene, finger, stop, times=times).last
     return course(scene, finger, stop, times).last
 
 
-def steps_asked(scene: Scene, finger: FiniteFinger, shape: Shape, stop: Callable[[], bool]) -> Steps | None:
+def steps_asked(scene: Scene, finger: FiniteFinger, shape: EquilibriumState, stop: Callable[[], bool]) -> Steps | None:
     """Return the load steps that a scene asks for, judged on a mesh on which it has led to `shape`.
 
     None where that is a settled slide. Raises NotConverged, Cancelled.
@@ -53,7 +53,9 @@ def times_on_way(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool]) -
     return 1 if steps is None else steps.times
 
 
-def felt_of_bound(scene: Scene, finger: FiniteFinger, shape: Shape, stop: Callable[[], bool]) -> Array:
+def sensitivity_to_bound(
+    scene: Scene, finger: FiniteFinger, shape: EquilibriumState, stop: Callable[[], bool]
+) -> Array:
     """Return how the numbers (6,) at the end of a course answer to the traction bound: relative change by its own.
 
     Zero where nothing slips at the bound in `shape`, the end, or where that is a slide. Raises NotConverged, Cancelled.

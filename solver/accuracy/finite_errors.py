@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver.accuracy import finite_ends
-from solver.accuracy.adaptivity import Ascent, Climbed, climbed
+from solver.accuracy.adaptivity import MeshSolution, NestedSolution, solution_on
 from solver.accuracy.error_estimate import FROM_MESHES, Errors, errors
 from solver.arrays import Array
 from solver.body.finite_measures import deformation
@@ -25,7 +25,7 @@ OF_SQUEEZED = 2.6  # under other skin, of the element there squared and what det
 
 
 def error_estimates(
-    scene: Scene, fineness: float, way_up: Ascent, numbers: Array, stop: Callable[[], bool]
+    scene: Scene, fineness: float, way_up: NestedSolution, numbers: Array, stop: Callable[[], bool]
 ) -> tuple[Errors, Array, float]:
     """Return how far the `numbers` (6,) (`finger.all_numbers`) of a scene may be off that was solved by `way_up`.
 
@@ -37,7 +37,7 @@ def error_estimates(
 
 
 def compared(
-    scene: Scene, fineness: float, way_up: Ascent, numbers: Array, stop: Callable[[], bool]
+    scene: Scene, fineness: float, way_up: NestedSolution, numbers: Array, stop: Callable[[], bool]
 ) -> tuple[Array, Array, Array, Steps | None]:
     """Return what errors are estimated from: numbers (6,), those of other meshes (n, 6), what is felt (6,), and steps.
 
@@ -53,18 +53,18 @@ def compared(
         if steps is not None and on_way:
             shape = finite_ends.end(coarse.finger, scene, stop) if finite_ends.relaxes(scene) else coarse.shape
             others = steps.taken(coarse.finger.all_numbers(shape))[None]
-            felt = finite_ends.felt_of_bound(scene, way_up.foot.finger, way_up.foot.shape, stop)
+            felt = finite_ends.sensitivity_to_bound(scene, way_up.coarse.finger, way_up.coarse.shape, stop)
             return numbers, others, felt, steps
     except SolveFailure:
         return numbers, np.empty((0, 6)), np.zeros(6), steps
     both = (coarse, way_up.first)
     others = np.array([other.finger.all_numbers(other.shape) for other in both if other is not None])
-    felt = np.zeros(6) if way_up.first is None else felt_of_bound(coarse)
+    felt = np.zeros(6) if way_up.first is None else sensitivity_to_bound(coarse)
     corner = _of_corner(scene, at, numbers, others[0]) / FROM_MESHES["finite"]
     return numbers, np.vstack([others, numbers * (1.0 + corner)]), felt, None
 
 
-def _of_corner(scene: Scene, at: Climbed, numbers: Array, other: Array) -> Array:
+def _of_corner(scene: Scene, at: MeshSolution, numbers: Array, other: Array) -> Array:
     """Return the parts (6,) of estimates, relative, for what meshes have in common where the cut meets the bone.
 
     They are told by how far tissue is squeezed there, and under stiff skin by what the `other` mesh makes of the force.
@@ -77,7 +77,7 @@ def _of_corner(scene: Scene, at: Climbed, numbers: Array, other: Array) -> Array
     return np.full(6, _squeezed(scene, at))
 
 
-def _squeezed(scene: Scene, at: Climbed) -> float:
+def _squeezed(scene: Scene, at: MeshSolution) -> float:
     """Return the same for skin that is not stiff, in all numbers: told by the first element and its least det F."""
     if scene.finger.cut == "driven" or at.at_cut is None:
         return 0.0
@@ -86,12 +86,12 @@ def _squeezed(scene: Scene, at: Climbed) -> float:
     return OF_SQUEEZED * element**2 * max(1.0 - at.finger.least_at_cut(at.shape), 0.0) ** 3
 
 
-def _volumes(at: Climbed) -> Array:
+def _volumes(at: MeshSolution) -> Array:
     """Return det F (e, 9) at the quadrature points."""
     return np.linalg.det(deformation(at.finger.newton.body, at.shape.u))
 
 
-def _crowded(scene: Scene, at: Climbed) -> bool:
+def _crowded(scene: Scene, at: MeshSolution) -> bool:
     """Return whether stiff or stiffening skin squeezes the tissue where the cut meets the bone.
 
     Strains are without bound in that corner, so that errors fall with the element and not with its square; in the SED
@@ -102,17 +102,17 @@ def _crowded(scene: Scene, at: Climbed) -> bool:
     return float(_volumes(at).min()) < SQUEEZED
 
 
-def _nearest(scene: Scene, fineness: float, at: Climbed, stop: Callable[[], bool]) -> Climbed:
+def _nearest(scene: Scene, fineness: float, at: MeshSolution, stop: Callable[[], bool]) -> MeshSolution:
     """Return the settled state on a coarser mesh, whose friction limit may lie just below the drag asked for."""
     try:
-        return climbed(scene, fineness, at, stop)
+        return solution_on(scene, fineness, at, stop)
     except NoSteadyState:
         if not scene.loading.dragged:
             raise
-        return climbed(scene.undragged(), fineness, at, stop)
+        return solution_on(scene.undragged(), fineness, at, stop)
 
 
-def felt_of_bound(at: Climbed) -> Array:
+def sensitivity_to_bound(at: MeshSolution) -> Array:
     """Return how the numbers (6,) of a settled slide answer to the traction bound: relative change by its own.
 
     Zero where no state lies beside this one.

@@ -9,7 +9,7 @@ from solver._kernels import STICK
 from solver.arrays import Array
 from solver.constitutive.hyperelastic import HUMAN_SKIN
 from solver.equilibrium.finger import FingerModel
-from solver.equilibrium.newton import Shape
+from solver.equilibrium.newton import EquilibriumState
 from solver.scene import Material, Scene
 
 DENSITY = 1.1e-9  # of soft tissue [t/mm3 = N s2/mm4]
@@ -45,7 +45,7 @@ def _held(scene: Scene) -> str:
     return said + (f"; a nail plate of {finger.nail_length:g} mm is fixed to it" if finger.nail_length else "; no nail")
 
 
-def model(scene: Scene, finger: FingerModel, contact: Shape, displacement: Array) -> dict[str, Any]:
+def model(scene: Scene, finger: FingerModel, contact: EquilibriumState, displacement: Array) -> dict[str, Any]:
     """Return what was modelled and what was left out, as plain data.
 
     Every entry of `left_out` has `estimate`, the relative change of the SED (or a lower bound of it) that leaving it

@@ -44,12 +44,12 @@ def relaxing(scene: Scene) -> Scene | None:
     """
     if scene.materials.relax:
         return scene
-    stays = 1.0 - sum(g for _, g in RELAXATION)
+    long_term = 1.0 - sum(g for _, g in RELAXATION)
     terms = tuple(Relaxation(g, tau) for tau, g in RELAXATION)
     soft: dict[str, Any] = {}
     for name in ("epidermis", "dermis", "fat"):
         tissue = scene.materials.of(name)
-        shear, bulk = tissue.E / (2.0 * (1.0 + tissue.nu)) / stays, tissue.E / (3.0 * (1.0 - 2.0 * tissue.nu))
+        shear, bulk = tissue.E / (2.0 * (1.0 + tissue.nu)) / long_term, tissue.E / (3.0 * (1.0 - 2.0 * tissue.nu))
         nu = (3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear))
         if nu < 0.0:
             return None

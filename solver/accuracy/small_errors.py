@@ -4,7 +4,7 @@ import numpy as np
 
 from solver.accuracy.error_estimate import Errors, errors
 from solver.arrays import Array
-from solver.continuation.small_states import NUDGE, bounded_more, end, felt_of_bound, nearest, rubbed_more
+from solver.continuation.small_states import NUDGE, bounded_more, end, nearest, rubbed_more, sensitivity_to_bound
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.loads import pull_of
 from solver.equilibrium.step_error import HALF, Steps
@@ -76,5 +76,5 @@ def _on_way(scene: Scene, coarse: FingerModel, steps: Steps) -> tuple[Array, Arr
     other = steps.taken(steps.whole if told else coarse.all_numbers(nearest(scene, coarse)))
     felt = np.zeros(6)
     if scene.friction.tau_max is not None:
-        felt = felt_of_bound(scene, coarse, end(scene, coarse, HALF))
+        felt = sensitivity_to_bound(scene, coarse, end(scene, coarse, HALF))
     return other[None], felt

@@ -109,7 +109,7 @@ def check_laws(laws: Sequence[Law]) -> None:
 def check_terms(laws: Sequence[Prony]) -> None:
     """Raise BodyError where the terms of a series are none that relax."""
     for number, law in enumerate(laws):
-        if not (all(g >= 0.0 and 0.0 < tau < np.inf for g, tau in law.terms) and law.stays > 0.0):
+        if not (all(g >= 0.0 and 0.0 < tau < np.inf for g, tau in law.terms) and law.long_term > 0.0):
             raise BodyError(
                 f"material {number}, {law}, has terms that cannot relax; every g must be 0 or more, all together below "
                 "1, and every tau a time above 0"

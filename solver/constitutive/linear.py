@@ -92,19 +92,19 @@ class Prony:
     terms: tuple[tuple[float, float], ...] = ()  # g [-] and tau [s] of each
 
     @property
-    def at_once(self) -> Hooke:
+    def instantaneous(self) -> Hooke:
         """The elastic solid that it is in a moment."""
         return Hooke(self.E, self.nu)
 
     @property
     def shear(self) -> float:
         """Shear modulus at once [MPa]."""
-        return self.at_once.shear
+        return self.instantaneous.shear
 
     @property
     def lame(self) -> float:
         """Lamé's first constant at once [MPa]."""
-        return self.at_once.lame
+        return self.instantaneous.lame
 
     @property
     def bulk(self) -> float:
@@ -112,7 +112,7 @@ class Prony:
         return self.lame + 2.0 / 3.0 * self.shear
 
     @property
-    def stays(self) -> float:
+    def long_term(self) -> float:
         """Part of the shear modulus that never relaxes [-]."""
         return 1.0 - sum(g for g, _ in self.terms)
 
@@ -123,7 +123,7 @@ class Prony:
         >>> round(Prony(0.08, 0.48, ((0.3, 1.0),)).relaxed.shear / Prony(0.08, 0.48).shear, 6)
         0.7
         """
-        return self._with(self.stays)
+        return self._with(self.long_term)
 
     def within(self, step: float) -> Moduli:
         """Return the moduli that a strain has which grows evenly over `step` [s]: what of it is left at the end.
@@ -133,7 +133,7 @@ class Prony:
         >>> round(Prony(0.08, 0.48, ((0.3, 1.0),)).within(1.0).shear / Prony(0.08, 0.48).shear, 6)
         0.889636
         """
-        return self._with(self.stays + sum(g * float(kept(np.asarray(step / tau))) for g, tau in self.terms))
+        return self._with(self.long_term + sum(g * float(kept(np.asarray(step / tau))) for g, tau in self.terms))
 
     def _with(self, part: float) -> Moduli:
         shear = part * self.shear
@@ -141,11 +141,11 @@ class Prony:
 
     def energy(self, gradient: Array) -> Array:
         """Return the energy density (...) [MPa] stored at once, as `Hooke.energy`."""
-        return self.at_once.energy(gradient)
+        return self.instantaneous.energy(gradient)
 
     def stress(self, gradient: Array) -> Array:
         """Return the stress (..., 2, 2) [MPa] at once, as `Hooke.stress`."""
-        return self.at_once.stress(gradient)
+        return self.instantaneous.stress(gradient)
 
 
 def kept(times: Array) -> Array:

@@ -31,7 +31,7 @@ def crosses_itself(outline: Array) -> bool:
     return bool(np.triu(crossing, 2).any())
 
 
-class Pinch(NamedTuple):
+class SkinCompression(NamedTuple):
     """How far the skin is squeezed where it is, and whether it has a crease.
 
     A neo-Hookean half-space in plane strain wrinkles at a stretch of 0.544 (Biot 1963, Appl. Sci. Res. A 12, 168).
@@ -44,7 +44,7 @@ class Pinch(NamedTuple):
     # Where skin touches or is drawn out at an edge of contact, jumps are the mesh's: open, squeezed skin is asked.
 
 
-def pinched(before: Array, after: Array, loose: Flags, touching: Flags) -> Pinch:
+def pinched(before: Array, after: Array, loose: Flags, touching: Flags) -> SkinCompression:
     """Return how far polylines of elements with three nodes each, (2 a + 1, 2), are squeezed where `loose` (a,).
 
     Some of the nodes are `touching` (2 a + 1,).
@@ -62,7 +62,7 @@ def pinched(before: Array, after: Array, loose: Flags, touching: Flags) -> Pinch
     jumps = _long(first[1:] - last[:-1])[joined]
     lowest = min(float(_long(side)[loose].min(initial=np.inf)) for side in (first, last))
     least, place = float(pieces.min()), int(pieces.min(axis=1).argmin())
-    return Pinch(least, place, min(lowest, least), float(jumps.max(initial=0.0)))
+    return SkinCompression(least, place, min(lowest, least), float(jumps.max(initial=0.0)))
 
 
 def _long(steps: Array) -> Array:

@@ -13,10 +13,10 @@ from typing import Protocol
 import numpy as np
 
 from solver.arrays import Array
-from solver.contact.skin_compression import Pinch
-from solver.equilibrium.newton import BY_FRICTION, EQUILIBRIUM, Newton, Pull, Shape
+from solver.contact.skin_compression import SkinCompression
+from solver.equilibrium.newton import BY_FRICTION, EQUILIBRIUM, EquilibriumState, Newton, Pull
 from solver.failures import Cancelled, NotConverged
-from solver.progress import tell
+from solver.progress import report_progress
 
 LARGEST_MU = 2.0  # beyond this a coefficient of friction is not looked for
 TOLERANCE = 1e-6  # of a point on the branch [mm]
@@ -39,11 +39,11 @@ class Followed(Protocol):
         """The iterations on its body."""
         ...
 
-    def pinch(self, shape: Shape) -> Pinch:
+    def skin_compression(self, shape: EquilibriumState) -> SkinCompression:
         """Return how far the skin is squeezed, and whether it has a crease."""
         ...
 
-    def crosses(self, shape: Shape) -> bool:
+    def crosses(self, shape: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
         ...
 
@@ -52,20 +52,22 @@ class Followed(Protocol):
 class Branch:
     """A branch of settled sliding states."""
 
-    states: tuple[Shape, ...]  # on the way, that at the value asked for or the last one before the limit being last
+    states: tuple[
+        EquilibriumState, ...
+    ]  # on the way, that at the value asked for or the last one before the limit being last
     value: float  # of the coefficient or the depth [mm] at its end: the largest one met
     limited: bool  # whether the branch ends there, short of what was asked for
     lost: bool = False  # whether it ends there for want of a next point only, far from a limit point and from a fold
 
     @property
-    def last(self) -> Shape:
+    def last(self) -> EquilibriumState:
         """The last state."""
         return self.states[-1]
 
 
-def followed(
+def continue_branch(
     finger: Followed,
-    start: Shape,
+    start: EquilibriumState,
     by: int,
     target: float,
     folds: float,
@@ -82,14 +84,14 @@ def followed(
     return branch
 
 
-def _beyond(finger: Followed, branch: Branch, by: int, target: float, folds: float) -> Shape | None:
+def _beyond(finger: Followed, branch: Branch, by: int, target: float, folds: float) -> EquilibriumState | None:
     """Return a state of the branch a little beyond its end, None where it ends there indeed.
 
     Where a node of the contact comes to the bound, the branch may turn back for a moment, as no skin does.
     """
     last = branch.last
-    pinch = finger.pinch(last)
-    if pinch.least < folds + APART:
+    compression = finger.skin_compression(last)
+    if compression.least < folds + APART:
         return None
     for part in HOP:
         value = min((1.0 + part) * branch.value, target)
@@ -98,14 +100,18 @@ def _beyond(finger: Followed, branch: Branch, by: int, target: float, folds: flo
         except NotConverged:
             continue
         near = abs(there.force - last.force).max() <= STAYS * abs(last.force).max()
-        if near and finger.pinch(there).least > pinch.least - APART and not leapt(finger, last, there):
+        if (
+            near
+            and finger.skin_compression(there).least > compression.least - APART
+            and not jumped_branch(finger, last, there)
+        ):
             return there
     return None
 
 
 def follow(
     finger: Followed,
-    start: Shape,
+    start: EquilibriumState,
     by: int,
     target: float,
     folds: float,
@@ -116,7 +122,7 @@ def follow(
     It ends where its value passes a maximum, or where the skin is squeezed to `folds` of its length
     (`folding.folds_at`). Raises Cancelled where `stop` says so.
     """
-    way = [_Point(start, finger.pinch(start), value_of(start.pull, by))]
+    way = [_Point(start, finger.skin_compression(start), value_of(start.pull, by))]
     if way[0].value >= target * (1.0 - 1e-12):
         return Branch((start,), way[0].value, limited=False)
     best = 0  # of them, by value
@@ -127,15 +133,17 @@ def follow(
     for _ in range(MOST):
         if stop():
             raise Cancelled
-        tell(doing, abs(way[best].value - way[0].value) / reach)
+        report_progress(doing, abs(way[best].value - way[0].value) / reach)
         step = _further(finger, way[-1], by, direction, rate, length, target, SHORTEST * reach)
         if step is None:
-            lost = rate > STEEP and way[-1].pinch.least > folds + APART
+            lost = rate > STEEP and way[-1].compression.least > folds + APART
             return Branch(tuple(point.shape for point in way[: best + 1]), way[best].value, limited=True, lost=lost)
         point, length = step
-        if point.pinch.least < folds:
+        if point.compression.least < folds:
             last = way[-1]
-            part = min(max((last.pinch.least - folds) / (last.pinch.least - point.pinch.least), 0.0), 1.0)
+            part = min(
+                max((last.compression.least - folds) / (last.compression.least - point.compression.least), 0.0), 1.0
+            )
             value = max(way[best].value, last.value + part * (point.value - last.value))
             return Branch(tuple(point.shape for point in way[: best + 1]), value, limited=True)
         easy = point.shape.iterations - way[-1].shape.iterations <= 5
@@ -156,8 +164,8 @@ def follow(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Point:
-    shape: Shape
-    pinch: Pinch
+    shape: EquilibriumState
+    compression: SkinCompression
     value: float
 
 
@@ -175,9 +183,9 @@ def _further(
     while length >= shortest:
         found = _next(finger.newton, last.shape, by, direction, rate, length, target)
         if found is not None:
-            pinch = finger.pinch(found)
-            if pinch.least >= last.pinch.least - APART and not leapt(finger, last.shape, found):
-                return _Point(found, pinch, value_of(found.pull, by)), length
+            compression = finger.skin_compression(found)
+            if compression.least >= last.compression.least - APART and not jumped_branch(finger, last.shape, found):
+                return _Point(found, compression, value_of(found.pull, by)), length
         length /= 2.0
     return None
 
@@ -192,13 +200,13 @@ def with_value(pull: Pull, by: int, value: float) -> Pull:
     return pull._replace(mu=value) if by == BY_FRICTION else pull._replace(depth=value)
 
 
-def leapt(finger: Followed, before: Shape, after: Shape) -> bool:
+def jumped_branch(finger: Followed, before: EquilibriumState, after: EquilibriumState) -> bool:
     """Return whether a step went to another branch, where the skin is folded."""
-    one, other = finger.pinch(before), finger.pinch(after)
+    one, other = finger.skin_compression(before), finger.skin_compression(after)
     return other.least < SQUEEZE * one.least or other.kink > CREASE or finger.crosses(after)
 
 
-def _tangent(newton: Newton, shape: Shape, by: int) -> tuple[Array, float]:
+def _tangent(newton: Newton, shape: EquilibriumState, by: int) -> tuple[Array, float]:
     """Return the direction of the branch, of unit length: per unknown over root n [mm], and of the value."""
     newton.linearise(shape, shape.pull, newton.skin_x)
     direction = newton.steps[:, by] / np.sqrt(len(newton.steps))
@@ -207,8 +215,8 @@ def _tangent(newton: Newton, shape: Shape, by: int) -> tuple[Array, float]:
 
 
 def _next(
-    newton: Newton, start: Shape, by: int, direction: Array, rate: float, length: float, target: float
-) -> Shape | None:
+    newton: Newton, start: EquilibriumState, by: int, direction: Array, rate: float, length: float, target: float
+) -> EquilibriumState | None:
     """Return the state `length` further along the branch, or at `target` where that is nearer; None where not found."""
     root = np.sqrt(len(newton.steps))
     value = value_of(start.pull, by)

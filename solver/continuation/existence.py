@@ -12,7 +12,7 @@ from solver.continuation.arc_length import follow
 from solver.continuation.limit_point import PLAIN, Reach, folded, sound
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import BY_FRICTION, Newton, Pull, Shape
+from solver.equilibrium.newton import BY_FRICTION, EquilibriumState, Newton, Pull
 from solver.failures import NoSteadyState, NotConverged
 from solver.scene import Scene
 
@@ -25,16 +25,16 @@ def steady(
     finger: FiniteFinger,
     pull: Pull,
     tolerance: float = 1e-10,
-    start: Shape | None = None,
+    start: EquilibriumState | None = None,
     stop: Callable[[], bool] = lambda: False,
-) -> Shape:
+) -> EquilibriumState:
     """Return the settled sliding state under `pull`, proven to lie on the branch that begins without friction.
 
     A state, sought from `start` first, whose skin is squeezed so far that it might have folded, or that is not found
     directly, is proven by following the branch on meshes made for it (`limit_point`). Raises NoSteadyState with both
     limits where the branch ends before, NotConverged where it cannot be begun, Cancelled where `stop` says so.
     """
-    found: list[Shape] = []
+    found: list[EquilibriumState] = []
     for shape in _tried(finger.newton, pull, tolerance, start, stop):
         if sound(finger, shape, PLAIN):
             return shape
@@ -64,7 +64,7 @@ def steady(
     )
 
 
-def stands(finger: FiniteFinger, shape: Shape, stop: Callable[[], bool]) -> bool:
+def stands(finger: FiniteFinger, shape: EquilibriumState, stop: Callable[[], bool]) -> bool:
     """Return whether a state lies on the branch that begins without friction: plainly, or since that was followed."""
     if sound(finger, shape, PLAIN):
         return True
@@ -95,13 +95,13 @@ def refuse_far_beyond(scene: Scene, pull: Pull, stop: Callable[[], bool]) -> Non
 
 
 def _tried(
-    newton: Newton, pull: Pull, tolerance: float, start: Shape | None, stop: Callable[[], bool]
-) -> Iterator[Shape]:
+    newton: Newton, pull: Pull, tolerance: float, start: EquilibriumState | None, stop: Callable[[], bool]
+) -> Iterator[EquilibriumState]:
     """Yield the states found directly: from `start`, from undeformed, and from all skin slipping at the bound.
 
     Where friction is steep, so that nearly all skin slips at the bound, undeformed leads nowhere that this does not.
     """
-    ways: list[Callable[[], Shape]] = []
+    ways: list[Callable[[], EquilibriumState]] = []
     if not steep(pull):
         ways.append(lambda: settled(newton, pull, None, tolerance, stop))
     if pull.tau < np.inf:
@@ -113,7 +113,7 @@ def _tried(
             yield way()
 
 
-def doubts(finger: FiniteFinger, shape: Shape, stop: Callable[[], bool] = lambda: False) -> tuple[str, ...]:
+def doubts(finger: FiniteFinger, shape: EquilibriumState, stop: Callable[[], bool] = lambda: False) -> tuple[str, ...]:
     """Return the sentence that a settled slide needs whose friction is as large as may be, or none."""
     if shape.pull.sense == 0 or sound(finger, shape, PLAIN):
         return ()
@@ -187,14 +187,14 @@ def _none_at(scene: Scene, further: Pull, pull: Pull, stop: Callable[[], bool]) 
     return proof.limited and not proof.lost
 
 
-def _proven(finger: FiniteFinger, shape: Shape, proof: Reach) -> bool:
+def _proven(finger: FiniteFinger, shape: EquilibriumState, proof: Reach) -> bool:
     """Return whether a state is the one that was reached along the branch on another mesh, and not a folded one."""
     if folded(finger, shape):
         return False
     return bool(np.all(np.abs(finger.numbers(shape) - proof.numbers) <= ALIKE * np.abs(proof.numbers)))
 
 
-def all_at_the_bound(newton: Newton, pull: Pull, tolerance: float, stop: Callable[[], bool]) -> Shape:
+def all_at_the_bound(newton: Newton, pull: Pull, tolerance: float, stop: Callable[[], bool]) -> EquilibriumState:
     """Return the settled state begun where nothing rubs, all that touches there slipping at a bound that grows.
 
     A low bound with a large coefficient of friction is felt where hardly anything presses: there slip is a bad guess.

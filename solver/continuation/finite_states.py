@@ -15,9 +15,9 @@ from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.load_path import Aim, Way, press_and_drag
 from solver.equilibrium.loads import pull_of, sliding_pull
-from solver.equilibrium.newton import BY_DEPTH, Given, Newton, Pull, Shape
+from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, Given, Newton, Pull
 from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
-from solver.progress import tell
+from solver.progress import report_progress
 from solver.scene import Scene
 
 FEW = 10  # iterations from a state nearby to one that is simple to find: 4 to 7 are usual
@@ -35,8 +35,12 @@ SETTLED = 1e-10  # relative change of the ending's SED in a step, with every tou
 
 
 def settled(
-    finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], start: Shape | None = None, times: float = 1.0
-) -> Shape:
+    finger: FiniteFinger,
+    scene: Scene,
+    stop: Callable[[], bool],
+    start: EquilibriumState | None = None,
+    times: float = 1.0,
+) -> EquilibriumState:
     """Return the settled state of a scene, sought first from `start`, a proven state nearby.
 
     Where it depends on its way, that has so many `times` the usual load steps; such a state has a pull without sense.
@@ -49,7 +53,9 @@ def settled(
     return steady(finger, sliding_pull(scene), start=start, stop=stop)
 
 
-def nearby(finger: FiniteFinger, scene: Scene, start: Shape, stop: Callable[[], bool] = lambda: False) -> Shape | None:
+def nearby(
+    finger: FiniteFinger, scene: Scene, start: EquilibriumState, stop: Callable[[], bool] = lambda: False
+) -> EquilibriumState | None:
     """Return the settled slide that lies a few iterations from `start`, or None where none that stands is so near.
 
     Raises Cancelled where `stop` says so.
@@ -67,7 +73,9 @@ def nearby(finger: FiniteFinger, scene: Scene, start: Shape, stop: Callable[[], 
         return None
 
 
-def roughly(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: Shape | None = None) -> Shape:
+def roughly(
+    finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: EquilibriumState | None = None
+) -> EquilibriumState:
     """Return a state near the settled one, from which others may start if it is `sound`. Raises as `settled`.
 
     It is sought first from `near`, the settled state of a surface that slides the same way.
@@ -88,8 +96,13 @@ def roughly(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: 
 
 
 def _settled_under(
-    finger: FiniteFinger, scene: Scene, force: float, stop: Callable[[], bool], start: Shape | None, times: float
-) -> Shape:
+    finger: FiniteFinger,
+    scene: Scene,
+    force: float,
+    stop: Callable[[], bool],
+    start: EquilibriumState | None,
+    times: float,
+) -> EquilibriumState:
     """Return the settled state under the forces of a scene, depth and shift found. Raises as `settled`."""
     direction, drag = scene.loading.direction, scene.tangential_force
     if direction == 0 and scene.friction.mu > 0.0:
@@ -131,8 +144,8 @@ def _under_force(scene: Scene, force: float, failure: SolveFailure) -> SolveFail
 
 
 def _sliding_under(
-    finger: FiniteFinger, scene: Scene, force: float, stop: Callable[[], bool], start: Shape | None
-) -> Shape:
+    finger: FiniteFinger, scene: Scene, force: float, stop: Callable[[], bool], start: EquilibriumState | None
+) -> EquilibriumState:
     """Return settled sliding under the normal force of a scene, from `start` or reached as the force grows."""
     newton = finger.newton
     pull = sliding_pull(scene)
@@ -148,7 +161,7 @@ def _sliding_under(
             begin = all_at_the_bound(newton, pull._replace(depth=bare.pull.depth), LEADING, stop)
             found = _at_force(newton, begin, force, stop)
             return steady(finger, found.pull, start=found, stop=stop)
-    shape: Shape | None = None
+    shape: EquilibriumState | None = None
     try:
         for reached in _grown(newton, pull, force, stop):
             shape = reached
@@ -160,7 +173,7 @@ def _sliding_under(
     return steady(finger, shape.pull, start=shape, stop=stop)
 
 
-def _grown(newton: Newton, pull: Pull, force: float, stop: Callable[[], bool]) -> Iterator[Shape]:
+def _grown(newton: Newton, pull: Pull, force: float, stop: Callable[[], bool]) -> Iterator[EquilibriumState]:
     """Yield slides with the friction of `pull` as the normal force grows to `force`. Raises NotConverged."""
     begin = finite_forced.untouched(newton, pull.mu, pull.tau)
     begin = replace(begin, pull=begin.pull._replace(sense=pull.sense))
@@ -168,7 +181,7 @@ def _grown(newton: Newton, pull: Pull, force: float, stop: Callable[[], bool]) -
     return finite_forced.march(newton, begin, Given(0.0, None), grows, stop)
 
 
-def _at_force(newton: Newton, start: Shape, force: float, stop: Callable[[], bool]) -> Shape:
+def _at_force(newton: Newton, start: EquilibriumState, force: float, stop: Callable[[], bool]) -> EquilibriumState:
     """Return the slide that presses with `force` [N/mm], its depth sought from `start` on. Raises NotConverged."""
     shape, depth = start, start.pull.depth
     for _ in range(SEARCHES):
@@ -184,7 +197,7 @@ def _at_force(newton: Newton, start: Shape, force: float, stop: Callable[[], boo
     raise NotConverged(f"No depth was found at which the finger presses with {force:.4g} N/mm: give a depth instead.")
 
 
-def _deeper(finger: FiniteFinger, shape: Shape, force: float, stop: Callable[[], bool]) -> Shape:
+def _deeper(finger: FiniteFinger, shape: EquilibriumState, force: float, stop: Callable[[], bool]) -> EquilibriumState:
     """Return settled sliding under `force` [N/mm] deeper than `shape`, from where it did not grow on.
 
     How deep sliding goes, and how hard it presses there, is told by `limit_point`; but only where driven a little
@@ -197,7 +210,9 @@ def _deeper(finger: FiniteFinger, shape: Shape, force: float, stop: Callable[[],
     return steady(finger, found.pull, start=found, stop=stop)
 
 
-def _risen_to(finger: FiniteFinger, shape: Shape, proof: reach.Reach, force: float, stop: Callable[[], bool]) -> Shape:
+def _risen_to(
+    finger: FiniteFinger, shape: EquilibriumState, proof: reach.Reach, force: float, stop: Callable[[], bool]
+) -> EquilibriumState:
     """Return a slide beyond the depth at which `proof` ends that presses with `force` [N/mm] or more.
 
     Depths grow by as much as limits of two meshes differ. Raises NoSteadyState between a depth with a state and one
@@ -205,7 +220,7 @@ def _risen_to(finger: FiniteFinger, shape: Shape, proof: reach.Reach, force: flo
     """
     depth, most = proof.value, float(proof.numbers[1])
     while most < force:
-        tell("trying whether the finger slides deeper than it was followed to", most / force)
+        report_progress("trying whether the finger slides deeper than it was followed to", most / force)
         try:
             shape = steady(finger, shape.pull._replace(depth=(1.0 + APART) * depth), start=shape, stop=stop)
         except NoSteadyState as failure:
@@ -214,7 +229,7 @@ def _risen_to(finger: FiniteFinger, shape: Shape, proof: reach.Reach, force: flo
     return shape
 
 
-def depends_on_way(scene: Scene, shape: Shape) -> bool:
+def depends_on_way(scene: Scene, shape: EquilibriumState) -> bool:
     """Return whether a state is the end of a course and not a settled slide, found directly."""
     return shape.pull.sense == 0 and scene.friction.mu > 0.0
 
@@ -229,7 +244,7 @@ def course(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], times: 
     loading, count = scene.loading_per_mm, round(PRESSES * times)
     good = GOOD if scene.normal_force is not None else min(GOOD, CLOSE * loading.depth)
     way = Way(finger.newton, pull_of(scene), loading, good, stop)
-    press_and_drag(way, loading, lambda part: tell("pressing and dragging step by step", part), count, count)
+    press_and_drag(way, loading, lambda part: report_progress("pressing and dragging step by step", part), count, count)
     if not loading.dragged:
         for direction in loading.directions:
             _settle(way, finger, direction * loading.speed, times)
@@ -242,7 +257,7 @@ def _settle(way: Way, finger: FiniteFinger, speed: float, times: float) -> None:
     sed, step = finger.sed_ending(way.last), STRIDE / times * depth
     longest = int(LONGEST / STRIDE * times)
     for number in range(longest):
-        tell("sliding until nothing changes", number / longest)
+        report_progress("sliding until nothing changes", number / longest)
         way.go(Aim(way.aim.time + step / abs(speed), way.aim.press, way.aim.along + float(np.sign(speed)) * step))
         before, sed = sed, finger.sed_ending(way.last)
         if not (way.last.state == STICK).any() and abs(sed - before) * times <= SETTLED * sed:

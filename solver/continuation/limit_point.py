@@ -11,11 +11,11 @@ from functools import lru_cache
 
 from solver.arrays import Array
 from solver.body.tissues import finite_laws
-from solver.continuation.arc_length import CREASE, LARGEST_MU, TOLERANCE, Branch, followed
+from solver.continuation.arc_length import CREASE, LARGEST_MU, TOLERANCE, Branch, continue_branch
 from solver.continuation.surface_instability import folds_at
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, Pull, Shape
+from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, Pull
 from solver.failures import NotConverged
 from solver.mesh.mesher import EPIDERMIS, Sizing
 from solver.scene import Finger, Materials, Receptor, Scene
@@ -75,15 +75,15 @@ def of_depth(scene: Scene, pull: Pull, stop: Callable[[], bool] = lambda: False)
     return _reach(_asked(scene, pull, BY_DEPTH, pull.depth, stop))
 
 
-def sound(finger: FiniteFinger, shape: Shape, least: float = SOUND) -> bool:
+def sound(finger: FiniteFinger, shape: EquilibriumState, least: float = SOUND) -> bool:
     """Return whether the skin is nowhere squeezed to `least`, has no crease and does not cross itself."""
-    pinch = finger.pinch(shape)
-    return pinch.lowest >= least and pinch.kink <= CREASE and not finger.crosses(shape)
+    compression = finger.skin_compression(shape)
+    return compression.lowest >= least and compression.kink <= CREASE and not finger.crosses(shape)
 
 
-def folded(finger: FiniteFinger, shape: Shape) -> bool:
+def folded(finger: FiniteFinger, shape: EquilibriumState) -> bool:
     """Return whether the skin has a crease or crosses itself."""
-    return finger.pinch(shape).kink > CREASE or finger.crosses(shape)
+    return finger.skin_compression(shape).kink > CREASE or finger.crosses(shape)
 
 
 def _asked(scene: Scene, pull: Pull, by: int, target: float, stop: Callable[[], bool]) -> _Question:
@@ -106,7 +106,7 @@ def _reach(asked: _Question) -> Reach:
 
 
 def _finely(
-    finger: FiniteFinger, states: tuple[Shape, ...], asked: _Question, folds: float
+    finger: FiniteFinger, states: tuple[EquilibriumState, ...], asked: _Question, folds: float
 ) -> tuple[FiniteFinger, Branch, float]:
     """Follow the branch on a mesh that is fine where the last of these `states` is squeezed most; return that place."""
     place = _squeezed(finger, states[-1])
@@ -114,10 +114,10 @@ def _finely(
     return fine, _followed(fine, _begun(fine, finger, states, asked), asked, folds), place
 
 
-def _followed(finger: FiniteFinger, start: Shape, asked: _Question, folds: float) -> Branch:
+def _followed(finger: FiniteFinger, start: EquilibriumState, asked: _Question, folds: float) -> Branch:
     """Return the branch from `start` on. Beyond LARGEST_MU the bound decides, and what is asked for is a step away."""
     target = asked.target if asked.by == BY_DEPTH else min(asked.target, LARGEST_MU)
-    branch = followed(finger, start, asked.by, target, folds, asked.stop)
+    branch = continue_branch(finger, start, asked.by, target, folds, asked.stop)
     if branch.limited or target == asked.target:
         return branch
     last = settled(finger.newton, branch.last.pull._replace(mu=asked.target), branch.last, TOLERANCE, asked.stop)
@@ -125,17 +125,17 @@ def _followed(finger: FiniteFinger, start: Shape, asked: _Question, folds: float
 
 
 def _told(finger: FiniteFinger, branch: Branch, folds: float) -> Reach:
-    least = finger.pinch(branch.last).least
+    least = finger.skin_compression(branch.last).least
     return Reach(float(branch.value), branch.limited, branch.lost, least, folds, finger.numbers(branch.last))
 
 
-def _squeezed(finger: FiniteFinger, shape: Shape) -> float:
+def _squeezed(finger: FiniteFinger, shape: EquilibriumState) -> float:
     """Return the arc position where the skin is squeezed most [mm]."""
-    place = finger.pinch(shape).place
+    place = finger.skin_compression(shape).place
     return float(finger.geometry.arcs[place : place + 2].mean())
 
 
-def _start(finger: FiniteFinger, asked: _Question) -> Shape:
+def _start(finger: FiniteFinger, asked: _Question) -> EquilibriumState:
     """Return the state at which the branch begins. Raises NotConverged."""
     if asked.by == BY_FRICTION:
         return settled(finger.newton, asked.pull, None, TOLERANCE, asked.stop)
@@ -152,16 +152,18 @@ def _start(finger: FiniteFinger, asked: _Question) -> Shape:
     )
 
 
-def _begun(fine: FiniteFinger, rough: FiniteFinger, states: tuple[Shape, ...], asked: _Question) -> Shape:
+def _begun(
+    fine: FiniteFinger, rough: FiniteFinger, states: tuple[EquilibriumState, ...], asked: _Question
+) -> EquilibriumState:
     """Return a state of the branch on the `fine` mesh from which to go on: the last that is as good on the rough one.
 
     Raises NotConverged.
     """
     for state in reversed(states):
-        if rough.pinch(state).lowest < SMOOTH:
+        if rough.skin_compression(state).lowest < SMOOTH:
             continue
         try:
-            shape = settled(fine.newton, state.pull, fine.brought(state, rough), TOLERANCE, asked.stop)
+            shape = settled(fine.newton, state.pull, fine.transfer(state, rough), TOLERANCE, asked.stop)
         except NotConverged:
             continue
         if sound(fine, shape) or state is states[0]:

@@ -8,19 +8,23 @@ import numpy as np
 from solver import _kernels as kernels
 from solver.body.finite_measures import deformation
 from solver.constitutive.hyperelastic import Law
-from solver.contact.skin_compression import Pinch
-from solver.continuation.arc_length import LARGEST_MU, followed, leapt
+from solver.contact.skin_compression import SkinCompression
+from solver.continuation.arc_length import LARGEST_MU, continue_branch, jumped_branch
 from solver.continuation.surface_instability import folds_at
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import BY_FRICTION, FiniteNewton, Pull, Shape
+from solver.equilibrium.newton import BY_FRICTION, EquilibriumState, FiniteNewton, Pull
 from solver.failures import NoSteadyState, NotConverged
 
 CRUSHED = 0.3  # det F in a corner of what is held, below which the mesh ends the branch and not the body
 
 
 def steady(
-    newton: FiniteNewton, pull: Pull, skin: Law, start: Shape | None = None, stop: Callable[[], bool] = lambda: False
-) -> Shape:
+    newton: FiniteNewton,
+    pull: Pull,
+    skin: Law,
+    start: EquilibriumState | None = None,
+    stop: Callable[[], bool] = lambda: False,
+) -> EquilibriumState:
     """Return the settled sliding state under `pull`, followed on this mesh from the one without friction.
 
     That is sought from undeformed, or from `start`. `skin` is the law of what may fold. Raises NoSteadyState where the
@@ -30,14 +34,14 @@ def steady(
     """
     body = _OwnBody(newton)
     bare = settled(newton, pull._replace(mu=0.0), start, stop=stop)
-    branch = followed(body, bare, BY_FRICTION, min(pull.mu, LARGEST_MU), folds_at(skin), stop)
+    branch = continue_branch(body, bare, BY_FRICTION, min(pull.mu, LARGEST_MU), folds_at(skin), stop)
     where = f"at {pull.depth:.4g} mm settled sliding was followed up to mu = {branch.value:.3g}"
     if branch.limited and (branch.lost or body.spoilt(branch.last)):
         raise NotConverged(f"{where} and lost there; whether there is any at mu = {pull.mu:.3g} is not known")
     if branch.limited:
         raise NoSteadyState(f"{where}, where it ends on this mesh", limit_mu=branch.value)
     found = settled(newton, pull, branch.last, stop=stop)
-    if leapt(body, branch.last, found):
+    if jumped_branch(body, branch.last, found):
         raise NotConverged(f"{where}, and beyond only with its skin folded")
     return found
 
@@ -48,17 +52,17 @@ class _OwnBody:
 
     newton: FiniteNewton
 
-    def pinch(self, shape: Shape) -> Pinch:
+    def skin_compression(self, shape: EquilibriumState) -> SkinCompression:
         """Return how far the skin is squeezed, and whether it has a crease."""
         mesh, every = self.newton.body.mesh, np.ones(len(shape.state) // 2, bool)
-        return Pinch(*kernels.pinched(mesh.nodes, shape.u, mesh.skin, every, shape.state, 0))
+        return SkinCompression(*kernels.pinched(mesh.nodes, shape.u, mesh.skin, every, shape.state, 0))
 
-    def crosses(self, shape: Shape) -> bool:
+    def crosses(self, shape: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
         mesh = self.newton.body.mesh
         return kernels.crosses(mesh.nodes, shape.u, mesh.skin)
 
-    def spoilt(self, shape: Shape) -> bool:
+    def spoilt(self, shape: EquilibriumState) -> bool:
         """Return whether contact has come to an end of the skin, or an element is crushed."""
         det = np.linalg.det(deformation(self.newton.body, shape.u))
         return bool(shape.touching[[0, -1]].any() or det.min() < CRUSHED)

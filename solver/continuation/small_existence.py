@@ -7,15 +7,15 @@ from numpy.linalg import LinAlgError
 
 from solver._kernels import STICK
 from solver.continuation.small_states import followed_under, settled
-from solver.continuation.wedging import followed, limits
+from solver.continuation.wedging import continue_branch, limits
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.loads import sliding_pull
-from solver.equilibrium.newton import Shape
+from solver.equilibrium.newton import EquilibriumState
 from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.scene import Scene
 
 
-def direct(scene: Scene, finger: FingerModel, times: float = 1.0, *, widest: bool) -> Shape | None:
+def direct(scene: Scene, finger: FingerModel, times: float = 1.0, *, widest: bool) -> EquilibriumState | None:
     """Return the settled state; None where contact must be looked for on more of the skin than this, not the `widest`.
 
     Where it depends on its way, that takes so many `times` the usual load steps. Near a limit, or beyond it, guesses
@@ -23,7 +23,7 @@ def direct(scene: Scene, finger: FingerModel, times: float = 1.0, *, widest: boo
     following the state from mu = 0 counts. Raises NoSteadyState, NotConverged.
     """
     direction = scene.loading.direction
-    state: Shape | None = None
+    state: EquilibriumState | None = None
     try:
         state = settled(scene, finger, times)
         on_way = direction == 0 or bool((state.state == STICK).any())
@@ -37,7 +37,7 @@ def direct(scene: Scene, finger: FingerModel, times: float = 1.0, *, widest: boo
     if direction == 0:
         raise _no_answer(scene, why, 0.0)
     if scene.normal_force is None:
-        reached, limit = followed(finger.newton, sliding_pull(scene))
+        reached, limit = continue_branch(finger.newton, sliding_pull(scene))
     else:
         reached, limit = followed_under(scene, finger)
     if reached is None:
@@ -45,7 +45,7 @@ def direct(scene: Scene, finger: FingerModel, times: float = 1.0, *, widest: boo
     return reached
 
 
-def _folded(finger: FingerModel, state: Shape) -> bool:
+def _folded(finger: FingerModel, state: EquilibriumState) -> bool:
     """Return whether tissue is turned inside out somewhere, as in states that no sliding leads to."""
     return bool(np.prod(finger.stretches(finger.displacement(state)), axis=0).min() <= 0.0)
 

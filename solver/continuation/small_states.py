@@ -9,14 +9,14 @@ from solver._kernels import SHEAR_LIMITED, STICK
 from solver.arrays import Array
 from solver.body.tissues import relaxing_laws
 from solver.contact.law import STEEP
-from solver.continuation.wedging import followed
+from solver.continuation.wedging import continue_branch
 from solver.equilibrium.expected_depth import DEEPEST, within_reach
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.full_slip import settled as full_slip
 from solver.equilibrium.full_slip import slide_beside, slide_under
 from solver.equilibrium.load_path import PRESSING_STEPS, PRESSING_TIME, Instant, Progress, march
 from solver.equilibrium.loads import forces_of, pull_of, sliding_pull
-from solver.equilibrium.newton import Newton, Shape
+from solver.equilibrium.newton import EquilibriumState, Newton
 from solver.equilibrium.relaxation import RelaxingBody, RelaxingWay, march_relaxing
 from solver.equilibrium.step_error import HALF
 from solver.failures import ContactLost, NoSteadyState, beyond_friction
@@ -27,7 +27,7 @@ NUDGE = 1e-4  # of the coefficient of friction, or of the bound of a settled sli
 FURTHER = 1e-2  # of the traction bound, to see what it does on a whole course
 
 
-def settled(scene: Scene, finger: FingerModel, times: float = 1.0) -> Shape:
+def settled(scene: Scene, finger: FingerModel, times: float = 1.0) -> EquilibriumState:
     """Return the settled state, without its history where it has none left, else in `times` the usual load steps.
 
     Raises NotConverged, ContactLost where no slide was found, and NoSteadyState where a given drag is more than
@@ -56,8 +56,8 @@ def settled(scene: Scene, finger: FingerModel, times: float = 1.0) -> Shape:
     return march(newton, pull_of(scene), loading, times=times)[-1].state
 
 
-def followed_under(scene: Scene, finger: FingerModel) -> tuple[Shape | None, float]:
-    """Return settled sliding under the normal force of a scene, followed from mu = 0, as `wedging.followed` does.
+def followed_under(scene: Scene, finger: FingerModel) -> tuple[EquilibriumState | None, float]:
+    """Return full slip under the normal force of a scene, continued from mu = 0 as `wedging.continue_branch` does.
 
     Raises NoSteadyState where that force presses the finger to its bone.
     """
@@ -67,13 +67,13 @@ def followed_under(scene: Scene, finger: FingerModel) -> tuple[Shape | None, flo
         first = slide_under(finger.newton, pull._replace(mu=0.0), force, deepest)
     except ContactLost:
         return None, 0.0
-    reached, limit = followed(finger.newton, pull, force, first)
+    reached, limit = continue_branch(finger.newton, pull, force, first)
     if limit == 0.0:
         in_tissue(scene, finger, first.pull.depth)
     return reached, limit
 
 
-def gives_way(scene: Scene, finger: FingerModel, state: Shape) -> bool:
+def gives_way(scene: Scene, finger: FingerModel, state: EquilibriumState) -> bool:
     """Return whether a settled slide under a given force would be less deep under a little more force."""
     force = scene.normal_force
     if force is None or scene.loading.direction == 0 or (state.state == STICK).any():
@@ -94,7 +94,7 @@ def in_tissue(scene: Scene, finger: FingerModel, depth: float) -> None:
     within_reach(scene, depth, most)
 
 
-def depends_on_way(scene: Scene, state: Shape) -> bool:
+def depends_on_way(scene: Scene, state: EquilibriumState) -> bool:
     """Return whether a state is the end of a course and not a settled slide."""
     pressed = scene.loading.direction == 0 and not pull_of(scene).frictionless
     return pressed or bool((state.state == STICK).any())
@@ -115,14 +115,16 @@ def marched(
     return tuple(way.instants), np.array(way.sed)
 
 
-def end(scene: Scene, finger: FingerModel, times: float = 1.0) -> Shape:
+def end(scene: Scene, finger: FingerModel, times: float = 1.0) -> EquilibriumState:
     """Return the end of a course that it depends on. Raises NotConverged."""
     if scene.materials.relax and scene.solve.course == "history":
         return marched(scene, finger, times=times)[0][-1].state
     return march(finger.newton, pull_of(scene), scene.loading_per_mm, times=times)[-1].state
 
 
-def refined(scene: Scene, finger: FingerModel, state: Shape, displacement: Array) -> tuple[Shape, Array]:
+def refined(
+    scene: Scene, finger: FingerModel, state: EquilibriumState, displacement: Array
+) -> tuple[EquilibriumState, Array]:
     """Return a state and its displacement (nodes, 2) once more, with less round-off: balanced, the skin on the surface.
 
     The elimination leaves some 1e-13 of the forces unbalanced, which falls by processor: a Newton step from the forces
@@ -139,7 +141,7 @@ def refined(scene: Scene, finger: FingerModel, state: Shape, displacement: Array
     return replace(again, u=state.u + again.u, iterations=state.iterations), recover(again.u)
 
 
-def rubbed_more(scene: Scene, finger: FingerModel, state: Shape) -> Shape | None:
+def rubbed_more(scene: Scene, finger: FingerModel, state: EquilibriumState) -> EquilibriumState | None:
     """Return the state beside a settled slide, its coefficient of friction a little larger; None where there is none.
 
     Nor is there one where forces are given, since those do not grow without bound.
@@ -153,7 +155,7 @@ def rubbed_more(scene: Scene, finger: FingerModel, state: Shape) -> Shape | None
         return None
 
 
-def bounded_more(scene: Scene, finger: FingerModel, state: Shape) -> Shape | None:
+def bounded_more(scene: Scene, finger: FingerModel, state: EquilibriumState) -> EquilibriumState | None:
     """Return the state beside a settled slide, its bound a little larger; None where there is none, or it matters not.
 
     It does where friction is so steep that skin slips at the bound up to an edge of contact.
@@ -170,7 +172,7 @@ def bounded_more(scene: Scene, finger: FingerModel, state: Shape) -> Shape | Non
         return None
 
 
-def nearest(scene: Scene, finger: FingerModel) -> Shape:
+def nearest(scene: Scene, finger: FingerModel) -> EquilibriumState:
     """Return the settled state on a coarser mesh, whose friction limit may lie just below the drag asked for.
 
     Where no guess leads to it, as with large coefficients, it is followed from mu = 0. Raises as `settled`.
@@ -184,19 +186,19 @@ def nearest(scene: Scene, finger: FingerModel) -> Shape:
     except ContactLost:
         if scene.normal_force is not None or scene.loading.direction == 0:
             raise
-        reached, _ = followed(finger.newton, sliding_pull(scene))
+        reached, _ = continue_branch(finger.newton, sliding_pull(scene))
         if reached is None:
             raise
         return reached
 
 
-def shift_of(scene: Scene, state: Shape) -> float | None:
+def shift_of(scene: Scene, state: EquilibriumState) -> float | None:
     """Return how far the bone was shifted along +x [mm] by a given drag; None where it slides or is only pressed."""
     held = scene.loading.dragged and state.pull.sense == 0 and not state.pull.frictionless
     return 0.0 - state.pull.travel if held else None
 
 
-def felt_of_bound(scene: Scene, finger: FingerModel, half: Shape) -> Array:
+def sensitivity_to_bound(scene: Scene, finger: FingerModel, half: EquilibriumState) -> Array:
     """Return how the numbers (6,) at the end of a course answer to the traction bound: relative change by its own.
 
     `half` is the end in half the usual steps. Zero where nothing slips at the bound. Raises as `end`.

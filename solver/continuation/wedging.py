@@ -12,7 +12,7 @@ from math import log2, sqrt
 from solver.body.linear import LinearBody
 from solver.body.tissues import settled_moduli
 from solver.equilibrium.full_slip import settled, slide_beside, slide_under
-from solver.equilibrium.newton import Newton, Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, Newton, Pull
 from solver.failures import ContactLost
 from solver.mesh.mesher import Sizing, finger_mesh
 from solver.scene import Scene
@@ -26,9 +26,9 @@ LEAST = 1e-3  # part of a depth or force below which no limit of it is looked fo
 CLOSE = 0.005  # relative step of mu below which a limit is taken as found
 
 
-def followed(
-    newton: Newton, pull: Pull, force: float | None = None, first: Shape | None = None
-) -> tuple[Shape | None, float]:
+def continue_branch(
+    newton: Newton, pull: Pull, force: float | None = None, first: EquilibriumState | None = None
+) -> tuple[EquilibriumState | None, float]:
     """Return the settled sliding state under `pull` reached by following it from mu = 0, and the largest mu with one.
 
     The state is None where that mu falls short of the pull's. Under a normal `force`, `first` is the state at mu = 0;
@@ -101,7 +101,7 @@ def _deepest(bodies: Bodies, pull: Pull, high: float, low: float | None = None) 
     """
 
     def slides(depth: float) -> bool:
-        return followed(bodies.at(depth), pull._replace(depth=depth))[0] is not None
+        return continue_branch(bodies.at(depth), pull._replace(depth=depth))[0] is not None
 
     least = LEAST * high
     while low is None:
@@ -110,7 +110,7 @@ def _deepest(bodies: Bodies, pull: Pull, high: float, low: float | None = None) 
         low, high = (high / 2.0, high) if slides(high / 2.0) else (None, high / 2.0)
     found = _largest(slides, low, high)
     finer = bodies.made_for(found, FINER * FINENESS)
-    ends = [followed(finer, pull._replace(depth=part * found))[0] is None for part in (0.97, 1.03)]
+    ends = [continue_branch(finer, pull._replace(depth=part * found))[0] is None for part in (0.97, 1.03)]
     return found if ends == [False, True] else None
 
 
@@ -122,8 +122,8 @@ def _strongest(bodies: Bodies, scene: Scene, force: float, pull: Pull) -> tuple[
     depths, bone = [0.0], scene.finger.pulp_thickness()
     bare = pull._replace(mu=0.0)
 
-    def reached(newton: Newton, force: float) -> Shape | None:
-        return followed(newton, pull, force, slide_under(newton, bare, force, bone))[0]
+    def reached(newton: Newton, force: float) -> EquilibriumState | None:
+        return continue_branch(newton, pull, force, slide_under(newton, bare, force, bone))[0]
 
     def rubless(force: float) -> float:
         return slide_under(bodies.at(bone / 2.0), bare, force, bone).pull.depth

@@ -11,7 +11,7 @@ import numpy as np
 from solver.arrays import Array
 from solver.body.validation import check_loads
 from solver.equilibrium.load_stepping import StepControl, advance
-from solver.equilibrium.newton import FiniteNewton, Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Pull
 from solver.failures import NotConverged
 
 
@@ -20,9 +20,9 @@ def loaded(
     loads: Array | None = None,
     prescribed: Array | None = None,
     pull: Pull | None = None,
-    start: Shape | None = None,
+    start: EquilibriumState | None = None,
     steps: int = 4,
-) -> Shape:
+) -> EquilibriumState:
     """Return the equilibrium under dead `loads` (nodes, 2) [N/mm], what is held displaced by `prescribed` [mm].
 
     `prescribed` (nodes, 2) is 0 where nothing holds. From undeformed, or from `start` (whose contact states are then
@@ -34,7 +34,7 @@ def loaded(
     body = newton.body
     check_loads(body.mesh, loads, prescribed)
     loads, prescribed = (None if given is None else np.asarray(given, np.float64) for given in (loads, prescribed))
-    shape = Shape.undeformed(body) if start is None else start
+    shape = EquilibriumState.undeformed(body) if start is None else start
     pull = (shape.pull if pull is None else pull).checked()
     shape = replace(shape, pull=pull)
     vector = np.zeros(body.size) if loads is None else _on_unknowns(newton, loads)

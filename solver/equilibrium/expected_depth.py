@@ -9,7 +9,7 @@ from numpy.linalg import LinAlgError
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.full_slip import slide_under
 from solver.equilibrium.loads import sliding_pull
-from solver.equilibrium.newton import Shape
+from solver.equilibrium.newton import EquilibriumState
 from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.mesh.grid import MeshError
 from solver.mesh.mesher import Sizing
@@ -96,7 +96,7 @@ def _finger(bare: Scene) -> FingerModel:
     return FingerModel.of(bare, Sizing(FINENESS, bare.loading.depth))
 
 
-def _pressed(finger: FingerModel, scene: Scene, normal_force: float, deepest: float) -> Shape | None:
+def _pressed(finger: FingerModel, scene: Scene, normal_force: float, deepest: float) -> EquilibriumState | None:
     """Return the settled slide under a normal force [N/mm], None where none is less deep than `deepest` [mm]."""
     try:
         found = slide_under(finger.newton, sliding_pull(scene), normal_force, deepest)

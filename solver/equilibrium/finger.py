@@ -14,7 +14,7 @@ from solver.body.stiffness import Probes
 from solver.body.tissues import settled_moduli
 from solver.contact.edges import arcs_of, width
 from solver.element import Q2P1
-from solver.equilibrium.newton import Newton, Shape
+from solver.equilibrium.newton import EquilibriumState, Newton
 from solver.mesh import distinct
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
 from solver.prediction import ROW
@@ -70,7 +70,7 @@ class FingerModel:
         """The iterations on its body."""
         return Newton(self.body.condensed)
 
-    def relaxed(self, state: Shape) -> Shape:
+    def relaxed(self, state: EquilibriumState) -> EquilibriumState:
         """Return a state of tissues that relax with the displacements that its forces hold once they have."""
         skin = self.body.condensed
         free = np.flatnonzero(skin.stiffness.diagonal() > 0.0)  # what is held along the surface has none
@@ -78,7 +78,7 @@ class FingerModel:
         u[free] = np.linalg.solve(skin.stiffness[np.ix_(free, free)], (skin.load + state.reaction.ravel())[free])
         return replace(state, u=u.reshape(-1, 2))
 
-    def displacement(self, state: Shape) -> Array:
+    def displacement(self, state: EquilibriumState) -> Array:
         """Return the displacement (nodes, 2) of all nodes relative to the bone [mm]."""
         return self.body.displacement(state.u)
 
@@ -86,21 +86,21 @@ class FingerModel:
         """Return the SED averaged over the reference ending [MPa] for displacements (nodes, 2)."""
         return float(self.ending.average(self.geometry.mesh, self.body.elastic, displacement[:, :, None])[0, 0])
 
-    def seds(self, states: Sequence[Shape]) -> Array:
+    def seds(self, states: Sequence[EquilibriumState]) -> Array:
         """Return the SED of the reference ending and in its middle (c, 2) [MPa] of several states."""
         return self._averaged(states, self.ending, self.point)
 
-    def numbers(self, states: Sequence[Shape]) -> Array:
+    def numbers(self, states: Sequence[EquilibriumState]) -> Array:
         """Return what errors are estimated of (c, 3): SED of the ending, normal and tangential force along +x."""
         forces = [(state.normal.sum(), state.tangential.sum()) for state in states]
         return np.column_stack([self._averaged(states, self.ending)[:, 0], forces])
 
-    def all_numbers(self, state: Shape) -> Array:
+    def all_numbers(self, state: EquilibriumState) -> Array:
         """Return them, the depth, the bone's shift along +x and the contact width (6,)."""
         found = state.pull.depth, 0.0 - state.pull.travel, self.contact_width(state)
         return np.concatenate([self.numbers([state])[0], found])
 
-    def _averaged(self, states: Sequence[Shape], *patches: Endings) -> Array:
+    def _averaged(self, states: Sequence[EquilibriumState], *patches: Endings) -> Array:
         """Return the SED averaged over the first ending of each of the patches (c, p) [MPa], recovered there alone."""
         mesh, elastic = self.geometry.mesh, self.body.elastic
         nodes = distinct(np.concatenate([patch.nodes(mesh) for patch in patches]))
@@ -126,12 +126,12 @@ class FingerModel:
         plus, minus = np.sqrt(total + 2.0 * det), np.sqrt(np.maximum(total - 2.0 * det, 0.0))
         return np.stack([(plus - minus) / 2.0, (plus + minus) / 2.0])
 
-    def contact_width(self, state: Shape) -> float:
+    def contact_width(self, state: EquilibriumState) -> float:
         """Return how long the contact is along the surface [mm]."""
         x = state.place(self.body.condensed)[:, 0]
         return width(arcs_of(self.geometry), x, state.normal, state.touching)
 
-    def reaches_out(self, state: Shape, displacement: Array, indentation: float) -> bool:
+    def reaches_out(self, state: EquilibriumState, displacement: Array, indentation: float) -> bool:
         """Return whether skin outside the part that may touch would, so that the part must be made larger."""
         whole = self.geometry.whole
         below = self.geometry.mesh.nodes[whole, 1] + displacement[whole, 1] < indentation * (1.0 - 1e-9)

@@ -14,9 +14,9 @@ from solver.body.finite import FiniteBody, FiniteProbes
 from solver.body.receptor import endings, middle
 from solver.body.tissues import finite_laws
 from solver.contact.edges import edges, width
-from solver.contact.skin_compression import Pinch
-from solver.equilibrium.mesh_transfer import Bridge, Places
-from solver.equilibrium.newton import FiniteNewton, Shape
+from solver.contact.skin_compression import SkinCompression
+from solver.equilibrium.mesh_transfer import MeshTransfer, Places
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton
 from solver.mesh.grid import MeshError
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
 from solver.prediction import ROW
@@ -65,41 +65,48 @@ class FiniteFinger:
         body = self.newton.body
         return FiniteProbes.of(body, endings(self.geometry, body, self.scene.receptor, ROW))
 
-    def sed_ending(self, shape: Shape) -> float:
+    def sed_ending(self, shape: EquilibriumState) -> float:
         """Return the SED averaged over the reference ending [MPa]."""
         return float(self.ending.average(self.newton.body, shape.u)[0])
 
-    def seds(self, shape: Shape) -> tuple[float, float]:
+    def seds(self, shape: EquilibriumState) -> tuple[float, float]:
         """Return the SED averaged over the reference ending and that in its middle [MPa]."""
         return self.sed_ending(shape), float(self.point.average(self.newton.body, shape.u)[0])
 
-    def numbers(self, shape: Shape) -> Array:
+    def numbers(self, shape: EquilibriumState) -> Array:
         """Return what errors are estimated of: SED of the ending, normal and tangential force along +x (3,)."""
         along, up = shape.force
         return np.array([self.sed_ending(shape), up, along])
 
-    def all_numbers(self, shape: Shape) -> Array:
+    def all_numbers(self, shape: EquilibriumState) -> Array:
         """Return them, the depth, the bone's shift along +x and the contact width (6,)."""
         return np.array([*self.numbers(shape), shape.pull.depth, 0.0 - shape.pull.travel, self.contact_width(shape)])
 
-    def brought(self, shape: Shape, other: "FiniteFinger") -> Shape:
+    def transfer(self, shape: EquilibriumState, other: "FiniteFinger") -> EquilibriumState:
         """Return `shape`, found on `other`, as a start on this mesh."""
         return self.bridge(other).carried(shape)
 
-    def brought_on(self, now: Shape, before: Shape, other: "FiniteFinger", top: Shape, finest: "FiniteFinger") -> Shape:
+    def transfer_change(
+        self,
+        now: EquilibriumState,
+        before: EquilibriumState,
+        other: "FiniteFinger",
+        top: EquilibriumState,
+        finest: "FiniteFinger",
+    ) -> EquilibriumState:
         """Return `top`, found on `finest`, with what has changed from `before` to `now` on `other`, as a start here."""
         change = self.bridge(other).fields(now.u - before.u, now.pressure - before.pressure)
         u, pressure = self.bridge(finest).fields(top.u, top.pressure)
         return self.bridge(other).touched(now, u + change[0], pressure + change[1])
 
-    def bridge(self, other: "FiniteFinger") -> Bridge:
+    def bridge(self, other: "FiniteFinger") -> MeshTransfer:
         """Return the way here from the mesh of `other`, made when first asked for."""
         if other not in self._bridges:
-            self._bridges[other] = Bridge.of(other.places, self.places)
+            self._bridges[other] = MeshTransfer.of(other.places, self.places)
         return self._bridges[other]
 
     @cached_property
-    def _bridges(self) -> "WeakKeyDictionary[FiniteFinger, Bridge]":
+    def _bridges(self) -> "WeakKeyDictionary[FiniteFinger, MeshTransfer]":
         return WeakKeyDictionary()
 
     @cached_property
@@ -107,25 +114,27 @@ class FiniteFinger:
         """Where nodes and quadrature points lie, for states that are carried."""
         return Places.of(self.geometry, self.newton.body)
 
-    def runs_out(self, shape: Shape) -> bool:
+    def runs_out(self, shape: EquilibriumState) -> bool:
         """Return whether contact reaches an end of the skin that is looked at."""
         return bool(shape.state[0] != OPEN or shape.state[-1] != OPEN)
 
-    def pinch(self, shape: Shape) -> Pinch:
+    def skin_compression(self, shape: EquilibriumState) -> SkinCompression:
         """Return how far the skin is squeezed, and whether it has a crease."""
         geometry, first = self.geometry, self._first
-        return Pinch(*kernels.pinched(geometry.mesh.nodes, shape.u, geometry.whole, geometry.loose, shape.state, first))
+        return SkinCompression(
+            *kernels.pinched(geometry.mesh.nodes, shape.u, geometry.whole, geometry.loose, shape.state, first)
+        )
 
     @cached_property
     def _first(self) -> int:
         """The first node of the whole skin that may touch."""
         return int(np.searchsorted(self.geometry.whole, self.geometry.mesh.skin)[0])
 
-    def crosses(self, shape: Shape) -> bool:
+    def crosses(self, shape: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
         return kernels.crosses(self.geometry.mesh.nodes, shape.u, self.geometry.whole)
 
-    def least_at_cut(self, shape: Shape) -> float:
+    def least_at_cut(self, shape: EquilibriumState) -> float:
         """Return the least det F at the quadrature points of the two elements along the skin at its palmar end."""
         body, layers = self.newton.body, self.geometry.fat + len(self.geometry.depths) - 1
         near = slice(0, 2 * layers)
@@ -133,15 +142,15 @@ class FiniteFinger:
         by_x, by_y = body.grad_x[near] @ local, body.grad_y[near] @ local
         return float(((1.0 + by_x[..., 0]) * (1.0 + by_y[..., 1]) - by_x[..., 1] * by_y[..., 0]).min())
 
-    def edges(self, shape: Shape) -> tuple[float, float] | None:
+    def edges(self, shape: EquilibriumState) -> tuple[float, float] | None:
         """Return the arc positions [mm] where contact ends; None where it is too short to tell."""
         return edges(self.places.skin, shape.reaction[:, 1], shape.touching)
 
-    def contact_width(self, shape: Shape) -> float:
+    def contact_width(self, shape: EquilibriumState) -> float:
         """Return how long the contact is along the surface [mm]."""
         return width(self.places.skin, shape.place(self.newton.body)[:, 0], shape.reaction[:, 1], shape.touching)
 
-    def bounded_at_an_edge(self, shape: Shape) -> bool:
+    def bounded_at_an_edge(self, shape: EquilibriumState) -> bool:
         """Return whether skin slips at the traction bound at the last two nodes of an edge of contact that is known.
 
         A drag too small to matter does not count.

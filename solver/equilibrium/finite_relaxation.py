@@ -23,10 +23,10 @@ from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.load_path import DRAGGING_STEPS, LONG, PRESSING_STEPS, Aim, Way, press_and_drag
 from solver.equilibrium.load_stepping import never
 from solver.equilibrium.loads import pull_of
-from solver.equilibrium.newton import FiniteNewton, Newton, Shape
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Newton
 from solver.equilibrium.relaxation import RELAXED, wait
 from solver.failures import NotConverged
-from solver.progress import tell
+from solver.progress import report_progress
 from solver.scene import Loading, Scene
 
 FIRST, LARGEST = 0.02, 0.1  # steps of a slide, by the indentation; each a fifth longer than the one before
@@ -77,12 +77,12 @@ class RelaxingNewton(FiniteNewton):
         body.tensor = body.past.over(step).reshape(body.tensor.shape)
         body.found = None
 
-    def took(self, shape: Shape, step: float) -> None:
+    def took(self, shape: EquilibriumState, step: float) -> None:
         """Remember the step that was made ready and led to `shape`."""
         body = self.relaxing
         body.past = body.past.after(deformation(self.body, shape.u).reshape(-1, 2, 2), step)
 
-    def excess(self, shape: Shape) -> Array:
+    def excess(self, shape: EquilibriumState) -> Array:
         """Return the forces (e, 18) of the overstress on the nodes of the elements at `shape`."""
         body = self.body
         stress = overstress.stress(self.relaxing.tensor, deformation(body, shape.u))
@@ -111,7 +111,7 @@ class _Watched:
         self._probes, self._body = probes, body
         self._past = Past.at_rest(*_terms(laws, body.mesh.region[probes.element]))
 
-    def follow(self, shape: Shape, step: float) -> float:
+    def follow(self, shape: EquilibriumState, step: float) -> float:
         """Return the average energy density [MPa] at `shape`, reached by a `step` [s]."""
         probes, body = self._probes, self._body
         local = shape.u[body.nodes[probes.element]]
@@ -146,7 +146,7 @@ class RelaxingCourse(Way):
             for aim in aims:
                 self.go(aim)
 
-    def found(self, before: Shape, aim: Aim) -> Shape:
+    def found(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
         """Return the state at `aim`, and let the body come to it. Raises NotConverged."""
         step = aim.time - self.aim.time
         self.relaxing.ready(step)
@@ -158,7 +158,7 @@ class RelaxingCourse(Way):
 
     def _march(self, loading: Loading) -> None:
         def report(part: float) -> None:
-            tell("pressing and dragging step by step, since the tissues relax", part)
+            report_progress("pressing and dragging step by step, since the tissues relax", part)
 
         press_and_drag(self, loading, report, round(PRESSING_STEPS * self._times), round(DRAGGING_STEPS * self._times))
         if not loading.dragged:
@@ -171,7 +171,9 @@ class RelaxingCourse(Way):
         depth = self.instants[-1].depth
         step, distance = FIRST / self._times * depth, 0.0
         while distance < LONG * depth:
-            tell("sliding step by step until nothing sticks, since the tissues relax", distance / (LONG * depth))
+            report_progress(
+                "sliding step by step until nothing sticks, since the tissues relax", distance / (LONG * depth)
+            )
             self.go(Aim(self.aim.time + step / abs(speed), self.aim.press, self.aim.along + np.sign(speed) * step))
             distance += step
             step = min(1.2 * step, LARGEST / self._times * depth)
@@ -189,7 +191,7 @@ class RelaxingCourse(Way):
 
         def go(step: float) -> None:
             part = min((self.aim.time - begun) / longest, 1.0)
-            tell("waiting step by step until the tissues have relaxed", part)
+            report_progress("waiting step by step until the tissues have relaxed", part)
             self.go(Aim(self.aim.time + step, self.aim.press, self.aim.along + speed * step))
 
         wait(go, self.instants[-1].time - self.instants[-2].time, self._longest, self.sed, self._times)

@@ -10,15 +10,15 @@ from dataclasses import replace
 from solver._kernels import STICK
 from solver.arrays import Array
 from solver.equilibrium.load_stepping import advance
-from solver.equilibrium.newton import EQUILIBRIUM, Given, Newton, Pull, Shape, lowered
-from solver.equilibrium.root import UNMET, met
+from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Given, Newton, Pull, lowered
+from solver.equilibrium.root import UNMET, find_root
 from solver.failures import ContactLost, NotConverged, followed_to
-from solver.progress import tell
+from solver.progress import report_progress
 
 
 def corrected(
-    newton: Newton, shape: Shape, given: Given, origin: Array, before: float, *, kept: bool = False
-) -> tuple[Shape, float, int] | None:
+    newton: Newton, shape: EquilibriumState, given: Given, origin: Array, before: float, *, kept: bool = False
+) -> tuple[EquilibriumState, float, int] | None:
     """Return the shape after one iteration towards the forces, its largest displacement, and changed contact states.
 
     `origin` (k,) are the positions along x where the skin's nodes were when the surface had travelled `before`. With
@@ -36,7 +36,9 @@ def corrected(
     return after, max(largest, abs(deeper), abs(along)), changed
 
 
-def balanced(newton: Newton, start: Shape, given: Given, tolerance: float = 1e-8, limit: int = 30) -> Shape:
+def balanced(
+    newton: Newton, start: EquilibriumState, given: Given, tolerance: float = 1e-8, limit: int = 30
+) -> EquilibriumState:
     """Return the equilibrium under `given`, one backward Euler step from `start`, whose pull has friction and sense.
 
     Raises NotConverged where `limit` iterations do not do it.
@@ -50,7 +52,9 @@ def balanced(newton: Newton, start: Shape, given: Given, tolerance: float = 1e-8
     return _met_by_travel(newton, start, shape, given, tolerance, limit) if _slips_freely(shape, given) else shape
 
 
-def _iterated(newton: Newton, start: Shape, begin: Shape, given: Given, tolerance: float, limit: int) -> Shape:
+def _iterated(
+    newton: Newton, start: EquilibriumState, begin: EquilibriumState, given: Given, tolerance: float, limit: int
+) -> EquilibriumState:
     """Return the equilibrium one step from `start`, sought from `begin` on. Raises NotConverged."""
     origin, before = start.place(newton.condensed)[:, 0], start.pull.travel
     shape = begin
@@ -70,34 +74,40 @@ def _iterated(newton: Newton, start: Shape, begin: Shape, given: Given, toleranc
     raise NotConverged(f"no equilibrium within {limit} iterations")
 
 
-def _slips_freely(shape: Shape, given: Given) -> bool:
+def _slips_freely(shape: EquilibriumState, given: Given) -> bool:
     """Return whether all that touches slips, so that nothing was there to meet the given drag, and it is not met."""
     if given.tangential is None or not shape.pull.mu > 0.0 or (shape.state == STICK).any():
         return False
     return abs(shape.force[0] - given.tangential) > UNMET * shape.pull.mu * given.normal
 
 
-def _met_by_travel(newton: Newton, start: Shape, shape: Shape, given: Given, tolerance: float, limit: int) -> Shape:
+def _met_by_travel(
+    newton: Newton, start: EquilibriumState, shape: EquilibriumState, given: Given, tolerance: float, limit: int
+) -> EquilibriumState:
     """Return the equilibrium that meets the given drag, one step from `start`, its travel sought from `shape` on.
 
     The travel holds a body of which nothing sticks, and the drag grows with it. Raises NotConverged.
     """
     wanted, near = given.tangential or 0.0, shape
 
-    def at(travel: float) -> tuple[float, Shape]:
+    def at(travel: float) -> tuple[float, EquilibriumState]:
         nonlocal near
         near = _iterated(newton, start, near, Given(given.normal, None, travel), tolerance, limit)
         return float(near.force[0]) - wanted, near
 
-    found = met(at, shape.pull.travel, UNMET * shape.pull.mu * given.normal)
+    found = find_root(at, shape.pull.travel, UNMET * shape.pull.mu * given.normal)
     if found is None:
         raise NotConverged("no travel meets the drag")
     return found
 
 
 def march(
-    newton: Newton, start: Shape, begin: Given, course: Iterable[Given], stop: Callable[[], bool] = lambda: False
-) -> Iterator[Shape]:
+    newton: Newton,
+    start: EquilibriumState,
+    begin: Given,
+    course: Iterable[Given],
+    stop: Callable[[], bool] = lambda: False,
+) -> Iterator[EquilibriumState]:
     """Yield the equilibrium at each aim of `course`, from `start`, which is that at `begin`.
 
     A step that fails is cut in two. Raises NotConverged, saying where, Cancelled where `stop` says so, and ValueError
@@ -106,7 +116,7 @@ def march(
     shape, begin = start, begin.checked()
     for number, aim in enumerate(aims := [aim.checked() for aim in course]):
         if len(aims) > 1:
-            tell("letting the forces grow step by step", number / len(aims))
+            report_progress("letting the forces grow step by step", number / len(aims))
 
         def step(part: float, begin: Given = begin, aim: Given = aim) -> None:
             nonlocal shape
@@ -117,6 +127,6 @@ def march(
         yield shape
 
 
-def untouched(newton: Newton, mu: float, tau: float) -> Shape:
+def untouched(newton: Newton, mu: float, tau: float) -> EquilibriumState:
     """Return the undeformed body over a surface with this friction."""
-    return replace(Shape.undeformed(newton.condensed), pull=Pull(0.0, mu, tau).checked())
+    return replace(EquilibriumState.undeformed(newton.condensed), pull=Pull(0.0, mu, tau).checked())

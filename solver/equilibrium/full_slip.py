@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
 from solver.equilibrium.load_stepping import StepControl, advance
-from solver.equilibrium.newton import Given, Newton, Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, Given, Newton, Pull
 from solver.failures import ContactLost, NotConverged
-from solver.progress import tell
+from solver.progress import report_progress
 
 HERTZ = 0.5  # part of the depth below which skin is first thought to touch: half as deep is half the overlap's square
 SHORT = 12  # systems after which that guess is given up
@@ -24,10 +24,10 @@ SMALLEST = 1.0 / 64.0  # part of the way below which a failing step is given up
 def settled(
     newton: Newton,
     pull: Pull,
-    start: Shape | None = None,
+    start: EquilibriumState | None = None,
     tolerance: float = 1e-10,
     stop: Callable[[], bool] = lambda: False,
-) -> Shape:
+) -> EquilibriumState:
     """Return the sliding state under `pull` (sense +1 or -1), from undeformed or from `start`, in one step.
 
     A step that fails is halved, depth, friction and bound together. Raises NotConverged where that does not help,
@@ -36,14 +36,14 @@ def settled(
     pull = pull.checked()
     if newton.condensed.constant:
         return _at_once(newton, pull, start)
-    shape = Shape.undeformed(newton.condensed) if start is None else start
+    shape = EquilibriumState.undeformed(newton.condensed) if start is None else start
     begin = shape.pull if start is not None else Pull(0.0, pull.mu, pull.tau, pull.sense)
     most = newton.systems + WORK
 
     def step(part: float) -> None:
         nonlocal shape
         if part < 1.0:
-            tell(f"coming to sliding at mu = {pull.mu:.3g} in small steps", part)
+            report_progress(f"coming to sliding at mu = {pull.mu:.3g} in small steps", part)
         shape = newton.settle(shape, _between(begin, pull, part), tolerance if part == 1.0 else FIRST_TOLERANCE)
 
     def refusal(done: float, part: float, reason: NotConverged) -> NotConverged:
@@ -58,7 +58,7 @@ def settled(
     return shape
 
 
-def _at_once(newton: Newton, pull: Pull, start: Shape | None) -> Shape:
+def _at_once(newton: Newton, pull: Pull, start: EquilibriumState | None) -> EquilibriumState:
     """Return the sliding state of a body of constant stiffness, which is one step from any. Raises ContactLost.
 
     What differs is the contact that is thought of first: that of `start`, or skin that would lie deep in the surface.
@@ -85,19 +85,19 @@ def _at_once(newton: Newton, pull: Pull, start: Shape | None) -> Shape:
 
 def slide_beside(
     newton: Newton, pull: Pull, guess: NDArray[np.integer], force: float | None = None, rounds: int | None = None
-) -> Shape:
+) -> EquilibriumState:
     """Return the slide of a body of constant stiffness whose contact states are sought from a `guess` (k,) of them.
 
     Under a normal `force` [N/mm] the depth of `pull` is found. Raises ContactLost, after so many `rounds` of changes.
     """
-    rest = Shape.undeformed(newton.condensed)
+    rest = EquilibriumState.undeformed(newton.condensed)
     states = guess.astype(np.int32)
     begin = replace(rest, state=states, sense=np.full(len(states), pull.sense, np.int32))
     given = None if force is None else Given(force, None)
     return newton.solved(begin, pull, newton.skin_x, given, rounds)
 
 
-def slide_under(newton: Newton, pull: Pull, force: float, deepest: float | None = None) -> Shape:
+def slide_under(newton: Newton, pull: Pull, force: float, deepest: float | None = None) -> EquilibriumState:
     """Return the slide of a body of constant stiffness under a normal `force` [N/mm], its depth found.
 
     `deepest` [mm] is the scale of the first guesses, by default the height of the skin. Raises ContactLost.
@@ -109,7 +109,7 @@ def slide_under(newton: Newton, pull: Pull, force: float, deepest: float | None 
     raise ContactLost("the touching points have no forces that amount to the normal force")
 
 
-def _first_of(newton: Newton, pull: Pull, scale: float, force: float | None) -> Shape:
+def _first_of(newton: Newton, pull: Pull, scale: float, force: float | None) -> EquilibriumState:
     """Return the first slide that touching skin leads to which reaches up to parts of a `scale` [mm]."""
     height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
     for number, part in enumerate(GUESSES):

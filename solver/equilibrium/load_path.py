@@ -9,7 +9,7 @@ import numpy as np
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.load_stepping import StepControl, advance, never
-from solver.equilibrium.newton import Given, Newton, Pull, Shape, lowered
+from solver.equilibrium.newton import EquilibriumState, Given, Newton, Pull, lowered
 from solver.failures import Cancelled, NotConverged, followed_to
 from solver.scene import Loading
 
@@ -28,7 +28,7 @@ class Instant:
     """One state on the way."""
 
     time: float  # [s]
-    state: Shape
+    state: EquilibriumState
 
     @property
     def depth(self) -> float:
@@ -123,17 +123,19 @@ class Way:
         self.by_force = loading.normal_force is not None
         # without friction there is no drag to speak of, and nothing that it could hold
         self.by_drag = loading.dragged and not self.frictionless
-        rest = replace(Shape.undeformed(newton.condensed), pull=Pull(0.0, friction.mu, friction.tau).checked())
+        rest = replace(
+            EquilibriumState.undeformed(newton.condensed), pull=Pull(0.0, friction.mu, friction.tau).checked()
+        )
         self.instants = [Instant(0.0, rest)]
         self.aim = Aim(0.0, 0.0, 0.0)
 
     @property
-    def last(self) -> Shape:
+    def last(self) -> EquilibriumState:
         """The state reached."""
         return self.instants[-1].state
 
     @property
-    def states(self) -> list[Shape]:
+    def states(self) -> list[EquilibriumState]:
         """The states after rest."""
         return [instant.state for instant in self.instants[1:]]
 
@@ -151,7 +153,7 @@ class Way:
     def _refusal(self, _done: float, _part: float, reason: NotConverged) -> NotConverged:
         return followed_to(self.last.pull.depth, self.last.pull.travel, reason)
 
-    def found(self, before: Shape, aim: Aim) -> Shape:
+    def found(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
         """Return the state at `aim`, coming from `before`. Raises NotConverged."""
         if not self.by_force:
             return self.newton.settle(before, before.pull._replace(depth=aim.press, travel=-aim.along), self._tolerance)
@@ -184,7 +186,7 @@ def slide(way: Way, direction: int, speed: float, progress: Progress | None, tim
     )
 
 
-def _settled(state: Shape, direction: int, *, frictionless: bool) -> bool:
+def _settled(state: EquilibriumState, direction: int, *, frictionless: bool) -> bool:
     """Return whether every touching point slips against the slide, so that further sliding changes nothing."""
     slips = (state.state == SLIP) | (state.state == SHEAR_LIMITED)
     along = state.sense == -direction

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterable, Iterator
 
 from solver.equilibrium.load_stepping import advance
-from solver.equilibrium.newton import Newton, Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, Newton, Pull
 from solver.failures import followed_to
-from solver.progress import tell
+from solver.progress import report_progress
 
 
 def press_and_slide(
@@ -26,19 +26,19 @@ def press_and_slide(
 def march(
     newton: Newton,
     course: Iterable[Pull],
-    start: Shape | None = None,
+    start: EquilibriumState | None = None,
     tolerance: float = 1e-7,
     stop: Callable[[], bool] = lambda: False,
-) -> Iterator[Shape]:
+) -> Iterator[EquilibriumState]:
     """Yield the equilibrium at each pull of `course`, from undeformed or `start`; a step that fails is cut in two.
 
     Backward Euler: within a step a point sticks where it was or slips from there. Raises NotConverged, saying where,
     Cancelled where `stop` says so, and ValueError for a pull that is none.
     """
-    shape = Shape.undeformed(newton.condensed) if start is None else start
+    shape = EquilibriumState.undeformed(newton.condensed) if start is None else start
     for number, pull in enumerate(pulls := [pull.checked() for pull in course]):
         if len(pulls) > 1:
-            tell("pressing and sliding step by step", number / len(pulls))
+            report_progress("pressing and sliding step by step", number / len(pulls))
         begin = shape.pull
 
         def step(part: float, begin: Pull = begin, pull: Pull = pull) -> None:

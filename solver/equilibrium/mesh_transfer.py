@@ -10,7 +10,7 @@ from solver.arrays import Array, Flags, Indices, Narrow
 from solver.body.finite import VALUES, FiniteBody
 from solver.contact.edges import arcs_of
 from solver.element import Q2P1
-from solver.equilibrium.newton import Shape
+from solver.equilibrium.newton import EquilibriumState
 from solver.mesh.mesher import FingerMesh, with_middles
 
 
@@ -42,7 +42,7 @@ class Places:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bridge:
+class MeshTransfer:
     """The way from one mesh to another of the same finger: what depends on where their lines lie, made once."""
 
     old: Places
@@ -58,7 +58,7 @@ class Bridge:
     driven: Flags  # (nodes, 2) which components of the new nodes are held
 
     @staticmethod
-    def of(old: Places, new: Places) -> "Bridge":
+    def of(old: Places, new: Places) -> "MeshTransfer":
         """Find for each place of the `new` mesh where it lies in the `old` one."""
         along, across = _interpolation(old.arcs, new.arcs), _interpolation(old.heights, new.heights)
         station = _piece(old.arcs[::2], new.inner_arcs).astype(np.int32)
@@ -66,17 +66,17 @@ class Bridge:
         onto = np.stack([np.interp(new.skin, old.skin, one, 0.0, 0.0) for one in np.eye(len(old.skin))], axis=1)
         forces = new.lengths[:, None] * onto / old.lengths
         nearest = np.abs(new.skin[:, None] - old.skin).argmin(axis=1)
-        return Bridge(old, new, *along, *across, station, layer, forces, nearest, new.body.mesh.driven)
+        return MeshTransfer(old, new, *along, *across, station, layer, forces, nearest, new.body.mesh.driven)
 
-    def carried(self, shape: Shape) -> Shape:
+    def carried(self, shape: EquilibriumState) -> EquilibriumState:
         """Return `shape`, found on the old mesh, as a start on the new one."""
         return self.touched(shape, *self.fields(shape.u, shape.pressure))
 
-    def touched(self, shape: Shape, u: Array, pressure: Array) -> Shape:
+    def touched(self, shape: EquilibriumState, u: Array, pressure: Array) -> EquilibriumState:
         """Return a start on the new mesh of `u` (nodes, 2) and `pressure` (e, 3), touching where `shape` does."""
         state, sense = shape.state[self.nearest], shape.sense[self.nearest]
         state[state == kernels.STICK] = kernels.SLIP
-        return Shape(u, pressure, state, sense, self.forces @ shape.reaction, shape.pull, shape.iterations)
+        return EquilibriumState(u, pressure, state, sense, self.forces @ shape.reaction, shape.pull, shape.iterations)
 
     def fields(self, u: Array, pressure: Array) -> tuple[Array, Array]:
         """Return displacements `u` [mm] and modes of `pressure` of the old mesh on the new one, (nodes, 2) and (e, 3).

@@ -110,7 +110,7 @@ class Deformable(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shape:
+class EquilibriumState:
     """A state of the body; never changed once made. k nodes of skin, e elements."""
 
     u: Array  # (nodes, 2) displacements relative to the bone [mm]
@@ -122,11 +122,11 @@ class Shape:
     iterations: int  # linear systems solved on the way here, from undeformed
 
     @staticmethod
-    def undeformed(body: Deformable) -> "Shape":
+    def undeformed(body: Deformable) -> "EquilibriumState":
         """Return the body before anything touches it."""
         u, pressure = body.undeformed()
         zero = np.zeros(len(body.held), np.int32)
-        return Shape(u, pressure, zero, zero, np.zeros((len(zero), 2)), Pull(0.0, 0.0), 0)
+        return EquilibriumState(u, pressure, zero, zero, np.zeros((len(zero), 2)), Pull(0.0, 0.0), 0)
 
     def place(self, body: Deformable) -> Array:
         """Return the deformed positions of the skin's nodes (k, 2) [mm]."""
@@ -176,7 +176,9 @@ class Newton:
         self._solve_contact = bind_arguments(kernels.solve_active_set, self.system)
         self._meet = bind_arguments(kernels.meet, self.skin, self.system.length)
 
-    def linearise(self, shape: Shape, pull: Pull, anchor: Array, rounds: int = 0, given: Given | None = None) -> bool:
+    def linearise(
+        self, shape: EquilibriumState, pull: Pull, anchor: Array, rounds: int = 0, given: Given | None = None
+    ) -> bool:
         """Set up the system at `shape` under `pull`, solve it for the skin's `steps` (2 k, 4); False where it fails.
 
         `anchor` (k,) are the positions along x where nodes stick [mm]. The states of contact are changed up to `rounds`
@@ -187,13 +189,15 @@ class Newton:
             return False
         return self._touch(shape, pull, anchor, rounds, given) != SINGULAR
 
-    def relinearise(self, shape: Shape, pull: Pull, anchor: Array, rounds: int, given: Given | None = None) -> bool:
+    def relinearise(
+        self, shape: EquilibriumState, pull: Pull, anchor: Array, rounds: int, given: Given | None = None
+    ) -> bool:
         """Do the same with the forces at `shape`, but the tangent and its factors that are there already."""
         if not self.condensed.relinearise(shape.u):
             return False
         return self._touch(shape, pull, anchor, rounds, given) != SINGULAR
 
-    def _touch(self, shape: Shape, pull: Pull, anchor: Array, rounds: int, given: Given | None) -> int:
+    def _touch(self, shape: EquilibriumState, pull: Pull, anchor: Array, rounds: int, given: Given | None) -> int:
         """Solve the contact of the linearised body at `shape`; return what `solve_active_set` does."""
         body = self.condensed
         self._states.state[:], self._states.sense[:] = shape.state, shape.sense
@@ -221,17 +225,19 @@ class Newton:
         return self.condensed.stiffness.reshape(-1, 2, len(steps)).sum(axis=0) @ steps
 
     def moved(
-        self, shape: Shape, pull: Pull, skin: Array, anchor: Array, scale: float = 1.0
-    ) -> tuple[Shape, float, int]:
+        self, shape: EquilibriumState, pull: Pull, skin: Array, anchor: Array, scale: float = 1.0
+    ) -> tuple[EquilibriumState, float, int]:
         """Return the shape after the skin's step (2 k,), its largest move [mm], and how many states it changed."""
         body, skin = self.condensed, np.ascontiguousarray(skin)
         reaction = (body.force + body.stiffness @ skin).reshape(-1, 2)
         u, pressure, largest = body.recover(shape.u, shape.pressure, skin, scale)
         states = ContactStates(self._states.state.copy(), self._states.sense.copy(), reaction)
         changed = self._meet(states, self._position(u, pull, anchor), load_state(pull))
-        return Shape(u, pressure, *states, pull, shape.iterations + 1), largest, changed
+        return EquilibriumState(u, pressure, *states, pull, shape.iterations + 1), largest, changed
 
-    def settle(self, start: Shape, pull: Pull, tolerance: float = 1e-10, limit: int = 25) -> Shape:
+    def settle(
+        self, start: EquilibriumState, pull: Pull, tolerance: float = 1e-10, limit: int = 25
+    ) -> EquilibriumState:
         """Return the equilibrium under `pull`, from `start`, its displacements good to `tolerance` [mm].
 
         Tangents are kept, factors and all, where steps are small or fall fast. What is still missing is judged from how
@@ -247,7 +253,9 @@ class Newton:
             return self.solved(begin, pull, anchor)
         return self._iterated(begin, pull, anchor, tolerance, limit)
 
-    def _iterated(self, start: Shape, pull: Pull, anchor: Array, tolerance: float, limit: int) -> Shape:
+    def _iterated(
+        self, start: EquilibriumState, pull: Pull, anchor: Array, tolerance: float, limit: int
+    ) -> EquilibriumState:
         """Do as `settle` from `start`, whose states are those that `pull` brings at once, `anchor` (k,) being known."""
         shape = before = start
         kept = self.condensed.found is start.u
@@ -284,8 +292,8 @@ class Newton:
         raise NotConverged(f"no equilibrium within {limit} iterations")
 
     def solved(
-        self, shape: Shape, pull: Pull, anchor: Array, given: Given | None = None, rounds: int | None = None
-    ) -> Shape:
+        self, shape: EquilibriumState, pull: Pull, anchor: Array, given: Given | None = None, rounds: int | None = None
+    ) -> EquilibriumState:
         """Return the equilibrium of a body of constant stiffness, its contact states sought from those of `shape`.
 
         Under `given` forces depth and travel are found. Raises ContactLost, after so many `rounds` of changes.
@@ -303,16 +311,18 @@ class Newton:
         pull = pull._replace(depth=pull.depth + deeper, travel=pull.travel + along)
         iterations = shape.iterations + used
         found = self._states
-        return Shape(u, shape.pressure, found.state.copy(), found.sense.copy(), found.reaction.copy(), pull, iterations)
+        return EquilibriumState(
+            u, shape.pressure, found.state.copy(), found.sense.copy(), found.reaction.copy(), pull, iterations
+        )
 
-    def _entered(self, start: Shape, pull: Pull, x: Array) -> Shape:
+    def _entered(self, start: EquilibriumState, pull: Pull, x: Array) -> EquilibriumState:
         """Return `start`, whose skin lies at `x` (k,) along the surface, with the states that `pull` brings at once."""
         states = ContactStates(start.state.copy(), start.sense.copy(), start.reaction)
         self._meet(states, self._position(start.u, pull, x), load_state(pull))
         return replace(start, state=states.state, sense=states.sense)
 
 
-def lowered(body: CondensedBody, shape: Shape) -> Shape:
+def lowered(body: CondensedBody, shape: EquilibriumState) -> EquilibriumState:
     """Return the shape with its lowest node on the surface where nothing touches: forces need one that does.
 
     A body that nothing holds needs as many nodes as it has motions.

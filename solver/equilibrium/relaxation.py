@@ -23,7 +23,7 @@ from solver.body.stiffness import Elastic, Probes
 from solver.body.validation import check_body, check_driven, check_held, check_terms
 from solver.constitutive.linear import Moduli, Prony, kept
 from solver.equilibrium.load_path import PRESSING_STEPS, PRESSING_TIME, Aim, Progress, Way, course
-from solver.equilibrium.newton import Newton, Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, Newton, Pull
 from solver.mesh import Mesh
 from solver.scene import Loading
 
@@ -111,9 +111,9 @@ class RelaxingBody:
         """Return the stored energy density (p,) [MPa]."""
         element = probes.element
         local = self.displacement[self.mesh.elements[element]].reshape(len(element), 18)
-        shear, stays = self.elastic.shear[element], 1.0 - self._g[element].sum(axis=1)
+        shear, long_term = self.elastic.shear[element], 1.0 - self._g[element].sum(axis=1)
         deviator, theta = self._strain(probes, local)
-        out = shear * stays * deviator + self._bulk[element] / 2.0 * theta**2
+        out = shear * long_term * deviator + self._bulk[element] / 2.0 * theta**2
         for term in range(self._left.shape[2]):
             deviator, _ = self._strain(probes, self._left[element, :, term])
             out += shear * self._g[element, term] * deviator
@@ -181,7 +181,7 @@ class RelaxingWay(Way):
         super().__init__(Newton(body.ready(first)), friction, loading)
         self.sed: list[tuple[float, float]] = [(0.0, 0.0)]
 
-    def found(self, before: Shape, aim: Aim) -> Shape:
+    def found(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
         """Return the state at `aim`, and let the body come to it. Raises NotConverged."""
         self.newton = Newton(self.body.ready(aim.time - self.aim.time))
         state = super().found(before, aim)

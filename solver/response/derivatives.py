@@ -18,7 +18,7 @@ from solver._kernels import SHEAR_LIMITED, STICK
 from solver._kernels.arguments import ContactStates, SkinPosition
 from solver.arrays import Array
 from solver.equilibrium.finger import FingerModel
-from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, Newton, Shape, load_state
+from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, Newton, load_state
 from solver.scene import Scene
 
 MU, TAU_MAX, DEPTH = range(3)
@@ -43,7 +43,7 @@ class Derivatives:
     indentation: By  # [mm]
 
 
-def of_contact(finger: FingerModel, scene: Scene, state: Shape) -> Derivatives:
+def of_contact(finger: FingerModel, scene: Scene, state: EquilibriumState) -> Derivatives:
     """Return the derivatives at a settled slide at small strain, whatever drives it.
 
     Raises ValueError where points stick: such a state depends on the way to it, and so do its derivatives.
@@ -56,7 +56,7 @@ def of_contact(finger: FingerModel, scene: Scene, state: Shape) -> Derivatives:
     return driven(scene, sed, up, drag_along(scene) * along)
 
 
-def of_skin(newton: Newton, state: Shape) -> Array:
+def of_skin(newton: Newton, state: EquilibriumState) -> Array:
     """Return how the skin (2 k, 3) of a slide follows mu, tau_max and depth, its contact linearised as Newton does.
 
     Raises ValueError where a state is no slide, or has no tangent: it lies at a limit.

@@ -10,7 +10,7 @@ from solver.arrays import Array
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.load_path import Instant, Progress, Way, course
 from solver.equilibrium.loads import pull_of
-from solver.equilibrium.newton import Shape
+from solver.equilibrium.newton import EquilibriumState
 from solver.failures import SolveFailure
 from solver.prediction import Skin
 from solver.response.fields import Fields, Sketch
@@ -73,7 +73,7 @@ def _unfolded(finger: FingerModel, instants: Sequence[Instant]) -> tuple[Instant
     return tuple(instants[: max(bisect_left(instants, True, key=folds), 1)])
 
 
-def most_squeezed(finger: FingerModel, state: Shape, depth: float) -> tuple[float, float]:
+def most_squeezed(finger: FingerModel, state: EquilibriumState, depth: float) -> tuple[float, float]:
     """Return the place [mm] in the world where tissue is squeezed most: the corner that stretches least."""
     displacement = finger.displacement(state)
     mesh = finger.geometry.mesh

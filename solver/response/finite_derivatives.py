@@ -6,12 +6,12 @@ from solver.arrays import Array
 from solver.body.finite import FiniteBody, FiniteProbes
 from solver.constitutive.hyperelastic import slopes
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.newton import FiniteNewton, Shape
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton
 from solver.response.derivatives import Derivatives, driven, of_skin
 from solver.scene import Scene
 
 
-def of_shape(finger: FiniteFinger, scene: Scene, shape: Shape) -> Derivatives:
+def of_shape(finger: FiniteFinger, scene: Scene, shape: EquilibriumState) -> Derivatives:
     """Return the derivatives at a settled slide, whatever drives it; `solver.response.derivatives` says what they are.
 
     Raises ValueError where a state is no slide, or has no tangent: it lies at a limit.

@@ -8,12 +8,12 @@ import numpy as np
 from solver import _kernels as kernels
 from solver.arrays import Array
 from solver.body.finite_measures import pressure
-from solver.continuation.arc_length import leapt
+from solver.continuation.arc_length import jumped_branch
 from solver.continuation.limit_point import sound
 from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium import full_slip as sliding
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.newton import Given, Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, Given, Pull
 from solver.failures import NotConverged
 from solver.prediction import Prediction
 from solver.response.derivatives import Derivatives
@@ -34,7 +34,7 @@ def met_again(found: Prediction) -> "FiniteNearby | None":
     state = states(skin).astype(np.int32)
     reaction = np.stack([skin.traction, skin.pressure], axis=1) * length[:, None]
     modes = pressure(body, found.displacement)
-    start = Shape(found.displacement, modes, state, np.full(len(state), sense, np.int32), reaction, pull, 0)
+    start = EquilibriumState(found.displacement, modes, state, np.full(len(state), sense, np.int32), reaction, pull, 0)
     try:
         return FiniteNearby(scene, finger, finger.newton.settle(start, pull))
     except NotConverged:
@@ -47,7 +47,7 @@ class FiniteNearby:
 
     scene: Scene
     finger: FiniteFinger
-    here: Shape
+    here: EquilibriumState
 
     def derivatives(self) -> Derivatives:
         """Return its derivatives, by the tangent at convergence."""
@@ -58,7 +58,7 @@ class FiniteNearby:
         found = [self._beside(scene) for scene in scenes]
         return np.array([(np.nan, np.nan) if shape is None else self.finger.seds(shape) for shape in found])
 
-    def _beside(self, scene: Scene) -> Shape | None:
+    def _beside(self, scene: Scene) -> EquilibriumState | None:
         newton, here = self.finger.newton, self.here
         pull = here.pull._replace(mu=float(scene.friction.mu), tau=scene.friction.cap)
         try:
@@ -72,4 +72,4 @@ class FiniteNearby:
         beyond = there.pull.mu > here.pull.mu or there.pull.depth > here.pull.depth
         # Skin that may have folded since: whether the branch goes on as far as that, this mesh cannot tell.
         unproven = beyond and not sound(self.finger, there)
-        return None if reaches_out or unproven or leapt(self.finger, here, there) else there
+        return None if reaches_out or unproven or jumped_branch(self.finger, here, there) else there

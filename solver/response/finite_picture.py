@@ -11,7 +11,7 @@ from solver.body.receptor import Endings
 from solver.body.stiffness import Elastic, Probes
 from solver.body.tissues import settled_moduli
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.newton import Shape
+from solver.equilibrium.newton import EquilibriumState
 from solver.response.live_picture import MIDDLES, QUARTERS
 from solver.scene import Scene
 
@@ -40,10 +40,10 @@ class FinitePicture:
         """Return where the nodes are undeformed (n, 2) [mm]."""
         return self._body.mesh.nodes
 
-    def nodes(self, shape: Shape) -> Array:
+    def nodes(self, shape: EquilibriumState) -> Array:
         """Return where the nodes are (n, 2) [mm], the surface being y = 0."""
         return self._body.mesh.nodes + shape.u - [0.0, shape.pull.depth]
 
-    def sed(self, shape: Shape) -> Array:
+    def sed(self, shape: EquilibriumState) -> Array:
         """Return the SED in the middle of each face (f,) [MPa]."""
         return self._middles.energy(self._body, shape.u)

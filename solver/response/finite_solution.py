@@ -15,7 +15,7 @@ from solver import _kernels as kernels
 from solver._kernels import STICK
 from solver.accuracy import contrasts as differences
 from solver.accuracy import omitted_effects as evidence
-from solver.accuracy.adaptivity import Ascent, Climbed, foot, risen, sized_together
+from solver.accuracy.adaptivity import MeshSolution, NestedSolution, coarse_solution, refine, sized_together
 from solver.accuracy.audits import forces_missed, refuse_unsound, rounding, unbalanced
 from solver.accuracy.finite_audits import audits, course_audits
 from solver.accuracy.finite_ends import times_on_way
@@ -27,11 +27,11 @@ from solver.equilibrium.expected_depth import within_reach
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.finite_relaxation import RelaxingCourse
 from solver.equilibrium.load_path import Way
-from solver.equilibrium.newton import EQUILIBRIUM, FiniteNewton, Shape
+from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, FiniteNewton
 from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW, History, Prediction, Row, Skin, drag
-from solver.progress import tell
+from solver.progress import report_progress
 from solver.scene import Scene
 
 ROUGH = 1e-8  # unbalanced part of the forces from which displacements are corrected further [-]
@@ -59,27 +59,27 @@ def answers(
     meshes = _Meshes()
     keys = [alike(scene) for scene in scenes]
     for _, group in groupby(sorted(range(len(scenes)), key=lambda n: keys[n]), lambda n: keys[n][0]):
-        feet: dict[int, tuple[Climbed, float]] = {}  # and what each took [s]
-        low: Climbed | None = None
+        feet: dict[int, tuple[MeshSolution, float]] = {}  # and what each took [s]
+        low: MeshSolution | None = None
         for number in group:
             if stop():
                 raise Cancelled
             begun = perf_counter()
-            tell("finding where contact ends, on a rough mesh")
+            report_progress("finding where contact ends, on a rough mesh")
             try:
-                low = foot(scenes[number], expected, fineness, stop, meshes.make, low)
+                low = coarse_solution(scenes[number], expected, fineness, stop, meshes.make, low)
                 feet[number] = low, perf_counter() - begun
             except SolveFailure as failure:
                 found[number] = failure
         sizings = sized_together(scenes[0], fineness, [below for below, _ in feet.values()])
-        before: Ascent | None = None
+        before: NestedSolution | None = None
         for (number, (below, took)), sizing in zip(feet.items(), sizings, strict=True):
             if stop():
                 raise Cancelled
             begun = perf_counter() - took
-            tell(f"solving on a mesh of {fineness:g} elements to the tip radius")
+            report_progress(f"solving on a mesh of {fineness:g} elements to the tip radius")
             try:
-                before = risen(scenes[number], fineness, below, stop, meshes.make, before, sizing)
+                before = refine(scenes[number], fineness, below, stop, meshes.make, before, sizing)
                 found[number] = _predicted(scenes[number], before, fineness, stop, begun)
             except SolveFailure as failure:
                 found[number] = failure
@@ -109,12 +109,14 @@ def alike(scene: Scene) -> tuple[tuple[float, float, str], float]:
     return scene.pressed, float(scene.friction.mu)
 
 
-def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[], bool], begun: float) -> Prediction:
+def _predicted(
+    scene: Scene, way_up: NestedSolution, fineness: float, stop: Callable[[], bool], begun: float
+) -> Prediction:
     at = way_up.top
     finger, shape = at.finger, at.shape
-    setup = sum(state.setup_s for state in (way_up.foot, way_up.first, at) if state is not None)
+    setup = sum(state.setup_s for state in (way_up.coarse, way_up.first, at) if state is not None)
     steps = way_up.steps
-    times = times_on_way(scene, way_up.foot.finger, stop) if steps is None else steps.times
+    times = times_on_way(scene, way_up.coarse.finger, stop) if steps is None else steps.times
     way: Way | None = None
     relaxing: RelaxingCourse | None = None
     if scene.solve.course == "history":
@@ -139,8 +141,8 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         checks["course_against_direct"] = abs(finger.sed_ending(at.shape) / sed - 1.0)
     held = scene.loading.dragged and _sticking(shape) > 0.0  # sliding, a finger may have shifted by anything
     solved = perf_counter()
-    tell("estimating errors, on a coarser mesh")
-    errors, others, stays = error_estimates(scene, fineness, way_up, numbers, stop)
+    report_progress("estimating errors, on a coarser mesh")
+    errors, others, error_stays = error_estimates(scene, fineness, way_up, numbers, stop)
     estimated = perf_counter()
     model = evidence.finite_model(
         driven, force=shape.force, width=width, sticking=_sticking(shape), slide=_slide(finger, shape)
@@ -160,7 +162,7 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
         indentation_error=errors.indentation,
         shift_error=errors.shift if held else None,
         contact_width_error=errors.width,
-        error_stays=stays,
+        error_stays=error_stays,
         beside=differences.those_of(others),
         dofs=body.dofs,
         newton_iterations=shape.iterations,
@@ -178,17 +180,17 @@ def _predicted(scene: Scene, way_up: Ascent, fineness: float, stop: Callable[[],
     )
 
 
-def _sticking(shape: Shape) -> float:
+def _sticking(shape: EquilibriumState) -> float:
     touching = int(shape.touching.sum())
     return int((shape.state == STICK).sum()) / touching if touching else 0.0
 
 
-def _slide(finger: FiniteFinger, shape: Shape) -> float:
+def _slide(finger: FiniteFinger, shape: EquilibriumState) -> float:
     """Return the largest sideways displacement of the skin that may touch [mm]."""
     return float(np.abs(shape.u[finger.geometry.mesh.skin, 0]).max())
 
 
-def _skin(finger: FiniteFinger, shape: Shape) -> Skin:
+def _skin(finger: FiniteFinger, shape: EquilibriumState) -> Skin:
     body = finger.newton.body
     place, touching, length = shape.place(body), shape.touching, np.empty(len(shape.state))
     kernels.tributary(np.ascontiguousarray(place[:, 0]), body.middle, length)
@@ -203,8 +205,8 @@ def _skin(finger: FiniteFinger, shape: Shape) -> Skin:
 
 
 def _balanced(
-    newton: FiniteNewton, shape: Shape, audits: Callable[[Shape], dict[str, float]]
-) -> tuple[Shape, dict[str, float]]:
+    newton: FiniteNewton, shape: EquilibriumState, audits: Callable[[EquilibriumState], dict[str, float]]
+) -> tuple[EquilibriumState, dict[str, float]]:
     """Return a state and its checks, its displacements so good that no force is left over but by round-off.
 
     Displacements good to a part of a nanometre leave much of a light touch on a nearly incompressible body unbalanced.

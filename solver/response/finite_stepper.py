@@ -14,7 +14,7 @@ from solver._kernels import OPEN, SLIP, STICK
 from solver.arrays import Array
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.force_control import corrected
-from solver.equilibrium.newton import BY_DEPTH, Given, Pull, Shape
+from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, Given, Pull
 
 SLIDING = 0.995  # part of the friction limit beyond which the tangential force means sliding
 LIGHT = 1e-7  # N/mm: less than this is no touch
@@ -37,7 +37,7 @@ class FiniteStepper:
         newton = finger.newton
         self._finger, self._newton = finger, newton
         self.mu, self.tau = mu, tau
-        self.shape = Shape.undeformed(newton.body)
+        self.shape = EquilibriumState.undeformed(newton.body)
         self._lost_at: float | None = None  # normal force [N/mm]
         self._hopeless = False  # whether these forces were led to in vain
         self._behind = False  # whether the last state had not caught up with its forces
@@ -55,7 +55,7 @@ class FiniteStepper:
 
     def forget(self) -> None:
         """Start afresh from the untouched finger."""
-        self.shape = Shape.undeformed(self._newton.body)
+        self.shape = EquilibriumState.undeformed(self._newton.body)
         self._lost_at, self._hopeless, self._behind = None, False, False
 
     def step(self, normal: float, tangential: float, iterations: int = 1) -> float:
@@ -115,8 +115,8 @@ class FiniteStepper:
             if number >= iterations and not kept and done[1] < far:
                 break
         self._stiffness = float(newton.follows(newton.steps)[1, BY_DEPTH])
-        pinch = self._finger.pinch(shape)
-        if pinch.least < FOLDING:
+        compression = self._finger.skin_compression(shape)
+        if compression.least < FOLDING:
             return self._lose(normal)
         self.shape = shape
         x, y = shape.force
@@ -124,7 +124,7 @@ class FiniteStepper:
         self._behind = behind > MET * normal
         if self._behind:
             return float("nan")
-        if pinch.lowest < FOLDING or pinch.kink > CREASING:
+        if compression.lowest < FOLDING or compression.kink > CREASING:
             return self._lose(normal)
         return self._finger.sed_ending(shape)
 
@@ -151,7 +151,7 @@ class FiniteStepper:
         whole = self._finger.geometry.whole
         return self._newton.body.mesh.nodes[whole] + self.shape.u[whole] - [0.0, self.depth]
 
-    def _ready(self, normal: float, tangential: float) -> Shape:
+    def _ready(self, normal: float, tangential: float) -> EquilibriumState:
         """Return the last shape with states that can carry the forces: something touches, and slides or does not."""
         shape = self.shape
         state, sense, pull = shape.state.copy(), shape.sense.copy(), shape.pull

@@ -11,7 +11,7 @@ import numpy as np
 from solver.arrays import Array, Indices
 from solver.body.stiffness import Probes
 from solver.equilibrium.finger import FingerModel
-from solver.equilibrium.newton import Shape
+from solver.equilibrium.newton import EquilibriumState
 
 # A nine-node element as four quadrilaterals, and the middle of each in its coordinates.
 QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
@@ -49,11 +49,11 @@ class LivePicture:
             elastic.lame[element],
         )
 
-    def nodes(self, state: Shape) -> Array:
+    def nodes(self, state: EquilibriumState) -> Array:
         """Return where the nodes are (n, 2) [mm], the surface being y = 0."""
         return self.rest + (self._moved @ state.u.ravel()).reshape(-1, 2) - [0.0, state.pull.depth]
 
-    def sed(self, state: Shape) -> Array:
+    def sed(self, state: EquilibriumState) -> Array:
         """Return the SED in the middle of each face (f,) [MPa]."""
         skin = state.u.ravel()
         xx, yy, xy = self._strain @ skin

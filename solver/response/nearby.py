@@ -17,7 +17,7 @@ from solver.contact.law import NAMES
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.full_slip import slide_beside
 from solver.equilibrium.loads import sliding_pull
-from solver.equilibrium.newton import Shape
+from solver.equilibrium.newton import EquilibriumState
 from solver.failures import ContactLost
 from solver.prediction import Prediction, Skin
 from solver.response.derivatives import Derivatives, of_contact
@@ -73,14 +73,14 @@ def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
 class _SmallNearby:
     scene: Scene
     finger: FingerModel
-    here: Shape
+    here: EquilibriumState
 
     def derivatives(self) -> Derivatives:
         return of_contact(self.finger, self.scene, self.here)
 
     def seds(self, scenes: Sequence[Scene]) -> Array:
         out = np.full((len(scenes), 2), np.nan)
-        held: list[tuple[int, Shape]] = []
+        held: list[tuple[int, EquilibriumState]] = []
         for number, scene in enumerate(scenes):
             try:
                 contact = _slide(self.finger, scene, self.here.state)
@@ -98,6 +98,6 @@ def states(skin: Skin) -> NDArray[np.int64]:
     return np.array([SLIP if state == "stick" else NUMBERS[state] for state in skin.state])
 
 
-def _slide(finger: FingerModel, scene: Scene, guess: NDArray[np.integer]) -> Shape:
+def _slide(finger: FingerModel, scene: Scene, guess: NDArray[np.integer]) -> EquilibriumState:
     """Return the settled slide of a scene that a guess of its states leads to. Raises ContactLost."""
     return slide_beside(finger.newton, sliding_pull(scene), guess, scene.normal_force)

@@ -32,7 +32,7 @@ from solver.continuation.small_states import depends_on_way, gives_way, in_tissu
 from solver.continuation.wedging import WIDE
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.load_path import Instant
-from solver.equilibrium.newton import Shape
+from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import Steps
 from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.mesh.grid import MeshError
@@ -163,7 +163,7 @@ def _meshed(scene: Scene, sizing: Sizing) -> FingerModel:
         raise NotConverged(f"Round-off has swallowed the finger's stiffness ({bad}): {MIXED} do that.") from bad
 
 
-def _in_steps(scene: Scene, shared: _Shared) -> tuple[Shape | None, Steps | None]:
+def _in_steps(scene: Scene, shared: _Shared) -> tuple[EquilibriumState | None, Steps | None]:
     """Return the settled state as `direct` does, and the load steps it took where it depends on its way.
 
     Where the course is asked for, an earlier slide that never settles is refused as the last one is, with its limits.
@@ -262,8 +262,8 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
 
 
 def _balanced(
-    scene: Scene, finger: FingerModel, state: Shape, displacement: Array, *, at_once: bool, where_seen: bool
-) -> tuple[Shape, Array, dict[str, float]]:
+    scene: Scene, finger: FingerModel, state: EquilibriumState, displacement: Array, *, at_once: bool, where_seen: bool
+) -> tuple[EquilibriumState, Array, dict[str, float]]:
     """Return a state, its displacement and their audits with less round-off, taken out `at_once` or where it shows."""
     law, depth = FrictionLaw(state.pull.mu, state.pull.tau), state.pull.depth
     if at_once:
@@ -275,7 +275,7 @@ def _balanced(
     return state, displacement, checks
 
 
-def skin_of(finger: FingerModel, state: Shape) -> Skin:
+def skin_of(finger: FingerModel, state: EquilibriumState) -> Skin:
     """Return the skin that may touch in a state of contact."""
     place, length = state.place(finger.body.condensed), finger.body.condensed.fixed_length
     return Skin(

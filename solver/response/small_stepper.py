@@ -17,7 +17,7 @@ from solver.arrays import Array
 from solver.body.linear import CondensedLinear
 from solver.body.receptor import Endings
 from solver.equilibrium.finger import FingerModel
-from solver.equilibrium.newton import Given, Newton, Pull, Shape, lowered
+from solver.equilibrium.newton import EquilibriumState, Given, Newton, Pull, lowered
 from solver.failures import ContactLost
 
 SLIDING = 0.995  # part of the friction limit beyond which the tangential force means sliding
@@ -93,7 +93,7 @@ class SmallStepper:
         """Start untouched, for a surface of friction `mu` and traction bound `tau` [MPa]."""
         self._finger, self._newton = finger, Newton(finger.skin)
         self.mu, self.tau = mu, tau
-        self.state = Shape.undeformed(finger.skin)
+        self.state = EquilibriumState.undeformed(finger.skin)
 
     @property
     def depth(self) -> float:
@@ -107,7 +107,7 @@ class SmallStepper:
 
     def forget(self) -> None:
         """Start afresh from the untouched finger."""
-        self.state = Shape.undeformed(self._finger.skin)
+        self.state = EquilibriumState.undeformed(self._finger.skin)
 
     def step(self, normal: float, tangential: float) -> float:
         """Take one reading and return the SED averaged over the ending [MPa]; nan where the state was lost.
@@ -140,7 +140,7 @@ class SmallStepper:
         stretched = self._finger.ending @ found.u.ravel()
         return float(stretched @ stretched)
 
-    def _ready(self, tangential: float, *, slides: bool) -> Shape:
+    def _ready(self, tangential: float, *, slides: bool) -> EquilibriumState:
         """Return the last state under today's friction; where the finger `slides` all that touches slips."""
         state, sense = self.state.state, self.state.sense
         way = (1 if tangential > 0.0 else -1) if slides else 0
@@ -148,7 +148,7 @@ class SmallStepper:
             state, sense = np.where(state == STICK, SLIP, state).astype(np.int32), np.full(len(sense), way, np.int32)
         last, before = self.state, self.state.pull
         under = Pull(before.depth, self.mu, self.tau, way, before.travel)
-        start = Shape(last.u, last.pressure, state, sense, last.reaction, under, 0)
+        start = EquilibriumState(last.u, last.pressure, state, sense, last.reaction, under, 0)
         return start if state.any() else lowered(self._newton.condensed, start)
 
     def _most(self, normal: float) -> float:

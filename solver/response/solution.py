@@ -14,7 +14,7 @@ from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.load_path import Instant
 from solver.failures import NotConverged, SolveFailure
 from solver.prediction import Prediction
-from solver.progress import tell
+from solver.progress import report_progress
 from solver.response import small_solution
 from solver.response.small_solution import Answer, Fingers, Progress, Watch
 from solver.scene import Scene
@@ -97,12 +97,12 @@ def _with_evidence(found: Answer, progress: Progress | None) -> Answer:
     """Return the answer with its evidence marched, and measured where its scene asks for that."""
     if not isinstance(found, Prediction) or found.scene.solve.evidence == "quick":
         return found
-    tell("estimating what the model leaves out")
+    report_progress("estimating what the model leaves out")
     found = with_held(found, lambda: progress is not None and not progress(1.0))
     found = _with_earlier_slides(found, lambda scenes: _answers(scenes, progress))
     if found.scene.solve.evidence == "estimated":
         return found
-    tell("measuring what the model leaves out")
+    report_progress("measuring what the model leaves out")
     return measured(found, lambda scenes: _answers(scenes, progress))
 
 
@@ -196,7 +196,7 @@ def _refined(
             else:
                 found[i] = answer
         missed = [i not in lost and _misses(found[i]) for i in range(len(scenes))]
-        mended = [one and not _stays(found[i]) for i, one in enumerate(missed)]
+        mended = [one and not _error_stays(found[i]) for i, one in enumerate(missed)]
         apart = [
             differences.off([one for i in together if isinstance(one := found[i], Prediction)]) for together in surfaces
         ]
@@ -307,10 +307,10 @@ def _left(answer: Answer) -> str:
     """Return what is to be said of an answer that misses."""
     if isinstance(answer, Prediction) and answer.error_estimate >= 1.0:
         return UNKNOWN
-    return STAYS if _stays(answer) else MISSES
+    return STAYS if _error_stays(answer) else MISSES
 
 
-def _stays(answer: Answer) -> bool:
+def _error_stays(answer: Answer) -> bool:
     """Return whether what meshes of all finenesses have in common is above the tolerance of an answer's scene."""
     if not isinstance(answer, Prediction) or answer.scene.solve.tolerance is None:
         return False

@@ -8,7 +8,16 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from solver.accuracy.adaptivity import MARGIN, Ascent, Climbed, climbed, foot, risen, sized, sized_together
+from solver.accuracy.adaptivity import (
+    MARGIN,
+    MeshSolution,
+    NestedSolution,
+    coarse_solution,
+    refine,
+    sized,
+    sized_together,
+    solution_on,
+)
 from solver.arrays import Array
 from solver.body.linear import LinearBody
 from solver.body.tissues import settled_moduli
@@ -18,7 +27,7 @@ from solver.continuation.small_states import settled
 from solver.element import Q2P1
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.newton import FiniteNewton, Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Pull
 from solver.mesh.mesher import AT_CUT, Sizing
 from solver.response.finite_solution import alike
 from solver.scene import Friction, Scene
@@ -148,26 +157,26 @@ class ClimbingMeshed:
         """Find the edges of contact of surfaces, and one mesh for those of them that are pressed alike."""
         for _, group in groupby(sorted(scenes, key=alike), lambda scene: scene.pressed):
             together = list(group)
-            feet = [foot(s, s.loading.depth, self._fineness, _going_on, self._make) for s in together]
+            feet = [coarse_solution(s, s.loading.depth, self._fineness, _going_on, self._make) for s in together]
             sizings = sized_together(together[0], self._fineness, feet)
             self._shared |= zip(together, sizings, strict=True)
             newton = self._make(together[0], sizings[0]).newton
             if newton.body.dofs >= self.dofs:
                 self._newton, self.dofs = newton, newton.body.dofs
 
-    def solve(self, scene: Scene, before: State | None = None) -> Ascent:
+    def solve(self, scene: Scene, before: State | None = None) -> NestedSolution:
         """Return the settled state, from undeformed or from `before`, of another surface at the same depth."""
-        below = foot(
-            scene, scene.loading.depth, self._fineness, _going_on, self._make, None if before is None else before.foot
+        below = coarse_solution(
+            scene, scene.loading.depth, self._fineness, _going_on, self._make, None if before is None else before.coarse
         )
         sizing = sized(self._fineness, below)  # what it costs to find the edges is counted
-        return risen(scene, self._fineness, below, _going_on, self._make, before, self._shared.get(scene, sizing))
+        return refine(scene, self._fineness, below, _going_on, self._make, before, self._shared.get(scene, sizing))
 
     def numbers(self, state: State) -> Array:
         """Return SED, normal force and drag."""
         return np.abs(state.top.finger.numbers(state.top.shape))
 
-    def numbers_together(self, states: Sequence[Ascent]) -> Array:
+    def numbers_together(self, states: Sequence[NestedSolution]) -> Array:
         """Return them for several states (n, 3)."""
         return np.array([self.numbers(state) for state in states])
 
@@ -212,12 +221,12 @@ class FiniteMeshed:
 class Overkill:
     """A state on a fine mesh, and what its numbers tend to as elements where the cut meets the bone get shorter."""
 
-    at: Climbed
+    at: MeshSolution
     numbers: Array  # (3,)
     at_cut: float  # the shortest of those elements, by tip radius
 
 
-def overkill(scene: Scene, sizing: Sizing, below: Climbed | None = None) -> Overkill:
+def overkill(scene: Scene, sizing: Sizing, below: MeshSolution | None = None) -> Overkill:
     """Return the state on a fine mesh, found from one `below`, and where its numbers tend to.
 
     Where the cut meets the bone, and a slide along +x squeezes tissue, errors fall with the power 0.8 of an element's
@@ -227,14 +236,14 @@ def overkill(scene: Scene, sizing: Sizing, below: Climbed | None = None) -> Over
     sizing = replace(sizing, at_cut=AT_CUT)
     if below is None:
         finger = FiniteFinger.of(scene, sizing)
-        first = Climbed(finger, steady(finger, pull_of(scene)), 0.0)
+        first = MeshSolution(finger, steady(finger, pull_of(scene)), 0.0)
     else:
-        first = climbed(scene, sizing.fineness, below, _going_on, sizing=sizing)
+        first = solution_on(scene, sizing.fineness, below, _going_on, sizing=sizing)
     length, last, numbers = AT_CUT, first, first.finger.numbers(first.shape)
     tends, part = numbers, HALF
     while length > SHORTEST and scene.loading.direction > 0:
         finger = FiniteFinger.of(scene, replace(sizing, at_cut=part * length))
-        shape = nearby(finger, scene, finger.brought(last.shape, last.finger))
+        shape = nearby(finger, scene, finger.transfer(last.shape, last.finger))
         if shape is None or finger.least_at_cut(shape) < LEAST:
             if part == LITTLE_LESS:
                 break
@@ -242,7 +251,7 @@ def overkill(scene: Scene, sizing: Sizing, below: Climbed | None = None) -> Over
             continue
         before, numbers = numbers, finger.numbers(shape)
         tends = numbers + (numbers - before) / (part**-FALLS - 1.0)
-        length, last = part * length, Climbed(finger, shape, 0.0)
+        length, last = part * length, MeshSolution(finger, shape, 0.0)
     return Overkill(first, tends, length)
 
 
@@ -258,7 +267,7 @@ def climbed_twice(scene: Scene, finenesses: tuple[float, float, float]) -> tuple
 
 
 def _system(newton: FiniteNewton) -> float:
-    shape = Shape.undeformed(newton.body)
+    shape = EquilibriumState.undeformed(newton.body)
     begun = clock()
     newton.linearise(shape, Pull(0.1, 0.0), newton.skin_x)
     return clock() - begun

@@ -9,7 +9,7 @@ import pytest
 
 from daq_app.cli.main import run
 from daq_app.console import Console, NotWritten, Underway, takes_all
-from solver.progress import listening, tell
+from solver.progress import listening, report_progress
 
 
 def console(*, as_json):
@@ -86,7 +86,7 @@ def test_the_part_shown_of_work_whose_end_nobody_knows_moves_and_never_goes_back
     work, shown = Underway("solving"), []
     for doing, part in [("solving on a mesh", 0.0), ("following", 0.5), ("following", 1.0), ("following", 0.2)]:
         with listening(work.hear):
-            tell(doing, part)
+            report_progress(doing, part)
         shown.append((work.doing, work.part))
     work.hear("estimating", 0.5)
     work.reach(1.0)

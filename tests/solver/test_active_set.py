@@ -13,7 +13,7 @@ from solver.contact.law import FrictionLaw
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.full_slip import settled, slide_beside
 from solver.equilibrium.load_path import march
-from solver.equilibrium.newton import Given, Newton, Pull, Shape, lowered
+from solver.equilibrium.newton import EquilibriumState, Given, Newton, Pull, lowered
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.oracle.active_set import Course, forced, touchable, untouched
 from tests.solver.oracle.active_set import lowered as lowered_plain
@@ -59,7 +59,7 @@ def test_settled_slides_are_the_plain_ones(newton, plain, law, direction):
 @pytest.mark.parametrize("law", LAWS, ids=str)
 def test_a_course_of_stick_slip_and_turning_round_is_the_plain_one(newton, plain, law):
     course, before = Course(plain, law), untouched(plain)
-    state, met = Shape.undeformed(newton.condensed), set()
+    state, met = EquilibriumState.undeformed(newton.condensed), set()
     for depth, travel in WAY:
         before = course.step(before, depth, travel)
         state = newton.settle(state, Pull(depth, law.mu, law.tau_max, travel=-travel))
@@ -71,7 +71,7 @@ def test_a_course_of_stick_slip_and_turning_round_is_the_plain_one(newton, plain
 @pytest.mark.parametrize("tau", [np.inf, 0.004])
 def test_a_body_pressed_and_dragged_by_forces_is_the_plain_one(newton, plain, tau):
     mu = 0.4
-    state, before = replace(Shape.undeformed(newton.condensed), pull=Pull(0.0, mu, tau)), untouched(plain)
+    state, before = replace(EquilibriumState.undeformed(newton.condensed), pull=Pull(0.0, mu, tau)), untouched(plain)
     for n in range(1, 41):
         normal, drag = 0.002 * n, 0.0006 * max(n - 20, 0) * (1 if n < 35 else -1)
         course = Course(forced(plain, normal, drag), FrictionLaw(mu, tau))

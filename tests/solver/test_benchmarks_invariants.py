@@ -12,7 +12,7 @@ from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.load_path import march
 from solver.equilibrium.loads import sliding_pull
-from solver.equilibrium.newton import Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, Pull
 from solver.mesh.mesher import Sizing
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
@@ -35,7 +35,7 @@ def pull_of(law):
     return Pull(0.0, law.mu, law.tau_max)
 
 
-def bone_force(finger, contact: Shape):
+def bone_force(finger, contact: EquilibriumState):
     inner = finger.body.reactions(finger.displacement(contact)[:, :, None])[:, :, 0]
     return inner[finger.geometry.mesh.held].sum(axis=0)
 

@@ -11,7 +11,7 @@ from solver.body.stiffness import Probes
 from solver.constitutive.linear import Hooke
 from solver.element import Q2P1
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import Newton, Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, Newton, Pull
 from solver.mesh import Mesh
 from solver.mesh.blocks import block
 from solver.mesh.grid import quality
@@ -80,7 +80,7 @@ def test_a_block_sheared_below_mu_p_sticks_at_every_point(part):
     mesh, loads = pressed(0.48, part * mu * 1e-3, 1)
     body = LinearBody.of(mesh, [Hooke(0.08, 0.48)], loads, free=("x", "y", "turn"))
     newton = Newton(body.condensed)
-    still = replace(Shape.undeformed(body.condensed), state=np.full(len(mesh.skin), STICK, np.int32))
+    still = replace(EquilibriumState.undeformed(body.condensed), state=np.full(len(mesh.skin), STICK, np.int32))
     found = newton.solved(still, Pull(0.0, mu), newton.skin_x)
     assert (found.state == STICK).all()
     assert np.abs(found.tangential / body.condensed.fixed_length + part * mu * 1e-3).max() < 1e-15

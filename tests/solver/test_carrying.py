@@ -5,7 +5,7 @@ import pytest
 
 from solver import Finger, Receptor
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.mesh_transfer import Bridge, Places
+from solver.equilibrium.mesh_transfer import MeshTransfer, Places
 from solver.equilibrium.newton import Pull
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.finite_examples import finger
@@ -21,7 +21,7 @@ def places(fineness):
 def test_a_mesh_carries_a_state_to_itself_unchanged():
     newton, _, _ = finger(5)
     shape = settled(newton, PULL)
-    same = Bridge.of(places(5), places(5)).carried(shape)
+    same = MeshTransfer.of(places(5), places(5)).carried(shape)
     np.testing.assert_allclose(same.u, shape.u, atol=1e-13)
     np.testing.assert_array_equal(same.touching, shape.touching)
     np.testing.assert_allclose(same.pressure, shape.pressure, atol=1e-7)
@@ -29,7 +29,7 @@ def test_a_mesh_carries_a_state_to_itself_unchanged():
 
 def test_the_compiled_carrying_is_the_plain_one():
     shape = settled(finger(5)[0], PULL)
-    bridge = Bridge.of(places(5), places(8))
+    bridge = MeshTransfer.of(places(5), places(8))
     old, new = bridge.old, bridge.new
     combined = np.einsum("em,eml->el", shape.pressure, old.body.combination)
     slopes = combined.copy()
@@ -49,7 +49,7 @@ def test_the_compiled_carrying_is_the_plain_one():
 def test_a_carried_state_is_a_few_iterations_from_the_finer_meshs_own(fineness):
     coarse, _, _ = finger(5)
     fine, _, _ = finger(fineness)
-    start = Bridge.of(places(5), places(fineness)).carried(settled(coarse, PULL))
+    start = MeshTransfer.of(places(5), places(fineness)).carried(settled(coarse, PULL))
     found, direct = settled(fine, PULL, start), settled(fine, PULL)
     assert found.iterations - start.iterations <= 5
     np.testing.assert_allclose(found.u, direct.u, atol=1e-9)

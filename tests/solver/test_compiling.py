@@ -12,7 +12,7 @@ import pytest
 
 from solver import _kernels as kernels
 from solver._kernels import compiling
-from solver.progress import listening, tell
+from solver.progress import listening, report_progress
 
 SCRIPT = """
 import numpy as np
@@ -82,7 +82,7 @@ def test_ctrl_c_that_is_lost_in_llvm_stops_when_the_loop_is_compiled(ctrl_c):
     watch, event = compiling._Compilation(), SimpleNamespace(data={"dispatcher": kernels.tributary})
     heard = []
     with listening(lambda doing, _: heard.append(doing)):
-        tell("solving")
+        report_progress("solving")
         watch.on_start(event)
         with pytest.raises(KeyboardInterrupt):  # which LLVM would print and lose
             ctrl_c()

@@ -11,7 +11,7 @@ from solver.body.linear import LinearBody
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.full_slip import settled, slide_beside, slide_under
-from solver.equilibrium.newton import Given, Newton, Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, Given, Newton, Pull
 from solver.mesh.blocks import block
 
 RADIUS = 5.0
@@ -129,6 +129,6 @@ def test_a_tyre_that_cannot_slide_is_reported_lost():
 
 def test_before_first_touch_nothing_is_felt():
     body = cylinder(4.5, 0.4)
-    before = Newton(body.condensed).settle(Shape.undeformed(body.condensed), Pull(-0.01, 0.3))
+    before = Newton(body.condensed).settle(EquilibriumState.undeformed(body.condensed), Pull(-0.01, 0.3))
     assert not before.normal.any()
     assert before.place(body.condensed)[:, 1].min() == pytest.approx(0.0, abs=1e-12)

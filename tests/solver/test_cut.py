@@ -6,7 +6,7 @@ import pytest
 
 from solver import Friction, Loading, Scene, Solve
 from solver.accuracy import adaptivity as climbing
-from solver.accuracy.adaptivity import ascended, climbed, foot, sized, sized_together
+from solver.accuracy.adaptivity import coarse_solution, nested_solution, sized, sized_together, solution_on
 from solver.mesh.mesher import AT_CUT, SHORT_AT_CUT
 
 
@@ -19,12 +19,12 @@ def going_on():
 
 
 def rough(scene):
-    return foot(scene, scene.loading.depth, 6.0, going_on)
+    return coarse_solution(scene, scene.loading.depth, 6.0, going_on)
 
 
 @pytest.fixture(scope="module")
 def easy():
-    return ascended(dragged(0.6), 1.0, 6.0, going_on)
+    return nested_solution(dragged(0.6), 1.0, 6.0, going_on)
 
 
 def test_elements_at_the_cut_are_the_shorter_the_less_the_rough_mesh_squeezes_tissue_there():
@@ -47,7 +47,7 @@ def test_surfaces_that_share_a_mesh_have_the_elements_of_the_most_squeezed_at_th
 
 def test_where_short_elements_lead_nowhere_usual_ones_do(easy, monkeypatch):
     monkeypatch.setattr(climbing, "nearby", lambda *_: None)
-    back = climbed(dragged(0.6), 6.0, easy.foot, going_on)
-    usual = climbed(dragged(0.6), 6.0, replace(easy.foot, at_cut=AT_CUT), going_on)
-    assert sized(6.0, easy.foot).at_cut == SHORT_AT_CUT < back.at_cut == AT_CUT
+    back = solution_on(dragged(0.6), 6.0, easy.coarse, going_on)
+    usual = solution_on(dragged(0.6), 6.0, replace(easy.coarse, at_cut=AT_CUT), going_on)
+    assert sized(6.0, easy.coarse).at_cut == SHORT_AT_CUT < back.at_cut == AT_CUT
     assert back.finger.sed_ending(back.shape) == pytest.approx(usual.finger.sed_ending(usual.shape), rel=1e-12)

@@ -11,7 +11,7 @@ from solver.body.linear import LinearBody, edge_load
 from solver.constitutive.hyperelastic import NeoHooke, stress
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.dead_loads import loaded
-from solver.equilibrium.newton import FiniteNewton, Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Pull
 from tests.solver.finite_examples import block
 
 DERMIS = NeoHooke(0.08, 0.48)
@@ -22,7 +22,7 @@ def on_the_flat():
     mesh = block(columns=4, rows=2)
     middle = mesh.skin[np.isclose(mesh.nodes[mesh.skin, 0], 1.0)]
     newton = FiniteNewton(FiniteBody.of(replace(mesh, held=middle), [DERMIS]))
-    start = Shape.undeformed(newton.body)
+    start = EquilibriumState.undeformed(newton.body)
     touching = np.full(len(mesh.skin), SLIP, np.int32)
     return newton, replace(start, state=touching, sense=np.ones_like(touching))
 

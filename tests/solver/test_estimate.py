@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve, solve
-from solver.accuracy.adaptivity import ascended, climbed
+from solver.accuracy.adaptivity import nested_solution, solution_on
 from solver.accuracy.error_estimate import DEFAULT, FINENESS, coarsest_for, estimates
 from solver.accuracy.finite_errors import error_estimates
 from solver.mesh.mesher import AT_CUT
@@ -162,8 +162,8 @@ def test_a_bound_far_from_the_edges_of_contact_keeps_no_tolerance_from_being_met
 
 def test_what_all_meshes_have_in_common_where_the_cut_meets_the_bone_is_part_of_the_estimate():
     sticks = replace(scene(STICKINESS[0]), solve=Solve("finite"))
-    way_up = ascended(sticks, 2.0, 11.0, lambda: False)
-    usual = climbed(sticks, 11.0, replace(way_up.foot, at_cut=AT_CUT), lambda: False)
+    way_up = nested_solution(sticks, 2.0, 11.0, lambda: False)
+    usual = solution_on(sticks, 11.0, replace(way_up.coarse, at_cut=AT_CUT), lambda: False)
     left: list[float] = []
     for top in (way_up.top, usual):
         numbers = top.finger.all_numbers(top.shape)

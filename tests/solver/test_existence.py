@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState, Receptor, Scene, Solve, solve
-from solver.accuracy.adaptivity import ascended
+from solver.accuracy.adaptivity import nested_solution
 from solver.continuation.existence import steady
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import Pull
@@ -87,12 +87,12 @@ def drawn(mu, tolerance=None):
 @pytest.mark.parametrize("mu", [0.8, 0.85, 0.9])
 def test_beyond_the_fold_every_mesh_refuses_also_where_it_has_a_creased_state(mu, fineness):
     with pytest.raises(NoSteadyState):
-        ascended(drawn(mu), 1.8, fineness, lambda: False)
+        nested_solution(drawn(mu), 1.8, fineness, lambda: False)
 
 
 @SLOW
 def test_every_mesh_has_the_state_below_the_fold_on_the_same_branch():
-    found = [ascended(drawn(0.71), 1.8, fineness, lambda: False).top for fineness in (7.0, 10.0, 14.0, 20.0)]
+    found = [nested_solution(drawn(0.71), 1.8, fineness, lambda: False).top for fineness in (7.0, 10.0, 14.0, 20.0)]
     np.testing.assert_allclose([top.finger.sed_ending(top.shape) for top in found], 0.00286, rtol=0.01)
 
 
@@ -133,7 +133,7 @@ def test_a_fold_that_lies_where_meshes_are_coarse_is_seen_by_all_of_them(finenes
             solve=Solve("finite"),
         )
 
-    assert ascended(at(0.84), 1.0997, fineness, lambda: False).top.shape.touching.any()
+    assert nested_solution(at(0.84), 1.0997, fineness, lambda: False).top.shape.touching.any()
     with pytest.raises(NoSteadyState) as refused:
-        ascended(at(0.91), 1.0997, fineness, lambda: False)
+        nested_solution(at(0.91), 1.0997, fineness, lambda: False)
     assert refused.value.limit_mu == pytest.approx(0.88, rel=0.03)

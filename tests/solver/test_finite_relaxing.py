@@ -18,7 +18,7 @@ from solver.constitutive.hyperelastic import tangent as relaxed_tangent
 from solver.constitutive.linear import Hooke, Prony
 from solver.constitutive.overstress import Past
 from solver.equilibrium.finite_relaxation import RelaxingNewton
-from solver.equilibrium.newton import Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, Pull
 from solver.progress import listening
 from solver.scene.published import SLIPPERINESS, scene
 from tests.solver.finite_examples import block
@@ -169,7 +169,7 @@ def relaxing_block(distortion=0.06):
     rng = np.random.default_rng(3)
     u = rng.uniform(-0.015, 0.015, body.mesh.nodes.shape)
     u[body.mesh.held] = 0.0
-    start = replace(Shape.undeformed(body), u=u)
+    start = replace(EquilibriumState.undeformed(body), u=u)
     newton.ready(0.2)
     newton.took(start, 0.2)
     newton.ready(0.3)
@@ -184,7 +184,7 @@ def whole(newton, u, pressure):
     bend = overstress.tangent(T, oracle.deformation(body, u))
     count = len(body.nodes)
     more = np.einsum("eq,eqaAbB,eqiA,eqjB->eiajb", body.weight, bend, gradient, gradient)
-    shape = replace(Shape.undeformed(body), u=u)
+    shape = replace(EquilibriumState.undeformed(body), u=u)
     return force + newton.excess(shape), tangent + more.reshape(count, 18, 18)
 
 
@@ -221,7 +221,7 @@ def test_compiled_forces_and_tangents_agree_with_the_plain_ones_and_with_differe
 def test_a_pressed_block_is_in_equilibrium_with_what_it_holds_of_the_past():
     newton, _, _ = relaxing_block(distortion=0.0)
     body = newton.body
-    shape = Shape.undeformed(body)
+    shape = EquilibriumState.undeformed(body)
     newton.relaxing.past = Past.at_rest(newton.relaxing.past.shear, newton.relaxing.past.tau)
     pushes = []
     for depth, step in ((0.1, 0.1), (0.2, 0.1), (0.2, 0.5), (0.2, 5.0)):
@@ -243,7 +243,7 @@ def test_what_a_pressed_block_keeps_and_friction_does_not_take_is_what_its_tissu
     newton, _, _ = relaxing_block(distortion=0.0)
     body, weight = newton.body, newton.body.weight.ravel()
     newton.relaxing.past = Past.at_rest(newton.relaxing.past.shear, newton.relaxing.past.tau)
-    shape, way, rates, steps, time = Shape.undeformed(body), [], [0.0], 24, 0.5
+    shape, way, rates, steps, time = EquilibriumState.undeformed(body), [], [0.0], 24, 0.5
     for number in range(1, steps + 1):
         newton.ready(time / steps)
         shape = newton.settle(shape, Pull(0.2 * number / steps, 0.3), 1e-9)

@@ -8,7 +8,7 @@ import pytest
 
 from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve, solve, solve_many
 from solver.accuracy import finite_errors
-from solver.accuracy.adaptivity import ascended
+from solver.accuracy.adaptivity import nested_solution
 from solver.accuracy.audits import refuse_unsound, rounding
 from solver.accuracy.finite_audits import audits
 from solver.equilibrium.finite_finger import FiniteFinger
@@ -118,13 +118,13 @@ def test_a_surface_begun_at_anothers_state_ends_where_one_begun_at_the_undeforme
         return made[key]
 
     one, other = finite(SLIPPERINESS[0]), finite(SLIPPERINESS[1])
-    before = ascended(one, 1.5, 6.0, lambda: False, make)
-    fresh = ascended(other, 1.5, 6.0, lambda: False, make)
-    warm = ascended(other, 1.5, 6.0, lambda: False, make, before)
+    before = nested_solution(one, 1.5, 6.0, lambda: False, make)
+    fresh = nested_solution(other, 1.5, 6.0, lambda: False, make)
+    warm = nested_solution(other, 1.5, 6.0, lambda: False, make, before)
     np.testing.assert_allclose(warm.top.shape.u, fresh.top.shape.u, rtol=0.0, atol=1e-10)
     np.testing.assert_allclose(warm.top.shape.reaction, fresh.top.shape.reaction, rtol=0.0, atol=1e-11)
     assert warm.top.shape.iterations < fresh.top.shape.iterations
-    edges = [at.foot.finger.edges(at.foot.shape) for at in (warm, fresh)]
+    edges = [at.coarse.finger.edges(at.coarse.shape) for at in (warm, fresh)]
     np.testing.assert_allclose(*edges, rtol=0.0, atol=1e-4)  # so that meshes, and answers, are the same but for that
 
 
@@ -177,7 +177,7 @@ def test_an_answer_that_no_coarser_mesh_has_is_solved_on_a_finer_one_or_said_to_
             raise NotConverged("lost")
         return nearest(scene, fineness, *more)
 
-    monkeypatch.setattr(finite_errors, "climbed", lost)
+    monkeypatch.setattr(finite_errors, "solution_on", lost)
     found = solve(Scene(friction=Friction(0.3), loading=Loading(0.5, "+x"), solve=Solve("finite", evidence="quick")))
     assert (found.error_estimate < 0.01) == known
     assert (UNKNOWN in found.warnings) == (not known)

@@ -14,7 +14,7 @@ from solver.constitutive.hyperelastic import NeoHooke
 from solver.contact import law as friction
 from solver.contact.law import LAWS, NAMES, OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, BY_TRAVEL, FiniteNewton, Newton, Pull, Shape
+from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, BY_TRAVEL, EquilibriumState, FiniteNewton, Newton, Pull
 from solver.mesh.blocks import block
 from solver.response.small_stepper import Condensed, SmallStepper
 from tests.solver.oracle import finite as oracle
@@ -64,7 +64,7 @@ def told(body, now, before):
 
 def driven(law):
     body = springs()
-    newton, states = Newton(body), [Shape.undeformed(body)]
+    newton, states = Newton(body), [EquilibriumState.undeformed(body)]
     for depth, travel in DRIVES:
         states.append(newton.settle(states[-1], Pull(depth, law.mu, law.tau_max, travel=-travel)))
     return [told(body, now, before) for before, now in pairwise(states)]
@@ -118,7 +118,7 @@ def cushion():
 
 def dragged(newton, law, drives=((0.02, 0.0), (0.06, 0.0), (0.06, 0.004), (0.06, 0.015), (0.06, 0.1), (0.06, 0.098),
                                  (0.06, 0.05), (0.03, 0.05), (-0.1, 0.05))):  # fmt: skip
-    shapes = [Shape.undeformed(newton.body)]
+    shapes = [EquilibriumState.undeformed(newton.body)]
     for depth, travel in drives:
         shapes.append(newton.settle(shapes[-1], Pull(depth, law.mu, law.tau_max, 0, travel), 1e-13))
     return shapes
@@ -202,7 +202,7 @@ def test_friction_that_vanishes_is_none_and_a_bound_that_is_never_felt_is_none(c
 def test_points_on_springs_carry_what_their_springs_and_the_law_say(law):
     """No point feels another, and without coupling N = (d - g)/a; T is the springs' pull, cut off."""
     body = springs(across=0.0)
-    newton, before = Newton(body), Shape.undeformed(body)
+    newton, before = Newton(body), EquilibriumState.undeformed(body)
     for depth, travel in DRIVES:
         normal = np.maximum(depth - body.rest[:, 1], 0.0) / COMPLIANCE[0]
         limit = np.minimum(law.mu * normal, law.tau_max * LENGTH if law.tau_max < np.inf else np.inf)

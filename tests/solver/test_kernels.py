@@ -14,7 +14,7 @@ from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.finite import CondensedFinite, FiniteBody
 from solver.constitutive.hyperelastic import LAWS, NeoHooke
 from solver.contact.skin_compression import crosses_itself, pinched
-from solver.equilibrium.newton import FiniteNewton, Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Pull
 from tests.solver.finite_examples import block, finger
 from tests.solver.oracle import finite as oracle
 
@@ -140,7 +140,7 @@ def test_tributary_lengths_add_up_and_agree_with_the_plain_ones():
 def test_contact_rows_are_the_derivatives_of_their_conditions():
     body, u = distorted(NeoHooke(0.08, 0.48))
     newton = FiniteNewton(body)
-    start = Shape.undeformed(body)
+    start = EquilibriumState.undeformed(body)
     state = np.array([STICK, SLIP, SHEAR_LIMITED, SHEAR_LIMITED, SHEAR_LIMITED, SLIP, OPEN], np.int32)
     sense = np.array([1, 1, -1, -1, -1, -1, 1], np.int32)
     pull = Pull(0.05, 0.4, 0.01, 0)
@@ -148,7 +148,7 @@ def test_contact_rows_are_the_derivatives_of_their_conditions():
 
     def conditions(u):
         pressure = newton_pressure(body, u)
-        at = Shape(u, pressure, state, sense, start.reaction, pull, 0)
+        at = EquilibriumState(u, pressure, state, sense, start.reaction, pull, 0)
         force = oracle.system(body, u, pressure)[0]
         place = at.place(body)
         length = oracle.tributary(place[:, 0])

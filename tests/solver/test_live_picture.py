@@ -7,7 +7,7 @@ import pytest
 
 from solver import Friction, Loading, Scene
 from solver.equilibrium.finger import FingerModel
-from solver.equilibrium.newton import Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, Pull
 from solver.mesh.mesher import Sizing
 from solver.response.live_picture import LivePicture
 
@@ -19,7 +19,7 @@ def finger():
 
 @pytest.fixture(scope="module")
 def state(finger):
-    rest = Shape.undeformed(finger.body.condensed)
+    rest = EquilibriumState.undeformed(finger.body.condensed)
     return replace(rest, u=np.random.default_rng(1).normal(size=rest.u.shape) * 1e-3, pull=Pull(1.5, 0.5))
 
 
@@ -39,7 +39,7 @@ def test_nodes_and_energies_are_those_that_the_body_gives_for_the_same_skin(fing
 
 def test_faces_cover_the_tissue_once(finger):
     picture = LivePicture.of(finger)
-    corners = picture.nodes(Shape.undeformed(finger.body.condensed))[picture.faces]
+    corners = picture.nodes(EquilibriumState.undeformed(finger.body.condensed))[picture.faces]
     x, y = corners[..., 0], corners[..., 1]
     area = 0.5 * np.sum(x * np.roll(y, -1, 1) - np.roll(x, -1, 1) * y, axis=1)
     whole = finger.geometry.mesh.nodes[finger.geometry.mesh.elements[:, :4]]

@@ -11,7 +11,7 @@ from solver.body.linear import LinearBody, edge_load
 from solver.body.stiffness import Probes
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import Newton, Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, Newton, Pull
 from solver.mesh import Mesh
 from solver.mesh.blocks import block
 
@@ -83,7 +83,7 @@ def test_below_the_friction_limit_every_point_sticks_and_carries_the_same_tracti
     mesh, loads = pressed_block(part * mu * PRESSURE, confined=True)
     body = LinearBody.of(mesh, [DERMIS], loads, free=("x", "y", "turn"))
     newton = Newton(body.condensed)
-    start = replace(Shape.undeformed(body.condensed), state=np.full(len(mesh.skin), STICK, np.int32))
+    start = replace(EquilibriumState.undeformed(body.condensed), state=np.full(len(mesh.skin), STICK, np.int32))
     found = newton.solved(start, Pull(0.0, mu), newton.skin_x)
     assert (found.state == STICK).all()
     assert np.allclose(found.normal, PRESSURE * body.condensed.fixed_length, rtol=0, atol=1e-15)
@@ -95,7 +95,7 @@ def test_no_point_sticks_alone_when_the_shear_exceeds_the_limit():
     mesh, loads = pressed_block(1.001 * mu * PRESSURE, confined=True)
     body = LinearBody.of(mesh, [DERMIS], loads, free=("x", "y", "turn"))
     newton = Newton(body.condensed)
-    start = replace(Shape.undeformed(body.condensed), state=np.full(len(mesh.skin), STICK, np.int32))
+    start = replace(EquilibriumState.undeformed(body.condensed), state=np.full(len(mesh.skin), STICK, np.int32))
     with pytest.raises(ContactLost):  # the block accelerates: nothing can balance its load
         newton.solved(start, Pull(0.0, mu), newton.skin_x)
 

@@ -9,7 +9,7 @@ from solver.constitutive.hyperelastic import NeoHooke
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.march import march
-from solver.equilibrium.newton import FiniteNewton, Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Pull
 from solver.mesh import Mesh
 from solver.mesh.blocks import block
 from solver.mesh.mesher import Sizing
@@ -26,11 +26,11 @@ def _model(fineness: float = 6.0) -> FiniteFinger:
     return FiniteFinger.of(scene(STICKINESS[0]), Sizing(fineness, DEPTH, margin=3.0))
 
 
-def _slid(mesh: Mesh, laws: Iterable[NeoHooke], pull: Pull) -> Shape:
+def _slid(mesh: Mesh, laws: Iterable[NeoHooke], pull: Pull) -> EquilibriumState:
     return settled(FiniteNewton(FiniteBody.of(mesh, list(laws))), pull)
 
 
-def _last(finger: FiniteFinger, course: list[Pull], start: Shape | None = None) -> Shape:
+def _last(finger: FiniteFinger, course: list[Pull], start: EquilibriumState | None = None) -> EquilibriumState:
     *_, last = march(finger.newton, course, start)
     return last
 
@@ -39,7 +39,7 @@ def reversal() -> Outcome:
     """Slide forth, back and forth again: the settled state must return, and the one of the other way be met."""
     finger, mu, tau = _model(), 0.44, 0.03009
     press = [Pull(DEPTH * (i + 1) / 8, mu, tau) for i in range(8)]
-    now, travel, ends = _last(finger, press), 0.0, list[Shape]()
+    now, travel, ends = _last(finger, press), 0.0, list[EquilibriumState]()
     for way in (1, -1, 1):
         course: list[Pull] = []
         for _ in range(24):
@@ -75,7 +75,7 @@ def edge_at_node() -> Outcome:
     finger = _model()
     start = settled(finger.newton, Pull(1.4, 0.3, np.inf, 1))
 
-    def at(depth: float) -> Shape:
+    def at(depth: float) -> EquilibriumState:
         return settled(finger.newton, Pull(depth, 0.3, np.inf, 1), start)
 
     low, high = 1.4, 1.5

@@ -15,7 +15,7 @@ from solver.constitutive.linear import Hooke
 from solver.contact.law import OPEN, STICK, FrictionLaw
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.full_slip import settled, slide_beside
-from solver.equilibrium.newton import Given, Newton, Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, Given, Newton, Pull
 from solver.verification.published.bodies import (
     chain,
     disc,
@@ -39,7 +39,7 @@ def half_plane(half_width: float, radius: float, law: Hooke, wide: float = 100.0
     return LinearBody.of(mound(x, y, radius, 3.0 * half_width), [law])
 
 
-def pressed(newton: Newton, load: float, half_width: float) -> Shape:
+def pressed(newton: Newton, load: float, half_width: float) -> EquilibriumState:
     """Return the contact of a body pressed by `load` [N/mm]."""
     return slide_beside(newton, NONE, touching_within(newton, 1.05 * half_width), load)
 
@@ -118,19 +118,19 @@ class Light:
     x: Array  # (k,) of the skin's nodes
     length: Array  # (k,)
     newton: Newton
-    found: Shape
+    found: EquilibriumState
 
-    def stress(self, state: Shape, points: Array) -> Array:
+    def stress(self, state: EquilibriumState, points: Array) -> Array:
         """Return the stress (p, 2, 2) at `points` (p, 2), by the peak pressure."""
         return stress(self.body, self.body.displacement(state.u), points) / self.peak
 
-    def sheared(self, law: FrictionLaw, part: float) -> Shape:
+    def sheared(self, law: FrictionLaw, part: float) -> EquilibriumState:
         """Return the state after a tangential force `part` mu P along -x on the far side of what only pressed."""
         stuck = np.where(self.found.touching, STICK, OPEN).astype(np.int32)
         before = replace(self.found, state=stuck, pull=Pull(self.found.pull.depth, law.mu, law.tau_max))
         return balanced(self.newton, before, Given(self.load, -part * law.mu * self.load))
 
-    def slid(self, law: FrictionLaw, direction: int = 1) -> Shape:
+    def slid(self, law: FrictionLaw, direction: int = 1) -> EquilibriumState:
         """Return the state of full slip; the body moves along `direction` x."""
         pull = Pull(0.0, law.mu, law.tau_max, -direction)
         return slide_beside(self.newton, pull, self.found.state, self.load)
@@ -147,11 +147,11 @@ def light(nu: float = 0.4999, wide: float = 100.0) -> Light:
     return Light(body, load, 2 * load / np.pi, x, body.condensed.fixed_length, newton, pressed(newton, load, 1.0))
 
 
-def stick_width(light: Light, state: Shape, mu: float) -> float:
+def stick_width(light: Light, state: EquilibriumState, mu: float) -> float:
     """Return half the width of the stick: what friction could carry and does not, mu p - q, falls to nothing there."""
     return half_width(light.x, mu * state.normal + state.tangential, state.state == STICK)
 
 
-def capped_width(light: Light, state: Shape, law: FrictionLaw) -> float:
+def capped_width(light: Light, state: EquilibriumState, law: FrictionLaw) -> float:
     """Return half the width of what slips at the bound: where mu p crosses it."""
     return half_above(light.x, law.mu * state.normal / light.length - law.tau_max)

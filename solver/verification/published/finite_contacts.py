@@ -12,7 +12,7 @@ from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.march import march
-from solver.equilibrium.newton import FiniteNewton, Pull, Shape
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Pull
 from solver.verification.published.bodies import graded, mirrored, mound
 from solver.verification.published.zones import half_above, half_width
 
@@ -29,7 +29,7 @@ class LightFinite:
     """A half-plane at finite strain and what a light press of it gives."""
 
     newton: FiniteNewton
-    pressed: Shape
+    pressed: EquilibriumState
     load: float  # [N/mm]
 
     @property
