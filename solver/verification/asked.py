@@ -26,13 +26,21 @@ class LeftOut:
 
 
 @dataclass(frozen=True, slots=True)
+class Host:
+    """The program that measures."""
+
+    versions: Mapping[str, str] = field(default_factory=dict[str, str])  # of it and its libraries, by name
+    python: tuple[str, ...] = ("python3",)  # the command that starts another Python
+
+
+@dataclass(frozen=True, slots=True)
 class Asked:
     """How much may be measured. `until` is an instant of the clock `now` after which nothing new is begun."""
 
     quick: bool
     until: float
     now: Callable[[], float] = perf_counter
-    versions: Mapping[str, str] = field(default_factory=dict[str, str])  # of the programs that measure, by name
+    host: Host = Host()
 
     @property
     def left(self) -> float:

@@ -28,7 +28,7 @@ def measure(asked: Asked, found: Found) -> Iterator[Machine]:
     threads = os.environ.get("OPENBLAS_NUM_THREADS", "not limited")
     yield Machine(
         f"{platform.system()} {platform.release()}", _processor(), os.cpu_count() or 1, threads, load,
-        dict(asked.versions),
+        dict(asked.host.versions),
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import msgspec
 from solver.failures import SolveFailure
 from solver.response.solution import solve
 from solver.response.stepper import stepper
-from solver.verification.asked import Asked, Found, LeftOut
+from solver.verification.asked import Asked, Found, Host, LeftOut
 from solver.verification.costs import Cost
 from solver.verification.estimates import Estimate, Guaranteed
 from solver.verification.growth import Growth
@@ -88,7 +88,7 @@ def restored(document: dict[str, Any]) -> Measured:
 
 
 def measured(
-    quick: bool, progress: Progress, versions: Mapping[str, str], subjects: Sequence[Subject] = SUBJECTS,
+    quick: bool, progress: Progress, host: Host, subjects: Sequence[Subject] = SUBJECTS,
     seconds: float | None = None, clock: Callable[[], float] = perf_counter,
 ) -> Measured:  # fmt: skip
     """Return what the subjects find. Ctrl-C ends the measuring and keeps what was found until then.
@@ -110,7 +110,7 @@ def measured(
             continue
         part = _share(subject, quick) / max(sum(_share(s, quick) for s in subjects[number:]), 1e-9)
         now = clock()
-        asked = Asked(quick, now + max(end - now, 0.0) * part, clock, versions)
+        asked = Asked(quick, now + max(end - now, 0.0) * part, clock, host)
         mine: list[DataclassInstance] = []
         try:
             for row in subject.measure(asked, found):

@@ -3,7 +3,6 @@
 import json
 import os
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -71,7 +70,7 @@ def measure(asked: Asked, found: Found) -> Iterator[Cold | Memory | LeftOut]:
     """Yield cold starts and the memory of a solve in each kinematics."""
     del found
     with tempfile.TemporaryDirectory() as folder:
-        for what, command in _commands(Path(folder)):
+        for what, command in _commands(Path(folder), asked.host.python):
             if asked.left <= 0.0 and not what.startswith("daq-app"):
                 continue
             runs = 5 if not asked.quick else 2 if what.startswith("daq-app") else 1
@@ -85,19 +84,19 @@ def measure(asked: Asked, found: Found) -> Iterator[Cold | Memory | LeftOut]:
         if asked.quick:
             yield LeftOut(f"Memory of a solve at {kinematics} strain is left to a full run.")
             continue
-        yield _memory(kinematics)
+        yield _memory(kinematics, asked.host.python)
 
 
-def _commands(folder: Path) -> list[tuple[str, list[str]]]:
+def _commands(folder: Path, python: tuple[str, ...]) -> list[tuple[str, list[str]]]:
     out: list[tuple[str, list[str]]] = [
-        ("Python alone", _python("-c", "pass")),
-        ("Python and its arrays", _python("-c", "import numpy, scipy.linalg")),
+        ("Python alone", [*python, "-c", "pass"]),
+        ("Python and its arrays", [*python, "-c", "import numpy, scipy.linalg"]),
     ]
     for kinematics, loaded in (("small", "solver.response.solution"), ("finite", "solver.response.finite_solution")):
-        out.append((f"the solver loaded, {kinematics} strain", _python("-c", f"import {loaded}")))
+        out.append((f"the solver loaded, {kinematics} strain", [*python, "-c", f"import {loaded}"]))
         scene = folder / f"{kinematics}.toml"
         scene.write_text(SCENE.format(kinematics=kinematics), encoding="utf-8")
-        out.append((f"daq-app solve, {kinematics} strain", _python("-m", "daq_app", "solve", str(scene), "--json")))
+        out.append((f"daq-app solve, {kinematics} strain", [*python, "-m", "daq_app", "solve", str(scene), "--json"]))
     return out
 
 
@@ -115,16 +114,11 @@ def _of_children() -> float:
     return times.children_user + times.children_system
 
 
-def _memory(kinematics: Kinematics) -> Memory | LeftOut:
+def _memory(kinematics: Kinematics, python: tuple[str, ...]) -> Memory | LeftOut:
     code = MEMORY.format(kinematics=kinematics, tolerance=TOLERANCE)
     try:
-        done = subprocess.run(_python("-c", code), check=True, capture_output=True, text=True, timeout=LONGEST)
+        done = subprocess.run([*python, "-c", code], check=True, capture_output=True, text=True, timeout=LONGEST)
     except (subprocess.SubprocessError, OSError) as bad:
         return LeftOut(f"Memory of a solve at {kinematics} strain could not be measured here: {bad}.")
     idle, solving, dofs, estimate = json.loads(done.stdout)
     return Memory(kinematics, TOLERANCE, dofs, estimate, idle, solving)
-
-
-def _python(*words: str) -> list[str]:
-    """Return the command that starts this Python with some words; it looks for no modules in the current folder."""
-    return [sys.executable, "-P", *words]

@@ -10,10 +10,11 @@ import pytest
 
 from daq_app.accuracy_page.page import page, write
 from daq_app.accuracy_page.tables import Table, tables
+from daq_app.child_process import interpreter
 from solver import solve
 from solver.accuracy.error_estimate import DEFAULT
 from solver.verification import estimates, targets
-from solver.verification.asked import Asked, Found, LeftOut, timed, within
+from solver.verification.asked import Asked, Found, Host, LeftOut, timed, within
 from solver.verification.costs import Cost, shares
 from solver.verification.estimates import Estimate, Guaranteed
 from solver.verification.growth import Growth, exponent
@@ -29,8 +30,9 @@ from solver.verification.subjects import Subject
 from solver.verification.truth import JUDGED, Truth, cases
 from solver.verification.warm import Warm
 
-FOREVER = Asked(quick=True, until=perf_counter() + 1e6)
-OVER = Asked(quick=True, until=perf_counter() - 1.0)
+HOST = Host({}, tuple(interpreter()))
+FOREVER = Asked(quick=True, until=perf_counter() + 1e6, host=HOST)
+OVER = Asked(quick=True, until=perf_counter() - 1.0, host=HOST)
 
 
 def speed(kinematics, dofs, error, first, floor=1e-3, failed=()):
@@ -251,7 +253,7 @@ def unloaded(monkeypatch):
 def test_ctrl_c_keeps_what_was_measured_and_names_what_was_not():
     first, second = ROWS["growth"][:2]
     parts = [subject("one", first), subject("two", second, KeyboardInterrupt), subject("three", first)]
-    found = measured(True, quiet, {}, parts, seconds=5.0)
+    found = measured(True, quiet, HOST, parts, seconds=5.0)
     assert found.stopped
     assert found.rows == {"one": (first,), "two": (second,)}
     assert found.left_out == ("Stopped during: the two.", "Stopped before: the three.")
@@ -262,7 +264,7 @@ def test_ctrl_c_keeps_what_was_measured_and_names_what_was_not():
 def test_a_subject_that_breaks_off_loses_nothing_of_the_others():
     first, second = ROWS["growth"][:2]
     parts = [subject("one", first, ValueError("bad luck")), subject("two", second)]
-    found = measured(True, quiet, {}, parts, seconds=5.0)
+    found = measured(True, quiet, HOST, parts, seconds=5.0)
     assert found.rows == {"one": (first,), "two": (second,)}
     assert found.left_out == ("The one broke off: bad luck",)
 
@@ -278,7 +280,7 @@ def test_time_within_a_part_of_the_solver_counts_for_that_part_and_that_outside_
 
 @pytest.mark.slow
 def test_a_quick_run_measures_something_of_every_subject(tmp_path):
-    found = measured(True, quiet, {}, seconds=1.0)
+    found = measured(True, quiet, HOST, seconds=1.0)
     assert {name for name, rows in found.rows.items() if not rows} == set()
     assert not [told for told in found.left_out if "broke off" in told]
     write(found, tmp_path)

@@ -12,6 +12,7 @@ import pytest
 from daq_app.analyst.messages import Problem
 from daq_app.analyst.process import Analyst
 from daq_app.batch.pool import _in_pool
+from daq_app.child_process import interpreter
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Connect, Device, Failed, Gone
 from daq_app.window.live_model_process import LiveModel
@@ -105,7 +106,7 @@ def test_the_pool_of_a_study_runs_nothing_that_lies_in_the_current_folder(tmp_pa
 
 
 def test_processes_that_are_timed_run_nothing_that_lies_in_the_current_folder(malicious):
-    commands = [command for _, command in processes._commands(malicious)]
+    commands = [command for _, command in processes._commands(malicious, tuple(interpreter()))]
     for command in (commands[1], commands[2], [*commands[-1][:-3], "verify", "--help"]):
         done = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
         assert done.returncode == 0, done.stderr

@@ -10,6 +10,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from daq_app.child_process import interpreter
 from daq_app.console import Console, WrongValue, table
 
 if TYPE_CHECKING:
@@ -63,10 +64,11 @@ def _found(options: argparse.Namespace, console: Console) -> "Measured":
     """Return what is measured, or what an earlier run measured. Raises WrongValue for a file that is none."""
     from sessions.file_access import read_limited
     from sessions.recording.provenance import software_versions
+    from solver.verification.asked import Host
     from solver.verification.measuring import measured, restored
 
     if options.data is None:
-        return measured(options.quick, console.progress, software_versions())
+        return measured(options.quick, console.progress, Host(software_versions(), tuple(interpreter())))
     try:
         return restored(json.loads(read_limited(options.data)))
     except (ValueError, KeyError, TypeError) as error:
