@@ -170,7 +170,7 @@ def test_small_and_finite_strain_agree_where_the_press_is_shallow():
 def test_an_answer_that_no_coarser_mesh_has_is_solved_on_a_finer_one_or_said_to_be_of_unknown_error(
     monkeypatch, lost_below, known
 ):
-    nearest = finite_errors.climbed
+    nearest = finite_errors.solution_on
 
     def lost(scene, fineness, *more):
         if fineness < lost_below:
