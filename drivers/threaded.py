@@ -79,8 +79,8 @@ class ThreadedTransducer(ABC):
             raise
 
     def _check_first(self) -> None:
-        """Raise why the stream cannot be used, where it cannot."""
-        if self._ended is not None:
+        """Raise why the stream cannot be used, where it cannot. A loss after readings came is left to `read`."""
+        if self._ended is not None and not (isinstance(self._ended, LinkLost) and self._has_come()):
             raise self._ended
 
     def read(self, timeout: float) -> ReadingBlock:
