@@ -10,6 +10,7 @@
 | point | the published family with an ending of 0.001 to 0.1 by 0.001 to 0.2 mm anywhere in the skin |
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Literal
@@ -175,7 +176,7 @@ def _tissues(draw: np.random.Generator) -> Materials:
 
 
 def _by_logarithm(draw: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(draw.uniform(np.log(low), np.log(high))))
+    return math.exp(draw.uniform(math.log(low), math.log(high)))
 
 
 def _slide(draw: np.random.Generator) -> Literal["+x", "-x"]:
