@@ -3,7 +3,7 @@
 Much of what a mesh makes wrong is the same for all surfaces of one finger and falls out of their differences; what is
 left comes from the edges of contact, which each has elsewhere. How far a difference may be off is a part of what it
 changes by from the answer's mesh to another. At small strain one other mesh agreed by chance in one of six sets, so
-that there are two. The parts were chosen and measured with benchmarks/differences.py.
+that there are two. The parts were chosen and measured with the contrasts of `solver.verification.survey`.
 """
 
 from collections.abc import Sequence

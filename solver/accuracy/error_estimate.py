@@ -14,7 +14,7 @@ hardly faster than elements get shorter. Where skin slips at the bound up to an 
 moved there is one of the others, and `felt` says what a number makes of the bound. Near the friction limit of small
 strain numbers grow without bound, and each mesh has its own limit: there `felt` says what they make of the coefficient.
 Meshes were chosen on the published finger; others' errors are larger, the more so the thinner the bone is, whatever two
-meshes differ by. The factors were chosen and measured with benchmarks/error_estimate.py and finite_error_estimate.py.
+meshes differ by. The factors were chosen and measured with the surveys of meshes of `solver.verification.survey`.
 """
 
 from math import sqrt

@@ -31,7 +31,7 @@ class Estimate:
     kinematics: Kinematics
     case: str
     number: str
-    tolerance: float  # asked of the SED
+    tolerance: float  # asked of the SED; 0 where none was
     dofs: int
     estimate: float  # relative
     error: float  # relative
@@ -40,7 +40,7 @@ class Estimate:
     @property
     def above(self) -> bool | None:
         """Whether the estimate lies above the true error; None where the truth is too doubtful to tell."""
-        return self.estimate >= self.error if self.doubt <= self.estimate / 3.0 else None
+        return self.estimate >= self.error if self.doubt <= max(self.estimate, self.error) / 3.0 else None
 
     @property
     def near(self) -> bool | None:
@@ -92,7 +92,7 @@ def _published(asked: Asked, found: Found, kinematics: Kinematics) -> Iterator[E
         good = [a for a in found_all if isinstance(a, Prediction)]
         for answer in good:
             truth = truths[answer.scene.title]
-            rows += _compared(kinematics, tolerance, answer, np.array(truth.numbers), np.array(truth.doubt))
+            rows += compared(answer, tolerance, np.array(truth.numbers), np.array(truth.doubt))
         yield from rows
         if good:
             yield Guaranteed(
@@ -115,7 +115,7 @@ def _random(asked: Asked, kinematics: Kinematics) -> Iterator[Estimate | LeftOut
         if isinstance(answer, SolveFailure) or truth is None:
             refused += 1
             continue
-        yield from _compared(kinematics, TOLERANCES[0], answer, *truth)
+        yield from compared(answer, TOLERANCES[0], *truth)
     if refused:
         yield LeftOut(f"{refused} of {wanted} random scenes at {kinematics} strain have no settled state to compare.")
 
@@ -129,15 +129,13 @@ def _truth(scene: Scene) -> tuple[np.ndarray, np.ndarray] | None:
     return judged(solves)
 
 
-def _compared(
-    kinematics: Kinematics, tolerance: float, answer: Prediction, truth: np.ndarray, doubt: np.ndarray
-) -> list[Estimate]:
-    numbers = (answer.sed_ending, answer.normal_force, answer.tangential_force)
+def compared(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.ndarray) -> list[Estimate]:
+    """Return the estimates of an answer's numbers beside their errors against `truth` (3,) of relative `doubt` (3,)."""
+    numbers = (answer.sed_ending, answer.normal_force, abs(answer.tangential_force))
     estimates = (answer.error_estimate, answer.normal_force_error, answer.tangential_force_error)
+    kinematics, title = answer.scene.solve.kinematics, answer.scene.title
     return [
-        Estimate(
-            kinematics, answer.scene.title, name, tolerance, answer.dofs, estimate, abs(value / true - 1.0), float(far)
-        )
+        Estimate(kinematics, title, name, tolerance, answer.dofs, estimate, abs(value / true - 1.0), float(far))
         for name, value, estimate, true, far in zip(NUMBERS, numbers, estimates, truth.tolist(), doubt, strict=True)
         if estimate is not None and true > 0.0
     ]

@@ -255,15 +255,16 @@ def overkill(scene: Scene, sizing: Sizing, below: MeshSolution | None = None) ->
     return Overkill(first, tends, length)
 
 
-def climbed_twice(scene: Scene, finenesses: tuple[float, float, float]) -> tuple[Array, tuple[int, ...]]:
-    """Return numbers (3, 3) and unknowns of a plain mesh, and of two meshes with lines at the edges that it finds.
+def fine_solutions(scene: Scene, finenesses: Sequence[float]) -> list[Overkill]:
+    """Return a plain mesh's solution, and those of meshes with lines at the edges of contact that the one before finds.
 
     Raises NoSteadyState, NotConverged.
     """
-    below = overkill(scene, Sizing(finenesses[0], scene.loading.depth, margin=MARGIN))
-    edges = below.at
-    found = [below, *(overkill(scene, sized(fineness, edges), edges) for fineness in finenesses[1:])]
-    return np.abs([over.numbers for over in found]), tuple(over.at.finger.newton.body.dofs for over in found)
+    found = [overkill(scene, Sizing(finenesses[0], scene.loading.depth, margin=MARGIN))]
+    for fineness in finenesses[1:]:
+        below = found[-1].at
+        found.append(overkill(scene, sized(fineness, below), below))
+    return found
 
 
 def _system(newton: FiniteNewton) -> float:

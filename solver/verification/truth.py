@@ -7,7 +7,7 @@ Nothing is shipped and nothing comes from elsewhere, so the truth is never older
 settled sliding the solver's refusal stands instead.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -18,7 +18,7 @@ from solver.response.solution import solve_many
 from solver.scene import Scene, Solve
 from solver.scene.published import scenes
 from solver.verification.asked import Asked, Found, LeftOut, clock
-from solver.verification.methods import Kinematics, SmallMeshed, climbed_twice
+from solver.verification.methods import Kinematics, SmallMeshed, fine_solutions
 
 KINEMATICS: tuple[Kinematics, ...] = ("small", "finite")
 NUMBERS = ("SED of the ending", "normal force", "drag")
@@ -60,13 +60,18 @@ def measure(asked: Asked, found: Found) -> Iterator[Truth | LeftOut]:
 def overkill(deepest: Scene, *, quick: bool) -> Solves:
     """Return what solves scenes of one finger, none deeper than `deepest`, on the three meshes of a truth."""
     if deepest.solve.kinematics == "finite":
-        return partial(climbed_twice, finenesses=CLIMBED_QUICK if quick else CLIMBED)
+        return partial(_finite_numbers, finenesses=CLIMBED_QUICK if quick else CLIMBED)
     meshes = [SmallMeshed(deepest, *mesh) for mesh in (SHIFTED_QUICK if quick else SHIFTED)]
 
     def solves(scene: Scene) -> tuple[np.ndarray, tuple[int, ...]]:
         return np.array([mesh.numbers(mesh.solve(scene)) for mesh in meshes]), tuple(mesh.dofs for mesh in meshes)
 
     return solves
+
+
+def _finite_numbers(scene: Scene, finenesses: Sequence[float]) -> tuple[np.ndarray, tuple[int, ...]]:
+    found = fine_solutions(scene, finenesses)
+    return np.abs([one.numbers for one in found]), tuple(one.at.finger.newton.body.dofs for one in found)
 
 
 def judged(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,8 +1,9 @@
 """Scenes drawn at random for the tests of estimates, each with its truth from far finer meshes."""
 
 # fmt: off
-# The first twelve scenes of benchmarks/error_estimate.py: depth, mu, bound, slide, contact angle, Young's moduli of
-# epidermis, dermis and fat, and the mean of three solves on far finer meshes: SED of the ending, normal force, drag
+# The first twelve published scenes of solver/verification/random_scenes.py: depth, mu, bound, slide, contact angle,
+# Young's moduli of epidermis, dermis and fat, and the mean of three solves on far finer meshes: SED of the ending,
+# normal force, drag
 DRAWN = (
     (1.05575079066, 0.248442134017, None, "-x", 65.5733210634, (0.109801080796, 0.0867158319543, 0.0333322753833),
      (0.003187108, 0.06343484, 0.01575989)),
@@ -30,8 +31,8 @@ DRAWN = (
      (0.0977279795842, 0.0790515809384, 0.0375358822264), (0.002812285, 0.07387995, 0.03302756)),
 )
 
-# Scenes that no factor of the estimates was chosen on: the first four of 7000 and, bounded, of 8000 of
-# benchmarks/finite_error_estimate.py, and of 2000 of benchmarks/error_estimate.py. As above, kinematics first.
+# Scenes that no factor of the estimates was chosen on, of solver/verification/random_scenes.py: the first four from
+# 7000 on and, bounded, from 8000 on at finite strain, and from 2000 on at small strain. As above, kinematics first.
 HELD_OUT = (
     ("finite", 0.963457165, 0.69221708, None, "-x", 37.6318419, (0.132203153, 0.0837386214, 0.0319011184),
      (0.00164212, 0.04187473, 0.0289864)),

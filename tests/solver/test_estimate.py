@@ -105,9 +105,10 @@ def test_of_two_meshes_whose_errors_fall_with_the_square_of_an_element_the_estim
     assert np.all(found < 1.01 * error)
 
 
-# Scenes of benchmarks/finite_error_estimate.py and of others with low bounds: depth, mu, bound, slide, contact angle,
-# moduli, and the mean of three solves on far finer meshes. Two meshes with lines at the same edges of contact agree on
-# them and are wrong: 4 % off with three layers in the fat, 1.3 % off where the bound acts on a part of an element.
+# Published scenes of solver/verification/random_scenes.py at finite strain and others with low bounds: depth, mu,
+# bound, slide, contact angle, moduli, and the mean of three solves on far finer meshes. Two meshes with lines at the
+# same edges of contact agree on them and are wrong: 4 % off with three layers in the fat, 1.3 % off where the bound
+# acts on a part of an element.
 DECEIVING = (
     (
         1.99320910990755,

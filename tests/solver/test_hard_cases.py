@@ -54,7 +54,7 @@ def test_what_has_to_answer_does_at_both_kinematics(kinematics):
 @pytest.mark.parametrize("kinematics", ["small", pytest.param("finite", marks=pytest.mark.slow)])
 def test_near_incompressibility_costs_no_more_linear_systems(kinematics):
     def systems(nu):
-        return int(SUITE[kinematics, f"nu {nu}"].run().told.split("; ")[1].split()[0])
+        return int(SUITE[kinematics, f"nu {nu}"].run().summary.split("; ")[1].split()[0])
 
     usual = systems(0.48)
     assert all(systems(nu) <= usual + (0 if kinematics == "small" else 2) for nu in (0.499, 0.4999, 0.4999999))

@@ -41,8 +41,10 @@ def of_light_touch(asked: Scene) -> Outcome:
         if abs(number - exact) > off * number + MODEL * exact
     ]
     flaws = ", ".join(filter(None, [outcome.flaw, *far]))
-    told = f"{outcome.told}; SED by Hertz {true.sed:.4g}, width {found.contact_width:.3g} by Hertz {true.width:.3g}"
-    return replace(outcome, flaw=flaws, told=told)
+    summary = (
+        f"{outcome.summary}; SED by Hertz {true.sed:.4g}, width {found.contact_width:.3g} by Hertz {true.width:.3g}"
+    )
+    return replace(outcome, flaw=flaws, summary=summary)
 
 
 def hertz(asked: Scene) -> Touch:

@@ -24,7 +24,7 @@ class Outcome:
     answered: bool
     numbers: tuple[float, ...]  # all that was found; each must be finite
     flaw: str  # "" where the answer is sound, else what is not
-    told: str  # for people: the answer with its error, or the reason why there is none
+    summary: str  # for people: the answer with its error, or the reason why there is none
 
 
 def of_scene(asked: Scene) -> Outcome:
@@ -38,9 +38,9 @@ def of_answer(found: Prediction | SolveFailure) -> Outcome:
 
 
 def _refused(failure: SolveFailure) -> Outcome:
-    told = str(failure)
-    flaw = "" if told.endswith(".") and "nan" not in told.split() else "its reason is no sentence"
-    return Outcome(False, (), flaw, told)
+    summary = str(failure)
+    flaw = "" if summary.endswith(".") and "nan" not in summary.split() else "its reason is no sentence"
+    return Outcome(False, (), flaw, summary)
 
 
 def _answered(found: Prediction) -> Outcome:
@@ -55,18 +55,18 @@ def _answered(found: Prediction) -> Outcome:
         flaws.append("error_estimate")
     numbers = (found.sed_ending, found.sed_point, found.normal_force, found.tangential_force, found.error_estimate)
     balance = max(checks[name] for name in BALANCE if name in checks)
-    told = (
+    summary = (
         f"SED {found.sed_ending:.4g} ± {percent(found.error_estimate)}, N {found.normal_force:.4g}, "
         f"T {found.tangential_force + 0.0:.4g}; {found.newton_iterations} systems; balance {power(balance)}"
     )
-    return Outcome(True, numbers, ", ".join(flaws), told)
+    return Outcome(True, numbers, ", ".join(flaws), summary)
 
 
-def agree(told: str, numbers: Sequence[float], within: float) -> Outcome:
+def agree(summary: str, numbers: Sequence[float], within: float) -> Outcome:
     """Return an outcome whose numbers must all be one."""
     spread = float(np.ptp(numbers)) / abs(numbers[0])
     flaw = "" if spread <= within else f"{len(numbers)} ways differ by {spread:.1g}"
-    return Outcome(True, tuple(numbers), flaw, f"{told}: {len(numbers)} ways agree to {power(spread)}")
+    return Outcome(True, tuple(numbers), flaw, f"{summary}: {len(numbers)} ways agree to {power(spread)}")
 
 
 def percent(part: float) -> str:

@@ -1,165 +1,133 @@
 """The hard cases that are scenes of the finger: name, scene, and what must happen."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
-from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve
-from solver.verification.hard_cases.light import KNOWN
+from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Slide, Solve
+from solver.verification.hard_cases.light import KNOWN, of_light_touch
+from solver.verification.hard_cases.outcome import Outcome, of_scene
 from solver.verification.methods import Kinematics
 
 Must = Literal["answer", "answer or limit"]
 ANSWER: Must = "answer"
 EITHER: Must = "answer or limit"
+SOFT = Material(0.034, 0.48)
+BEYOND: dict[Kinematics, tuple[tuple[float, float], ...]] = {  # depth [mm] and mu near and beyond a limit
+    "small": ((1.5, 1.4), (2.0, 1.3), (2.0, 2.0)),  # at which the finger wedges itself in
+    "finite": (
+        (2.0, 0.37),
+        (2.0, 0.38),
+        (2.0, 0.44),
+        (1.5, 0.62),
+        (1.0, 2.0),
+    ),  # at which skin behind the contact folds
+}
 
 
 @dataclass(frozen=True, slots=True)
-class HardScene:
-    """One scene and what must happen."""
+class Case:
+    """A named hard case and what must happen."""
 
+    kinematics: Kinematics
     name: str
-    scene: Scene
     must: Must
-    same_as: str = ""  # a case whose SED this one's must be
+    run: Callable[[], Outcome]
+    same_as: str = ""  # a case of the same kinematics whose first number this one's must be
     within: float = 0.0  # relative
     slow: bool = False  # seconds rather than tenths
-    light: bool = False  # a touch so light that it must be Hertz's
 
 
-def hard_scenes(kinematics: Kinematics) -> list[HardScene]:
-    """Return the scenes of the suite in one of the two kinematics."""
-    make = _Maker(kinematics)
-    return [
-        *_tissues(make),
-        *_friction(make),
-        *(_beyond_small(make) if kinematics == "small" else _beyond_finite(make)),
-        *_depths(make),
-        *_angles(make),
-        *_layers(make),
-        HardScene("the whole course at nu 0.4999999", make(0.44, 0.005, nu=0.4999999, history=True), ANSWER),
-        HardScene(
-            "the whole course forth and back",
-            make(0.44, 0.03, history=True, back=True),
-            ANSWER,
-            "angle 45 degrees, backwards",
-            1e-8,
-        ),
-    ]
-
-
-class _Maker:
-    """Makes scenes of one kinematics: mu 0.3 at 1.5 mm unless said otherwise."""
-
-    def __init__(self, kinematics: Kinematics) -> None:
-        self.kinematics: Kinematics = kinematics
-
-    def __call__(
-        self,
-        mu: float = 0.3,
-        bound: float | None = None,
-        depth: float = 1.5,
-        *,
-        backward: bool = False,
-        nu: float = 0.48,
-        finger: Finger | None = None,
-        materials: Materials | None = None,
-        receptor: Receptor | None = None,
-        history: bool = False,
-        back: bool = False,
-    ) -> Scene:
-        tissues = materials or Materials(Material(0.136, nu), Material(0.08, nu), Material(0.034, nu))
-        return Scene(
-            finger=finger or Finger(),
-            materials=tissues,
-            friction=Friction(mu, bound),
-            loading=Loading(depth, ("+x", "-x") if back else "-x" if backward else "+x"),
-            receptor=receptor or Receptor(),
-            solve=Solve(self.kinematics, "history" if history else "steady"),
-        )
-
-
-def _tissues(make: _Maker) -> list[HardScene]:
-    plain = [HardScene(f"nu {nu}", make(nu=nu), ANSWER) for nu in (0.0, 0.3, 0.48, 0.499, 0.4999)]
-    limit = [HardScene(f"nu {nu}", make(nu=nu), ANSWER, "nu 0.4999", 2e-3) for nu in (0.49999, 0.499999, 0.4999999)]
-    soft = Material(0.034, 0.48)
-    stiff = make(materials=Materials(Material(3.4e4, 0.48), soft, soft))
-    rigid = Materials(Material(0.136, 0.48), Material(0.08, 0.48), soft, Material(3.4e8, 0.3))
-    ratio, light = (make(depth=d, materials=rigid, finger=Finger(bone="meshed")) for d in (1.5, 1e-5))
-    return [
-        *plain,
-        *limit,
-        HardScene("nu 0.4999999 at 1e-05 mm", make(depth=1e-5, nu=0.4999999), ANSWER),
-        HardScene("bone 1e10 times stiffer than fat", ratio, ANSWER, "nu 0.48", 1e-3),
-        HardScene("bone 1e10 times stiffer than fat at 1e-05 mm", light, ANSWER, "depth 1e-05 mm", 1e-3),
-        HardScene("epidermis 1e6 times stiffer than fat", stiff, EITHER, slow=True),
-    ]
-
-
-def _friction(make: _Maker) -> list[HardScene]:
-    return [
-        HardScene("mu 0", make(0.0), ANSWER),
-        HardScene("mu 1e-09", make(1e-9), ANSWER, "mu 0", 1e-6),
-        HardScene("mu 0.44", make(0.44), ANSWER),
-        HardScene("tau_max 0 MPa", make(0.44, 0.0), ANSWER, "mu 0", 1e-9),
-        HardScene("tau_max 1e-09 MPa", make(0.44, 1e-9), ANSWER, "mu 0", 1e-5),
-        HardScene("tau_max 1e+09 MPa", make(0.44, 1e9), ANSWER, "mu 0.44", 1e-9),
-        *(HardScene(f"mu {mu:g} with a bound of 0.005 MPa", make(mu, 0.005), ANSWER) for mu in (10.0, 1000.0)),
-        *(
-            HardScene(f"mu {mu:g} with a bound of 0.02 MPa, backwards", make(mu, 0.02, backward=True), ANSWER)
-            for mu in (10.0, 1000.0)
-        ),
-    ]
-
-
-def _beyond_small(make: _Maker) -> list[HardScene]:
-    """Return scenes near and beyond the coefficient at which the finger wedges itself in."""
-    pairs = ((1.5, 1.4), (2.0, 1.3), (2.0, 2.0))
-    return [HardScene(f"mu {mu:g} at {depth:g} mm", make(mu, depth=depth), EITHER, slow=True) for depth, mu in pairs]
-
-
-def _beyond_finite(make: _Maker) -> list[HardScene]:
-    """Return scenes near and beyond the coefficient at which the skin behind the contact folds."""
-    pairs = ((2.0, 0.37), (2.0, 0.38), (2.0, 0.44), (1.5, 0.62), (1.0, 2.0))
-    return [HardScene(f"mu {mu:g} at {depth:g} mm", make(mu, depth=depth), EITHER, slow=True) for depth, mu in pairs]
-
-
-def _depths(make: _Maker) -> list[HardScene]:
-    small = make.kinematics == "small"
-    shallow = (1e-6, 3e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.1, 1.0)
-    return [
-        *(HardScene(f"depth {d:g} mm", make(depth=d), ANSWER, light=d < KNOWN) for d in shallow),
-        HardScene("depth 2 mm", make(depth=2.0), ANSWER if small else EITHER),
-        HardScene("depth 3 mm", make(depth=3.0), EITHER, slow=not small),
-        *(
-            HardScene(f"depth {d:g} mm without friction", make(0.0, depth=d), ANSWER, light=d < KNOWN)
-            for d in (1e-6, 1e-3, 0.1, 2.0)
-        ),
-        HardScene("depth 3 mm without friction", make(0.0, depth=3.0), ANSWER if small else EITHER, slow=not small),
-    ]
-
-
-def _angles(make: _Maker) -> list[HardScene]:
-    return [
-        HardScene(
-            f"angle {angle:g} degrees{', backwards' if backward else ''}",
-            make(0.44, 0.03, finger=Finger(contact_angle=angle), backward=backward),
-            ANSWER if 30.0 <= angle <= 75.0 else EITHER,
-        )
-        for angle in (15.0, 30.0, 45.0, 60.0, 75.0, 85.0)
-        for backward in (False, True)
-    ]
-
-
-def _layers(make: _Maker) -> list[HardScene]:
-    thin = {
-        "epidermis of 0.05 mm": (0.05, 1.25),
-        "dermis of 0.05 mm": (0.75, 0.05),
-        "epidermis and dermis of 0.05 mm each": (0.05, 0.05),
-    }
-    out: list[HardScene] = []
-    for name, (epidermis, dermis) in thin.items():
+def hard_scenes(kinematics: Kinematics) -> Iterator[Case]:
+    """Yield the scenes of the suite in one of the two kinematics."""
+    make = partial(_scene, kinematics)
+    history = Solve(kinematics, "history")
+    yield from _tissues(make)
+    yield from _friction(make)
+    for depth, mu in BEYOND[kinematics]:
+        yield _case(f"mu {mu:g} at {depth:g} mm", make(mu, depth=depth), EITHER, slow=True)
+    yield from _depths(make, small=kinematics == "small")
+    for angle in (15.0, 30.0, 45.0, 60.0, 75.0, 85.0):
+        must = ANSWER if 30.0 <= angle <= 75.0 else EITHER
+        finger = Finger(contact_angle=angle)
+        yield _case(f"angle {angle:g} degrees", make(0.44, 0.03, finger=finger), must)
+        yield _case(f"angle {angle:g} degrees, backwards", make(0.44, 0.03, slide="-x", finger=finger), must)
+    for name, epidermis, dermis in (
+        ("epidermis of 0.05 mm", 0.05, 1.25),
+        ("dermis of 0.05 mm", 0.75, 0.05),
+        ("epidermis and dermis of 0.05 mm each", 0.05, 0.05),
+    ):
         across = min(0.2, dermis)
         receptor = Receptor(depth=epidermis + dermis - across / 2, ending=(across, 1.0))
-        finger = Finger(epidermis=epidermis, dermis=dermis)
-        must = ANSWER if make.kinematics == "small" else EITHER
-        out.append(HardScene(name, make(finger=finger, receptor=receptor), must))
-    return out
+        thin = make(finger=Finger(epidermis=epidermis, dermis=dermis), receptor=receptor)
+        yield _case(name, thin, ANSWER if kinematics == "small" else EITHER)
+    yield _case("the whole course at nu 0.4999999", make(0.44, 0.005, materials=_of_nu(0.4999999), solve=history))
+    back = make(0.44, 0.03, slide=("+x", "-x"), solve=history)
+    yield _case("the whole course forth and back", back, same=("angle 45 degrees, backwards", 1e-8))
+
+
+def _scene(
+    kinematics: Kinematics,
+    mu: float = 0.3,
+    bound: float | None = None,
+    depth: float = 1.5,
+    slide: Slide | tuple[Literal["+x", "-x"], ...] = "+x",
+    **parts: Finger | Materials | Receptor | Solve,
+) -> Scene:
+    usual = Scene(friction=Friction(mu, bound), loading=Loading(depth, slide), solve=Solve(kinematics))
+    return replace(usual, **parts)
+
+
+def _case(
+    name: str,
+    scene: Scene,
+    must: Must = ANSWER,
+    same: tuple[str, float] = ("", 0.0),
+    run: Callable[[Scene], Outcome] = of_scene,
+    *,
+    slow: bool = False,
+) -> Case:
+    return Case(scene.solve.kinematics, name, must, partial(run, scene), *same, slow)
+
+
+def _of_nu(nu: float) -> Materials:
+    return Materials(Material(0.136, nu), Material(0.08, nu), Material(0.034, nu))
+
+
+def _tissues(make: Callable[..., Scene]) -> Iterator[Case]:
+    for nu in (0.0, 0.3, 0.48, 0.499, 0.4999):
+        yield _case(f"nu {nu}", make(materials=_of_nu(nu)))
+    for nu in (0.49999, 0.499999, 0.4999999):
+        yield _case(f"nu {nu}", make(materials=_of_nu(nu)), same=("nu 0.4999", 2e-3))
+    yield _case("nu 0.4999999 at 1e-05 mm", make(depth=1e-5, materials=_of_nu(0.4999999)))
+    rigid = replace(_of_nu(0.48), bone=Material(3.4e8, 0.3))
+    for name, depth, same_as in (("", 1.5, "nu 0.48"), (" at 1e-05 mm", 1e-5, "depth 1e-05 mm")):
+        scene = make(depth=depth, materials=rigid, finger=Finger(bone="meshed"))
+        yield _case(f"bone 1e10 times stiffer than fat{name}", scene, same=(same_as, 1e-3))
+    stiff = Materials(Material(3.4e4, 0.48), SOFT, SOFT)
+    yield _case("epidermis 1e6 times stiffer than fat", make(materials=stiff), EITHER, slow=True)
+
+
+def _friction(make: Callable[..., Scene]) -> Iterator[Case]:
+    yield _case("mu 0", make(0.0))
+    yield _case("mu 1e-09", make(1e-9), same=("mu 0", 1e-6))
+    yield _case("mu 0.44", make(0.44))
+    for bound, same_as, within in ((0.0, "mu 0", 1e-9), (1e-9, "mu 0", 1e-5), (1e9, "mu 0.44", 1e-9)):
+        name = "tau_max 0 MPa" if bound == 0.0 else f"tau_max {bound:.0e} MPa"
+        yield _case(name, make(0.44, bound), same=(same_as, within))
+    for mu in (10.0, 1000.0):
+        yield _case(f"mu {mu:g} with a bound of 0.005 MPa", make(mu, 0.005))
+    for mu in (10.0, 1000.0):
+        yield _case(f"mu {mu:g} with a bound of 0.02 MPa, backwards", make(mu, 0.02, slide="-x"))
+
+
+def _depths(make: Callable[..., Scene], *, small: bool) -> Iterator[Case]:
+    for depth in (1e-6, 3e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.1, 1.0):
+        yield _case(f"depth {depth:g} mm", make(depth=depth), run=of_light_touch if depth < KNOWN else of_scene)
+    yield _case("depth 2 mm", make(depth=2.0), ANSWER if small else EITHER)
+    yield _case("depth 3 mm", make(depth=3.0), EITHER, slow=not small)
+    for depth in (1e-6, 1e-3, 0.1, 2.0):
+        run = of_light_touch if depth < KNOWN else of_scene
+        yield _case(f"depth {depth:g} mm without friction", make(0.0, depth=depth), run=run)
+    yield _case("depth 3 mm without friction", make(0.0, depth=3.0), ANSWER if small else EITHER, slow=not small)

@@ -3,13 +3,11 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from types import ModuleType
 
 from solver.verification.asked import Asked, Found, LeftOut, clock, within
-from solver.verification.hard_cases import finite, small
-from solver.verification.hard_cases.light import of_light_touch
-from solver.verification.hard_cases.outcome import Outcome, of_scene
-from solver.verification.hard_cases.scenes import ANSWER, Must, hard_scenes
+from solver.verification.hard_cases import bodies
+from solver.verification.hard_cases.outcome import Outcome
+from solver.verification.hard_cases.scenes import ANSWER, Case, hard_scenes
 from solver.verification.methods import Kinematics
 
 TELLING = {  # what a quick run shows, and `make test` of finite strain
@@ -18,20 +16,15 @@ TELLING = {  # what a quick run shows, and `make test` of finite strain
     "epidermis and dermis of 0.05 mm each", "a part 1e+10 times stiffer", "one node touching", "direction reversal",
     "contact edge at a mesh node", "elements distorted to 0.45 of an edge", "elements of aspect 50",
 }  # fmt: skip
-_MODULES: dict[Kinematics, ModuleType] = {"small": small, "finite": finite}
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """A named hard case."""
-
-    kinematics: Kinematics
-    name: str
-    must: Must
-    run: Callable[[], Outcome]
-    same_as: str = ""  # a case of the same kinematics whose first number this one's must be
-    within: float = 0.0  # relative
-    slow: bool = False
+OF_BODIES: dict[str, Callable[[bodies.Bodies], Outcome]] = {
+    **{f"a part {ratio:g} times stiffer": partial(bodies.stiff_part, ratio=ratio) for ratio in (1e3, 1e6, 1e10)},
+    "one node touching": bodies.one_node,
+    "direction reversal": bodies.reversal,
+    "steps over four decades": bodies.steps,
+    "contact edge at a mesh node": bodies.edge_at_node,
+    "elements distorted to 0.45 of an edge": bodies.distorted_finger,
+    "elements of aspect 50": bodies.aspect,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,36 +36,17 @@ class HardCase:
     must: str
     answered: bool
     flaw: str  # "" where what must happen happened
-    told: str
+    told: str  # the outcome's summary
     took_s: float
 
 
 def cases(kinematics: Kinematics) -> tuple[Case, ...]:
     """Return the suite in one of the two kinematics."""
-    module = _MODULES[kinematics]
-    others: dict[str, Callable[[], Outcome]] = {
-        **{f"a part {ratio:g} times stiffer": partial(module.stiff_part, ratio) for ratio in (1e3, 1e6, 1e10)},
-        "one node touching": module.one_node,
-        "direction reversal": module.reversal,
-        "steps over four decades": module.steps,
-        "contact edge at a mesh node": module.edge_at_node,
-        "elements distorted to 0.45 of an edge": module.distorted_finger,
-        "elements of aspect 50": module.aspect,
-    }
-    scenes = (
-        Case(
-            kinematics,
-            s.name,
-            s.must,
-            partial(of_light_touch if s.light else of_scene, s.scene),
-            s.same_as,
-            s.within,
-            s.slow,
-        )
-        for s in hard_scenes(kinematics)
+    own = bodies.BODIES[kinematics]
+    of_bodies = (
+        Case(kinematics, name, ANSWER, partial(run, own), slow=run is bodies.steps) for name, run in OF_BODIES.items()
     )
-    slow = {"steps over four decades"}
-    return (*scenes, *(Case(kinematics, name, ANSWER, run, slow=name in slow) for name, run in others.items()))
+    return (*hard_scenes(kinematics), *of_bodies)
 
 
 def judged(case: Case, neighbour: Outcome | None = None) -> HardCase:
@@ -92,7 +66,7 @@ def _row(case: Case, found: Outcome, neighbour: Outcome | None, begun: float) ->
         if off > case.within:
             flaws.append(f"{off:.1g} from {case.same_as}, not {case.within:g}")
     took = clock() - begun
-    return HardCase(case.kinematics, case.name, case.must, found.answered, "; ".join(flaws), found.told, took)
+    return HardCase(case.kinematics, case.name, case.must, found.answered, "; ".join(flaws), found.summary, took)
 
 
 def measure(asked: Asked, found: Found) -> Iterator[HardCase | LeftOut]:
@@ -109,5 +83,5 @@ def measure(asked: Asked, found: Found) -> Iterator[HardCase | LeftOut]:
             return
         begun = clock()
         outcome = case.run()
-        kept[case.kinematics, case.name] = replace(outcome, told="")
+        kept[case.kinematics, case.name] = replace(outcome, summary="")
         yield _row(case, outcome, kept.get((case.kinematics, case.same_as)), begun)

@@ -10,9 +10,10 @@ from solver.arrays import Array, Indices
 from solver.body.linear import LinearBody
 from solver.body.stiffness import Probes, local_coordinates
 from solver.contact.law import OPEN, SLIP
+from solver.element import Q2P1
 from solver.equilibrium.newton import Newton
 from solver.mesh import Mesh
-from solver.mesh.grid import grid_mesh, quality
+from solver.mesh.grid import grid_mesh
 
 NONE: Indices = np.zeros(0, np.int64)
 
@@ -135,38 +136,36 @@ def _clockwise(grid: Array) -> bool:
 
 
 def distorted(mesh: Mesh, by: float, seed: int, still: Indices | None = None) -> Mesh:
-    """Move the inner corners of elements at random by up to `by` of their shortest edge; mid-nodes follow.
+    """Return the mesh with inner corners of elements moved at random by up to `by` of their shortest edge.
 
-    Nodes in `still` stay, as does the boundary.
+    Corners on the boundary, between layers, held, on the skin or in `still` stay, so that the body stays the same;
+    other nodes follow. Corners that would fold an element move less.
     """
+    corners, middles = mesh.elements[:, :4], mesh.elements[:, 4:8]
+    sides = np.stack([corners, np.roll(corners, -1, axis=1)])  # two ends of every side
+    length = np.linalg.norm(mesh.nodes[sides[0]] - mesh.nodes[sides[1]], axis=2)
+    shortest = np.full(len(mesh.nodes), np.inf)
+    least, most = np.full(len(mesh.nodes), len(mesh.nodes)), np.full(len(mesh.nodes), -1)  # region
+    for ends in sides:
+        np.minimum.at(shortest, ends, length)
+        np.minimum.at(least, ends, mesh.region[:, None])
+        np.maximum.at(most, ends, mesh.region[:, None])
+    free = least == most
+    once = np.bincount(middles.ravel(), minlength=len(free))[middles] == 1  # sides of the boundary
+    free[sides[:, once]] = free[mesh.held] = free[mesh.skin] = False
+    free[[] if still is None else still] = False
+    moved = np.zeros(mesh.nodes.shape)
     rng = np.random.default_rng(seed)
-    nodes = mesh.nodes.copy()
-    corners = mesh.elements[:, :4]
-    sides = np.stack([np.roll(corners, -1, axis=1), corners])  # two ends of every side
-    length = np.linalg.norm(nodes[sides[0]] - nodes[sides[1]], axis=2)
-    shortest = np.full(len(nodes), np.inf)
-    for ends in sides:
-        np.minimum.at(shortest, ends.ravel(), length.ravel())
-    pairs = np.sort(sides.reshape(2, -1), axis=0)
-    _, place, count = np.unique(pairs, axis=1, return_inverse=True, return_counts=True)
-    lonely = (count[place.ravel()] == 1).reshape(length.shape)  # sides of the boundary
-    free = np.zeros(len(nodes), bool)
-    free[corners] = True
-    for ends in sides:
-        free[ends[lonely]] = False
-    free[mesh.held] = free[mesh.skin] = False
-    if still is not None:
-        free[still] = False
-    nodes[free] += rng.uniform(-1, 1, (int(free.sum()), 2)) * by / np.sqrt(2) * shortest[free, None]
-    for side in range(4):
-        inside = ~lonely[:, side]
-        ends = corners[inside][:, [side, (side + 1) % 4]]
-        nodes[mesh.elements[inside, 4 + side]] = nodes[ends].mean(axis=1)
-    middle = nodes[mesh.elements[:, 4:8]].sum(axis=1) / 2 - nodes[corners].sum(axis=1) / 4
-    nodes[mesh.elements[:, 8]] = middle
-    out = replace(mesh, nodes=nodes)
-    quality(out)
-    return out
+    moved[free] = rng.uniform(-1, 1, (int(free.sum()), 2)) * by / np.sqrt(2) * shortest[free, None]
+    while True:
+        nodes = mesh.nodes + moved
+        nodes[middles] = mesh.nodes[middles] + moved[sides].sum(axis=0) / 2
+        nodes[mesh.elements[:, 8]] = mesh.nodes[mesh.elements[:, 8]] + moved[corners].sum(axis=1) / 4
+        det = np.linalg.det(np.swapaxes(nodes[mesh.elements], 1, 2)[:, None] @ Q2P1.shape(Q2P1.corners)[1])
+        folded = det.min(axis=1) < 0.02 * det.max(axis=1)
+        if not folded.any():
+            return replace(mesh, nodes=nodes)
+        moved[np.unique(corners[folded])] *= 0.8
 
 
 def placed(mesh: Mesh, points: Array) -> tuple[Indices, Array]:

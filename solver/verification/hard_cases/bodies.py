@@ -1,0 +1,182 @@
+"""The hard cases that are no scenes: bodies, load paths and bad meshes, in one of the two kinematics."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.body.finite import FiniteBody
+from solver.body.linear import LinearBody
+from solver.constitutive.hyperelastic import NeoHooke
+from solver.constitutive.linear import Hooke
+from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.full_slip import settled
+from solver.equilibrium.march import march
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Newton, Pull
+from solver.mesh import Mesh
+from solver.mesh.blocks import block
+from solver.mesh.mesher import Sizing
+from solver.scene.published import STICKINESS, scene
+from solver.verification.hard_cases.meshes import slabs, two_parts
+from solver.verification.hard_cases.outcome import Outcome, agree, percent, power
+from solver.verification.methods import Kinematics
+from solver.verification.published.bodies import distorted
+
+DEPTH = 1.5  # [mm]
+TISSUES = ((0.136, 0.48), (0.08, 0.48), (0.034, 0.48))  # Young's modulus [MPa] and Poisson's ratio
+Finger = FingerModel | FiniteFinger
+
+
+@dataclass(frozen=True, slots=True)
+class Bodies:
+    """How bodies of one kinematics are made and loaded, and to how much their states must agree."""
+
+    newton: Callable[[Mesh, Sequence[tuple[float, float]]], Newton]  # of a body of layers (E, nu)
+    finger: Callable[[float], Finger]  # by fineness
+    fineness: float
+    sense: int  # of the surface, where it first goes
+    back_and_forth: tuple[float, int, int, float]  # bound [MPa], steps of the press and of a leg, and their length [mm]
+    path: Callable[[int], list[Pull]]  # that begins in steps of this part of the way
+    path_words: str
+    meshes: int  # that are distorted
+    agreement: float  # of states that are one, relative
+    rigid_agreement: float  # of a stiff part's force and a rigid one's, where only round-off is left
+    node_agreement: float  # of one node's force and its compliance
+
+
+def _linear(mesh: Mesh, layers: Sequence[tuple[float, float]]) -> Newton:
+    return Newton(LinearBody.of(mesh, [Hooke(*layer) for layer in layers]).condensed)
+
+
+def _finite(mesh: Mesh, layers: Sequence[tuple[float, float]]) -> Newton:
+    return FiniteNewton(FiniteBody.of(mesh, [NeoHooke(*layer) for layer in layers]))
+
+
+def _sed(finger: Finger, state: EquilibriumState) -> float:
+    if isinstance(finger, FingerModel):
+        return finger.sed_ending(finger.displacement(state))
+    return finger.sed_ending(state)
+
+
+def _whole_path(count: int) -> list[Pull]:
+    """Return a press of `count` even steps, and a slide of as many, ten at least."""
+    press = [Pull(depth, 0.3, 0.01) for depth in np.linspace(0.0, DEPTH, count + 1)[1:].tolist()]
+    slide = [Pull(DEPTH, 0.3, 0.01, travel=-far) for far in np.linspace(0.0, 10.0, max(count, 10) + 1)[1:].tolist()]
+    return press + slide
+
+
+def _beginning(count: int) -> list[Pull]:
+    """Return a press and a slide that begin in up to twenty steps of 1/`count` of the way and go on in long ones."""
+    down = [DEPTH * (i + 1) / count for i in range(min(count, 20))]
+    along = [8.0 * (i + 1) / count for i in range(min(count, 20))]
+    down += [DEPTH * part for part in (0.25, 0.5, 0.75, 1.0) if DEPTH * part > down[-1]]
+    along += [8.0 * part for part in np.linspace(0.05, 1.0, 20).tolist() if 8.0 * part > along[-1]]
+    return [Pull(depth, 0.3, 0.01) for depth in down] + [Pull(DEPTH, 0.3, 0.01, travel=travel) for travel in along]
+
+
+BODIES: dict[Kinematics, Bodies] = {
+    "small": Bodies(
+        _linear, lambda fineness: FingerModel.of(scene(STICKINESS[0]), Sizing(fineness, DEPTH, margin=4.0)),
+        8.0, -1, (0.005, 25, 200, 0.05), _whole_path, "1 to 10,000 steps", 5, 1e-10, 1e-9, 1e-12,
+    ),
+    "finite": Bodies(
+        _finite, lambda fineness: FiniteFinger.of(scene(STICKINESS[0]), Sizing(fineness, DEPTH, margin=3.0)),
+        6.0, 1, (0.03009, 8, 24, 0.4), _beginning, "steps of 1 to 1/10,000 of the way", 3, 1e-8, 1e-7, 1e-4,
+    ),
+}  # fmt: skip
+
+
+def _last(newton: Newton, path: Iterable[Pull]) -> EquilibriumState:
+    *_, last = march(newton, path)
+    return last
+
+
+def _force(newton: Newton, depth: float, sense: int = -1) -> float:
+    return float(settled(newton, Pull(depth, 0.3, sense=sense)).force[1])
+
+
+def reversal(bodies: Bodies) -> Outcome:
+    """Slide forth, back and forth again: full slip must return, and full slip the other way be met."""
+    tau, press, leg, step = bodies.back_and_forth
+    finger, pull = bodies.finger(bodies.fineness), Pull(DEPTH, 0.44, tau)
+    senses = [bodies.sense, -bodies.sense, bodies.sense]
+    down = [pull._replace(depth=DEPTH * (i + 1) / press) for i in range(press)]
+    travels = np.cumsum(np.repeat(step * np.array(senses), leg)).tolist()
+    states = list(march(finger.newton, down + [pull._replace(travel=travel) for travel in travels]))
+    seds = [_sed(finger, state) for state in states[press + leg - 1 :: leg]]
+    direct = [_sed(finger, settled(finger.newton, pull._replace(sense=sense))) for sense in senses[:2]]
+    spread = max(abs(seds[0] / seds[2] - 1), abs(seds[0] / direct[0] - 1), abs(seds[1] / direct[1] - 1))
+    flaw = "" if spread < bodies.agreement else f"differs from the direct states by {spread:.1g}"
+    summary = f"SED {seds[0]:.4g} forth, {seds[1]:.4g} back; equal to the direct states to {power(spread)}"
+    return Outcome(True, (*seds, *direct), flaw, summary)
+
+
+def steps(bodies: Bodies) -> Outcome:
+    """Press and slide in steps of 1 to 1/10,000 of the way: full slip does not depend on the way."""
+    finger = bodies.finger(4.0)
+    seds = [_sed(finger, _last(finger.newton, bodies.path(count))) for count in (1, 10, 100, 1000, 10000)]
+    return agree(f"SED {seds[0]:.4g} after {bodies.path_words}", seds, bodies.agreement)
+
+
+def edge_at_node(bodies: Bodies) -> Outcome:
+    """Bisect for the depth at which one more node comes to touch, and solve on both sides of it and there."""
+    finger = bodies.finger(bodies.fineness)
+
+    def at(depth: float) -> EquilibriumState:
+        return settled(finger.newton, Pull(float(depth), 0.3, sense=bodies.sense))
+
+    low, high = 1.4, 1.5
+    fewest = int(at(low).touching.sum())
+    while int(at(high).touching.sum()) == fewest:
+        high += 0.05
+    for _ in range(50):
+        middle = (low + high) / 2
+        low, high = (middle, high) if int(at(middle).touching.sum()) == fewest else (low, middle)
+    nearby = [low, high, (low + high) / 2, np.nextafter(low, 0), np.nextafter(high, 9), low - 1e-12, high + 1e-12]
+    seds = [_sed(finger, at(depth)) for depth in nearby]
+    return agree(f"SED {seds[0]:.4g} at {low:.6g} mm", seds, 1e-9)
+
+
+def distorted_finger(bodies: Bodies) -> Outcome:
+    """Move every free inner node of the finger's mesh by 0.45 of its distance to the next, at random."""
+    geometry = bodies.finger(8.0).geometry
+    meshes = [distorted(geometry.mesh, 0.45, seed, geometry.whole) for seed in range(bodies.meshes)]
+    forces = [_force(bodies.newton(mesh, TISSUES), DEPTH, bodies.sense) for mesh in (geometry.mesh, *meshes)]
+    spread = max(abs(f / forces[0] - 1) for f in forces)
+    flaw = "" if spread < 0.01 else f"the force changes by {spread:.1g}"
+    summary = f"N {forces[0]:.4g} undistorted; {len(meshes)} distorted meshes differ by {percent(spread)} at most"
+    return Outcome(True, tuple(forces), flaw, summary)
+
+
+def stiff_part(bodies: Bodies, ratio: float) -> Outcome:
+    """Press a soft block by a plate in it that is `ratio` times stiffer, and by one held as a whole in its place."""
+    whole, alone = two_parts()
+    found = settled(bodies.newton(whole, [(0.034, 0.48), (0.034 * ratio, 0.3)]), Pull(0.3, 0.3, sense=-1))
+    force, rigid = float(found.force[1]), _force(bodies.newton(alone, [(0.034, 0.48)]), 0.3)
+    drag, off = -float(found.force[0]) / force, abs(force / rigid - 1)
+    good = off < 2.0 / ratio + bodies.rigid_agreement and abs(drag - 0.3) < 1e-12
+    summary = f"N {force:.5g}, {percent(off)} from the rigid part's; {found.iterations} systems"
+    return Outcome(True, (force, drag, rigid), "" if good else f"off by {off:.1g}", summary)
+
+
+def one_node(bodies: Bodies) -> Outcome:
+    """Press so lightly that one node touches: its force is its depth by its compliance at small strain."""
+    mesh, layers = block(np.linspace(-4, 4, 17), np.linspace(0, 3, 7), radius=8.0), [(0.08, 0.48)]
+    depth, mu = 1e-5, 0.3
+    found = settled(bodies.newton(mesh, layers), Pull(depth, mu, sense=-1))
+    compliance = np.linalg.inv(LinearBody.of(mesh, [Hooke(*layers[0])]).condensed.stiffness)
+    up = 2 * (len(mesh.skin) // 2) + 1  # the unknown of the node in the middle
+    force, exact = float(found.force[1]), depth / float(compliance[up, up] - mu * compliance[up, up - 1])
+    off = abs(force / exact - 1)
+    flaw = "" if found.touching.sum() == 1 and off < bodies.node_agreement else "not what one node bears"
+    apart = "equal to" if off < 1e-12 else f"{percent(off)} from"
+    return Outcome(True, (force, exact), flaw, f"N {force:.4g}, {apart} the depth by the node's compliance")
+
+
+def aspect(bodies: Bodies) -> Outcome:
+    """Press a block of elements fifty times longer than wide, and the same block of squarer ones."""
+    forces = [_force(bodies.newton(mesh, [(0.08, 0.48)]), 0.1) for mesh in slabs()]
+    off = abs(forces[1] / forces[0] - 1)
+    summary = f"N {forces[1]:.4g}, {percent(off)} from squarer elements'"
+    return Outcome(True, tuple(forces), "" if off < 0.005 else f"off by {off:.1g}", summary)
