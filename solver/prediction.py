@@ -20,6 +20,7 @@ class Row:
 
     arc: Array  # (r,) from first touch, positive towards the tip, on the undeformed skin [mm]
     sed: Array  # (r,) SED averaged over each ending [MPa]; nan where the finger ends before it
+    error: Array  # (r,) estimated, of each, relative, but for what edges of contact add; nan where nothing is known
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,6 +50,15 @@ class History:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class NestedNumbers:
+    """A scene on the nested mesh, every element in four: its `all_numbers`, SED of the ending first."""
+
+    numbers: Array  # (7,)
+    of_edges: Array  # (7,) what they change by when edges of contact move by a node of that mesh
+    row: Array  # (r,) SED of the row of receptors [MPa]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Prediction:
     """The settled response of one scene, or the last state of its course."""
 
@@ -60,7 +70,7 @@ class Prediction:
     contact_width: float  # from the first to the last touching point, along the surface [mm]
     indentation: float  # of the bone, asked for or found under a given force [mm]
     shift: float | None  # of the bone along +x, found under a given drag [mm]; None where it slides or is only pressed
-    error_estimate: float  # of sed_ending, relative [-]
+    error_estimate: float  # half width of the interval about sed_ending_corrected, and about sed_ending, relative [-]
     dofs: int  # unknown displacements
     newton_iterations: int  # solutions of a linear system with trial contact states
     wall_s: float  # the solve alone: this scene's, and its part of what scenes solved together share [s]
@@ -74,14 +84,19 @@ class Prediction:
     displacement: Array  # (nodes, 2) relative to the bone [mm]
     history: History | None = None
     evidence_s: float | None = None  # what marching and measuring the evidence in `model` took [s]; None: nothing was
+    sed_point_error: float = 1.0  # estimated, of sed_point, relative [-]
     normal_force_error: float | None = None  # estimated, of normal_force, relative [-]; None: it was given
     tangential_force_error: float | None = None  # likewise of tangential_force; 0 where there is no friction
     indentation_error: float | None = None  # likewise of indentation; None where that was given
     shift_error: float | None = None  # estimated, of shift [mm]; None where there is none
     contact_width_error: float | None = None  # estimated, of contact_width, relative [-]
-    error_stays: float = 0.0  # part of error_estimate that meshes of all finenesses have in common
-    beside: Array = field(default_factory=lambda: np.empty((0, 4)))  # SED, forces, indentation on m other meshes (m, 4)
+    nested: NestedNumbers | None = None  # what errors are estimated from; None where the nested mesh has no such state
     warnings: tuple[str, ...] = field(default=())  # one sentence each
+
+    @property
+    def sed_ending_corrected(self) -> float:
+        """SED averaged over the ending on the nested mesh [MPa], the best value there is; nan where it has none."""
+        return float("nan") if self.nested is None else float(self.nested.numbers[0])
 
     @property
     def mesh(self) -> Mesh:
@@ -101,6 +116,7 @@ class Prediction:
                 "indentation",
                 "shift",
                 "error_estimate",
+                "sed_point_error",
                 "normal_force_error",
                 "tangential_force_error",
                 "indentation_error",
@@ -115,7 +131,8 @@ class Prediction:
             )
         }
         plain["title"] = self.scene.title
-        plain["row"] = {"arc": self.row.arc.tolist(), "sed": [None if s != s else s for s in self.row.sed.tolist()]}
+        plain["sed_ending_corrected"] = None if self.nested is None else self.sed_ending_corrected
+        plain["row"] = {name: _plain(getattr(self.row, name)) for name in ("arc", "sed", "error")}
         plain["model"] = dict(self.model)
         plain["audits"] = dict(self.audits)
         plain["warnings"] = list(self.warnings)
@@ -124,6 +141,11 @@ class Prediction:
             plain["time"], plain["bone_x"], plain["bone_y"] = (course.pop(k) for k in ("time", "bone_x", "bone_y"))
             plain["history"] = course
         return plain
+
+
+def _plain(numbers: Array) -> list[float | None]:
+    """Return an array as JSON has it: null where there is no number."""
+    return [None if number != number else number for number in numbers.tolist()]
 
 
 def drag(scene: Scene, along: float) -> float:

@@ -27,7 +27,6 @@ from solver.verification.costs import Cost
 from solver.verification.estimates import Estimate
 from solver.verification.growth import FEWEST, Growth, exponent
 from solver.verification.measuring import Measured
-from solver.verification.methods import PLAIN
 from solver.verification.orders import Order
 from solver.verification.speed import Speed
 from solver.verification.truth import JUDGED, NUMBERS, Truth
@@ -74,7 +73,7 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
         if not known:
             continue
         kinematics = known[0][2].kinematics
-        colour, mark = GREY if method == PLAIN.name else COLOURS[kinematics], MARKS[kinematics]
+        colour, mark = COLOURS[kinematics], MARKS[kinematics]
         axes.plot([100 * e for e, _, _ in known], [s for _, s, _ in known], color=colour, linewidth=0.8)
         for error, span, row in known:
             words = f"{row.method}: {row.dofs} unknowns, {100 * error:.2g} %, {span:.3g} ms"

@@ -1,37 +1,30 @@
-"""Settled sliding at finite strain on a mesh whose lines follow the edges of contact, and on a coarser one beside it.
+"""A settled state at finite strain on nested meshes: each begins where the coarser one ended, a few iterations away."""
 
-No element can follow a skin that touches with one half and not with the other: where contact ends inside an element,
-the energy below is wrong by some tenths of a per cent, up or down. So the edges are found on a rough mesh, and the
-meshes that count have lines there. From the rough state they are a few iterations away. Where skin slips at the
-traction bound up to an edge, its force is the bound times a length, and lines a third of an element off make it wrong
-by a per cent: there the lines are moved once more, to the edges that the fine mesh itself finds.
-"""
-
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
 
-from solver.accuracy.finite_ends import steps_asked
-from solver.body.tissues import strains_the_cut
+from solver.accuracy.error_estimate import edge_changes
+from solver.accuracy.finite_ends import end, relaxes, steps_asked
 from solver.continuation.existence import refuse_far_beyond, steep
-from solver.continuation.finite_states import course, nearby, roughly, settled
+from solver.continuation.finite_states import course, depends_on_way, nearby, roughly, settled
 from solver.continuation.limit_point import folded, sound
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.loads import sliding_pull
+from solver.equilibrium.loads import forces_of, sliding_pull
 from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import Steps
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
-from solver.mesh.mesher import AT_CUT, SHORT_AT_CUT, Sizing, sharing, still_sharing
+from solver.mesh.mesher import Sizing
+from solver.prediction import NestedNumbers
 from solver.scene import Scene
 
-ROUGH = 3.0  # fineness of the mesh that finds the edges
-BESIDE = 1.05  # times as fine is a mesh whose nodes lie elsewhere
+COARSE = (
+    4.0  # fineness of the mesh that all others begin at: 3 folds the skin of steep slides, 5 takes half as long again
+)
+ELSEWHERE = 1.05  # times as fine is a mesh whose nodes lie elsewhere
 NEARLY = 0.98  # of the friction limit, from which contact is where it is when the finger slides
 MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
 WIDER = 6.0  # the same where contact was met at the end of that skin
-UNSQUEEZED = 0.78  # least det F at the cut on the rough mesh, from which elements there are shortest
-DOUBLED = 0.07  # by how much it lies below where they are twice as long
-COLLAPSED = 0.4  # least det F at the cut, below which short elements have several states
 
 
 Maker = Callable[[Scene, Sizing], FiniteFinger]  # of meshes; whoever wants may keep what it makes
@@ -42,37 +35,28 @@ class MeshSolution:
     """A settled state on the mesh made for it."""
 
     finger: FiniteFinger
+    sizing: Sizing
     shape: EquilibriumState
     setup_s: float  # meshes and tables [s]
-    at_cut: float | None = None  # of finer meshes made from here, as in `Sizing`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NestedSolution:
-    """What a scene was solved by: the state that found the edges of contact, and the one that counts."""
+    """What a scene was solved by: the state on a coarse mesh, and the one that counts."""
 
     coarse: MeshSolution
     top: MeshSolution
-    first: MeshSolution | None = None  # of the top's fineness, before its lines were moved to the edges found on it
     steps: Steps | None = None  # those that the course takes, where the state depends on its way
 
 
 def nested_solution(
-    scene: Scene,
-    expected: float,
-    fineness: float,
-    stop: Callable[[], bool],
-    make: Maker = FiniteFinger.of,
-    before: NestedSolution | None = None,
+    scene: Scene, expected: float, fineness: float, stop: Callable[[], bool], make: Maker = FiniteFinger.of
 ) -> NestedSolution:
     """Return the settled state of a scene on a mesh made for it; for the arguments see `coarse_solution`.
 
-    It is begun at the undeformed finger, or at `before`, the ascent of a surface that shares the rough mesh: from there
-    the rough state is two systems away, and what it has changed by leads to a state as near on the finer mesh. Raises
-    NoSteadyState, NotConverged, Cancelled.
+    Raises NoSteadyState, NotConverged, Cancelled.
     """
-    low = coarse_solution(scene, expected, fineness, stop, make, None if before is None else before.coarse)
-    return refine(scene, fineness, low, stop, make, before)
+    return refine(scene, fineness, coarse_solution(scene, expected, fineness, stop, make), stop, make)
 
 
 def coarse_solution(
@@ -83,24 +67,23 @@ def coarse_solution(
     make: Maker = FiniteFinger.of,
     near: MeshSolution | None = None,
 ) -> MeshSolution:
-    """Return the settled state on a mesh that does not know the edges of contact, from which others can be climbed.
+    """Return the settled state on a coarse mesh, from which finer ones begin.
 
     `expected` is the depth [mm], or about it where forces are given. For a drag near the limit of friction, which lies
-    a little elsewhere on each mesh, it is the slide. A rough mesh will do where its state is sound.
-    Near a limit, only a mesh of `fineness` itself can tell. From `near`, where it is of the same mesh, it is begun.
-    Raises NoSteadyState, NotConverged, Cancelled.
+    a little elsewhere on each mesh, it is the slide. A coarse mesh will do where its state is sound. Near a limit, only
+    a mesh of `fineness` itself can tell. From `near`, where it is of the same mesh, it is begun. Raises NoSteadyState,
+    NotConverged, Cancelled.
     """
     depth = expected if scene.normal_force is not None else scene.loading.depth
-    margin = MARGIN
+    sizing = Sizing(min(COARSE, fineness), depth, margin=MARGIN)
     beyond = False
     try:
-        low = _rough(scene, depth, margin, stop, make, near)
+        low = _coarse(scene, sizing, stop, make, near)
         if low.finger.runs_out(low.shape):
-            margin = WIDER
-            low = _rough(scene, depth, margin, stop, make, near)
+            sizing = replace(sizing, margin=WIDER)
+            low = _coarse(scene, sizing, stop, make, near)
         if sound(low.finger, low.shape):
             return low
-        depth = low.shape.pull.depth
         beyond = folded(low.finger, low.shape)
     except NoSteadyState:
         if scene.normal_force is not None and not scene.loading.dragged:
@@ -111,7 +94,7 @@ def coarse_solution(
         pass
     if beyond and scene.normal_force is None and scene.loading.direction != 0:
         refuse_far_beyond(scene, sliding_pull(scene), stop)
-    sizing = Sizing(fineness, depth, margin=margin, at_cut=_usual_at_cut(scene))
+    sizing = replace(sizing, fineness=fineness)
     try:
         return _plain(scene, sizing, stop, make)
     except NoSteadyState:
@@ -120,14 +103,14 @@ def coarse_solution(
         return _plain(scene.undragged(), sizing, stop, make)
 
 
-def _rough(
-    scene: Scene, depth: float, margin: float, stop: Callable[[], bool], make: Maker, near: MeshSolution | None
+def _coarse(
+    scene: Scene, sizing: Sizing, stop: Callable[[], bool], make: Maker, near: MeshSolution | None
 ) -> MeshSolution:
     begun = perf_counter()
-    finger = make(scene, Sizing(ROUGH, depth, margin=margin, at_cut=_usual_at_cut(scene)))
+    finger = make(scene, sizing)
     setup = perf_counter() - begun
-    shape = _on_rough(finger, scene, stop, near.shape if near is not None and near.finger is finger else None)
-    return MeshSolution(finger, shape, setup, _at_cut(scene, finger, shape))
+    start = near.shape if near is not None and near.finger is finger else None
+    return MeshSolution(finger, sizing, _on_coarse(finger, scene, stop, start), setup)
 
 
 def _plain(scene: Scene, sizing: Sizing, stop: Callable[[], bool], make: Maker) -> MeshSolution:
@@ -137,13 +120,13 @@ def _plain(scene: Scene, sizing: Sizing, stop: Callable[[], bool], make: Maker) 
     shape = settled(finger, scene, stop)
     if sizing.margin < WIDER and finger.runs_out(shape):
         return _plain(scene, replace(sizing, margin=WIDER), stop, make)
-    return MeshSolution(finger, shape, setup, sizing.at_cut)
+    return MeshSolution(finger, sizing, shape, setup)
 
 
-def _on_rough(
+def _on_coarse(
     finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: EquilibriumState | None
 ) -> EquilibriumState:
-    """Return the state on the rough mesh, or the slide where a given drag nearly makes the finger slide there."""
+    """Return the state on the coarse mesh, or the slide where a given drag nearly makes the finger slide there."""
     drag = scene.tangential_force
     if drag is None:
         return roughly(finger, scene, stop, near)
@@ -155,120 +138,73 @@ def _on_rough(
 
 
 def refine(
-    scene: Scene,
-    fineness: float,
-    low: MeshSolution,
-    stop: Callable[[], bool],
-    make: Maker = FiniteFinger.of,
-    before: NestedSolution | None = None,
-    sizing: Sizing | None = None,
+    scene: Scene, fineness: float, low: MeshSolution, stop: Callable[[], bool], make: Maker = FiniteFinger.of
 ) -> NestedSolution:
-    """Return the settled state refined from `low`, the scene's coarse solution; for arguments see `solution_on`."""
-    sizing = sizing or sized(fineness, low)
+    """Return the settled state refined from `low`, the scene's coarse solution. Raises as `solution_on`."""
     steps = steps_asked(scene, low.finger, low.shape, stop)
-    slides = scene.undragged() if scene.loading.dragged and low.shape.pull.sense != 0 else scene
-    top = solution_on(slides, fineness, low, stop, make, before, sizing, 1 if steps is None else steps.times)
-    if top.shape.pull.sense == 0 or not top.finger.bounded_at_an_edge(top.shape):
-        if slides is not scene:  # a drag near the limit of friction, which the slide has told the edges of
-            top = solution_on(scene, fineness, low, stop, make, None, sizing)
-        return NestedSolution(low, top, steps=steps)
-    again = still_sharing(scene.finger, scene.receptor, sized(fineness, top), sizing)
-    return NestedSolution(low, solution_on(scene, fineness, top, stop, make, None, again), top)
-
-
-def sized(fineness: float, below: MeshSolution) -> Sizing:
-    """Return the sizing of a mesh of `fineness` whose lines follow the edges of contact found `below`."""
-    edges = below.finger.edges(below.shape)
-    return Sizing(fineness, below.shape.pull.depth, margin=MARGIN, edges=edges, at_cut=below.at_cut)
-
-
-def _usual_at_cut(scene: Scene) -> float | None:
-    """Return how long the elements are where the cut meets the bone, on a mesh that finds how tissue is squeezed there.
-
-    Sliding along +x squeezes it. Under stiff skin short elements collapse, and Newton's iterations lose their way,
-    sooner than they bring anything.
-    """
-    return AT_CUT if scene.loading.direction > 0 and not strains_the_cut(scene.materials) else None
-
-
-def _at_cut(scene: Scene, finger: FiniteFinger, shape: EquilibriumState) -> float | None:
-    """Return the same for the meshes above a rough one: the shorter, the less this squeezes that corner.
-
-    Where it is squeezed far, short elements collapse, and have more states than one. Ends of courses are not found from
-    a state nearby, that could show it.
-    """
-    usual = _usual_at_cut(scene)
-    if usual is None or scene.loading.dragged or shape.pull.sense == 0:
-        return usual
-    squeezed = max(UNSQUEEZED - finger.least_at_cut(shape), 0.0)
-    return min(SHORT_AT_CUT * 2.0 ** (squeezed / DOUBLED), usual)
-
-
-def sized_together(scene: Scene, fineness: float, feet: Sequence[MeshSolution]) -> list[Sizing]:
-    """Return the same for surfaces that are pressed alike: one mesh for all, its lines moved to the edges of each.
-
-    `scene` is that of any of them. Where contact is too short to tell its edges, a surface has a mesh of its own.
-    """
-    sizings = [sized(fineness, below) for below in feet]
-    longest = max((sizing.at_cut for sizing in sizings if sizing.at_cut is not None), default=None)
-    sizings = [sizing if sizing.at_cut is None else replace(sizing, at_cut=longest) for sizing in sizings]
-    known = [number for number, sizing in enumerate(sizings) if sizing.edges is not None]
-    if known:
-        shared = sharing(scene.finger, scene.receptor, [sizings[number] for number in known])
-        for number, sizing in zip(known, shared, strict=True):
-            sizings[number] = sizing
-    return sizings
+    sizing = replace(low.sizing, fineness=fineness)
+    top = solution_on(scene, sizing, low, stop, make, 1 if steps is None else steps.times)
+    if top.sizing.margin < WIDER and top.finger.runs_out(top.shape):
+        wider = replace(sizing, margin=WIDER)
+        top = solution_on(scene, wider, low, stop, make, 1 if steps is None else steps.times)
+    return NestedSolution(low, top, steps)
 
 
 def solution_on(
     scene: Scene,
-    fineness: float,
+    sizing: Sizing,
     below: MeshSolution,
     stop: Callable[[], bool],
     make: Maker = FiniteFinger.of,
-    before: NestedSolution | None = None,
-    sizing: Sizing | None = None,
     times: int = 1,
 ) -> MeshSolution:
-    """Return the settled state on a mesh of `fineness` whose lines follow the edges of contact found `below`.
+    """Return the settled state on a mesh of `sizing`, begun at the state `below`.
 
-    With `sizing` on the mesh of `sized_together`. It is begun at the state `below`, or at what that has changed by
-    since `before`, of a surface that shares the rough mesh, added to the state found then; a
-    course has so many `times` the usual load steps. Where friction is steep a mesh may have no state, its last node
+    A course takes so many `times` the usual load steps. Where friction is steep a mesh may have no state, its last node
     neither open nor touching: then one with nodes elsewhere is asked. Raises NoSteadyState, NotConverged, Cancelled.
     """
-    near = before if before is not None and before.coarse.finger is below.finger else None
-    sizing = sizing or sized(fineness, below)
-    if sizing.at_cut is not None and sizing.at_cut < AT_CUT:
-        begun = _begun(scene, sizing, below, make, near)
-        shape = nearby(begun.finger, scene, begun.shape, stop)
-        if shape is not None and begun.finger.least_at_cut(shape) >= COLLAPSED:
-            return replace(begun, shape=shape)
-        sizing = replace(sizing, at_cut=AT_CUT, sharing=None)
-    begun = _begun(scene, sizing, below, make, near)
+    begun = _begun(scene, sizing, below, make)
     try:
         return replace(begun, shape=settled(begun.finger, scene, stop, begun.shape, times))
     except NotConverged:
         if not steep(sliding_pull(scene)):
             raise
-    begun = _begun(scene, replace(sized(BESIDE * fineness, below), at_cut=sizing.at_cut), below, make, None)
+    begun = _begun(scene, replace(sizing, fineness=ELSEWHERE * sizing.fineness), below, make)
     return replace(begun, shape=settled(begun.finger, scene, stop, begun.shape, times))
 
 
-def _begun(
-    scene: Scene, sizing: Sizing, below: MeshSolution, make: Maker, before: NestedSolution | None
-) -> MeshSolution:
+def _begun(scene: Scene, sizing: Sizing, below: MeshSolution, make: Maker) -> MeshSolution:
     """Return a mesh above the state `below`, with the shape that a settled one is sought from."""
     begun = perf_counter()
     finger = make(scene, sizing)
-    for other in (below, before.top if before is not None else None):
-        if other is not None:
-            finger.bridge(other.finger)
-    setup = perf_counter() - begun
-    if before is None:
-        start = finger.transfer(below.shape, below.finger)
-    else:
-        start = finger.transfer_change(
-            below.shape, before.coarse.shape, below.finger, before.top.shape, before.top.finger
-        )
-    return MeshSolution(finger, start, setup, sizing.at_cut)
+    if finger is below.finger:
+        return below
+    start = finger.transfer(below.shape, below.finger)
+    return MeshSolution(finger, sizing, start, perf_counter() - begun)
+
+
+def on_nested(
+    scene: Scene, top: MeshSolution, steps: Steps | None, stop: Callable[[], bool], make: Maker = FiniteFinger.of
+) -> tuple[NestedNumbers | None, Steps | None]:
+    """Return the numbers of a scene on the nested mesh of `top`, None where it has no state there, and its steps.
+
+    `steps` are those taken where the state depends on its way. Raises Cancelled.
+    """
+    begun = _begun(scene, replace(top.sizing, halved=True), top, make)
+    finger = begun.finger
+    try:
+        if depends_on_way(scene, top.shape):
+            if steps is None:  # since it slid on the coarse mesh
+                judged = steps_asked(scene, top.finger, top.shape, stop)
+                steps = None if judged is None else replace(judged, times=1)
+            shape = end(finger, scene, stop)
+        else:
+            steps = None
+            shape = nearby(finger, scene, begun.shape, stop) or settled(finger, scene, stop, begun.shape)
+    except SolveFailure:
+        return None, steps
+    numbers = finger.all_numbers([shape])[0]
+    given = None if relaxes(scene) else forces_of(scene, shape.pull)
+    of_edges = edge_changes(finger.newton, shape, given, finger.all_numbers)
+    row = finger.row.average(finger.newton.body, shape.u)
+    return NestedNumbers(numbers if steps is None else steps.taken(numbers), of_edges, row), steps

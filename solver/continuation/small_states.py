@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver._kernels import SHEAR_LIMITED, STICK
+from solver._kernels import STICK
 from solver.arrays import Array
 from solver.body.tissues import relaxing_laws
-from solver.contact.law import STEEP
 from solver.continuation.wedging import continue_branch
 from solver.equilibrium.expected_depth import DEEPEST, within_reach
 from solver.equilibrium.finger import FingerModel
@@ -18,13 +17,11 @@ from solver.equilibrium.load_path import PRESSING_STEPS, PRESSING_TIME, Instant,
 from solver.equilibrium.loads import forces_of, pull_of, sliding_pull
 from solver.equilibrium.newton import EquilibriumState, Newton
 from solver.equilibrium.relaxation import RelaxingBody, RelaxingWay, march_relaxing
-from solver.equilibrium.step_error import HALF
 from solver.failures import ContactLost, NoSteadyState, beyond_friction
 from solver.scene import Scene
 
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
-NUDGE = 1e-4  # of the coefficient of friction, or of the bound of a settled slide, to see what it does
-FURTHER = 1e-2  # of the traction bound, to see what it does on a whole course
+NUDGE = 1e-4  # of a given force, to see whether the finger gives way
 
 
 def settled(scene: Scene, finger: FingerModel, times: float = 1.0) -> EquilibriumState:
@@ -141,37 +138,6 @@ def refined(
     return replace(again, u=state.u + again.u, iterations=state.iterations), recover(again.u)
 
 
-def rubbed_more(scene: Scene, finger: FingerModel, state: EquilibriumState) -> EquilibriumState | None:
-    """Return the state beside a settled slide, its coefficient of friction a little larger; None where there is none.
-
-    Nor is there one where forces are given, since those do not grow without bound.
-    """
-    pull = sliding_pull(scene)
-    if pull.frictionless or scene.loading.direction == 0 or scene.normal_force is not None:
-        return None
-    try:
-        return slide_beside(finger.newton, pull._replace(mu=(1.0 + NUDGE) * pull.mu), state.state)
-    except ContactLost:
-        return None
-
-
-def bounded_more(scene: Scene, finger: FingerModel, state: EquilibriumState) -> EquilibriumState | None:
-    """Return the state beside a settled slide, its bound a little larger; None where there is none, or it matters not.
-
-    It does where friction is so steep that skin slips at the bound up to an edge of contact.
-    """
-    pull = sliding_pull(scene)
-    on = np.flatnonzero(state.touching)
-    last = state.state[np.concatenate([on[:2], on[-2:]])]
-    if pull.mu <= STEEP or scene.loading.direction == 0 or not (last == SHEAR_LIMITED).any():
-        return None
-    more = pull._replace(tau=(1.0 + NUDGE) * pull.tau)
-    try:
-        return slide_beside(finger.newton, more, state.state, scene.normal_force)
-    except ContactLost:
-        return None
-
-
 def nearest(scene: Scene, finger: FingerModel) -> EquilibriumState:
     """Return the settled state on a coarser mesh, whose friction limit may lie just below the drag asked for.
 
@@ -196,16 +162,3 @@ def shift_of(scene: Scene, state: EquilibriumState) -> float | None:
     """Return how far the bone was shifted along +x [mm] by a given drag; None where it slides or is only pressed."""
     held = scene.loading.dragged and state.pull.sense == 0 and not state.pull.frictionless
     return 0.0 - state.pull.travel if held else None
-
-
-def sensitivity_to_bound(scene: Scene, finger: FingerModel, half: EquilibriumState) -> Array:
-    """Return how the numbers (6,) at the end of a course answer to the traction bound: relative change by its own.
-
-    `half` is the end in half the usual steps. Zero where nothing slips at the bound. Raises as `end`.
-    """
-    bound = scene.friction.tau_max
-    if bound is None or not (half.state == SHEAR_LIMITED).any():
-        return np.zeros(6)
-    more = replace(scene, friction=replace(scene.friction, tau_max=(1.0 + FURTHER) * bound))
-    here, beside = (finger.all_numbers(state) for state in (half, end(more, finger, HALF)))
-    return (beside - here) / np.where(here == 0.0, 1.0, here) / FURTHER

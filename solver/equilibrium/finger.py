@@ -91,14 +91,18 @@ class FingerModel:
         return self._averaged(states, self.ending, self.point)
 
     def numbers(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return what errors are estimated of (c, 3): SED of the ending, normal and tangential force along +x."""
+        """Return SED of the ending, normal and tangential force along +x (c, 3) of several states."""
         forces = [(state.normal.sum(), state.tangential.sum()) for state in states]
         return np.column_stack([self._averaged(states, self.ending)[:, 0], forces])
 
-    def all_numbers(self, state: EquilibriumState) -> Array:
-        """Return them, the depth, the bone's shift along +x and the contact width (6,)."""
-        found = state.pull.depth, 0.0 - state.pull.travel, self.contact_width(state)
-        return np.concatenate([self.numbers([state])[0], found])
+    def all_numbers(self, states: Sequence[EquilibriumState]) -> Array:
+        """Return SED, both forces, depth, the bone's shift along +x, contact width and the middle's SED (c, 7)."""
+        rest = [
+            (s.normal.sum(), s.tangential.sum(), s.pull.depth, 0.0 - s.pull.travel, self.contact_width(s))
+            for s in states
+        ]
+        ending, middle = self.seds(states).T
+        return np.column_stack([ending, rest, middle])
 
     def _averaged(self, states: Sequence[EquilibriumState], *patches: Endings) -> Array:
         """Return the SED averaged over the first ending of each of the patches (c, p) [MPa], recovered there alone."""

@@ -1,5 +1,6 @@
 """The finger at finite strain on one mesh, ready for any surface."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from weakref import WeakKeyDictionary
@@ -8,12 +9,12 @@ import numpy as np
 from numpy.linalg import LinAlgError
 
 from solver import _kernels as kernels
-from solver._kernels import OPEN, SHEAR_LIMITED
+from solver._kernels import OPEN
 from solver.arrays import Array
 from solver.body.finite import FiniteBody, FiniteProbes
 from solver.body.receptor import endings, middle
 from solver.body.tissues import finite_laws
-from solver.contact.edges import edges, width
+from solver.contact.edges import width
 from solver.contact.skin_compression import SkinCompression
 from solver.equilibrium.mesh_transfer import MeshTransfer, Places
 from solver.equilibrium.newton import EquilibriumState, FiniteNewton
@@ -21,8 +22,6 @@ from solver.mesh.grid import MeshError
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
 from solver.prediction import ROW
 from solver.scene import Scene, SceneError
-
-RUBS = 1e-3  # drag by normal force from which a traction bound matters
 
 
 @dataclass(frozen=True, eq=False)  # without slots: what few ask for is made when they ask
@@ -74,30 +73,22 @@ class FiniteFinger:
         return self.sed_ending(shape), float(self.point.average(self.newton.body, shape.u)[0])
 
     def numbers(self, shape: EquilibriumState) -> Array:
-        """Return what errors are estimated of: SED of the ending, normal and tangential force along +x (3,)."""
+        """Return SED of the ending, normal and tangential force along +x (3,)."""
         along, up = shape.force
         return np.array([self.sed_ending(shape), up, along])
 
-    def all_numbers(self, shape: EquilibriumState) -> Array:
-        """Return them, the depth, the bone's shift along +x and the contact width (6,)."""
-        return np.array([*self.numbers(shape), shape.pull.depth, 0.0 - shape.pull.travel, self.contact_width(shape)])
+    def all_numbers(self, states: Sequence[EquilibriumState]) -> Array:
+        """Return SED, both forces, depth, the bone's shift along +x, contact width and the middle's SED (c, 7)."""
+        return np.array(
+            [
+                (*self.numbers(s), s.pull.depth, 0.0 - s.pull.travel, self.contact_width(s), self.seds(s)[1])
+                for s in states
+            ]
+        )
 
     def transfer(self, shape: EquilibriumState, other: "FiniteFinger") -> EquilibriumState:
         """Return `shape`, found on `other`, as a start on this mesh."""
         return self.bridge(other).carried(shape)
-
-    def transfer_change(
-        self,
-        now: EquilibriumState,
-        before: EquilibriumState,
-        other: "FiniteFinger",
-        top: EquilibriumState,
-        finest: "FiniteFinger",
-    ) -> EquilibriumState:
-        """Return `top`, found on `finest`, with what has changed from `before` to `now` on `other`, as a start here."""
-        change = self.bridge(other).fields(now.u - before.u, now.pressure - before.pressure)
-        u, pressure = self.bridge(finest).fields(top.u, top.pressure)
-        return self.bridge(other).touched(now, u + change[0], pressure + change[1])
 
     def bridge(self, other: "FiniteFinger") -> MeshTransfer:
         """Return the way here from the mesh of `other`, made when first asked for."""
@@ -134,29 +125,6 @@ class FiniteFinger:
         """Return whether the skin crosses itself."""
         return kernels.crosses(self.geometry.mesh.nodes, shape.u, self.geometry.whole)
 
-    def least_at_cut(self, shape: EquilibriumState) -> float:
-        """Return the least det F at the quadrature points of the two elements along the skin at its palmar end."""
-        body, layers = self.newton.body, self.geometry.fat + len(self.geometry.depths) - 1
-        near = slice(0, 2 * layers)
-        local = shape.u[body.nodes[near]]
-        by_x, by_y = body.grad_x[near] @ local, body.grad_y[near] @ local
-        return float(((1.0 + by_x[..., 0]) * (1.0 + by_y[..., 1]) - by_x[..., 1] * by_y[..., 0]).min())
-
-    def edges(self, shape: EquilibriumState) -> tuple[float, float] | None:
-        """Return the arc positions [mm] where contact ends; None where it is too short to tell."""
-        return edges(self.places.skin, shape.reaction[:, 1], shape.touching)
-
     def contact_width(self, shape: EquilibriumState) -> float:
         """Return how long the contact is along the surface [mm]."""
         return width(self.places.skin, shape.place(self.newton.body)[:, 0], shape.reaction[:, 1], shape.touching)
-
-    def bounded_at_an_edge(self, shape: EquilibriumState) -> bool:
-        """Return whether skin slips at the traction bound at the last two nodes of an edge of contact that is known.
-
-        A drag too small to matter does not count.
-        """
-        on = [state for state in shape.state.tolist() if state != OPEN]
-        if SHEAR_LIMITED not in on[:2] + on[-2:]:
-            return False
-        along, up = shape.force
-        return bool(abs(along) > RUBS * up) and self.edges(shape) is not None

@@ -1,7 +1,7 @@
 """The finger's mesh: a half-O from the bone to the skin, fine along the skin where it may touch."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil
 
@@ -17,10 +17,7 @@ from solver.scene import Finger, Receptor
 EPIDERMIS, DERMIS, FAT, BONE = 0, 1, 2, 3  # numbers of the regions
 CORE = 1.0 / 3.0  # radius of a meshed bone's core, which is driven, by the bone's [-]
 # Sizes of elements, by tip radius over fineness; chosen on random scenes at finite strain
-ANYWHERE = 0.5  # along the skin that may touch, where the edges of contact are not known
-EDGE = 0.85  # along the skin at the edges of contact, where they are known
-MIDDLE = 1.7  # along the skin, in the middle of a contact whose edges are known
-TOWARDS = 2.85  # growth from edge to middle, by tip radius
+ANYWHERE = 0.5  # along the skin that may touch
 AWAY = (1.0, 1.9)  # growth outside the contact, palmar and dorsal: skin behind a contact is squeezed, and may fold
 TALL = 1.7  # across the skin at the surface, by that along it
 BULK = 1.5  # across the tissue, at most
@@ -29,26 +26,12 @@ ENDING, FROM_ENDING = 0.7, 3.0  # the same for the ending
 POINT = (0.02, 0.1)  # endings smaller across or along the skin, by tip radius, are hardly more than points
 AT_POINT, FROM_POINT = 0.1, 0.5  # the element that has them in its middle; growth from there [-]
 GROWTH = 0.2  # of elements smaller than that, at the surface, with the depth below it [-]
-SHORT = (0.56, 0.4)  # half contacts shorter than that, by tip radius, have smaller elements: overlaps, known contacts
-NEAR = 0.15  # a line nearer to another, by the element's size, is left out
-BEYOND = 0.1  # skin beyond known edges that is looked at for contact, by its width
+SHORT = 0.56  # half overlaps shorter than that, by tip radius, have smaller elements
 FOLD = (0.015, 0.1)  # where the skin folds: of the tip radius, and of the epidermis if that is less
 AROUND, FROM_FOLD = 4.0, 0.5  # so many of these elements to each side are as small; growth from there [-]
 THIN = 2.0 / 3.0  # across the skin there, by that along it
-AT_CUT = 0.12  # along the skin at a free cut's palmar end, by tip radius (docs/explanation/solver-model.md)
-SHORT_AT_CUT = 0.03  # the same where tissue is hardly squeezed there
-COARSE, FROM_CUT = 10.0, 0.5  # fineness below which those are longer in proportion; growth from there [-]
 APART = 0.1  # skin nearer to where it is held is squeezed without bound, by tip radius
 FINEST = 1e-3  # smallest element by tip radius: thinner ones across the whole finger would drown in round-off [-]
-
-
-@dataclass(frozen=True, slots=True)
-class Sharing:
-    """What meshes have in common that differ only in where contact ends: their elements, and how these are joined."""
-
-    narrowest: float  # half of the narrowest of their contacts [mm]
-    gaps: tuple[int, ...]  # elements between each two of the lines that have their place
-    skin: tuple[int, int]  # first and last line between elements where the skin may touch
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,10 +42,8 @@ class Sizing:
     indentation: float  # the skin that lies lower than this may touch [mm]
     shift: bool = False  # move the mesh along the skin by half an element
     margin: float = 1.0  # contact is looked for where undeformed skin lies lower than (1 + margin/4) indentation
-    edges: tuple[float, float] | None = None  # arc positions where contact ends, where they are known: lines lie there
-    sharing: Sharing | None = None  # with the meshes of other surfaces
     fold: float | None = None  # arc position where the skin is squeezed most, where it is to be seen folding
-    at_cut: float | None = None  # elements at a free cut's palmar end, by tip radius, where its corner counts
+    halved: bool = False  # whether every element is divided in four
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,8 +70,10 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     size = finger.tip_radius / sizing.fineness
     fine = _fine(outline, sizing)
     row = _Row.of(outline, fine, receptor, sizing)
-    arcs = row.lines(row.gaps() if sizing.sharing is None else sizing.sharing.gaps, shift=sizing.shift)
+    arcs = row.lines(row.gaps(), shift=sizing.shift)
     lines, fat = _layers(finger, fine, size, receptor, np.inf if sizing.fold is None else THIN * _fold(finger))
+    if sizing.halved:
+        arcs, lines, fat = with_middles(arcs), with_middles(lines), with_middles(fat)
     every_arc = with_middles(arcs)
     depths = with_middles(lines)
     core = outline.tissue(every_arc, np.asarray(lines[0]))[:, None]
@@ -101,11 +84,12 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     layers = np.concatenate([np.full(len(fat) - 1, FAT), skin])
     below = len(fat) - 1
     if finger.bone == "meshed":
-        parts = np.linspace(CORE, 1.0, 2 * max(2, ceil((1.0 - CORE) * finger.bone_radius / (BULK * size))) + 1)[:-1]
+        count = max(2, ceil((1.0 - CORE) * finger.bone_radius / (BULK * size))) * (2 if sizing.halved else 1)
+        parts = np.linspace(CORE, 1.0, 2 * count + 1)[:-1]
         points = np.concatenate([outline.bone(every_arc[:, None], parts), points], axis=1)
         layers = np.concatenate([np.full(len(parts) // 2, BONE), layers])
         below += len(parts) // 2
-    low, high = _touchable(outline, arcs, sizing) if sizing.sharing is None else sizing.sharing.skin
+    low, high = _touchable(outline, arcs, sizing)
     long, wide = points.shape[0], points.shape[1]
     number: Indices = np.arange(long * wide, dtype=np.int64).reshape(long, wide)
     held = [number[:, 0]]
@@ -148,25 +132,15 @@ def _lower_than(outline: Outline, height: float) -> tuple[float, float]:
 def _touchable(outline: Outline, arcs: Array, sizing: Sizing) -> tuple[int, int]:
     """Return the first and last of the lines at `arcs` between which the skin may touch."""
     first, last = _lower_than(outline, sizing.indentation * (1.0 + 0.25 * sizing.margin))
-    if sizing.edges is not None:  # contact that friction turns round the tip may end higher up
-        beyond = BEYOND * (sizing.edges[1] - sizing.edges[0])
-        first, last = min(first, sizing.edges[0] - beyond), max(last, sizing.edges[1] + beyond)
     low = max(int(np.searchsorted(arcs, first)) - 1, 0)
     return low, min(int(np.searchsorted(arcs, last)), len(arcs) - 1)
 
 
 def _fine(outline: Outline, sizing: Sizing) -> float:
     """Return the size of the smallest elements along the skin [mm]."""
-    contact, radius = _contact(outline, sizing), outline.finger.tip_radius
-    half = (contact[1] - contact[0]) / 2.0
-    if sizing.sharing is not None:
-        half = sizing.sharing.narrowest
-    along, short = (ANYWHERE, SHORT[0]) if sizing.edges is None else (EDGE, SHORT[1])
-    return max(radius / sizing.fineness * along * min(1.0, half / (short * radius)), FINEST * radius)
-
-
-def _contact(outline: Outline, sizing: Sizing) -> tuple[float, float]:
-    return sizing.edges or _lower_than(outline, sizing.indentation)
+    low, high = _lower_than(outline, sizing.indentation)
+    radius = outline.finger.tip_radius
+    return max(radius / sizing.fineness * ANYWHERE * min(1.0, (high - low) / 2.0 / (SHORT * radius)), FINEST * radius)
 
 
 def _middles(lines: Array) -> Array:
@@ -194,35 +168,24 @@ class _Row:
     ends: tuple[float, ...]
     least: tuple[int, ...]  # elements between each two of them
     spare: float  # part of an element that is spread over the others
-    edges: tuple[int, ...] = ()  # which of the ends are edges of contact
 
     @staticmethod
     def of(outline: Outline, fine: float, receptor: Receptor, sizing: Sizing) -> "_Row":
         """Return the row along the skin: fine in the contact, coarser with the distance from it.
 
-        Lines always lie where straight edge and arc meet, since an element cannot follow a jump in curvature, at the
-        ends of the ending and of a nail plate, and where contact is known to end, since no element can follow a skin
-        half of which touches.
+        Lines always lie where straight edge and arc meet, since an element cannot follow a jump in curvature, and at
+        the ends of the ending and of a nail plate.
         """
-        low, high = _contact(outline, sizing)
+        low, high = _lower_than(outline, sizing.indentation)
         scale = 1.0 / sizing.fineness
-        at_cut = sizing.at_cut if outline.finger.cut == "free" else None
         away = np.concatenate([[0.0], np.geomspace(1e-9, 1.0, 1000)])
         palmar, dorsal = low + (outline.palmar_cut - low) * away, high + (outline.dorsal_cut - high) * away
         arc = np.concatenate([palmar, np.linspace(low, high, 1000), dorsal])
         if sizing.fold is not None:
             near = sizing.fold + np.linspace(-1.0, 1.0, 2001) * outline.finger.tip_radius
             arc = np.concatenate([arc, near[(near > outline.palmar_cut) & (near < outline.dorsal_cut)]])
-        if at_cut is not None:
-            arc = np.concatenate([arc, outline.palmar_cut + (low - outline.palmar_cut) * away])
         arc = distinct(arc)
         asked = fine + scale * (AWAY[0] * np.maximum(low - arc, 0.0) + AWAY[1] * np.maximum(arc - high, 0.0))
-        if at_cut is not None:
-            least = outline.finger.tip_radius * at_cut * max(1.0, COARSE * scale)
-            asked = np.minimum(asked, least + FROM_CUT * (arc - outline.palmar_cut))
-        if sizing.edges is not None:
-            inside = np.maximum(np.minimum(arc - low, high - arc), 0.0)
-            asked += np.minimum(scale * TOWARDS * inside, (MIDDLE / EDGE - 1.0) * fine)
         if sizing.fold is not None:
             least = _fold(outline.finger)
             from_fold = np.maximum(np.abs(arc - sizing.fold) - AROUND * least, 0.0)
@@ -235,21 +198,12 @@ class _Row:
         if outline.finger.nail_length > 0.0:
             ends.append(outline.nail_end)
         ends = _distinct(*ends)
-        apart: list[float] = []
-        if sizing.edges is not None:
-            apart = [e for e in sizing.edges if min(abs(e - end) for end in ends) > NEAR * fine]
-            ends = tuple(sorted((*ends, *apart)))
         least = tuple(2 if end in (outline.palmar_cut, outline.dorsal) else 1 for end in ends[:-1])
-        return _Row(arc, _counted(arc, asked), ends, least, 0.2, tuple(ends.index(edge) for edge in apart))
+        return _Row(arc, _counted(arc, asked), ends, least, 0.2)
 
     def asked(self) -> Array:
         """Return how many elements, and which part of one, are asked for between each two of the ends."""
         return np.diff(np.interp(self.ends, self.place, self.number))
-
-    def outside(self, contact: tuple[float, float]) -> Array:
-        """Return the same, 0 where the middle between two ends lies in the `contact`."""
-        middles = _middles(np.array(self.ends))
-        return np.where((middles > contact[0]) & (middles < contact[1]), 0.0, self.asked())
 
     def gaps(self) -> tuple[int, ...]:
         """Return how many elements there are between each two of the ends."""
@@ -267,53 +221,6 @@ class _Row:
             lines[0], lines[-1] = start, stop
             out.append(lines if not out else lines[1:])
         return np.concatenate(out)
-
-
-def sharing(finger: Finger, receptor: Receptor, sizings: Sequence[Sizing]) -> list[Sizing]:
-    """Return the sizings of meshes that share their elements and move only the lines between them.
-
-    They differ in the edges of contact, which are known. Everywhere there are as many elements as any of them has
-    alone.
-    """
-    outline = Outline.of(finger)
-    narrowest = min((edges[1] - edges[0]) / 2.0 for edges in (_contact(outline, sizing) for sizing in sizings))
-    joined = [replace(sizing, sharing=Sharing(narrowest, (), (0, 0))) for sizing in sizings]
-    rows = [_Row.of(outline, _fine(outline, sizing), receptor, sizing) for sizing in joined]
-    gaps: dict[tuple[int, ...], Array] = {}  # by which of the lines are edges
-    for row in rows:
-        gaps[row.edges] = np.maximum(gaps.get(row.edges, 0), row.gaps())
-    behind = sum(end > outline.dorsal + 1e-9 for end in rows[0].ends)  # gaps behind the tip's arc: those of a nail too
-    tail = np.max([count[-behind:] for count in gaps.values()], axis=0)
-    for count in gaps.values():
-        count[-behind:] = tail
-    most = max(int(count.sum()) for count in gaps.values())
-    for edges, count in gaps.items():
-        alike = [(row, sizing) for row, sizing in zip(rows, joined, strict=True) if row.edges == edges]
-        large = np.max([row.outside(_contact(outline, sizing)) for row, sizing in alike], axis=0)
-        large[-behind:] = 0.0
-        while count.sum() < most:  # outside the contact, where elements are largest by what is asked for
-            count[int(np.argmax(large / count))] += 1
-    arcs = [row.lines(gaps[row.edges].tolist()) for row in rows]
-    skins = [_touchable(outline, lines, sizing) for lines, sizing in zip(arcs, sizings, strict=True)]
-    skin = min(low for low, _ in skins), max(high for _, high in skins)
-    if finger.nail_length > 0.0:
-        skin = skin[0], min(skin[1], *(int(np.searchsorted(lines, outline.dorsal - 1e-9)) - 1 for lines in arcs))
-    return [
-        replace(sizing, sharing=Sharing(narrowest, tuple(gaps[row.edges].tolist()), skin))
-        for sizing, row in zip(sizings, rows, strict=True)
-    ]
-
-
-def still_sharing(finger: Finger, receptor: Receptor, sizing: Sizing, before: Sizing) -> Sizing:
-    """Return `sizing`, of edges found anew, with what the mesh of `before` shares with those of other surfaces.
-
-    Where an edge of contact has passed a line that keeps its place, nothing is shared.
-    """
-    if before.sharing is None or sizing.edges is None:
-        return sizing
-    kept, outline = replace(sizing, sharing=before.sharing), Outline.of(finger)
-    one, other = (_Row.of(outline, _fine(outline, each), receptor, each) for each in (before, kept))
-    return kept if (one.edges, len(one.ends)) == (other.edges, len(other.ends)) else sizing
 
 
 def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: float) -> tuple[Array, Array]:

@@ -13,13 +13,12 @@ import numpy as np
 
 from solver import _kernels as kernels
 from solver._kernels import STICK
-from solver.accuracy import contrasts as differences
 from solver.accuracy import omitted_effects as evidence
-from solver.accuracy.adaptivity import MeshSolution, NestedSolution, coarse_solution, refine, sized_together
+from solver.accuracy.adaptivity import Maker, MeshSolution, NestedSolution, coarse_solution, on_nested, refine
 from solver.accuracy.audits import forces_missed, refuse_unsound, rounding, unbalanced
+from solver.accuracy.error_estimate import errors, row_errors
 from solver.accuracy.finite_audits import audits, course_audits
 from solver.accuracy.finite_ends import times_on_way
-from solver.accuracy.finite_errors import error_estimates
 from solver.contact.law import NAMES
 from solver.continuation.existence import doubts
 from solver.continuation.finite_states import course
@@ -46,62 +45,36 @@ def answers(
 ) -> list[Answer]:
     """Return the predictions of scenes, or why there is none, on meshes of that fineness.
 
-    Those pressed alike and moved the same way share one mesh, of which only the lines at the edges of contact lie
-    elsewhere for each, and are solved one after the other, friction rising, each begun at the one before. `expected` is
-    the depth [mm] that they reach, or about it where forces are given. Raises SceneError where the finger cannot be
-    meshed, Cancelled where `progress` (told the part done) says so.
+    Those pressed alike and moved the same way share one mesh and are solved one after the other, friction rising, each
+    begun at the one before. `expected` is the depth [mm] that they reach, or about it where forces are given. Raises
+    SceneError where the finger cannot be meshed, Cancelled where `progress` (told the part done) says so.
     """
     found: dict[int, Answer] = {}
 
     def stop() -> bool:
         return progress is not None and not progress(len(found) / len(scenes))
 
-    meshes = _Meshes()
     keys = [alike(scene) for scene in scenes]
     for _, group in groupby(sorted(range(len(scenes)), key=lambda n: keys[n]), lambda n: keys[n][0]):
-        feet: dict[int, tuple[MeshSolution, float]] = {}  # and what each took [s]
+        meshes: dict[Sizing, FiniteFinger] = {}
+
+        def make(scene: Scene, sizing: Sizing, meshes: dict[Sizing, FiniteFinger] = meshes) -> FiniteFinger:
+            if sizing not in meshes:
+                meshes[sizing] = FiniteFinger.of(scene, sizing)
+            return meshes[sizing]
+
         low: MeshSolution | None = None
         for number in group:
             if stop():
                 raise Cancelled
-            begun = perf_counter()
-            report_progress("finding where contact ends, on a rough mesh")
-            try:
-                low = coarse_solution(scenes[number], expected, fineness, stop, meshes.make, low)
-                feet[number] = low, perf_counter() - begun
-            except SolveFailure as failure:
-                found[number] = failure
-        sizings = sized_together(scenes[0], fineness, [below for below, _ in feet.values()])
-        before: NestedSolution | None = None
-        for (number, (below, took)), sizing in zip(feet.items(), sizings, strict=True):
-            if stop():
-                raise Cancelled
-            begun = perf_counter() - took
+            begun, scene = perf_counter(), scenes[number]
             report_progress(f"solving on a mesh of {fineness:g} elements to the tip radius")
             try:
-                before = refine(scenes[number], fineness, below, stop, meshes.make, before, sizing)
-                found[number] = _predicted(scenes[number], before, fineness, stop, begun)
+                low = coarse_solution(scene, expected, fineness, stop, make, low)
+                found[number] = _predicted(scene, refine(scene, fineness, low, stop, make), stop, make, begun)
             except SolveFailure as failure:
                 found[number] = failure
     return [found[number] for number in range(len(scenes))]
-
-
-class _Meshes:
-    """Makes the meshes of one finger: rough ones once, that surfaces begin one at the other; others with one memory."""
-
-    def __init__(self) -> None:
-        self._rough: dict[Sizing, FiniteFinger] = {}
-        self._last: FiniteFinger | None = None
-
-    def make(self, scene: Scene, sizing: Sizing) -> FiniteFinger:
-        """Mesh the finger, or take its rough mesh again."""
-        if sizing.edges is not None:
-            self._last = FiniteFinger.of(scene, sizing, self._last)
-            return self._last
-        if sizing not in self._rough:
-            self._rough.clear()
-            self._rough[sizing] = FiniteFinger.of(scene, sizing)
-        return self._rough[sizing]
 
 
 def alike(scene: Scene) -> tuple[tuple[float, float, str], float]:
@@ -109,14 +82,12 @@ def alike(scene: Scene) -> tuple[tuple[float, float, str], float]:
     return scene.pressed, float(scene.friction.mu)
 
 
-def _predicted(
-    scene: Scene, way_up: NestedSolution, fineness: float, stop: Callable[[], bool], begun: float
-) -> Prediction:
-    at = way_up.top
+def _predicted(scene: Scene, nested: NestedSolution, stop: Callable[[], bool], make: Maker, begun: float) -> Prediction:
+    at = nested.top
     finger, shape = at.finger, at.shape
-    setup = sum(state.setup_s for state in (way_up.coarse, way_up.first, at) if state is not None)
-    steps = way_up.steps
-    times = times_on_way(scene, way_up.coarse.finger, stop) if steps is None else steps.times
+    setup = nested.coarse.setup_s + at.setup_s
+    steps = nested.steps
+    times = times_on_way(scene, nested.coarse.finger, stop) if steps is None else steps.times
     way: Way | None = None
     relaxing: RelaxingCourse | None = None
     if scene.solve.course == "history":
@@ -131,8 +102,8 @@ def _predicted(
     newton = finger.newton if relaxing is None else relaxing.relaxing
     shape, checks = _balanced(newton, shape, lambda found: audits(driven, finger, found, newton))
     refuse_unsound(checks, shape.pull.depth)
-    numbers = finger.all_numbers(shape)
-    sed, normal, tangential, depth, shift, width = (float(number) for number in numbers)
+    numbers = finger.all_numbers([shape])[0]
+    sed, normal, tangential, depth, shift, width, point = numbers.tolist()
     skin = _skin(finger, shape)
     checks |= forces_missed(scene, float(shape.force[1]), float(shape.force[0]))
     if way:
@@ -141,8 +112,10 @@ def _predicted(
         checks["course_against_direct"] = abs(finger.sed_ending(at.shape) / sed - 1.0)
     held = scene.loading.dragged and _sticking(shape) > 0.0  # sliding, a finger may have shifted by anything
     solved = perf_counter()
-    report_progress("estimating errors, on a coarser mesh")
-    errors, others, error_stays = error_estimates(scene, fineness, way_up, numbers, stop)
+    report_progress("estimating errors, on the nested mesh")
+    finer, steps = on_nested(scene, at, steps, stop, make)
+    off = errors(scene, numbers, finer, steps)
+    row = finger.row.average(body, shape.u)
     estimated = perf_counter()
     model = evidence.finite_model(
         driven, force=shape.force, width=width, sticking=_sticking(shape), slide=_slide(finger, shape)
@@ -150,26 +123,26 @@ def _predicted(
     return Prediction(
         scene=scene,
         sed_ending=sed,
-        sed_point=float(finger.point.average(body, shape.u)[0]),
+        sed_point=point,
         normal_force=normal,
         tangential_force=drag(scene, tangential),
         contact_width=width,
         indentation=depth,
         shift=shift if held else None,
-        error_estimate=errors.sed,
-        normal_force_error=errors.normal,
-        tangential_force_error=errors.tangential,
-        indentation_error=errors.indentation,
-        shift_error=errors.shift if held else None,
-        contact_width_error=errors.width,
-        error_stays=error_stays,
-        beside=differences.those_of(others),
+        error_estimate=off.sed,
+        normal_force_error=off.normal,
+        tangential_force_error=off.tangential,
+        indentation_error=off.indentation,
+        shift_error=off.shift if held else None,
+        contact_width_error=off.width,
+        nested=finer,
+        sed_point_error=off.point,
         dofs=body.dofs,
         newton_iterations=shape.iterations,
         wall_s=solved - begun - setup,
         setup_s=setup,
         estimate_s=estimated - solved,
-        row=Row(ROW, finger.row.average(body, shape.u)),
+        row=Row(ROW, row, row_errors(row, finer)),
         model=model,
         audits=checks,
         skin=skin,

@@ -22,9 +22,9 @@ from solver.accuracy.audits import (
     rounding,
     unbalanced,
 )
-from solver.accuracy.contrasts import those_of, together
+from solver.accuracy.error_estimate import errors, row_errors
 from solver.accuracy.omitted_effects import model, warnings
-from solver.accuracy.small_errors import error_estimates, others_on, steps_asked, times_on_way
+from solver.accuracy.small_errors import on_nested, steps_asked, times_on_way
 from solver.arrays import Array
 from solver.contact.law import NAMES, FrictionLaw
 from solver.continuation.small_existence import direct
@@ -57,10 +57,8 @@ Progress = Callable[[float], bool]  # told the part done, 0 to 1; returns False 
 class _Shared:
     """What scenes solved together share, and each one's part of what it took [s]."""
 
-    fineness: float
-    fine: FingerModel
-    coarse: FingerModel
-    plain: FingerModel | None  # as coarse and not moved, where surfaces are to be told apart
+    mesh: FingerModel
+    nested: FingerModel
     setup_s: float
     solve_s: float
     estimate_s: float
@@ -99,33 +97,25 @@ def answers(
     watch: Watch | None,
     fingers: Fingers,
 ) -> list[Answer]:
-    """Solve all scenes on one mesh, and on a coarser one for the estimate; look wider where contact reaches out.
-
-    Surfaces that are told apart are solved on a second coarse mesh.
-    """
+    """Solve all scenes on one mesh, and on its nested one for the estimate; look wider where contact reaches out."""
     fingers.begin(fineness)
-    surfaces = {number for numbers in together(scenes) for number in numbers}
     done: list[Answer | None] = []
     most = max(depth, min(WIDE * depth, scenes[0].finger.pulp_thickness()))  # for drags that lay much skin on
     for margin, deep in ((1.0, depth), (4.0, depth), (WIDE, depth), (WIDE, most)):
         sizing = Sizing(fineness, deep, margin=margin)
-        half = replace(sizing, fineness=fineness / 2.0)
         try:
-            fine, took = fingers.of(sizing)
-            coarse, more = fingers.of(replace(half, shift=True))
-            plain, again = fingers.of(half) if surfaces else (None, 0.0)
+            mesh, took = fingers.of(sizing)
+            nested, more = fingers.of(replace(sizing, halved=True))
         except NotConverged as failure:
             return [failure] * len(scenes)
-        solve, estimate = fine.solve_s / len(scenes), (more + again) / len(scenes)
-        alone = _Shared(fineness, fine, coarse, None, took - fine.solve_s, solve, estimate, widest=margin == WIDE)
-        beside = replace(alone, plain=plain)
+        solve = mesh.solve_s / len(scenes)
+        shared = _Shared(mesh, nested, took - mesh.solve_s, solve, more / len(scenes), widest=margin == WIDE)
         done = []
         for number, scene in enumerate(scenes):
             _report(progress, number / len(scenes))
-            shared = beside if number in surfaces else alone
             answer, way = _answer(scene, shared, _of_all(progress, number, len(scenes)))
             if watch is not None and answer is not None:
-                watch(number, answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer, fine, way)
+                watch(number, answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer, mesh, way)
             done.append(answer)
         if all(answer is not None for answer in done):
             break
@@ -169,13 +159,13 @@ def _in_steps(scene: Scene, shared: _Shared) -> tuple[EquilibriumState | None, S
     Where the course is asked for, an earlier slide that never settles is refused as the last one is, with its limits.
     """
     before = scene.earlier_slides() if scene.solve.course == "history" else ()
-    if any(direct(leg, shared.fine, widest=shared.widest) is None for leg in before):
+    if any(direct(leg, shared.mesh, widest=shared.widest) is None for leg in before):
         return None, None
-    contact = direct(scene, shared.fine, widest=shared.widest)
+    contact = direct(scene, shared.mesh, widest=shared.widest)
     if contact is None or not depends_on_way(scene, contact):
         return contact, None
-    steps = steps_asked(scene, shared.coarse)
-    return (contact if steps.times == 1 else direct(scene, shared.fine, steps.times, widest=shared.widest)), steps
+    steps = steps_asked(scene, shared.mesh)
+    return (contact if steps.times == 1 else direct(scene, shared.mesh, steps.times, widest=shared.widest)), steps
 
 
 def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[Prediction, Way | None] | None:
@@ -183,12 +173,12 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
 
     None where contact must be looked for on more of the skin.
     """
-    finger = shared.fine
+    finger = shared.mesh
     begun = perf_counter()
     contact, steps = _in_steps(scene, shared)
     if contact is None:
         return None
-    times = times_on_way(scene, shared.coarse) if steps is None else steps.times
+    times = times_on_way(scene, shared.mesh) if steps is None else steps.times
     way: Way | None = None
     over_time: Array | None = None
     direct = contact
@@ -216,17 +206,16 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
             checks["course_against_direct"] = abs(finger.sed_ending(finger.displacement(direct)) / sed - 1.0)
     left = model(scene.driven(depth), finger, contact, displacement)
     history = None if way is None else _history(scene, finger, way, over_time)
-    row = Row(ROW, finger.sed_row(displacement))
+    sed_row = finger.sed_row(displacement)
     solved = perf_counter()
-    numbers, shift = finger.all_numbers(contact), shift_of(scene, contact)
+    numbers, shift = finger.all_numbers([contact])[0], shift_of(scene, contact)
     numbers[0], numbers[4] = sed, shift or 0.0
-    off, others = error_estimates(scene, shared.fineness, shared.coarse, numbers, steps)
-    if shared.plain is not None:
-        others = np.vstack([others, others_on(scene, shared.plain, steps)])
+    nested = on_nested(scene, shared.nested, steps)
+    off = errors(scene, numbers, nested, steps)
     found = Prediction(
         scene=scene,
         sed_ending=sed,
-        sed_point=finger.sed_point(displacement),
+        sed_point=float(numbers[6]),
         normal_force=float(contact.normal.sum()),
         tangential_force=drag(scene, float(contact.tangential.sum())),
         contact_width=float(numbers[5]),
@@ -238,13 +227,14 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
         indentation_error=off.indentation,
         shift_error=None if shift is None else off.shift,
         contact_width_error=off.width,
-        beside=those_of(others),
+        nested=nested,
+        sed_point_error=off.point,
         dofs=finger.body.dofs,
         newton_iterations=contact.iterations,
         wall_s=solved - begun + shared.solve_s,
         setup_s=shared.setup_s,
         estimate_s=perf_counter() - solved + shared.estimate_s,
-        row=row,
+        row=Row(ROW, sed_row, row_errors(sed_row, nested)),
         model=left,
         audits=checks,
         skin=skin_of(finger, contact),

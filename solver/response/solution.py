@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from math import sqrt
 
 from solver.accuracy import contrasts as differences
-from solver.accuracy.contrasts import TOLD, Off
-from solver.accuracy.error_estimate import DEFAULT, FINENESS, coarsest_for, finer_than
+from solver.accuracy.contrasts import Off
 from solver.accuracy.measured_effects import COARSE, Answers, measured
 from solver.accuracy.residual_overstress import with_held
 from solver.contact.law import STEEP
@@ -23,9 +23,13 @@ KNOWN = 0.03  # of a limit of friction, to which it is known
 WORTH = 0.1  # error estimate up to which a coarser mesh's number near a limit is worth more than the limit alone
 NEAR_LIMIT = "That mesh ends settled sliding at mu = {:.3g}, which is known to {:.0f} %: this state may lie beyond."
 MISSES = "The finest mesh leaves an error estimate above the tolerance asked for."
-STAYS = "Where the cut meets the bone tissue is squeezed so far that no mesh meets the tolerance asked for."
-UNKNOWN = "How far this is off is not known, since a coarser mesh has no such state: ask for less friction or depth."
-FINEST_HAS = 0.5  # of an error that meshes have in common, the part that is there on the finest of them too
+UNKNOWN = "How far this is off is not known, since the nested mesh has no such state: ask for less friction or depth."
+DEFAULT = {"small": 8.0, "finite": 6.0}  # fineness where no tolerance is asked for: estimates of 0.1 % and 0.4 %
+FIRST = 4.0  # fineness where one is asked for: on 3 and on 5 ten surfaces take as long to 1 %
+FINEST = {"small": 24.0, "finite": 14.0}  # their nested meshes have 100,000 and 50,000 unknowns, a second's work
+SAFETY = 1.1  # times the fineness that errors falling with its square ask for
+GROWTH = (1.2, 3.0)  # of the fineness from mesh to mesh
+NOT_KNOWN = 1.5  # times the tolerance, that an error is taken for of which nothing is known
 Rough = Callable[[Prediction], None]  # told an answer before more is made of it: what there is, should work be stopped
 
 
@@ -52,9 +56,9 @@ def solve_many(
 
     Scenes with the same finger, materials and receptor share one mesh, fine enough for the strictest tolerance among
     them, so that differences between them are more accurate than each of them. At finite strain those share it that are
-    pressed alike, its lines moved to the edges of contact of each. It is also so fine that differences between those
-    pressed alike are good to 5 % of their range, as estimated, in SED and, where a tolerance is asked for, in forces
-    and depth, but for variants, asked for with quick evidence. Where the finest is not, a warning says by how much.
+    pressed alike. Where a `contrast_tolerance` is asked for, it is also so fine that differences in SED between
+    surfaces pressed alike are as good as that, as estimated. Where they may be off by more than 5 % of their range, a
+    warning says by how much.
 
     At small strain `watch` is given each answer, by the position of its scene, as soon as it is found, with the finger
     and the way that led to it; where another mesh is needed it is given once more. `rough` is given the answers that a
@@ -135,10 +139,10 @@ def _solve_group(
     scenes: list[Scene], progress: Progress | None, watch: Watch | None, rough: Rough | None
 ) -> list[Answer]:
     """Solve scenes that share a mesh on the coarsest that does."""
-    asked = [s.solve.tolerance for s in scenes if s.solve.tolerance is not None]
     kind = scenes[0].solve.kinematics
     depth = max(expected_depth(scene) for scene in scenes)
-    fineness: float = coarsest_for(scenes[0].driven(depth), min(asked)) if asked else DEFAULT[kind]
+    asked = any(scene.solve.tolerance or scene.solve.contrast_tolerance for scene in scenes)
+    fineness = FIRST if asked else DEFAULT[kind]
     on_mesh = _Meshing(depth, progress, Fingers(scenes[0]))
     marched = kind == "small" and any(scene.solve.course == "history" for scene in scenes)
     if marched and (asked or differences.together(scenes)):
@@ -177,7 +181,7 @@ class _Refined:
 def _refined(
     scenes: list[Scene], fineness: float, on_mesh: "_Meshing", watch: Watch | None, rough: Rough | None
 ) -> _Refined:
-    """Refine until every estimate is known and meets its tolerance and surfaces are told apart, or no mesh is finer.
+    """Refine until every estimate is known and meets its tolerance, of differences too, or no mesh is finer.
 
     Scenes that share a mesh are solved again together on the finer one. Where that has no answer, the coarser mesh's
     is told if it `_stands`.
@@ -195,27 +199,30 @@ def _refined(
                 lost[i] = answer
             else:
                 found[i] = answer
-        missed = [i not in lost and _misses(found[i]) for i in range(len(scenes))]
-        mended = [one and not _error_stays(found[i]) for i, one in enumerate(missed)]
+        missed = [0.0 if i in lost else _missed(found[i]) for i in range(len(scenes))]
         apart = [
-            differences.off([one for i in together if isinstance(one := found[i], Prediction)]) for together in surfaces
+            differences.off([p for i in together if isinstance(p := found[i], Prediction)]) for together in surfaces
         ]
-        alike = {i for together, off in zip(surfaces, apart, strict=True) if off.share > TOLD for i in together}
-        finer = finer_than(scenes[0].driven(on_mesh.depth), fineness) if any(mended) or alike else []
-        if not finer:
+        contrasts = [
+            max((off.share / asked for i in together if (asked := scenes[i].solve.contrast_tolerance)), default=0.0)
+            for together, off in zip(surfaces, apart, strict=True)
+        ]
+        worst = max(*missed, *contrasts, 0.0)
+        if worst <= 1.0 or fineness >= FINEST[kind]:
             break
         for answer in found.values():
             if rough is not None and isinstance(answer, Prediction):
                 rough(answer)
-        fineness = differences.finer(finer, fineness, max((off.share for off in apart), default=0.0))
+        again = {i for together, miss in zip(surfaces, contrasts, strict=True) if miss > 1.0 for i in together}
+        again |= {i for i, miss in enumerate(missed) if miss > 1.0}
         if kind == "finite":
-            again = {scenes[i].pressed for i in todo if mended[i] or i in alike}
-            todo = [i for i in todo if scenes[i].pressed in again]
+            pressed = {scenes[i].pressed for i in again}
+            todo = [i for i in todo if scenes[i].pressed in pressed]
+        fineness = min(fineness * min(max(SAFETY * sqrt(worst), GROWTH[0]), GROWTH[1]), FINEST[kind])
     if kind == "finite":  # where a fine mesh may lose its way
         lost |= _fallen_back(scenes, found, first, on_mesh)
     of = {i: off for together, off in zip(surfaces, apart, strict=True) for i in together}
-    left = [_left(found[i]) if missed[i] else "" for i in range(len(scenes))]
-    told = [_undone(of.get(i), left[i], lost.get(i)) for i in range(len(scenes))]
+    told = [_undone(of.get(i), missed[i], found[i], lost.get(i)) for i in range(len(scenes))]
     return _Refined([found[i] for i in range(len(scenes))], told, fineness)
 
 
@@ -228,14 +235,12 @@ def _fallen_back(
     """
     lost: dict[int, SolveFailure] = {}
     for i, scene in enumerate(scenes):
-        coarser = [n for n in FINENESS["finite"] if n < first]
-        while coarser and isinstance(failure := found[i], SolveFailure) and _doubtful(scene, failure):
-            answer = on_mesh([scene], coarser.pop(), None)[0]
+        if isinstance(failure := found[i], SolveFailure) and _doubtful(scene, failure):
+            answer = on_mesh([scene], first / GROWTH[0], None)[0]
             if _stands(answer, failure):
                 found[i], lost[i] = answer, failure
-        finer = [n for n in FINENESS["finite"] if n > first]
-        if finer and isinstance(found[i], NotConverged) and scene.friction.mu > STEEP:
-            found[i] = on_mesh([scene], finer[0], None)[0]
+        if isinstance(found[i], NotConverged) and scene.friction.mu > STEEP:
+            found[i] = on_mesh([scene], first * GROWTH[0], None)[0]
     return lost
 
 
@@ -258,15 +263,15 @@ def _stands(coarser: Answer, failure: SolveFailure) -> bool:
     return isinstance(failure, NotConverged) or coarser.error_estimate <= WORTH
 
 
-def _undone(off: Off | None, misses: str, lost: SolveFailure | None) -> tuple[str, ...]:
+def _undone(off: Off | None, missed: float, answer: Answer, lost: SolveFailure | None) -> tuple[str, ...]:
     """Return what is to be said of an answer for what the finest mesh has left undone."""
     told: list[str] = []
     if lost is not None:
         told.append("A finer mesh did not find this state; told is the coarser one's, with its own error estimate.")
         if lost.limit_mu is not None:
             told.append(NEAR_LIMIT.format(lost.limit_mu, 100.0 * KNOWN))
-    if misses:
-        told.append(misses)
+    if missed > 1.0:
+        told.append(UNKNOWN if isinstance(answer, Prediction) and answer.error_estimate >= 1.0 else MISSES)
     if off is not None and off.warning:
         told.append(off.warning)
     return tuple(told)
@@ -295,23 +300,11 @@ class _Meshing:
         return small_solution.answers(scenes, self.depth, fineness, self.progress, watch, self.fingers)
 
 
-def _misses(answer: Answer) -> bool:
-    """Return whether an answer has not met the tolerance of its scene, or where none is asked has no estimate."""
+def _missed(answer: Answer) -> float:
+    """Return an answer's error estimate by the tolerance of its scene; 1.5 where nothing is known of the error."""
     if not isinstance(answer, Prediction):
-        return False
+        return 0.0
+    if answer.error_estimate >= 1.0:
+        return NOT_KNOWN
     asked = answer.scene.solve.tolerance
-    return answer.error_estimate > asked if asked is not None else answer.error_estimate >= 1.0
-
-
-def _left(answer: Answer) -> str:
-    """Return what is to be said of an answer that misses."""
-    if isinstance(answer, Prediction) and answer.error_estimate >= 1.0:
-        return UNKNOWN
-    return STAYS if _error_stays(answer) else MISSES
-
-
-def _error_stays(answer: Answer) -> bool:
-    """Return whether what meshes of all finenesses have in common is above the tolerance of an answer's scene."""
-    if not isinstance(answer, Prediction) or answer.scene.solve.tolerance is None:
-        return False
-    return FINEST_HAS * answer.error_stays > answer.scene.solve.tolerance
+    return 0.0 if asked is None else answer.error_estimate / asked

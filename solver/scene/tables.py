@@ -303,6 +303,7 @@ class Solve:
     course: Literal["steady", "history"] = "steady"  # "steady": the settled state alone; "history": all the way to it
     tolerance: float | None = None  # relative error asked for in the ending-averaged SED [-]; None: the solver's own
     evidence: Literal["quick", "estimated", "measured"] = "estimated"  # that what was left out could be
+    contrast_tolerance: float | None = None  # error asked for in SED's differences between surfaces, by their range [-]
 
     def __post_init__(self) -> None:
         """Check that we can do what is asked for."""
@@ -312,5 +313,6 @@ class Solve:
             raise SceneError("solve.course", self.course, 'it must be "steady" or "history"')
         if self.evidence not in ("quick", "estimated", "measured"):
             raise SceneError("solve.evidence", self.evidence, 'it must be "quick", "estimated" or "measured"')
-        if self.tolerance is not None:
-            _within("solve.tolerance", self.tolerance, 1e-4, 0.5)
+        for name in ("tolerance", "contrast_tolerance"):
+            if getattr(self, name) is not None:
+                _within(f"solve.{name}", getattr(self, name), 1e-4, 0.5)

@@ -7,7 +7,7 @@ from math import log
 from statistics import median
 
 from solver.verification.asked import Asked, Found, LeftOut
-from solver.verification.methods import PLAIN, SMALL
+from solver.verification.methods import METHODS
 from solver.verification.truth import cases
 
 MESHES = (3.0, 4.0, 6.0, 9.0, 13.0, 18.0, 26.0, 34.0, 46.0)
@@ -30,7 +30,7 @@ class Growth:
 def measure(asked: Asked, found: Found) -> Iterator[Growth | LeftOut]:
     """Yield a row for each kinematics and mesh, until the next would take too long."""
     del found
-    for method in (SMALL, PLAIN):
+    for method in METHODS:
         scene = cases(method.kinematics)[0]
         last: Growth | None = None
         for fineness in asked.pick(MESHES, QUICK):

@@ -10,19 +10,17 @@ from solver.failures import SolveFailure
 from solver.response.finite_solution import alike
 from solver.scene import Scene
 from solver.verification.asked import Asked, Found, LeftOut, clock, timed, within
-from solver.verification.methods import FINITE, METHODS, PLAIN, SMALL, Meshed, Method
+from solver.verification.methods import FINITE, METHODS, SMALL, Meshed, Method
 from solver.verification.truth import JUDGED, Truth, cases, known
 
 MESHES = {  # elements to a tip radius; 840 to 15,000 unknowns, and 1,480 to 11,000 where meshes follow the contact
     SMALL.name: (2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0),
     FINITE.name: (5.5, 6.5, 8.0, 10.0, 12.0, 16.0, 20.0),
-    PLAIN.name: (3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 14.0),
 }
 LITTLE = 0.25  # patience of a quick run
 QUICK = {
     SMALL.name: (2.5, 3.0, 5.0, 8.0),
     FINITE.name: (5.5, 10.0, 20.0),
-    PLAIN.name: (4.0, 8.0),
 }
 
 
@@ -76,7 +74,6 @@ def _row(method: Method, fineness: float, truths: dict[str, Truth], patience: fl
     deepest = max(chosen, key=lambda scene: scene.loading.depth)
     prepared, setup, beside = _made(method, deepest, fineness, 0.3 * patience)
     mesh = method.meshed(deepest, fineness, False)
-    mesh.share(chosen)
     first: list[float] = []
     solved: list[Scene] = []
     errors: dict[str, tuple[float, ...]] = {}

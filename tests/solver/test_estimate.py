@@ -5,11 +5,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from solver.accuracy.finite_errors import error_estimates
 
 from solver import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve, solve
 from solver.accuracy.adaptivity import nested_solution, solution_on
 from solver.accuracy.error_estimate import DEFAULT, FINENESS, coarsest_for, estimates
-from solver.accuracy.finite_errors import error_estimates
 from solver.mesh.mesher import AT_CUT
 from solver.scene.published import STICKINESS, scene
 from tests.solver.drawn_scenes import DRAWN, HELD_OUT

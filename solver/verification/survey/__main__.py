@@ -3,7 +3,6 @@
 | survey | asks |
 | --- | --- |
 | answers | whether the estimates of answers are safe and near, without a tolerance, at 1 % and at 0.3 % |
-| meshes | the same of every mesh, from numbers that can be judged again with other factors unsolved |
 | contrasts | whether differences between three surfaces solved together are right to 5 % of their range |
 
 One scene takes 1 to 60 s. `--keep FILE` appends what is solved to FILE, and takes from it what is there.
@@ -19,7 +18,7 @@ import msgspec
 
 from solver.verification.methods import Kinematics
 from solver.verification.random_scenes import FAMILIES
-from solver.verification.survey import answers, contrasts, meshes
+from solver.verification.survey import answers, contrasts
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +32,6 @@ class Survey:
 
 SURVEYS = {
     "answers": Survey(answers.Row, answers.solve, answers.report),
-    "meshes": Survey(meshes.Row, meshes.solve, meshes.report),
     "contrasts": Survey(contrasts.Row, contrasts.solve, contrasts.report),
 }
 
