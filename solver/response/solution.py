@@ -12,7 +12,7 @@ from solver.contact.law import STEEP
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.load_path import Instant
-from solver.failures import NotConverged, SolveFailure
+from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.prediction import Prediction
 from solver.progress import report_progress
 from solver.response import small_solution
@@ -29,7 +29,7 @@ FIRST = 4.0  # fineness where one is asked for: on 3 and on 5 ten surfaces take 
 FINEST = {"small": 24.0, "finite": 14.0}  # their nested meshes have 100,000 and 50,000 unknowns, a second's work
 SAFETY = 1.1  # times the fineness that errors falling with its square ask for
 GROWTH = (1.2, 3.0)  # of the fineness from mesh to mesh
-NOT_KNOWN = 1.5  # times the tolerance, that an error is taken for of which nothing is known
+NOT_KNOWN = 4.0  # times the tolerance, that an error is taken for of which nothing is known: twice the fineness
 Rough = Callable[[Prediction], None]  # told an answer before more is made of it: what there is, should work be stopped
 
 
@@ -199,7 +199,7 @@ def _refined(
                 lost[i] = answer
             else:
                 found[i] = answer
-        missed = [0.0 if i in lost else _missed(found[i]) for i in range(len(scenes))]
+        missed = [0.0 if i in lost else _missed(found[i], limits=fineness >= DEFAULT[kind]) for i in range(len(scenes))]
         apart = [
             differences.off([p for i in together if isinstance(p := found[i], Prediction)]) for together in surfaces
         ]
@@ -300,8 +300,13 @@ class _Meshing:
         return small_solution.answers(scenes, self.depth, fineness, self.progress, watch, self.fingers)
 
 
-def _missed(answer: Answer) -> float:
-    """Return an answer's error estimate by the tolerance of its scene; 1.5 where nothing is known of the error."""
+def _missed(answer: Answer, *, limits: bool) -> float:
+    """Return an answer's error estimate by the tolerance of its scene; 4 where nothing is known of the error.
+
+    So it is of a refusal on a mesh whose `limits` are not known to 3 %.
+    """
+    if isinstance(answer, NoSteadyState) and not limits:
+        return NOT_KNOWN
     if not isinstance(answer, Prediction):
         return 0.0
     if answer.error_estimate >= 1.0:

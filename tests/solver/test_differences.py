@@ -6,43 +6,36 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from solver import Finger, Friction, Loading, Material, Materials, Scene, Solve, solve, solve_many
-from solver.accuracy.contrasts import TOLD, finer, off, off_by, together
-from solver.accuracy.error_estimate import FINENESS
+from solver import Finger, Friction, Loading, Material, Materials, Scene, Solve, solve_many
+from solver.accuracy.contrasts import off, together
 from solver.scene.published import STICKINESS, scene
 
 
-def test_differences_are_off_by_a_part_of_what_the_other_mesh_that_changes_them_most_makes_of_them():
-    numbers = np.array([[1.0, 2.0, 0.5], [1.1, 2.2, 0.7], [1.2, 2.1, 0.6]])
-    others = np.stack([numbers + 0.3, 1.0 * numbers], axis=1)  # each is up to 60 % off, and their differences are not
-    assert off_by(numbers, others, 0.5) == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
-    others[1, 0, 1] += 0.01
-    others[1, 1, 1] -= 0.02
-    assert off_by(numbers, others, 0.5) == pytest.approx([0.0, 0.5 * 0.02 / 0.2, 0.0], abs=1e-12)
+def surface(numbers, nested, edges=(0.0, 0.0, 0.0, 0.0)):
+    names = ("sed_ending", "normal_force", "tangential_force", "indentation")
+    known = SimpleNamespace(numbers=np.array(nested), of_edges=np.array(edges))
+    return SimpleNamespace(nested=known, **dict(zip(names, numbers, strict=True)))
 
 
-def test_nobody_minds_differences_that_are_off_by_less_than_a_1000th_of_a_per_cent_of_the_numbers():
-    numbers = np.full((2, 1), 3.0)
-    others = numbers[:, None] + [[[0.0]], [[3e-5]]]
-    assert off_by(numbers, others, 0.9)[0] < TOLD < off_by(numbers, others, 1.1)[0]
+def test_what_halving_the_elements_changes_alike_in_all_surfaces_falls_out_of_their_differences():
+    one, other = (1.0, 2.0, 0.5, 1.0), (1.2, 2.2, 0.7, 1.0)
+    alike = [surface(each, np.array(each) + 0.3) for each in (one, other)]
+    assert off(alike).share == pytest.approx(0.0, abs=1e-12)
+    # four thirds of what it changes in their difference, by their range
+    changed = [alike[0], surface(other, np.add(other, [0.33, 0.3, 0.3, 0.3]))]
+    assert off(changed).share == pytest.approx(4.0 / 3.0 * 0.03 / 0.2)
 
 
-@pytest.mark.parametrize(
-    ("tolerance", "changed", "held", "warned"),
-    [(None, 0.004, False, True), (None, 0.001, False, False), (0.01, 0.001, True, True)],
-)
-def test_without_a_tolerance_forces_are_not_held_to_their_range_but_warned_of_where_a_sensor_could_tell(
-    tolerance, changed, held, warned
-):
-    def surface(force):
-        numbers = (1.0 + 10.0 * (force - 1.0), force, 0.3, 2.0)
-        other = np.array([numbers[0], force + (changed if force > 1.0 else 0.0), 0.3, 2.0])
-        asked = replace(scene(STICKINESS[0]), solve=Solve(tolerance=tolerance))
-        names = ("sed_ending", "normal_force", "tangential_force", "indentation")
-        return SimpleNamespace(scene=asked, beside=other[None], **dict(zip(names, numbers, strict=True)))
+def test_edges_of_contact_put_differences_off_by_half_of_what_a_node_changes_in_each_surface():
+    one, other = (1.0, 2.0, 0.5, 1.0), (1.2, 2.2, 0.7, 1.0)
+    found = [surface(one, one, (0.03, 0.0, 0.0, 0.0)), surface(other, other, (0.04, 0.0, 0.0, 0.0))]
+    assert off(found).share == pytest.approx(0.5 * 0.05 / 0.2)
 
-    found = off([surface(1.0), surface(1.01)])
-    assert (found.share > TOLD) == held
+
+@pytest.mark.parametrize(("changed", "warned"), [(0.004, True), (0.0005, False)])
+def test_of_forces_only_what_a_sensor_could_tell_is_warned_of(changed, warned):
+    one, other = (1.0, 1.0, 0.3, 2.0), (1.1, 1.01, 0.3, 2.0)
+    found = off([surface(one, one), surface(other, np.add(other, [0.0, changed, 0.0, 0.0]))])
     assert ("Differences in normal force" in found.warning) == warned
 
 
@@ -52,11 +45,6 @@ def test_variants_of_one_surface_and_surfaces_pressed_otherwise_are_not_told_apa
     variant = replace(other, solve=Solve(evidence="quick"))
     assert together([one, deeper, variant, other]) == [[0, 3]]
     assert together([one, deeper, variant, one]) == []
-
-
-@pytest.mark.parametrize(("share", "mesh"), [(0.06, 10), (0.12, 16), (5.0, 24)])
-def test_the_next_mesh_is_one_that_may_tell_surfaces_apart(share, mesh):
-    assert finer((10, 12, 16, 20, 24), 8, share) == mesh
 
 
 # Three surfaces for one finger, whose normal forces (finite strain) or SED (small) differ by 2 and 0.6 %: indentation,
@@ -85,7 +73,7 @@ HARDLY_DIFFERENT = {
 }
 
 
-def hardly_different(kinematics, tolerance, course="steady"):
+def hardly_different(kinematics, tolerance, course="steady", contrast=None):
     """Return the surfaces, and the truth (3, 3) of them."""
     depth, angle, moduli, surfaces = HARDLY_DIFFERENT[kinematics]
     asked = Scene(
@@ -93,45 +81,37 @@ def hardly_different(kinematics, tolerance, course="steady"):
         materials=Materials(*(Material(modulus, 0.48) for modulus in moduli)),
         friction=Friction(0.0),
         loading=Loading(depth, "+x"),
-        solve=Solve(kinematics, course, tolerance=tolerance),
+        solve=Solve(kinematics, course, tolerance=tolerance, contrast_tolerance=contrast),
     )
     return [replace(asked, friction=Friction(mu, bound)) for mu, bound, _ in surfaces], np.array(
         [truth for _, _, truth in surfaces]
     )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kinematics", HARDLY_DIFFERENT)
-def test_differences_between_surfaces_that_hardly_differ_are_good_to_5_percent_of_their_range_at_any_tolerance(
-    kinematics,
-):
-    asked, true = hardly_different(kinematics, 0.01)  # on the coarsest mesh they were up to 41 % of their range off
+def test_differences_in_sed_between_surfaces_that_hardly_differ_are_as_good_as_is_asked_for(kinematics):
+    asked, true = hardly_different(kinematics, 0.01, contrast=0.03)
     together = solve_many(asked)
-    found = np.array([(p.sed_ending, p.normal_force, p.tangential_force) for p in together])
-    assert (np.ptp(found - true, axis=0) < 0.05 * np.ptp(true, axis=0)).all()
-    assert solve(together[0].scene).dofs < together[0].dofs
+    found = np.array([p.sed_ending for p in together])
+    assert np.ptp(found - true[:, 0]) < 0.03 * np.ptp(true[:, 0])
 
 
-def test_surfaces_that_the_finest_mesh_does_not_tell_apart_say_in_what_and_by_how_much(monkeypatch):
-    monkeypatch.setitem(FINENESS, "small", (5, 6, 8))
-    asked, true = hardly_different("small", None)
+def test_surfaces_that_nobody_asked_to_tell_apart_say_in_what_and_by_how_much_they_may_be_off():
+    asked, true = hardly_different("small", 0.01)
     found = solve_many(asked)
     seds = np.array([p.sed_ending for p in found])
     wrong = np.ptp(seds - true[:, 0]) / np.ptp(true[:, 0])
-    assert wrong > 0.02
-    (told,) = {w for p in found for w in p.warnings if w.startswith("Differences in SED")}
-    part = float(told.split(" may be off by ")[1].split(" %")[0])
-    assert 100.0 * wrong < part < 1000.0 * wrong
+    (told,) = {w for p in found for w in p.warnings if w.startswith("Differences in")}
+    assert "more than all" in told or 100.0 * wrong < float(told.split(" may be off by ")[1].split(" %")[0])
     quick = solve_many([replace(s, solve=Solve(evidence="quick")) for s in asked])
     assert not [w for p in quick for w in p.warnings if w.startswith("Differences")]
 
 
 @pytest.mark.slow
 def test_courses_of_surfaces_that_hardly_differ_are_marched_and_told_once_on_a_mesh_that_tells_them_apart():
-    asked, true = hardly_different("small", None, "history")
+    asked, true = hardly_different("small", None, "history", 0.05)
     told = []
     together = solve_many(asked, watch=lambda number, *_: told.append(number))
     assert told == [0, 1, 2]
     found = np.array([p.sed_ending for p in together])
     assert np.ptp(found - true[:, 0]) < 0.05 * np.ptp(true[:, 0])
-    assert solve(asked[0]).dofs < together[0].dofs

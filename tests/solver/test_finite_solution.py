@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve, solve, solve_many
-from solver.accuracy import finite_errors
-from solver.accuracy.adaptivity import nested_solution
+from solver.accuracy.adaptivity import coarse_solution, refine
 from solver.accuracy.audits import refuse_unsound, rounding
 from solver.accuracy.finite_audits import audits
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import Pull
+from solver.response import finite_solution
 from solver.response.solution import UNKNOWN
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
-from solver.verification.methods import fine_solutions
+from solver.verification.methods import FiniteMeshed
 from tests.solver.finite_examples import published
 
 # Ending-averaged SED [MPa], normal and tangential force [N/mm] of the published finger: means of two independent codes
@@ -102,8 +102,10 @@ def test_differences_between_surfaces_solved_together_are_good_to_5_percent_of_t
 def test_differences_between_five_surfaces_are_those_of_separate_overkill_solves():
     scenes = [finite(surface, tolerance=0.01) for surface in SLIPPERINESS]
     found = np.array([[p.sed_ending, p.normal_force, p.tangential_force] for p in solve_many(scenes)])
-    fine = [[one.numbers for one in fine_solutions(scene, (14.0, 20.0, 17.0))] for scene in scenes]
-    true = np.abs(fine).mean(axis=1)
+    meshes = [
+        FiniteMeshed(scenes[0], fineness, shift) for fineness, shift in ((15.0, False), (15.0, True), (13.0, False))
+    ]
+    true = np.mean([[mesh.numbers(mesh.solve(scene)) for scene in scenes] for mesh in meshes], axis=0)
     apart = (found[:, None] - found) - (true[:, None] - true)
     assert (np.abs(apart).max(axis=(0, 1)) < DIFFERENT * np.ptp(true, axis=0)).all()
 
@@ -112,21 +114,16 @@ def test_a_surface_begun_at_anothers_state_ends_where_one_begun_at_the_undeforme
     made = {}
 
     def make(scene, sizing):
-        """Keep the rough mesh, and one mesh for each surface."""
-        key = "rough" if sizing.edges is None else scene.friction
-        if key not in made:
-            made[key] = FiniteFinger.of(scene, sizing)
-        return made[key]
+        return made.setdefault(sizing, FiniteFinger.of(scene, sizing))
 
     one, other = finite(SLIPPERINESS[0]), finite(SLIPPERINESS[1])
-    before = nested_solution(one, 1.5, 6.0, lambda: False, make)
-    fresh = nested_solution(other, 1.5, 6.0, lambda: False, make)
-    warm = nested_solution(other, 1.5, 6.0, lambda: False, make, before)
-    np.testing.assert_allclose(warm.top.shape.u, fresh.top.shape.u, rtol=0.0, atol=1e-10)
-    np.testing.assert_allclose(warm.top.shape.reaction, fresh.top.shape.reaction, rtol=0.0, atol=1e-11)
-    assert warm.top.shape.iterations < fresh.top.shape.iterations
-    edges = [at.coarse.finger.edges(at.coarse.shape) for at in (warm, fresh)]
-    np.testing.assert_allclose(*edges, rtol=0.0, atol=1e-4)  # so that meshes, and answers, are the same but for that
+    before = coarse_solution(one, 1.5, 4.0, lambda: False, make)
+    fresh = coarse_solution(other, 1.5, 4.0, lambda: False, make)
+    warm = coarse_solution(other, 1.5, 4.0, lambda: False, make, before)
+    assert warm.shape.iterations < fresh.shape.iterations
+    tops = [refine(other, 6.0, low, lambda: False, make).top.shape for low in (warm, fresh)]
+    np.testing.assert_allclose(tops[0].u, tops[1].u, rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(tops[0].reaction, tops[1].reaction, rtol=0.0, atol=1e-11)
 
 
 def test_a_result_is_json_and_says_what_was_modelled(four):
@@ -168,17 +165,15 @@ def test_small_and_finite_strain_agree_where_the_press_is_shallow():
 
 
 @pytest.mark.parametrize(("lost_below", "known"), [(10.0, True), (1e9, False)])
-def test_an_answer_that_no_coarser_mesh_has_is_solved_on_a_finer_one_or_said_to_be_of_unknown_error(
+def test_an_answer_that_the_nested_mesh_has_not_is_solved_on_a_finer_one_or_said_to_be_of_unknown_error(
     monkeypatch, lost_below, known
 ):
-    nearest = finite_errors.solution_on
+    nested = finite_solution.on_nested
 
-    def lost(scene, fineness, *more):
-        if fineness < lost_below:
-            raise NotConverged("lost")
-        return nearest(scene, fineness, *more)
+    def lost(scene, top, *more):
+        return (None, None) if top.sizing.fineness < lost_below else nested(scene, top, *more)
 
-    monkeypatch.setattr(finite_errors, "solution_on", lost)
+    monkeypatch.setattr(finite_solution, "on_nested", lost)
     found = solve(Scene(friction=Friction(0.3), loading=Loading(0.5, "+x"), solve=Solve("finite", evidence="quick")))
     assert (found.error_estimate < 0.01) == known
     assert (UNKNOWN in found.warnings) == (not known)

@@ -12,7 +12,7 @@ from solver.equilibrium.step_error import Steps
 from solver.mesh.mesher import Sizing
 from solver.scene.published import SLIPPERINESS, scene
 
-WHOLE = np.array([1.0, 2.0, -0.5, 1.5, -0.2, 6.0])
+WHOLE = np.array([1.0, 2.0, -0.5, 1.5, -0.2, 6.0, 1.1])
 
 
 @pytest.mark.parametrize(("tolerance", "times"), [(0.02, 1), (0.01, 2), (0.005, 3), (1e-4, 16)])
@@ -22,21 +22,21 @@ def test_half_the_tolerance_asks_for_twice_the_steps_up_to_a_limit(tolerance, ti
 
 
 def test_an_error_in_proportion_to_the_step_is_taken_out_of_what_a_coarse_mesh_says():
-    true, first = WHOLE, np.array([4e-3, 0.0, 1e-3, 0.0, -2e-3, 0.0])  # what the usual steps add
+    true, first = WHOLE, np.array([4e-3, 0.0, 1e-3, 0.0, -2e-3, 0.0, 4e-3])  # what the usual steps add
     steps = Steps.of(true + first, true + 2.0 * first, 0.003)
     np.testing.assert_allclose(steps.taken(true + first), true + first / steps.times, rtol=1e-12)
     assert (steps.error(true) >= np.abs(first) / steps.times).all()
 
 
 def finely(asked, fineness, shift):
-    """Return the six numbers of a scene at small strain in 8 times the usual steps."""
+    """Return the numbers of a scene at small strain in 8 times the usual steps."""
     finger = FingerModel.of(asked, Sizing(fineness, 1.5, shift, margin=4.0))
-    return finger.all_numbers(end(asked, finger, 8.0))
+    return finger.all_numbers([end(asked, finger, 8.0)])[0]
 
 
 @pytest.fixture(scope="module")
 def held():
-    """Return a press with friction, a drag that sticks, and the true numbers (6,) of both."""
+    """Return a press with friction, a drag that sticks, and the true numbers (7,) of both."""
     press = Scene(friction=Friction(0.5), loading=Loading(1.5, "none"))
     drag = replace(press, loading=Loading(normal_force=0.1, tangential_force=0.03, slide="-x"))
     return [
@@ -45,7 +45,7 @@ def held():
 
 
 def test_the_ends_of_courses_at_small_strain_lie_within_their_estimates(held):
-    for asked, (sed, normal, _, depth, shift, width) in held:
+    for asked, (sed, normal, _, depth, shift, width, _) in held:
         found = solve(asked)
         assert found.sed_ending == pytest.approx(sed, rel=found.error_estimate)
         assert found.contact_width == pytest.approx(width, rel=found.contact_width_error)
@@ -81,7 +81,7 @@ def test_at_finite_strain_a_press_under_a_bound_is_not_judged_as_a_slide():
     )
     assert "cap" in found.skin.state
     assert found.error_estimate < 0.02
-    assert found.normal_force_error < 0.01
+    assert found.normal_force_error < 0.02
 
 
 @pytest.mark.slow

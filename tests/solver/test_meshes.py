@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from solver import Finger, Receptor
 from solver.element import ELEMENTS, GAUSS_3, GAUSS_4, Q2P1
 from solver.mesh.grid import MeshError, grid_mesh, quality
-from solver.mesh.mesher import AT_CUT, DERMIS, EPIDERMIS, FAT, Sizing, finger_mesh, sharing
+from solver.mesh.mesher import DERMIS, EPIDERMIS, FAT, Sizing, finger_mesh
 from solver.mesh.outline import Outline
 
 
@@ -123,49 +123,17 @@ def test_an_ending_that_is_hardly_more_than_a_point_lies_in_one_small_element_an
     assert made.arcs[first] == pytest.approx(-size / 2)  # in the middle of it, where no layer ends
 
 
-def test_lines_lie_where_contact_ends_and_elements_are_shortest_there():
-    made = finger_mesh(Finger(), Receptor(), Sizing(10, 1.5, margin=3.0, edges=(-3.2, 1.4)))
-    for edge in (-3.2, 1.4):
-        assert np.abs(made.arcs - edge).min() < 1e-12
-    inside = np.diff(made.arcs[(made.arcs > -3.2 - 1e-9) & (made.arcs < 1.4 + 1e-9)])
-    assert max(inside[0], inside[-1]) < inside[1:-1].mean()
-
-
-def test_elements_are_short_where_a_free_cut_squeezes_tissue_to_the_bone_and_as_ever_elsewhere():
-    free, plain = (
-        finger_mesh(Finger(), Receptor(), Sizing(11, 1.8, margin=3.0, edges=(-3.2, 1.4), at_cut=at_cut)).arcs
-        for at_cut in (0.12, None)
-    )
-    assert np.diff(free)[0] < 1.5 * 0.12 * 5.0 < np.diff(plain)[0]
-    np.testing.assert_allclose(free[free > -3.92], plain[plain > -3.92], atol=1e-4)
-    driven = [Sizing(11, 1.8, edges=(-3.2, 1.4), at_cut=at_cut) for at_cut in (0.12, None)]
-    held, as_ever = (finger_mesh(Finger(cut="driven"), Receptor(), sizing).arcs for sizing in driven)
-    np.testing.assert_array_equal(held, as_ever)
-
-
-@settings(deadline=None, max_examples=8)
-@given(
-    edges=st.lists(st.tuples(st.floats(-5.0, -0.5), st.floats(0.05, 4.5)), min_size=1, max_size=4),
-    fineness=st.sampled_from([4.0, 7.0, 10.0]),
-    angle=st.floats(30, 75),
-    nail=st.sampled_from([0.0, 4.0]),
+@pytest.mark.parametrize(
+    "finger", [Finger(), Finger(bone="meshed", nail_length=4.0, cut="driven")], ids=["usual", "all"]
 )
-def test_meshes_of_surfaces_solved_together_differ_only_in_where_their_lines_lie(edges, fineness, angle, nail):
-    finger = Finger(contact_angle=angle, nail_length=nail)
-    sizings = [Sizing(fineness, 1.8, margin=3.0, edges=each, at_cut=AT_CUT) for each in edges]
-    alone = [finger_mesh(finger, Receptor(), sizing) for sizing in sizings]
-    together = [finger_mesh(finger, Receptor(), sizing) for sizing in sharing(finger, Receptor(), sizings)]
-    first = together[0]
-    for each, own, made in zip(edges, alone, together, strict=True):
-        for name in ("elements", "region", "skin", "held"):
-            np.testing.assert_array_equal(getattr(made.mesh, name), getattr(first.mesh, name))
-        np.testing.assert_array_equal(made.depths, first.depths)
-        assert len(made.arcs) >= len(own.arcs)
-        for edge in each:  # as near as alone: a line of the ending may stand for it
-            assert np.abs(made.arcs - edge).min() <= np.abs(own.arcs - edge).min() + 1e-12
-        quality(made.mesh)
-    if len(edges) == 1:
-        np.testing.assert_array_equal(first.mesh.nodes, alone[0].mesh.nodes)
+def test_the_nested_mesh_divides_every_element_in_four_and_keeps_every_node(finger):
+    made, nested = (finger_mesh(finger, Receptor(), Sizing(5, 1.5, halved=halved)) for halved in (False, True))
+    assert len(nested.mesh.elements) == 4 * len(made.mesh.elements)
+    corners = made.mesh.nodes[made.mesh.elements[:, :4]].reshape(-1, 2)
+    there = nested.mesh.nodes[nested.mesh.elements[:, :4]].reshape(-1, 2)
+    apart = np.abs(corners[:, None] - there[None]).sum(axis=2).min(axis=1)
+    assert apart.max() < 1e-12
+    np.testing.assert_array_equal(np.bincount(nested.mesh.region), 4 * np.bincount(made.mesh.region))
 
 
 def test_the_lowest_point_of_the_skin_touches_the_surface():

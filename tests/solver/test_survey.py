@@ -10,7 +10,7 @@ from solver.failures import SolveFailure
 from solver.response.solution import solve_many
 from solver.verification.estimates import Estimate
 from solver.verification.random_scenes import FAMILIES, surface_set
-from solver.verification.survey import answers, contrasts, meshes
+from solver.verification.survey import answers, contrasts
 from solver.verification.survey.__main__ import SURVEYS, main, rows
 from solver.verification.survey.statistics import shares
 from solver.verification.truth import NUMBERS
@@ -66,12 +66,12 @@ def test_a_survey_of_answers_holds_every_estimate_of_the_program_against_fine_me
 
 def test_what_a_file_keeps_is_not_solved_again(tmp_path, monkeypatch, capsys):
     keep = tmp_path / "kept.json"
-    first = meshes.Row("published", 0, "small", refusal="There is none.")
-    survey = replace(SURVEYS["meshes"], solve=lambda *_: first)
+    first = contrasts.Row("published", 0, "small", refusal="There is none.")
+    survey = replace(SURVEYS["contrasts"], solve=lambda *_: first)
     assert list(rows(survey, [("published", 0, "small")], keep)) == [first]
-    monkeypatch.setattr(sys, "argv", ["survey", "meshes", "--scenes", "1", "--keep", str(keep)])
+    monkeypatch.setattr(sys, "argv", ["survey", "contrasts", "--scenes", "1", "--keep", str(keep)])
     main()
-    assert capsys.readouterr().out == "scene 0: There is none.\n"
+    assert capsys.readouterr().out == "set 0: There is none.\n"
 
 
 def test_a_family_of_finite_strain_is_refused_at_small_strain_with_a_sentence(monkeypatch, capsys):
