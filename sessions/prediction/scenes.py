@@ -12,6 +12,7 @@ from solver import Friction, Loading, Scene, SceneError, Slide, Solve
 from solver.scene.published import SCALE
 
 SLIDES: dict[int, Slide] = {PROXIMAL_TO_DISTAL: "+x", DISTAL_TO_PROXIMAL: "-x"}
+CONTRAST = 0.05  # error of differences between surfaces, by their range: far below what scores tell apart
 DEFAULT_SPEED = 20.0  # where none was measured [mm/s]; rescales the time of a course and nothing else
 
 
@@ -131,7 +132,7 @@ def _scene(row: TrialPrediction, options: PredictionOptions) -> Scene:
         title=f"trial {row.trial}: {surface}" if surface else f"stroke {row.stroke}",
         friction=Friction(max(row.mu, 0.0), row.tau_max),
         loading=Loading(row.indentation, SLIDES[row.direction], row.speed or DEFAULT_SPEED),
-        solve=Solve(options.kinematics, options.course, base.solve.tolerance),
+        solve=Solve(options.kinematics, options.course, base.solve.tolerance, contrast_tolerance=CONTRAST),
     )
 
 

@@ -7,6 +7,7 @@ import pytest
 from examples import SCENE
 
 from daq_app.cli.main import run
+from solver.response import solution
 
 
 def printed(capsys):
@@ -32,6 +33,20 @@ def test_solve_tells_people_the_error_of_each_force_and_what_was_left_out(tmp_pa
     for told in ("normal force", "tangential force", "SED at the ending"):
         assert next(line for line in said.splitlines() if line.startswith(told)).endswith(" %")
     assert {"bone compliance", "viscosity", "the third dimension"} <= {line[:19].strip() for line in said.splitlines()}
+
+
+def test_a_tolerance_that_no_mesh_meets_gives_the_best_answer_its_interval_a_warning_and_exit_code_3(
+    tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setitem(solution.FINEST, "small", 5.0)
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE + "[solve]\ntolerance = 0.0001\n")
+    assert run(["solve", str(scene), "--json"]) == 3
+    document = printed(capsys)
+    assert document["error_estimate"] > 1e-4
+    assert document["sed_ending_corrected"] == pytest.approx(document["sed_ending"], rel=document["error_estimate"])
+    assert len(document["row"]["error"]) == len(document["row"]["sed"])
+    assert any("above the tolerance" in warning for warning in document["warnings"])
 
 
 def test_solve_stopped_by_the_user_gives_the_answer_that_was_there_already(tmp_path, capsys, monkeypatch):

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq_app.cli.main import DONE, STOPPED
+from daq_app.cli.main import DONE, FLAWED, STOPPED
 from daq_app.console import Console, number, table
 
 if TYPE_CHECKING:
@@ -54,7 +54,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         _print(found, scene.title or options.scene.name, console)
         return STOPPED
     _print(found, scene.title or options.scene.name, console)
-    return DONE
+    asked = scene.solve.tolerance
+    return DONE if asked is None or found.error_estimate <= asked else FLAWED
 
 
 def _print(found: "Prediction", title: str, console: Console) -> None:
@@ -62,7 +63,8 @@ def _print(found: "Prediction", title: str, console: Console) -> None:
     console.say(title)
     rows = [
         ["SED at the ending", number(found.sed_ending * 1e3, 5), "kPa", _percent(found.error_estimate)],
-        ["SED at the point", number(found.sed_point * 1e3, 5), "kPa", ""],
+        *([] if found.nested is None else [["corrected", number(found.sed_ending_corrected * 1e3, 5), "kPa", ""]]),
+        ["SED at the point", number(found.sed_point * 1e3, 5), "kPa", _percent(found.sed_point_error)],
         ["normal force", number(found.normal_force, 5), "N/mm", _percent(found.normal_force_error)],
         ["tangential force", number(found.tangential_force, 5), "N/mm", _percent(found.tangential_force_error)],
         ["contact width", number(found.contact_width, 3), "mm", _percent(found.contact_width_error)],
