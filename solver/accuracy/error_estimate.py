@@ -52,7 +52,8 @@ def edge_changes(
     x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
     edges = np.flatnonzero(np.diff(state.state)).tolist()
     pairs = [pair for edge in edges for pair in ((edge, edge + 1), (edge + 1, edge))]
-    moved = [_moved(newton, state, given, x, *pair) for pair in pairs]
+    found = newton.linearise(state, state.pull, x, 0, given)
+    moved = [_moved(newton, state, given, x, *pair) if found else None for pair in pairs]
     values = iter(numbers([state, *(one for one in moved if one is not None)]))
     here = next(values)
     changes = [np.full(len(here), np.inf) if one is None else np.abs(next(values) - here) for one in moved]
@@ -62,14 +63,14 @@ def edge_changes(
 def _moved(
     newton: Newton, state: EquilibriumState, given: Given | None, x: Array, node: int, other: int
 ) -> EquilibriumState | None:
-    """Return the equilibrium of the body linearised at `state` with `node` in the contact state of the `other`.
+    """Return the equilibrium of the body, linearised at `state`, with `node` in the contact state of the `other`.
 
     `x` (k,) are the positions of the skin's nodes along the surface. None where there is no such equilibrium.
     """
     states, senses = state.state.copy(), state.sense.copy()
     states[node], senses[node] = states[other], senses[other]
     begin = replace(state, state=states, sense=senses)
-    if not newton.linearise(begin, state.pull, x, 0, given):
+    if not newton.relinearise(begin, state.pull, x, 0, given):
         return None
     deeper, along = newton.system.motion.tolist() if given is not None else (0.0, 0.0)
     pull = state.pull._replace(depth=state.pull.depth + deeper, travel=state.pull.travel + along)

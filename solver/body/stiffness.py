@@ -89,6 +89,9 @@ class Probes:
     element: Indices  # (p,)
     gradient: Array  # (p, 9, 2) of the shape functions there [1/mm]
     modes: Array  # (p, 3) volume-strain modes there
+    strain: (
+        Array  # (p, 4, 18) of the element's nodes: strain xx, yy, xy times root of 2, volume; (0, 4, 18) if not known
+    )
 
     @staticmethod
     def at(mesh: Mesh, elements: Centred, element: Indices, local: Array) -> "Probes":
@@ -98,7 +101,8 @@ class Probes:
         jacobian = np.swapaxes(corners, 1, 2) @ slopes
         place = (values[:, None] @ corners)[:, 0] - elements.centre[element]
         modes = np.concatenate([np.ones((len(element), 1)), place], axis=1)
-        return Probes(element, slopes @ np.linalg.inv(jacobian), modes)
+        gradient = slopes @ np.linalg.inv(jacobian)
+        return Probes(element, gradient, modes, _strains(elements, element, gradient, modes))
 
     def displacement_gradient(self, mesh: Mesh, displacement: Array) -> Array:
         """Return du_a/dx_b (p, 2, 2, ...) for displacements (nodes, 2, ...)."""
@@ -107,22 +111,32 @@ class Probes:
         slopes = np.swapaxes(self.gradient, 1, 2) @ moved.reshape(len(moved), 9, -1)
         return np.swapaxes(slopes.reshape(len(moved), 2, *moved.shape[2:]), 1, 2)
 
-    def volume_strain(self, mesh: Mesh, elastic: Elastic, displacement: Array) -> Array:
-        """Return the elements' best fit of the volume strain (p, ...) for displacements (nodes, 2, ...)."""
-        moved = displacement[mesh.elements[self.element]]  # (p, 9, 2, ...)
-        moved = moved - moved[:, 8:]
-        flat = moved.reshape(len(self.element), 18, *moved.shape[3:])
-        row = self.modes[:, None] @ elastic.dilatation[self.element]  # (p, 1, 18)
-        return (row @ flat.reshape(len(flat), 18, -1)).reshape(len(flat), *flat.shape[2:])
+    def strains(self, mesh: Mesh, displacement: Array) -> Array:
+        """Return strains xx, yy, xy times root of 2, and volume strain (p, 4, ...) for displacements (nodes, 2, ...).
+
+        For probes of an elastic body alone.
+        """
+        local = displacement[mesh.elements]
+        local = (local - local[:, 8:]).reshape(len(local), 18, -1)  # moved as a whole, strains would drown in round-off
+        return (self.strain @ local[self.element]).reshape(len(self.element), 4, *displacement.shape[2:])
 
     def energy(self, mesh: Mesh, elastic: Elastic, displacement: Array) -> Array:
         """Return the SED (p, ...) [MPa] for displacements (nodes, 2, ...): G eps:eps + lambda/2 theta^2."""
-        strain = self.displacement_gradient(mesh, displacement)
-        strain = (strain + np.swapaxes(strain, 1, 2)) / 2.0
-        theta = self.volume_strain(mesh, elastic, displacement)
-        wide = (slice(None), *([None] * (theta.ndim - 1)))
+        strain = self.strains(mesh, displacement)
+        wide = (slice(None), *([None] * (strain.ndim - 2)))
         shear, lame = elastic.shear[self.element][wide], elastic.lame[self.element][wide]
-        return shear * np.sum(strain * strain, axis=(1, 2)) + lame / 2.0 * theta**2
+        return shear * np.sum(strain[:, :3] ** 2, axis=1) + lame / 2.0 * strain[:, 3] ** 2
+
+
+def _strains(elements: Centred, element: Indices, gradient: Array, modes: Array) -> Array:
+    """Return what makes strains (p, 4, 18) of the displacements of nodes, for an elastic body."""
+    if not isinstance(elements, Elastic):
+        return np.empty((0, 4, 18))
+    out = np.zeros((len(element), 4, 18))
+    out[:, 0, ::2], out[:, 1, 1::2] = gradient[:, :, 0], gradient[:, :, 1]
+    out[:, 2, ::2], out[:, 2, 1::2] = gradient[:, :, 1] / np.sqrt(2.0), gradient[:, :, 0] / np.sqrt(2.0)
+    out[:, 3] = (modes[:, None] @ elements.dilatation[element])[:, 0]
+    return out
 
 
 def local_coordinates(corners: Array, points: Array, start: Array) -> Array:

@@ -25,7 +25,7 @@ class LivePicture:
     faces: Indices  # (f, 4) nodes of the quadrilaterals that are drawn
     rest: Array  # (n, 2) undeformed nodes [mm]
     _moved: Array  # (2 n, 2 k) displacements, x and y in turn [mm per mm]
-    _strain: Array  # (3, f, 2 k) exx, eyy and 2 exy in the middle of each face [1/mm]
+    _strain: Array  # (3, f, 2 k) xx, yy and xy times root of 2 in the middle of each face [1/mm]
     _theta: Array  # (f, 2 k) volume strain there
     _shear: Array  # (f,) [MPa]
     _lame: Array  # (f,) [MPa]
@@ -38,13 +38,13 @@ class LivePicture:
         count = len(mesh.elements)
         element = np.repeat(np.arange(count), len(MIDDLES))
         probes = Probes.at(mesh, elastic, element, np.tile(MIDDLES, (count, 1)))
-        gradient = probes.displacement_gradient(mesh, everywhere)
+        strain = np.moveaxis(probes.strains(mesh, everywhere), 1, 0)
         return cls(
             mesh.elements[:, QUARTERS].reshape(-1, 4),
             mesh.nodes,
             np.ascontiguousarray(everywhere.reshape(2 * len(mesh.nodes), -1)),
-            np.stack([gradient[:, 0, 0], gradient[:, 1, 1], gradient[:, 0, 1] + gradient[:, 1, 0]]),
-            probes.volume_strain(mesh, elastic, everywhere),
+            strain[:3],
+            strain[3],
             elastic.shear[element],
             elastic.lame[element],
         )
@@ -58,5 +58,4 @@ class LivePicture:
         skin = state.u.ravel()
         xx, yy, xy = self._strain @ skin
         theta = self._theta @ skin
-        # W = G (exx^2 + eyy^2 + 2 exy^2) + lambda/2 theta^2
-        return self._shear * (xx**2 + yy**2 + xy**2 / 2.0) + self._lame / 2.0 * theta**2
+        return self._shear * (xx**2 + yy**2 + xy**2) + self._lame / 2.0 * theta**2

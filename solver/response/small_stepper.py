@@ -59,19 +59,9 @@ class Condensed:
 def _square_roots(finger: FingerModel, endings: Endings, everywhere: Array) -> list[Array]:
     """Return for each ending a matrix (a, 2 k): the SED is the sum of squares of it times the skin's unknowns."""
     mesh, elastic, probes = finger.geometry.mesh, finger.body.elastic, endings.probes
-    gradient = probes.displacement_gradient(mesh, everywhere)  # (p, 2, 2, 2 k)
-    theta = probes.volume_strain(mesh, elastic, everywhere)
-    shear, lame = elastic.shear[probes.element, None], elastic.lame[probes.element, None]
-    # W = G (exx^2 + eyy^2 + 2 exy^2) + lambda/2 theta^2
-    lines = np.stack(
-        [
-            np.sqrt(shear) * gradient[:, 0, 0],
-            np.sqrt(shear) * gradient[:, 1, 1],
-            np.sqrt(shear / 2.0) * (gradient[:, 0, 1] + gradient[:, 1, 0]),
-            np.sqrt(lame / 2.0) * theta,
-        ],
-        axis=1,
-    )  # (p, 4, 2 k)
+    shear, lame = elastic.shear[probes.element, None, None], elastic.lame[probes.element, None, None]
+    lines = probes.strains(mesh, everywhere)  # (p, 4, 2 k)
+    lines *= np.sqrt(np.concatenate([shear, shear, shear, lame / 2.0], axis=1))  # W = G eps:eps + lambda/2 theta^2
     area = np.bincount(endings.patch, endings.weights, endings.count)
     out: list[Array] = []
     for number in range(endings.count):
