@@ -40,8 +40,10 @@ def main() -> int:
     def passes(command: list[str], *, quiet: bool = False) -> tuple[bool, str, str]:
         """Run one check; return whether it passed, what to say of that, and its output if it is to be `quiet`."""
         began = time.monotonic()
-        output = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT} if quiet else {}
-        ended = subprocess.run(installed(command), cwd=ROOT, env=environment, text=True, check=False, **output)
+        out, err = (subprocess.PIPE, subprocess.STDOUT) if quiet else (None, None)
+        ended = subprocess.run(
+            installed(command), cwd=ROOT, env=environment, stdout=out, stderr=err, text=True, check=False
+        )
         passed = ended.returncode == 0
         return passed, f"{'passed' if passed else 'FAILED'} in {time.monotonic() - began:.0f} s", ended.stdout or ""
 
