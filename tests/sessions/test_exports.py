@@ -135,7 +135,7 @@ def test_one_long_answer_takes_room_and_memory_once_in_every_export(exports, tmp
     assert exports[form, "whole"].exists()  # so that its libraries are loaded
     writer = begun(tmp_path / "s")
     writer.readings(readings(0, 100))
-    positions = [[1000.0 + i / 60, i % 101 * 0.99] for i in range(60_000)]
+    positions = [[1000.0 + i / 60, i % 101 * 0.99] for i in range(12_000)]
     writer.event("scored", 1, {"score": 42.5, "positions": positions}, commit=False)
     for i in range(118):
         writer.event("note", data={"text": f"{i}"}, commit=False)

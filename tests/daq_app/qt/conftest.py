@@ -63,14 +63,16 @@ def application(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def one_window(application):
+def one_window(application, request):
     """One window for all tests of a file: a session that is over leaves it as it was.
+
+    A file without a session sets its own PACE of 1: readings that come 20 times as fast keep a core half busy.
 
     Its live model does not start by itself, for with time running so fast it would keep a core busy all along.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(LiveModel, "prepare", lambda _: None)
-        window = opened(application, lambda: Recorder.start(pace=PACE))
+        window = opened(application, lambda: Recorder.start(pace=getattr(request.module, "PACE", PACE)))
     window.resize(1440, 900)
     window.show()
     yield window

@@ -17,6 +17,7 @@ from daq_app.window.live_trace import CHANNELS, LiveTrace
 
 pytestmark = pytest.mark.qt
 
+PACE = 1.0  # no test here waits for a session
 CONTROLS = (QAbstractButton, QComboBox, QLineEdit, QListWidget)
 
 
