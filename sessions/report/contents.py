@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from sessions.prediction.sed_interval import Ends, SedInterval
 from sessions.prediction.variants import Alternative
 from sessions.statistics.multiverse import PathFinding
+from sessions.statistics.rivals import Rival
 from sessions.statistics.scores import MeanScore, Relation
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ class Experiment:
     answers: tuple[Answers, ...]
     score_relation: Relation | None  # SED [MPa] against mean score; None where one of the two is missing
     index_relation: Relation | None  # SED [MPa] against index
+    rivals: tuple[Rival, ...] = ()  # the SED first, and what else follows the mean scores
     paths: tuple[PathFinding, ...] = ()  # the first of them along many paths of the analysis, where they were asked for
 
 

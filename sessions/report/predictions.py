@@ -51,15 +51,6 @@ def afferent_facts(settings: AfferentSettings, reference: float | None) -> tuple
     return () if reference is None else tuple(facts)
 
 
-def predicted_seds(findings: Sequence[PredictionFinding]) -> dict[tuple[str, int], float]:
-    """Return the SED [MPa] by experiment and index, the mean over repetitions."""
-    given: defaultdict[tuple[str, int], list[float]] = defaultdict(list)
-    for finding in findings:
-        if finding.sed is not None and finding.index is not None:
-            given[finding.experiment, finding.index].append(finding.sed)
-    return {key: float(np.mean(values)) for key, values in given.items()}
-
-
 def fields(found: SessionPrediction | None) -> tuple[Field, ...]:
     """Return the settled finger of each experiment's greatest index that has a prediction."""
     if found is None:

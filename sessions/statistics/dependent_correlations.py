@@ -23,6 +23,12 @@ class Contrast:
     z: float | None  # Steiger's; None where the interval comes from a bootstrap
     p: float | None  # two-sided
 
+    def differs(self, alpha: float) -> bool:
+        """Say whether the two correlations differ: by p where there is one, else by the interval."""
+        if self.p is not None:
+            return self.p < alpha
+        return self.low is not None and self.high is not None and not self.low <= 0.0 <= self.high
+
 
 def steiger_z(first: float, second: float, mutual: float, n: int) -> float | None:
     """Return Steiger's Z of two correlations with one variable; `mutual` is that of the other two with each other.
@@ -82,9 +88,11 @@ def left_out_error(x: Sequence[float], y: Sequence[float]) -> float | None:
 
     The residual over 1 less its leverage (Allen 1974, Technometrics 16:125). None where the others fix no line.
     """
+    if len(x) < 3:
+        return None
     centred = np.asarray(x, np.float64) - float(np.mean(x))
     size = float(centred @ centred)
-    if len(x) < 3 or size <= 1e-24 * float(np.max(np.abs(x))) ** 2:
+    if size <= 1e-24 * float(np.max(np.abs(x))) ** 2:
         return None
     own = 1.0 - 1.0 / len(x) - centred**2 / size
     if float(own.min()) < 1e-9:

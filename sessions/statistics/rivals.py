@@ -33,6 +33,7 @@ QUANTITIES: Mapping[str, str] = {
     "speed": "speed",
 }
 _RESAMPLES = 10_000
+_NO_LINE = "without some surface the others fix no line"
 _LEAST_SUBJECTS = 3  # of a bootstrap over subjects, and of the jackknife beside it
 
 
@@ -78,6 +79,13 @@ def rivals_of_means(scores: Mapping[int, float], series: Mapping[str, Mapping[in
     return tuple(_of_means(name, scores, series) for name in QUANTITIES if name in series)
 
 
+def rivals_of_surfaces(trials: Sequence[RivalTrial]) -> tuple[Rival, ...]:
+    """Return `rivals_of_means` of means over subjects, of the trials that have the model's quantity."""
+    counted = [trial for trial in trials if MODEL in trial.values]
+    names = [name for name in QUANTITIES if any(name in trial.values for trial in counted)]
+    return rivals_of_means(*_means(counted, names))
+
+
 def rivals_within(trials: Sequence[RivalTrial]) -> tuple[Rival, ...]:
     """Return how each quantity goes with the scores within subjects; () where no trial has the model's quantity.
 
@@ -88,18 +96,14 @@ def rivals_within(trials: Sequence[RivalTrial]) -> tuple[Rival, ...]:
     names = [name for name in QUANTITIES if any(name in trial.values for trial in counted)]
     if not counted:
         return ()
-    of_means = {rival.name: rival for rival in rivals_of_means(*_means(counted, names))}
     deviances = {name: _deviance(name, counted) for name in names}
     whole = {name: value for name, value in deviances.items() if not isinstance(value, str)}
     weights = dict(zip(whole, akaike_weights(list(whole.values())), strict=True)) if whole else {}
     found: list[Rival] = []
     for name in names:
-        means, told = of_means.get(name), deviances[name]
+        told = deviances[name]
         rival = replace(_within(name, counted), weight=weights.get(name))
-        rival = _because(rival, "weight", told if isinstance(told, str) else None)
-        if means is not None:
-            rival = replace(rival, same_order=means.same_order, needed=means.needed)
-        found.append(rival)
+        found.append(_because(rival, "weight", told if isinstance(told, str) else None))
     return tuple(found)
 
 
@@ -110,7 +114,7 @@ def _of_means(name: str, scores: Mapping[int, float], series: Mapping[str, Mappi
     related = relation(x, y, own)
     rival = Rival(name, len(own), related.pearson, related.low, related.high, left_out_error=left_out_error(x, y))
     rival = _because(rival, "r", related.reason)
-    rival = _because(rival, "left_out_error", None if rival.left_out_error is not None else "too few surfaces")
+    rival = _because(rival, "left_out_error", None if rival.left_out_error is not None else _NO_LINE)
     shared = [i for i in scores if all(i in series[one] for one in used)]
     score = [scores[i] for i in shared]
     values = {one: [series[one][i] for i in shared] for one in used}
@@ -154,7 +158,7 @@ def _within(name: str, trials: Sequence[RivalTrial]) -> Rival:
     error = _left_out_surface(mine, name)
     rival = Rival(name, len(mine), None if related is None else related.r, low, high, left_out_error=error)
     rival = _because(rival, "r", None if related is not None else "too few trials within subjects, or no variation")
-    rival = _because(rival, "left_out_error", None if error is not None else "too few surfaces")
+    rival = _because(rival, "left_out_error", None if error is not None else _NO_LINE)
     shared = [trial for trial in mine if all(one in trial.values for one in used)]
     drawn = _resampled(shared, used)
     few = f"it takes {_LEAST_SUBJECTS} subjects with trials that have all of them"

@@ -4,9 +4,16 @@ import math
 
 import numpy as np
 import pytest
-from report_example import TABLES
+from report_example import TABLES, example
 from scipy import optimize, stats
+from study_example import study
 
+from sessions.report.figures import picture
+from sessions.report.prose import summary
+from sessions.report.study_csv import rivals_csv
+from sessions.report.study_page import study_page
+from sessions.report.tables import tables
+from sessions.report.tables.rivals import rivals_sentences
 from sessions.statistics.crossed_model import akaike_weights, crossed_deviance
 from sessions.statistics.dependent_correlations import (
     cases_needed,
@@ -175,3 +182,46 @@ def test_the_crossed_deviance_is_the_least_of_the_dense_normal_density():
 
 def test_weights_are_those_of_the_published_rule():
     assert akaike_weights([204.0, 202.0, 206.0]) == pytest.approx((0.2447, 0.6652, 0.0900), abs=1e-4)
+
+
+def test_a_session_shows_every_rival_beside_the_sed_in_table_picture_data_and_summary():
+    report = example()
+    shown = next(one for one in tables(report)["relation"] if one.name == "table-rivals")
+    assert [row[0].text for row in shown.groups[0].rows] == [MODEL, GIVEN, "µ static", "τ max", "speed"]
+    assert len(shown.caption.split()) <= 60
+    drawn = picture(report, "relation", "stickiness").svg.replace("\N{NO-BREAK SPACE}", " ")
+    assert "τ max +0.95" in drawn
+    in_data = report.to_dict()["experiments"][0]["rivals"][1]["contrast"]
+    assert in_data["z"] == report.experiments[0].rivals[1].contrast.z
+    said = " ".join(summary(report))
+    assert "µ of the model and τ max order these 5 surfaces as the SED does, so no order of scores" in said
+    needed = cases_needed(*correlations_of(report.experiments[0]))
+    assert f"{float(f'{needed:.2g}'):.0f} for µ of the model" in said
+
+
+def correlations_of(experiment):
+    """Return r of SED and of µ with the mean scores, and with each other, of the made-up report."""
+    rows = TABLES[experiment.descriptor]
+    (_, a, b), (_, _, c), _ = np.corrcoef(
+        [[m.mean for m in experiment.scores], [row[3] for row in rows.values()], [row[0] for row in rows.values()]]
+    )
+    return a, b, c
+
+
+def test_a_study_shows_rivals_of_means_and_within_subjects_on_its_page_and_as_csv():
+    found = study()
+    page = study_page(found, "x")
+    assert 'id="table-rivals"' in page
+    assert "stickiness, within subjects" in page
+    rows = rivals_csv(found).splitlines()
+    assert rows[0].startswith("SIMULATED,descriptor,kind,name,n,r,low,high")
+    assert sum(",within," in row for row in rows) == len(found.descriptors[0].rivals)
+
+
+def test_equal_rivals_are_said_to_be_told_apart_by_no_number_of_surfaces():
+    score = {0: 1.0, 1: 3.0, 2: 4.0, 3: 2.0, 4: 6.0}
+    same = {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0, 4: 5.0}
+    twice = {index: 2.0 * value for index, value in same.items()}
+    said = rivals_sentences("roughness", rivals_of_means(score, {MODEL: same, GIVEN: twice}))
+    assert said[0].startswith("Roughness: µ of the model orders these 5 surfaces as the SED does")
+    assert said[0].endswith("no number of surfaces would.")

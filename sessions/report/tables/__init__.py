@@ -11,6 +11,7 @@ from sessions.report.tables.predictions import (
     force_table,
     prediction_table,
 )
+from sessions.report.tables.rivals import rivals_table
 from sessions.report.tables.scores import answer_tables, relation_table, score_table
 from sessions.report.tables.strokes import course_table, planted_table, stroke_table
 
@@ -30,7 +31,7 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
             beside_forces_table(report),
         ),
         "afferent": (afferent_table(report),),
-        "relation": (relation_table(report),),
+        "relation": (relation_table(report), rivals_table((e.name, e.rivals) for e in report.experiments)),
         "paths": (paths_table((e.name, e.paths) for e in report.experiments),),
         "planted": (planted_table(report),),
     }
