@@ -8,6 +8,7 @@ from scipy import linalg, optimize
 
 from sessions.statistics.reml import Array
 
+_WIDEST = 1e3  # spread relative to what is left: scores have three figures, and a step of the search may not go beyond
 _STARTS = (0.1, 1.0)  # spreads relative to what is left; the criterion is smooth, and the best of four is kept
 
 
@@ -43,7 +44,7 @@ def crossed_deviance(
         return 2.0 * float(np.log(np.diag(root)).sum()) + n * (1.0 + float(np.log(2.0 * np.pi * rest / n)))
 
     fits = [
-        optimize.minimize(deviance, start, method="L-BFGS-B", bounds=[(0.0, None)] * 2)
+        optimize.minimize(deviance, start, method="L-BFGS-B", bounds=[(0.0, _WIDEST)] * 2)
         for start in product(_STARTS, _STARTS)
     ]
     return min(float(one.fun) for one in fits)

@@ -180,6 +180,13 @@ def test_the_crossed_deviance_is_the_least_of_the_dense_normal_density():
     assert crossed_deviance([str(one) for one in who], what, y, x) == pytest.approx(least.fun, abs=1e-5)
 
 
+def test_surfaces_that_explain_almost_everything_leave_a_deviance_still():
+    draw = np.random.default_rng(11)
+    who, what = np.repeat(np.arange(10), 5), np.tile(np.arange(5), 10)
+    y = 1e4 * draw.normal(size=5)[what] + 1e-3 * draw.normal(size=50)
+    assert math.isfinite(crossed_deviance([str(one) for one in who], what, y, draw.normal(size=50)))
+
+
 def test_weights_are_those_of_the_published_rule():
     assert akaike_weights([204.0, 202.0, 206.0]) == pytest.approx((0.2447, 0.6652, 0.0900), abs=1e-4)
 
