@@ -161,6 +161,8 @@ class PredictionFinding:
     settled_rate: float | None = None  # likewise
     peak_rate_interval: Ends | None = None  # that the interval of the SED makes of it, every parameter as given
     settled_rate_interval: Ends | None = None  # likewise
+    doubt: str = ""  # why no finger can be in the state of the model's numbers, as `Alternative.doubt`
+    opposite_doubt: str = ""  # likewise of the state slid the other way
     alternatives: tuple[Alternative, ...] = ()  # the trial in each variant, where they were asked for
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction
+from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction, doubt_of
 from sessions.prediction.afferent import AfferentSettings, Firing, parameters
 from sessions.prediction.model_facts import model_facts
 from sessions.report.contents import Fact, Field, History, PredictionFinding, same_fields
@@ -111,6 +111,8 @@ def finding_of(row: TrialPrediction) -> PredictionFinding:
         "code": "" if row.stimulus is None else row.stimulus.code,
         "history": None if history is None else History(_numbers(history.time), _numbers(history.sed_ending)),
         "reasons": reasons,
+        "doubt": "" if row.prediction is None else doubt_of(row.prediction),
+        "opposite_doubt": "" if row.opposite is None else doubt_of(row.opposite),
     }
     return PredictionFinding(**{**same_fields(row, PredictionFinding), **told})
 

@@ -20,6 +20,7 @@ __all__ = ["Cell", "Column", "Group", "Table", "tables"]
 
 def tables(report: Report) -> dict[str, tuple[Table, ...]]:
     """Return the tables a report has numbers for, by section, in their order."""
+    compared = ((e.name, e.rivals) for e in report.experiments)
     sections = {
         "scores": (score_table(report), *answer_tables(report)),
         "strokes": (stroke_table(report), course_table(report)),
@@ -31,7 +32,10 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
             beside_forces_table(report),
         ),
         "afferent": (afferent_table(report),),
-        "relation": (relation_table(report), rivals_table((e.name, e.rivals) for e in report.experiments)),
+        "relation": (
+            relation_table(report),
+            rivals_table(compared, report.model),
+        ),
         "paths": (paths_table((e.name, e.paths) for e in report.experiments),),
         "planted": (planted_table(report),),
     }

@@ -12,8 +12,8 @@ _ALPHA = 0.05
 _LINE = 44  # characters that a line of a picture's title has room for
 
 
-def rivals_table(compared: Iterable[tuple[str, Sequence[Rival]]]) -> Table | None:
-    """Return the rivals of each group that is named."""
+def rivals_table(compared: Iterable[tuple[str, Sequence[Rival]]], model: str) -> Table | None:
+    """Return the rivals of each group that is named; `model` says in short which model the SED is of."""
     notes = Notes()
     groups = [Group(name, tuple(_row(rival, notes) for rival in rivals)) for name, rivals in compared]
     columns = (
@@ -21,10 +21,9 @@ def rivals_table(compared: Iterable[tuple[str, Sequence[Rival]]]) -> Table | Non
         "left-out error [0–100] | AIC weight"
     )
     caption = (
-        "r of scores with the SED and with its rivals. Differences: rivals turned so that both r are positive; Zou "
-        "(2007), Steiger (1980), within subjects a bootstrap over subjects. Left-out error: of a surface's scores by "
-        "the line through the others, root mean square. AIC: mixed models, subjects and surfaces crossed. Exploratory, "
-        "not corrected."
+        f"r of scores with the SED ({model}) and rivals. Differences: with both r made positive; Zou (2007), Steiger "
+        "(1980), within subjects by bootstrap. Left-out error: of surfaces left out, root mean square. AIC: crossed "
+        "mixed models. Exploratory, not corrected."
     )
     return table("table-rivals", caption, columns, groups, notes)
 

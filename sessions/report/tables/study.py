@@ -296,7 +296,8 @@ def _rivals(study: StudyFindings) -> Table | None:
         for one in study.descriptors
         for kind, rivals in (("means over subjects", one.rivals_of_means), ("within subjects", one.rivals))
     ]
-    return rivals_table((f"{descriptor}, {kind}", rivals) for descriptor, kind, rivals in kinds)
+    model = model_in_short(study.options.prediction, study.options.area)
+    return rivals_table(((f"{descriptor}, {kind}", rivals) for descriptor, kind, rivals in kinds), model)
 
 
 def _of_means(name: str, related: Relation | None, notes: Notes) -> Iterable[Row]:
