@@ -232,10 +232,10 @@ def _forces(study: StudyFindings) -> Table | None:
     )
     model = model_in_short(study.options.prediction, study.options.area)
     caption = (
-        "Model against measurement: normal force over the steady window, the force of the model pressed to the depth "
-        "of its block (times the finger's width, assumed unless it was measured), and the depth at which the model "
-        "would press as hard as the subject did (on a rough mesh, to some tenths of a per cent). Means over "
-        f"subjects with t intervals, which hold what errs from trial to trial. Model: {model}."
+        "Normal force as measured over the steady window, that of the model at the depth of its block (times the "
+        "finger's width, assumed unless it was measured), and the depth at which the two would be equal (on a rough "
+        "mesh, to some tenths of a per cent). Means over subjects with t intervals, which hold what errs from trial to "
+        f"trial. Model: {model}."
     )
     return table(
         "table-forces", caption, columns, [Group(one.descriptor, tuple(row(one))) for one in study.descriptors], notes
