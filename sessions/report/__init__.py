@@ -25,8 +25,8 @@ from sessions.report.contents import (
     TextFile,
     Trace,
 )
-from sessions.report.experiments import experiments
-from sessions.report.predictions import fields, left_out, model_in_short, modelled, predicted_seds, predictions
+from sessions.report.experiments import experiments, quantities
+from sessions.report.predictions import fields, left_out, model_in_short, modelled, predictions
 from sessions.report.strokes import course, flaws, strokes
 from sessions.statistics.multiverse import Seds
 from sessions.statistics.scores import MeanScore, Relation, ScoreTable, joined, score_table
@@ -95,7 +95,9 @@ def findings(
         excluded=facts.excluded(recording, analysis, found, tables),
         remarks=facts.remarks(recording, analysis, tables),
         flaws=flaws(analysis),
-        experiments=experiments(recording.plan, tables, predicted_seds(predicted), more.paths, analysis.settings.area),
+        experiments=experiments(
+            recording.plan, tables, quantities(predicted, found), more.paths, analysis.settings.area
+        ),
         course=course(recording),
         strokes=found,
         predictions=predicted,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from sessions.prediction.sed_interval import Ends, SedInterval
 from sessions.prediction.variants import Alternative
 from sessions.statistics.multiverse import PathFinding
+from sessions.statistics.rivals import Rival
 from sessions.statistics.scores import MeanScore, Relation
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ class Experiment:
     answers: tuple[Answers, ...]
     score_relation: Relation | None  # SED [MPa] against mean score; None where one of the two is missing
     index_relation: Relation | None  # SED [MPa] against index
+    rivals: tuple[Rival, ...] = ()  # the SED first, and what else follows the mean scores
     paths: tuple[PathFinding, ...] = ()  # the first of them along many paths of the analysis, where they were asked for
 
 
@@ -159,6 +161,8 @@ class PredictionFinding:
     settled_rate: float | None = None  # likewise
     peak_rate_interval: Ends | None = None  # that the interval of the SED makes of it, every parameter as given
     settled_rate_interval: Ends | None = None  # likewise
+    doubt: str = ""  # why no finger can be in the state of the model's numbers, as `Alternative.doubt`
+    opposite_doubt: str = ""  # likewise of the state slid the other way
     alternatives: tuple[Alternative, ...] = ()  # the trial in each variant, where they were asked for
 
 

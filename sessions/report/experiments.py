@@ -1,30 +1,50 @@
-"""The experiments of a session: who scored what, and how predictions go with it."""
+"""The experiments of a session: who scored what, and how predictions and their rivals go with it."""
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from sessions.plan.plan import Block, SessionPlan
-from sessions.report.contents import Answers, Experiment
+from sessions.report.contents import Answers, Experiment, PredictionFinding, StrokeFinding
 from sessions.statistics.multiverse import PathTrial, Seds, path_findings
+from sessions.statistics.rivals import GIVEN, MODEL, QUANTITIES, rivals_of_means
 from sessions.statistics.scores import MeanScore, Relation, ScoreTable, mean_scores, relation, score_matrix
 from sessions.strokes.contact_area import FIXED, AreaLaw
 from sessions.strokes.friction import rule_for
+
+Quantities = Mapping[str, Mapping[tuple[str, int], float]]  # name in `QUANTITIES` -> block and index -> number
+
+
+def quantities(predictions: Sequence[PredictionFinding], strokes: Sequence[StrokeFinding]) -> Quantities:
+    """Return each quantity by block and index, the mean over repetitions: the model's, and of the strokes it got."""
+    given: dict[str, defaultdict[tuple[str, int], list[float]]] = {name: defaultdict(list) for name in QUANTITIES}
+    by_number = {stroke.number: stroke for stroke in strokes}
+    for one in predictions:
+        if one.index is not None:
+            for name, attribute in QUANTITIES.items():
+                holder = one if name in (MODEL, GIVEN) else by_number.get(one.stroke or 0)
+                value = getattr(holder, attribute, None)
+                if value is not None:
+                    given[name][one.experiment, one.index].append(value)
+    return {name: {key: float(np.mean(all_of)) for key, all_of in values.items()} for name, values in given.items()}
 
 
 def experiments(
     plan: SessionPlan,
     tables: Sequence[ScoreTable],
-    seds: Mapping[tuple[str, int], float],
+    numbers: Quantities,
     paths: Mapping[int, Seds] | None = None,
     law: AreaLaw = FIXED,
 ) -> tuple[Experiment, ...]:
-    """Return one experiment a block; `seds` holds the predicted SED [MPa] by block and index, where there is one.
+    """Return one experiment a block; `numbers` are the `quantities` of its surfaces.
 
     `paths` holds the SED of each trial along many paths of the analysis, where they were asked for, and `law` the
     contact area by which every other number was told.
     """
     means = mean_scores(tables)
     return tuple(
-        _experiment(block, means, tables, seds, paths or {}, law) for block in plan.blocks if block.phase == "main"
+        _experiment(block, means, tables, numbers, paths or {}, law) for block in plan.blocks if block.phase == "main"
     )
 
 
@@ -32,7 +52,7 @@ def _experiment(
     block: Block,
     means: Sequence[MeanScore],
     tables: Sequence[ScoreTable],
-    seds: Mapping[tuple[str, int], float],
+    numbers: Quantities,
     paths: Mapping[int, Seds],
     law: AreaLaw,
 ) -> Experiment:
@@ -40,7 +60,11 @@ def _experiment(
     indices = tuple(sorted({trial.stimulus.known_index for trial in block.trials}))
     told = tuple(mean for mean in means if mean.descriptor == descriptor and mean.index in indices)
     score_of = {mean.index: mean.mean for mean in told}
-    predicted = {index: seds[block.name, index] for index in indices if (block.name, index) in seds}
+    series = {
+        name: {index: values[block.name, index] for index in indices if (block.name, index) in values}
+        for name, values in numbers.items()
+    }
+    predicted = series.get(MODEL, {})
     return Experiment(
         name=block.name,
         descriptor=descriptor,
@@ -56,6 +80,7 @@ def _experiment(
         ),
         score_relation=_related(score_of, predicted),
         index_relation=_related({index: float(index) for index in indices}, predicted),
+        rivals=rivals_of_means(score_of, series) if predicted and score_of else (),
         paths=path_findings(
             [
                 PathTrial("", index, score_of.get(index), rule_for(trial), paths.get(trial.number, ()))

@@ -17,9 +17,11 @@ from sessions.report import tables as report_tables
 from sessions.report.figures import Panel, Plate, plates
 from sessions.report.prose import question, summary
 from sessions.report.tables import Table
+from sessions.report.tables.cells import parted
 from sessions.report.templates import template
 
 HEAD = "<!DOCTYPE html>"
+BODY = {"table-scores", "table-strokes", "table-predictions", "table-relation", "table-rivals"}  # no appendix for them
 
 
 class ReportError(Exception):
@@ -32,7 +34,7 @@ def page(report: Report, drawings: Sequence[Plate] | None = None) -> str:
     `drawings` are its `plates`, where they were drawn already.
     """
     figures = {plate.name: plate for plate in (plates(report) if drawings is None else drawings)}
-    tables = report_tables.tables(report)
+    tables, further = parted(report_tables.tables(report), BODY)
     return template("report.html.jinja").render(
         report=report,
         question=question(report),
@@ -41,9 +43,10 @@ def page(report: Report, drawings: Sequence[Plate] | None = None) -> str:
         drawing=drawn,
         data_address=partial(data_address, head=report.head if report.simulated else ""),
         scene_address="" if report.scene is None else text_address(report.scene.text, "application/toml"),
-        numbers=_numbers(figures, tables),
-        contents=_contents(report, figures, tables),
+        numbers=_numbers(figures, {**tables, "further": further}),
+        contents=_contents(report, figures, tables, further=bool(further)),
         tables=tables,
+        further=further,
     )
 
 
@@ -85,7 +88,7 @@ def _numbers(figures: dict[str, Plate], tables: dict[str, tuple[Table, ...]]) ->
 
 
 def _contents(
-    report: Report, figures: dict[str, Plate], tables: dict[str, tuple[Table, ...]]
+    report: Report, figures: dict[str, Plate], tables: dict[str, tuple[Table, ...]], *, further: bool
 ) -> tuple[tuple[str, str], ...]:
     """Return anchor and words of the sections that the page has."""
     parts = (
@@ -95,10 +98,10 @@ def _contents(
         ("friction", "forces and friction", "course" in figures or bool(tables["strokes"])),
         ("predictions", "predicted responses", bool(tables["predictions"])),
         ("relation", "prediction against score", bool(tables["relation"])),
-        ("paths", "many paths", bool(tables["paths"])),
-        ("planted", "planted against recovered", bool(tables["planted"])),
+        ("paths", "many paths", "paths" in figures),
         ("model", "the model", bool(report.modelled or report.left_out)),
         ("again", "to do it again", True),
+        ("further", "appendix: further tables", further),
     )
     return tuple((anchor, words) for anchor, words, there in parts if there)
 

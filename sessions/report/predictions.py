@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction
+from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction, doubt_of
 from sessions.prediction.afferent import AfferentSettings, Firing, parameters
 from sessions.prediction.model_facts import model_facts
 from sessions.report.contents import Fact, Field, History, PredictionFinding, same_fields
@@ -49,15 +49,6 @@ def afferent_facts(settings: AfferentSettings, reference: float | None) -> tuple
         for told in parameters(settings, reference)
     ]
     return () if reference is None else tuple(facts)
-
-
-def predicted_seds(findings: Sequence[PredictionFinding]) -> dict[tuple[str, int], float]:
-    """Return the SED [MPa] by experiment and index, the mean over repetitions."""
-    given: defaultdict[tuple[str, int], list[float]] = defaultdict(list)
-    for finding in findings:
-        if finding.sed is not None and finding.index is not None:
-            given[finding.experiment, finding.index].append(finding.sed)
-    return {key: float(np.mean(values)) for key, values in given.items()}
 
 
 def fields(found: SessionPrediction | None) -> tuple[Field, ...]:
@@ -120,6 +111,8 @@ def finding_of(row: TrialPrediction) -> PredictionFinding:
         "code": "" if row.stimulus is None else row.stimulus.code,
         "history": None if history is None else History(_numbers(history.time), _numbers(history.sed_ending)),
         "reasons": reasons,
+        "doubt": "" if row.prediction is None else doubt_of(row.prediction),
+        "opposite_doubt": "" if row.opposite is None else doubt_of(row.opposite),
     }
     return PredictionFinding(**{**same_fields(row, PredictionFinding), **told})
 

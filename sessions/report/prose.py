@@ -3,6 +3,7 @@
 from sessions.prediction.variants import Variant
 from sessions.report import Experiment, Report
 from sessions.report.tables.multiverse import paths_sentence
+from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.wording import correlation, digits, plural, spread_share
 from sessions.statistics.scores import Relation, relation
 
@@ -35,6 +36,7 @@ def summary(report: Report) -> tuple[str, ...]:
         seds = [p.sed for p in report.predictions if p.experiment == experiment.name and p.sed is not None]
         if seds:
             sentences.append(_predicted(experiment, min(seds), max(seds), report.model.split(",")[0]))
+            sentences += rivals_sentences(experiment.name, experiment.rivals)
         if experiment.paths:
             sentences.append(paths_sentence(experiment.name, experiment.paths))
     if any(p.sed is not None for p in report.predictions):

@@ -8,6 +8,7 @@ from sessions.exchange.csv_text import write_rows
 from sessions.statistics.multiverse import Path
 from sessions.statistics.pooling.exclusions import decided
 from sessions.statistics.pooling.findings import StudyFindings
+from sessions.statistics.rivals import Rival
 
 SIMULATED = "SIMULATED"
 TRIALS, COLUMNS = "trials.csv", "trials-columns.csv"  # as they lie beside the page
@@ -47,6 +48,7 @@ _MEANING: Mapping[str, tuple[str, str]] = {
     "sed_high": ("MPa", "upper end"),
     "sed_interval": ("", "how that interval was found, or why there is none"),
     "error_estimate": ("", "of sed, from its mesh, relative"),
+    "tangential_force": ("N", "measured, mean over the steady window"),
     "model_normal_force": ("N", "of the model, pressed to the planned depth, times the finger's width"),
     "model_normal_force_error": ("", "its relative error, estimated by the solver"),
     "matching_depth": ("mm", "depth at which the model would press as hard as the subject did"),
@@ -88,6 +90,24 @@ def paths_csv(study: StudyFindings) -> str:
             numbers = (found.surfaces, found.trials, found.r, found.within, found.low, found.high)
             told = [*(["yes"] if mark else []), one.descriptor, *(getattr(found.path, name) for name in names)]
             rows.append([*told, "yes" if found.usual else "no", *(_plain(number) for number in numbers)])
+    write_rows(out, rows)
+    return out.getvalue()
+
+
+def rivals_csv(study: StudyFindings) -> str:
+    """Return a row for each quantity that may follow the scores, of means and within subjects, for R and pandas."""
+    mark = [SIMULATED] if study.simulated else []
+    names = [field.name for field in fields(Rival) if field.name not in ("contrast", "reasons")]
+    heads = ["difference", "difference_low", "difference_high", "steiger_z", "p"]
+    rows: list[list[object]] = [[*mark, "descriptor", "kind", *names, *heads]]
+    for one in study.descriptors:
+        for kind, rivals in (("means", one.rivals_of_means), ("within", one.rivals)):
+            for rival in rivals:
+                found = rival.contrast
+                less = [None] * 5 if found is None else [found.difference, found.low, found.high, found.z, found.p]
+                numbers = [*(getattr(rival, name) for name in names), *less]
+                rows.append([*(["yes"] if mark else []), one.descriptor, kind, *(_plain(each) for each in numbers)])
+    out = io.StringIO()
     write_rows(out, rows)
     return out.getvalue()
 

@@ -11,6 +11,7 @@ from sessions.recording.provenance import software_versions
 from sessions.report import Fact
 from sessions.report.commands import area_words, calibration_words, model_words
 from sessions.report.tables.multiverse import paths_sentence
+from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.wording import correlation, digits, plural, significant
 from sessions.statistics.pooling.exclusions import Exclusion
 from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
@@ -26,6 +27,8 @@ def summary(study: StudyFindings) -> list[str]:
     strain = study.options.prediction.kinematics
     for one in study.descriptors:
         said += _related(one, strain)
+        said += rivals_sentences(f"{one.descriptor}, by means over subjects", one.rivals_of_means)
+        said += rivals_sentences(f"{one.descriptor}, within subjects", one.rivals)
         said += [paths_sentence(one.descriptor, one.paths)] if one.paths else []
     if study.friction is not None:
         f = study.friction

@@ -159,9 +159,9 @@ def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> R
         why = f"{few} too few for a correlation" if n < 3 else "one of the two does not vary"
         return Relation(n, None, None, None, None, None, None, None, None, None, without, why)
     slope, intercept = np.polyfit(x, y, 1)
-    low, high = _fisher_interval(r, n)
+    low, high = fisher_interval(r, n)
     why = None if low is not None else f"no interval of r from {n} points" if n < 4 else "no interval of a perfect r"
-    rho = float(np.corrcoef(_ranks(x), _ranks(y))[0, 1])
+    rho = _rank_correlation(x, y)
     ends = _rank_interval(rho, n)
     return Relation(n, r, low, high, rho, *ends, _exact_p(x, y, rho), float(slope), float(intercept), without, why)
 
@@ -246,7 +246,16 @@ def pearson(x: Sequence[float], y: Sequence[float]) -> float | None:
     return float(np.clip(np.corrcoef(x, y)[0, 1], -1.0, 1.0))
 
 
-def _fisher_interval(r: float, n: int, inflated: float = 1.0) -> tuple[float | None, float | None]:
+def spearman(x: Sequence[float], y: Sequence[float]) -> float | None:
+    """Return Spearman's rho, None for fewer than three points or where one of the two does not vary."""
+    return None if pearson(x, y) is None else _rank_correlation(x, y)
+
+
+def _rank_correlation(x: Sequence[float], y: Sequence[float]) -> float:
+    return float(np.corrcoef(_ranks(x), _ranks(y))[0, 1])
+
+
+def fisher_interval(r: float, n: int, inflated: float = 1.0) -> tuple[float | None, float | None]:
     """Return the 95 % interval of a correlation by Fisher's z, its variance `inflated`.
 
     None for fewer than four points, or where all points agree wholly or are each other's reverse.
@@ -261,7 +270,7 @@ def _fisher_interval(r: float, n: int, inflated: float = 1.0) -> tuple[float | N
 
 def _rank_interval(rho: float, n: int) -> tuple[float | None, float | None]:
     """Return the 95 % interval of Spearman's rho (Bonett & Wright 2000, Psychometrika 65:23, equation 4)."""
-    return _fisher_interval(rho, n, 1 + rho * rho / 2)
+    return fisher_interval(rho, n, 1 + rho * rho / 2)
 
 
 def _ranks(values: Sequence[float]) -> NDArray[np.float64]:

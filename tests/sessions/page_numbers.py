@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 # doubt or of chance; what describes a whole set of numbers.
 NO_ESTIMATES = {
     "names": {"stroke", "trial", "index", "subject", "session", "term", "descriptor", "effect", "scores", "choice", "",
+              "quantity",
               "SED against", "unit", "which µ", "direction", "stroked", "flaws", "usual"},
     "counts": {"subjects", "stimuli", "n", "answers", "strokes with SED", "flawed trials", "paths with r",
                "different r"},
@@ -14,12 +15,23 @@ NO_ESTIMATES = {
                  "ended as planned", "counted", "inside"},
     "answers": {"score"},
     "doubt": {"estimated error", "solved in", "agree", "exact p of rho", "p", "p, Holm", "Friedman's p", "Page's p",
-              "off by"},
+              "off by", "Steiger's Z", "left-out error", "AIC weight"},
     "descriptions": {"r without one", "r with one left out", "Kendall's W", "least", "lower quartile", "median",
                      "upper quartile", "greatest"},
 }  # fmt: skip
 PLAIN = set().union(*NO_ESTIMATES.values())
-BARE = {"r", "rho", "Pearson's r", "Spearman's rho", "estimate", "found", "geometric mean", "at one modulus"}
+BARE = {
+    "r",
+    "rho",
+    "Pearson's r",
+    "Spearman's rho",
+    "estimate",
+    "found",
+    "geometric mean",
+    "at one modulus",
+    "SED's r less this",
+    "r given the model's µ",
+}
 # Correlations have no unit; a row of effects has a column for its own; magnitude estimates have the subject's own.
 
 

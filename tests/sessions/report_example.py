@@ -21,6 +21,7 @@ from sessions.report import (
     Trace,
 )
 from sessions.statistics.multiverse import PATHS, PathTrial, path_findings
+from sessions.statistics.rivals import rivals_of_means
 from sessions.statistics.scores import Score, ScoreTable, mean_scores, relation, score_matrix
 
 # The published Tables 1 and 2, and SEDs of the small-strain reference where it has them, else between its neighbours.
@@ -80,6 +81,7 @@ def experiment(descriptor, score_tables):
         ),
         score_relation=relation([m.mean for m in means], seds, [m.index for m in means]) if means else None,
         index_relation=relation(list(rows), [row[3] for row in rows.values()], list(rows)),
+        rivals=rivals_of_means({m.index: m.mean for m in means}, _series(rows)),
         paths=path_findings(
             [
                 PathTrial("", i, {mean.index: mean.mean for mean in means}.get(i), "maximum", along(i, row[3]))
@@ -89,6 +91,17 @@ def experiment(descriptor, score_tables):
             within=False,
         ),
     )
+
+
+def _series(rows):
+    """Return the made-up quantities of each surface, those of `stroke` and `prediction`."""
+    return {
+        "SED": {i: row[3] for i, row in rows.items()},
+        "µ of the model": {i: row[0] for i, row in rows.items()},
+        "τ max": {i: row[1] for i, row in rows.items()},
+        "speed": {i: row[2] for i, row in rows.items()},
+        "µ static": {},
+    }
 
 
 def along(index, sed):

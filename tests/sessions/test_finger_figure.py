@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from report_example import example
 
-from sessions.report.figures.finger import common_levels, finger_panels
+from sessions.report.figures.finger import NO_SED, common_levels, finger_panels
 from sessions.report.figures.style import look
 
 FIELD = example().fields[0]
@@ -29,3 +29,12 @@ def test_a_finger_with_a_node_without_an_sed_is_drawn():
     with look():
         panels = finger_panels(gone, common_levels((gone,)), simulated=True)
     assert all(panel.svg for panel in panels)
+
+
+def test_a_finger_without_any_sed_is_drawn_without_colours_and_says_so_in_one_sentence():
+    gone = replace(FIELD, sed=UNKNOWN * len(FIELD.sed))
+    with look():
+        panels = finger_panels(gone, common_levels((gone,)), simulated=True)
+        usual = finger_panels(FIELD, common_levels((FIELD,)), simulated=True)
+    assert all(NO_SED in panel.svg and "SED [kPa]" not in panel.svg for panel in panels)
+    assert not any(NO_SED in panel.svg for panel in usual)

@@ -257,6 +257,41 @@ def test_every_number_of_a_table_has_a_unit_and_an_interval_or_says_why_it_has_n
     assert sum(bool(interval) for _, _, interval, _ in found) > 100
 
 
+def test_a_state_that_no_finger_can_be_in_has_numbers_without_an_error_or_an_interval(report):
+    doubt = "Tissue is turned inside out somewhere."
+    one = report.predictions[0]
+    inverted = replace(
+        one,
+        doubt=doubt,
+        opposite_doubt=doubt,
+        alternatives=tuple(replace(other, doubt=doubt) for other in one.alternatives),
+    )
+    held = tables(replace(report, predictions=(inverted,)))["predictions"]
+    shown = [cell for table in held for group in table.groups for row in group.rows for cell in row]
+    marks = {mark for table in held for mark, sentence in table.notes if doubt in sentence}
+    doubted = [cell for cell in shown if set(cell.mark.split(",")) & marks]
+    assert len(doubted) > 8
+    assert not any("±" in cell.text or cell.interval for cell in doubted)
+    assert not any(
+        "±" in cell.text
+        for table in held
+        if table.name != "table-forces"
+        for group in table.groups
+        for row in group.rows
+        for cell in row
+    )
+
+
+def test_the_body_has_at_most_five_tables_with_captions_of_at_most_sixty_words_and_an_appendix(text):
+    body, appendix = re.split(r'<h2 id="further">', text)
+    assert 1 <= body.count('<table class="data"') <= 5
+    assert appendix.count('<table class="data"') >= 5
+    captions = [re.sub(r"<[^>]+>", "", one) for one in re.findall(r"<caption>(.*?)</caption>", text)]
+    assert [one for one in captions if len(one.split()) > 60 + 2] == []  # and "Table", and its number
+    numbers = [int(n) for n in re.findall(r"<strong>Table (\d+)\.", text)]
+    assert numbers == list(range(1, len(numbers) + 1))
+
+
 def test_a_number_without_a_unit_or_an_interval_is_found_out():
     bad = (
         '<table class="data" id="t"><caption>1</caption><tr><th>trial</th><th>µ</th><th>N<small>[N]</small></th></tr>'

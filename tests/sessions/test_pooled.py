@@ -238,7 +238,7 @@ SENSE = {"small": 1.0, "finite": -1.0}  # of the SED along a path
 
 def test_the_headline_says_whether_the_other_strain_was_tried_and_what_it_gave():
     plain = pooled(VISITS[:4])
-    (untried,) = summary(plain)[1:]
+    untried = summary(plain)[1]
     assert "at small strain go together by r = " in untried
     assert untried.endswith("at finite strain, which was not tried here, the sign may be another.")
     turned = [
@@ -251,7 +251,7 @@ def test_the_headline_says_whether_the_other_strain_was_tried_and_what_it_gave()
         )
         for v in VISITS[:4]
     ]
-    (tried, _) = summary(pooled(turned))[1:]
+    tried = summary(pooled(turned))[1]
     assert f"at finite strain r = −{plain.descriptors[0].repeated.r:.2f}" in tried
     assert "of the 20 trials that have an SED there" in tried
 

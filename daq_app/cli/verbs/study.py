@@ -127,7 +127,7 @@ def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
     """Write page, table and numbers and return where they are."""
     # Imported here: drawing is slow to load.
     from sessions.report.html import swap_in
-    from sessions.report.study_csv import COLUMNS, TRIALS, columns_csv, paths_csv, trials_csv
+    from sessions.report.study_csv import COLUMNS, TRIALS, columns_csv, paths_csv, rivals_csv, trials_csv
     from sessions.report.study_page import study_page
 
     files = {"page": out / "study.html", "table": out / TRIALS, "columns": out / COLUMNS, "numbers": out / "study.json"}
@@ -135,6 +135,8 @@ def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
     swap_in(files["table"], trials_csv(study))
     swap_in(files["columns"], columns_csv(study))
     swap_in(files["numbers"], json_text(study.to_dict()))
+    files["rivals"] = out / "rivals.csv"
+    swap_in(files["rivals"], rivals_csv(study))
     if study.options.paths != "none":
         files["paths"] = out / "paths.csv"
         swap_in(files["paths"], paths_csv(study))

@@ -82,10 +82,8 @@ def _of_strokes(name: str, caption: str, panel: Callable[..., Panel | None], rep
 def _fingers(report: Report) -> Plate:
     caption = (
         "Strain-energy density (SED) in the deformed finger in its settled state, sliding; lengths are true. Thin "
-        "lines: skin and the boundaries between epidermis, dermis and fat; outlined: the ending. The close view adds "
-        "the traction of the surface on the skin as arrows and, under them, which part of the skin slips. One scale of "
-        "colours for all; it ends below the peaks at bone and contact."
-        f"{_model(report)}"
+        "lines: borders of skin and layers; outlined: the ending. Close view: tractions as arrows; which skin slips. "
+        f"One scale of colours, which ends below the peaks.{_model(report)}"
     )
     levels = common_levels(report.fields) if report.fields else ()
     pairs = [finger_panels(field, levels, simulated=report.simulated) for field in report.fields]
@@ -107,11 +105,9 @@ def _responses(report: Report) -> Plate:
 
 def _relations(report: Report) -> Plate:
     caption = (
-        "Predicted SED against mean score; each point is a stimulus with its index. Across: 95 % t interval of the "
-        "mean score. Upright: estimated error of each SED from its mesh; all share one mesh, so that differences "
-        "between them are more accurate than that. Line: least squares. r: Pearson's, with its 95 % interval by "
-        "Fisher's z. Range of SED: greatest less least, and its share of their middle. Beside it the same SEDs on an "
-        f"axis from 0.{_model(report)}"
+        "Predicted SED against mean score; each point is a stimulus with its index. Across: 95 % t interval. Upright: "
+        "error of each SED from the mesh, which all share. Line: least squares. r: Pearson's, interval by Fisher's z. "
+        f"Range: greatest less least, and its share of their middle. Beside it: from 0.{_model(report)}"
     )
     panels = [
         relation_panel(e, [p for p in report.predictions if p.experiment == e.name], simulated=report.simulated)

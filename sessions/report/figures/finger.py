@@ -19,6 +19,7 @@ from sessions.report.figures.style import GREY, INK, PALE, Panel, Sheet, sheet, 
 COLOURS = ListedColormap(colormaps["magma_r"](np.linspace(0.0, 0.8, 256)))
 LONGEST_ARROW = 1.5  # of the tractions in the picture [mm]
 ARROWS = 22  # at most
+NO_SED = "No node of this finger has a finite SED."
 HALF_WIDTH = 4.6  # of the close view [mm]
 _STYLE = {"slip": "solid", "cap": (0, (4, 1.2)), "stick": (0, (1, 1))}
 _WORDS = {"slip": "slips", "cap": "slips at the bound", "stick": "sticks"}
@@ -33,7 +34,8 @@ def finger_panels(field: Field, levels: tuple[float, ...], *, simulated: bool) -
     y = np.array([place[1] for place in field.nodes])
     whole.axes[0].set_xlim(x.min() - 0.5, x.max() + 0.5)
     whole.axes[0].set_ylim(-1.2, y.max() + 0.5)
-    _bar(whole, filled, levels)
+    if filled is not None:
+        _bar(whole, filled, levels)
     _name_layers(whole.axes[0], field)
     _tractions(close, field)
     inside = np.mean(np.asarray(field.patch), axis=0)
@@ -80,21 +82,12 @@ def common_levels(fields: Sequence[Field]) -> tuple[float, ...]:
     return tuple(round(step * n, 9) for n in range(int(np.ceil(high / step)) + 1))
 
 
-def _tissue(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSet:
-    """Fill the finger by its SED, outline layers, bone and ending, and draw the surface it rests on."""
-    nodes = np.asarray(field.nodes)
-    sed = np.asarray(field.sed) * 1e3
-    corners = np.asarray(field.triangles)
-    mesh = Triangulation(nodes[:, 0], nodes[:, 1], corners, mask=~np.isfinite(sed[corners]).all(axis=1))
-    filled = axes.tricontourf(
-        mesh,
-        np.nan_to_num(sed),  # a node without an SED lies in no triangle that is drawn
-        levels=levels,
-        cmap=COLOURS,
-        extend="max",
-    )
-    filled.set_edgecolor("face")  # else hairlines of the page show between the levels
-    filled.set_linewidth(0.3)
+def _tissue(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSet | None:
+    """Fill the finger by its SED, outline layers, bone and ending, and draw the surface it rests on.
+
+    Returns the filling; None where no triangle has an SED at all its corners, which the picture then says.
+    """
+    filled = _filling(axes, field, levels)
     for name, outline in field.outlines.items():
         line = np.asarray(outline)
         if name == "bone":
@@ -107,6 +100,24 @@ def _tissue(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSe
     axes.axhline(0.0, color=INK, linewidth=1.0)
     axes.axhspan(-50.0, 0.0, color=PALE, alpha=0.45, linewidth=0, zorder=0)
     axes.set_aspect("equal", anchor="N")
+    if filled is None:
+        axes.text(0.5, 0.98, NO_SED, transform=axes.transAxes, ha="center", va="top")
+    return filled
+
+
+def _filling(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourSet | None:
+    """Fill the triangles whose corners all have a finite SED; return None where there are none."""
+    nodes = np.asarray(field.nodes)
+    sed = np.asarray(field.sed) * 1e3
+    corners = np.asarray(field.triangles)
+    missing = ~np.isfinite(sed[corners]).all(axis=1)
+    if missing.all():
+        return None
+    known = np.where(np.isfinite(sed), sed, 0.0)  # a node without an SED lies in no triangle that is drawn
+    mesh = Triangulation(nodes[:, 0], nodes[:, 1], corners, mask=missing)
+    filled = axes.tricontourf(mesh, known, levels=levels, cmap=COLOURS, extend="max")
+    filled.set_edgecolor("face")  # else hairlines of the page show between the levels
+    filled.set_linewidth(0.3)
     return filled
 
 

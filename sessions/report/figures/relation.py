@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from sessions.report import Experiment, PredictionFinding
 from sessions.report.figures.style import GREEN, GREY, Panel, Sheet, sheet, svg
+from sessions.report.tables.rivals import rival_words
 from sessions.report.wording import correlation, spread_share
 from sessions.statistics.scores import MeanScore, Relation
 
@@ -38,7 +39,8 @@ def relation_panel(
     axes.set_xticks([0, 20, 40, 60, 80, 100])
     axes.set_xlabel(f"mean score of {experiment.descriptor} [0–100]")
     axes.set_ylabel("predicted SED [kPa]")
-    axes.set_title(f"{relation_words(experiment)}\nrange of SED: {high - low:.3f} kPa ({spread_share(low, high)})")
+    title = f"{relation_words(experiment)}\nrange of SED: {high - low:.3f} kPa ({spread_share(low, high)})"
+    axes.set_title(f"{title}\n{rival_words(experiment.rivals)}".strip())
     beside.plot([0.0] * len(seds), seds, "_", color=GREEN, markersize=12, markeredgewidth=1.2)
     beside.set_ylim(0.0, 1.15 * high)
     beside.set_xlim(-1, 1)

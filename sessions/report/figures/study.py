@@ -8,6 +8,7 @@ from sessions.report.figures.multiverse import CAPTION, paths_panel
 from sessions.report.figures.scores import score_panel
 from sessions.report.figures.style import GREEN, GREY, Panel, Plate, look, sheet, svg
 from sessions.report.predictions import model_in_short
+from sessions.report.tables.rivals import rival_words
 from sessions.report.wording import correlation
 from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
 
@@ -83,7 +84,7 @@ def _relation(one: DescriptorFindings, *, simulated: bool) -> Panel:
     axes.set_xlabel("predicted SED [kPa]")
     axes.set_ylabel(f"score of {one.descriptor} [0–100]")
     within = "" if one.repeated is None else f": within subjects r = {correlation(one.repeated.r)}"
-    axes.set_title(f"{one.descriptor}{within}")
+    axes.set_title(f"{one.descriptor}{within}\n{rival_words(one.rivals)}".strip())
     name, title = f"study-relation-{one.descriptor}", f"Score of {one.descriptor} against predicted SED"
     header = ("subject", "index", "SED [MPa]", "score")
     return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, one.points)

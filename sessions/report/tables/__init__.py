@@ -11,6 +11,7 @@ from sessions.report.tables.predictions import (
     force_table,
     prediction_table,
 )
+from sessions.report.tables.rivals import rivals_table
 from sessions.report.tables.scores import answer_tables, relation_table, score_table
 from sessions.report.tables.strokes import course_table, planted_table, stroke_table
 
@@ -19,6 +20,7 @@ __all__ = ["Cell", "Column", "Group", "Table", "tables"]
 
 def tables(report: Report) -> dict[str, tuple[Table, ...]]:
     """Return the tables a report has numbers for, by section, in their order."""
+    compared = ((e.name, e.rivals) for e in report.experiments)
     sections = {
         "scores": (score_table(report), *answer_tables(report)),
         "strokes": (stroke_table(report), course_table(report)),
@@ -30,7 +32,10 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
             beside_forces_table(report),
         ),
         "afferent": (afferent_table(report),),
-        "relation": (relation_table(report),),
+        "relation": (
+            relation_table(report),
+            rivals_table(compared, report.model),
+        ),
         "paths": (paths_table((e.name, e.paths) for e in report.experiments),),
         "planted": (planted_table(report),),
     }

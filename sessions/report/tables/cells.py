@@ -1,6 +1,7 @@
 """Cells, columns and notes: what every table of a report is made of, of a session as of a study."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -8,6 +9,7 @@ from sessions.report import Report
 from sessions.report.wording import NONE, between
 
 Thing = TypeVar("Thing")
+CAPTION_WORDS = 60  # of a caption at most; what is more stands as a note under the table
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,15 +113,46 @@ def table(name: str, caption: str, columns: str, groups: Iterable[Group], notes:
     kept = tuple(group for group in groups if group.rows)
     if not kept:
         return None
+    told, further = _in_short(caption)
     heads = (head.strip().removesuffix("]").partition(" [") for head in columns.split("|"))
     return Table(
-        name, caption, tuple(Column(head, unit) for head, _, unit in heads), kept, notes.listed() if notes else ()
+        name,
+        told,
+        tuple(Column(head, unit) for head, _, unit in heads),
+        kept,
+        (*further, *(notes.listed() if notes else ())),
     )
+
+
+def _in_short(caption: str) -> tuple[str, tuple[tuple[str, str], ...]]:
+    """Return a caption of at most `CAPTION_WORDS` words, and the sentences beyond as a note without a mark.
+
+    A sentence that names the model stays in the caption, wherever it stands.
+    """
+    sentences = re.split(r"(?<=[.;]) (?=\S)", caption)
+    if len(caption.split()) <= CAPTION_WORDS:
+        return caption, ()
+    kept = {n for n, sentence in enumerate(sentences) if "Model" in sentence or n == 0}
+    for n in range(len(sentences)):
+        words = sum(len(sentences[k].split()) for k in {*kept, n})
+        if words > CAPTION_WORDS and n not in kept:
+            break
+        kept.add(n)
+    short = " ".join(sentence for n, sentence in enumerate(sentences) if n in kept)
+    return short, (("", " ".join(sentence for n, sentence in enumerate(sentences) if n not in kept)),)
 
 
 def sections_of(made: Mapping[str, Iterable[Table | None]]) -> dict[str, tuple[Table, ...]]:
     """Return the tables of each section that have rows."""
     return {name: tuple(each for each in tables if each is not None) for name, tables in made.items()}
+
+
+def parted(
+    sections: Mapping[str, tuple[Table, ...]], body: Set[str]
+) -> tuple[dict[str, tuple[Table, ...]], tuple[Table, ...]]:
+    """Return the sections with those tables that are named in `body`, and all others, for the appendix."""
+    kept = {section: tuple(each for each in tables if each.name in body) for section, tables in sections.items()}
+    return kept, tuple(each for tables in sections.values() for each in tables if each.name not in body)
 
 
 def grouped(

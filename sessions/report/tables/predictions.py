@@ -33,7 +33,11 @@ def prediction_table(report: Report) -> Table | None:
             notes.estimate(p.tau_max, tau, p.reasons.get("tau_max") or missing, bound, _SHORT, unit=1e3),
             _depth(p, notes),
             _stroked_sed(p, notes),
-            notes.number(p.error_estimate, lambda v: significant(100 * v, 2), p.reasons.get("error_estimate")),
+            notes.number(
+                None if p.doubt else p.error_estimate,
+                lambda v: significant(100 * v, 2),
+                p.doubt or p.reasons.get("error_estimate"),
+            ),
             notes.number(p.wall_s, lambda v: significant(v, 2), p.reasons.get("wall_s")),
         )
 
@@ -55,7 +59,14 @@ def _stroked_sed(p: PredictionFinding, notes: Notes) -> Cell:
     interval = p.sed_interval
     why = p.reasons.get("sed_interval")
     star = p.interval_by == "sampling"
+    if p.doubt and p.sed is not None:
+        return _alone(notes, p.sed, sed, p.doubt)
     return _sed(notes, p.sed, p.error_estimate, p.reasons.get("sed"), interval, why, star=star)
+
+
+def _alone(notes: Notes, value: float, shown: Callable[[float], str], doubt: str) -> Cell:
+    """Return a number of a state that no finger can be in: without ± or interval, which would speak for it."""
+    return notes.estimate(value, shown, None, None, doubt)
 
 
 def _sed(
@@ -121,11 +132,9 @@ def beside_table(report: Report) -> Table | None:
 
     def cell(one: Alternative) -> Cell:
         ends, why, star = _of(one.interval)
-        cell = _sed(notes, one.sed, one.error_estimate, one.reason, ends, why, star=star)
         if one.doubt and one.sed is not None:
-            doubt = notes.mark(one.doubt)
-            return replace(cell, mark=f"{cell.mark},{doubt}" if cell.mark else doubt, hover=one.doubt)
-        return cell
+            return _alone(notes, one.sed, sed, one.doubt)
+        return _sed(notes, one.sed, one.error_estimate, one.reason, ends, why, star=star)
 
     told = "; ".join(f"({n}) {way}" for n, way in enumerate(ways, 1))
     caption = (
@@ -151,6 +160,8 @@ def beside_forces_table(report: Report) -> Table | None:
         ends = None if interval is None else interval.indentation if pressed else interval.normal_force
         why = None if interval is None else interval.reason
         value = None if one.sed is None else value
+        if one.doubt and value is not None:
+            return _alone(notes, value, places(2), one.doubt)
         return notes.estimate(value, _with(error, 2), one.reason, ends, why, told=places(2))
 
     units = {
@@ -204,6 +215,8 @@ def force_table(report: Report) -> Table | None:
 
         def cell(name: str, error: float | None, ends: Ends | None, without: str | None, decimals: int = 2) -> Cell:
             value, shown = getattr(p, name), places(decimals)
+            if p.doubt and value is not None and name in _OF_STATE:
+                return _alone(notes, value, shown, p.doubt)
             return notes.estimate(value, _with(error, decimals), p.reasons.get(name), ends, without, told=shown)
 
         why = p.reasons.get("sed_interval")
@@ -228,6 +241,7 @@ def force_table(report: Report) -> Table | None:
     return _table(report, "table-forces", caption, columns, _rows(report, row), notes)
 
 
+_OF_STATE = ("normal_per_mm", "normal_force", "tangential_force")  # the depth to match is that of another state
 _ROUGH = "found on a rough mesh; under the measured force trials are solved with tau_max computed (--beside small)"
 
 
@@ -242,12 +256,18 @@ def direction_table(report: Report) -> Table | None:
         back, without, star = _of(p.opposite_interval)
         why = p.reasons.get("opposite_sed") or p.reasons.get("sed")
         ratio, ends = _ratio(p, back)
+        other = _sed(notes, p.opposite_sed, p.opposite_error, why, back, without, star=star)
+        if p.opposite_doubt and p.opposite_sed is not None:
+            other = _alone(notes, p.opposite_sed, sed, p.opposite_doubt)
+        doubt = p.doubt or p.opposite_doubt
         return (
             _depth(p, notes),
             Cell(direction(p.direction)),
             _stroked_sed(p, notes),
-            _sed(notes, p.opposite_sed, p.opposite_error, why, back, without, star=star),
-            notes.estimate(ratio, places(3), why, ends, without or p.reasons.get("sed_interval")),
+            other,
+            notes.estimate(
+                ratio, places(3), why, None if doubt else ends, doubt or without or p.reasons.get("sed_interval")
+            ),
         )
 
     caption = (

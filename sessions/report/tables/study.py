@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from sessions.report.predictions import model_in_short
 from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, range_cell, sections_of, table
 from sessions.report.tables.multiverse import paths_table
+from sessions.report.tables.rivals import rivals_table
 from sessions.report.tables.scores import rank_interval, score_cells, spread_cell
 from sessions.report.tables.study_models import flaws_table, models_table, planted_table
 from sessions.report.tables.study_trials import trials_table
@@ -23,7 +24,7 @@ def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
         "visits": (_visits(study),),
         "scores": (_scores(study), _normalised(study), _differences(study), _agreement(study), _estimates(study)),
         "surfaces": (_surfaces(study), _forces(study)),
-        "relation": (_relation(study), models_table(study)),
+        "relation": (_relation(study), _rivals(study), models_table(study)),
         "paths": (paths_table((one.descriptor, one.paths) for one in study.descriptors),),
         "planted": (planted_table(study), flaws_table(study)),
         "trials": (trials_table(study),),
@@ -231,10 +232,10 @@ def _forces(study: StudyFindings) -> Table | None:
     )
     model = model_in_short(study.options.prediction, study.options.area)
     caption = (
-        "Model against measurement: normal force over the steady window, the force of the model pressed to the depth "
-        "of its block (times the finger's width, assumed unless it was measured), and the depth at which the model "
-        "would press as hard as the subject did (on a rough mesh, to some tenths of a per cent). Means over "
-        f"subjects with t intervals, which hold what errs from trial to trial. Model: {model}."
+        "Normal force as measured over the steady window, that of the model at the depth of its block (times the "
+        "finger's width, assumed unless it was measured), and the depth at which the two would be equal (on a rough "
+        "mesh, to some tenths of a per cent). Means over subjects with t intervals, which hold what errs from trial to "
+        f"trial. Model: {model}."
     )
     return table(
         "table-forces", caption, columns, [Group(one.descriptor, tuple(row(one))) for one in study.descriptors], notes
@@ -287,6 +288,16 @@ def _relation(study: StudyFindings) -> Table | None:
     )
     groups = [Group(one.descriptor, rows(one)) for one in study.descriptors]
     return table("table-relation", caption, columns, groups, notes)
+
+
+def _rivals(study: StudyFindings) -> Table | None:
+    kinds = [
+        (one.descriptor, kind, rivals)
+        for one in study.descriptors
+        for kind, rivals in (("means over subjects", one.rivals_of_means), ("within subjects", one.rivals))
+    ]
+    model = model_in_short(study.options.prediction, study.options.area)
+    return rivals_table(((f"{descriptor}, {kind}", rivals) for descriptor, kind, rivals in kinds), model)
 
 
 def _of_means(name: str, related: Relation | None, notes: Notes) -> Iterable[Row]:

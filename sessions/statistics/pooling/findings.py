@@ -9,6 +9,7 @@ from sessions.statistics.multiverse import PathFinding
 from sessions.statistics.pooling.averages import Average, Estimates
 from sessions.statistics.pooling.exclusions import Exclusion
 from sessions.statistics.pooling.visit import Visit, VisitOptions
+from sessions.statistics.rivals import Rival
 from sessions.statistics.scores import MeanScore, Relation
 from sessions.statistics.variance_components import Spread
 from sessions.statistics.within_subjects import Agreement, Difference, RepeatedCorrelation, WithinMean
@@ -74,6 +75,8 @@ class DescriptorFindings:
     mean_relation: Relation | None  # mean SED [MPa] against mean score
     repeated: RepeatedCorrelation | None  # of a subject's scores with the SEDs of its own strokes
     repeated_holm: float | None  # its p, allowing for as many descriptors as have one
+    rivals: tuple[Rival, ...]  # within subjects: the SED, and what else follows a subject's scores
+    rivals_of_means: tuple[Rival, ...]  # likewise of the means over subjects
     without_subject: tuple[tuple[str, float], ...]  # subject left out, r within the others
     normalised: Normalised
     differences: tuple[Difference, ...]

@@ -25,6 +25,7 @@ from sessions.statistics.pooling.findings import (
 )
 from sessions.statistics.pooling.ground_truth import found_flaws, found_friction, recovered
 from sessions.statistics.pooling.visit import TrialRow, Visit, VisitOptions, scores_of
+from sessions.statistics.rivals import QUANTITIES, RivalTrial, rivals_of_surfaces, rivals_within
 from sessions.statistics.scores import (
     Relation,
     ScoreTable,
@@ -116,6 +117,7 @@ def _descriptor(
     level = standardised(matrix)
     points = [(v.subject, r, r.sed, r.score) for v, r in trials if r.sed is not None and r.score is not None]
     scored = [(v.subject, r, r.score) for v, r in trials if r.score is not None]
+    competing = [_rival_trial(v.subject, r, r.score) for v, r in trials if r.sed is not None and r.score is not None]
     return DescriptorFindings(
         descriptor=name,
         indices=indices,
@@ -128,6 +130,8 @@ def _descriptor(
         mean_relation=_related([(p[0], p[1].index, p[2], p[3]) for p in points]),
         repeated=repeated_correlation([p[0] for p in points], [p[2] for p in points], [p[3] for p in points]),
         repeated_holm=None,
+        rivals=rivals_within(competing),
+        rivals_of_means=rivals_of_surfaces(competing),
         without_subject=_without_subject([(p[0], p[2], p[3]) for p in points]),
         normalised=_normalised(level, [(p[0], p[1].index, p[2]) for p in points]),
         differences=differences(matrix),
@@ -143,6 +147,12 @@ def _descriptor(
             within=True,
         ),
     )
+
+
+def _rival_trial(subject: str, row: TrialRow, score: float) -> RivalTrial:
+    """Return a scored trial with those quantities that its row has."""
+    held = {name: getattr(row, attribute) for name, attribute in QUANTITIES.items()}
+    return RivalTrial(subject, row.index, score, {name: value for name, value in held.items() if value is not None})
 
 
 def _model(trials: Sequence[tuple[str, TrialRow, float]], *what: str) -> MixedModel | str:

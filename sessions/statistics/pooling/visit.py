@@ -23,7 +23,7 @@ from sessions.strokes import Analysis, AnalysisSettings, FrictionParameters, ana
 from sessions.strokes.bootstrap import drawn_from, stroke_intervals
 from sessions.strokes.contact_area import FIXED, AreaLaw
 
-FORM = 9  # raised when a row holds something else: what was stored before is then computed anew
+FORM = 10  # raised when a row holds something else: what was stored before is then computed anew
 
 
 NO_INTERVAL = "intervals of the SED were not asked for"
@@ -73,6 +73,7 @@ class TrialRow:
     normal_force: float | None = None  # [N]
     normal_force_low: float | None = None
     normal_force_high: float | None = None
+    tangential_force: float | None = None  # [N]
     sed: float | None = None  # [MPa]
     sed_low: float | None = None  # 95 % interval that friction alone makes, see `sessions.prediction.uncertainty`
     sed_high: float | None = None
@@ -221,6 +222,7 @@ def _with_friction(row: TrialRow, friction: FrictionParameters, analysis: Analys
         normal_force=stroke.normal_force,
         normal_force_low=normal_low,
         normal_force_high=normal_high,
+        tangential_force=stroke.tangential_force,
     )
 
 

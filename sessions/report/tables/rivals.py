@@ -1,0 +1,132 @@
+"""Table and sentences of what else follows the scores beside the model's quantity, of a session as of a study."""
+
+from collections.abc import Iterable, Sequence
+from textwrap import fill
+
+from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, table
+from sessions.report.wording import NONE, correlation, digits, p_value, places
+from sessions.statistics.dependent_correlations import POWER
+from sessions.statistics.rivals import MODEL, Rival
+
+_ALPHA = 0.05
+_LINE = 44  # characters that a line of a picture's title has room for
+
+
+def rivals_table(compared: Iterable[tuple[str, Sequence[Rival]]], model: str) -> Table | None:
+    """Return the rivals of each group that is named; `model` says in short which model the SED is of."""
+    notes = Notes()
+    groups = [Group(name, tuple(_row(rival, notes) for rival in rivals)) for name, rivals in compared]
+    columns = (
+        "quantity | n | r | SED's r less this | Steiger's Z | p | r given the model's µ | "
+        "left-out error [0–100] | AIC weight"
+    )
+    caption = (
+        f"r of scores with the SED ({model}) and rivals. Differences: with both r made positive; Zou (2007), Steiger "
+        "(1980), within subjects by bootstrap. Left-out error: of surfaces left out, root mean square. AIC: crossed "
+        "mixed models. Exploratory, not corrected."
+    )
+    return table("table-rivals", caption, columns, groups, notes)
+
+
+def rival_words(rivals: Sequence[Rival]) -> str:
+    """Return lines with the r of each rival for the title of a picture, "" where there is none."""
+    told = [(rival.name, correlation(rival.r)) for rival in rivals if rival.name != MODEL and rival.r is not None]
+    unbroken = [f"{name} {r}".replace(" ", "\N{NO-BREAK SPACE}") for name, r in told]
+    return fill(f"r of rivals: {', '.join(unbroken)}", _LINE) if told else ""
+
+
+def rivals_sentences(name: str, rivals: Sequence[Rival]) -> list[str]:
+    """Return what the scores can and what they cannot tell apart, a sentence each; none without rivals."""
+    model = next((rival for rival in rivals if rival.name == MODEL), None)
+    compared = [rival for rival in rivals if rival.contrast is not None]
+    if model is None or not any(rival.name != MODEL for rival in rivals):
+        return []
+    return [*_alike(name, rivals), *_verdict(name, compared)]
+
+
+def _alike(name: str, rivals: Sequence[Rival]) -> list[str]:
+    """Return which rivals order the surfaces as the SED does, and how many surfaces it takes to tell them apart."""
+    alike = [rival for rival in rivals if rival.same_order]
+    if not alike:
+        return []
+    order, them = ("orders", "it") if len(alike) == 1 else ("order", "them")
+    names = _listed([rival.name for rival in alike])
+    each = [f"{_rounded(rival.needed)} for {rival.name}" for rival in alike if rival.needed is not None]
+    said = (
+        f"{name[:1].upper()}{name[1:]}: {names} {order} these {alike[0].n} surfaces as the SED does, so no order of "
+        f"scores can tell {them} apart from it; "
+    )
+    if not each:
+        return [f"{said}at the r seen here, no number of surfaces would."]
+    return [
+        f"{said}at the r seen here, Steiger's test would need about so many surfaces for {POWER:.0%} power: "
+        f"{_listed(each)}.".replace("%", "\N{NO-BREAK SPACE}%")
+    ]
+
+
+def _verdict(name: str, compared: Sequence[Rival]) -> list[str]:
+    """Return which rivals the scores follow more or less closely than the SED, and of which nothing can be said."""
+    sides: dict[str, list[str]] = {"more": [], "less": [], "neither": []}
+    for rival in compared:
+        found = rival.contrast
+        if found is not None:
+            side = "more" if found.difference < 0.0 else "less"
+            sides[side if found.differs(_ALPHA) else "neither"].append(rival.name)
+    if not compared:
+        return [f"Of {name} the surfaces are too few, or r too near 1, to compare the SED with any rival."]
+    told = [f"{_listed(sides[side])} {side} closely than the SED" for side in ("more", "less") if sides[side]]
+    said = f"the scores follow {' and '.join(told)} (p < 0.05, not corrected)" if told else ""
+    if sides["neither"]:
+        said += (
+            "; they" if said else "the scores"
+        ) + f" tell no difference between the SED and {_listed(sides['neither'])}"
+    return [f"On {name}, {said}."]
+
+
+def _row(rival: Rival, notes: Notes) -> Row:
+    why = rival.reasons.get
+    found = rival.contrast
+    ends = None if rival.low is None or rival.high is None else (rival.low, rival.high)
+    given = None if rival.partial_low is None or rival.partial_high is None else (rival.partial_low, rival.partial_high)
+    less = (Cell(NONE), Cell(NONE), Cell(NONE))
+    if found is not None:
+        inside = None if found.low is None or found.high is None else (found.low, found.high)
+        less = (
+            notes.estimate(found.difference, correlation, None, inside),
+            _or_dash(None if found.z is None else digits(found.z, 2)),
+            _or_dash(None if found.p is None else p_value(found.p)),
+        )
+    elif rival.name != MODEL:
+        less = (notes.number(None, correlation, why("contrast")), *less[1:])
+    return (
+        Cell(rival.name),
+        Cell(str(rival.n)),
+        notes.estimate(rival.r, correlation, why("r"), ends, "too few cases, or a perfect r"),
+        *less,
+        notes.estimate(rival.partial, correlation, why("partial"), given, "it takes five surfaces"),
+        notes.number(rival.left_out_error, places(1), why("left_out_error")),
+        _weight(rival, notes),
+    )
+
+
+def _weight(rival: Rival, notes: Notes) -> Cell:
+    if rival.weight is None and "weight" not in rival.reasons:
+        return Cell(NONE)
+    return notes.number(rival.weight, places(3), rival.reasons.get("weight"))
+
+
+def _or_dash(text: str | None) -> Cell:
+    return Cell(NONE if text is None else text)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(part for part in (", ".join(names[:-1]), names[-1] if names else "") if part)
+
+
+def _rounded(n: int) -> str:
+    """Return a count with two figures, for it rests on correlations that are themselves uncertain.
+
+    >>> _rounded(2347), _rounded(8)
+    ('2300', '8')
+    """
+    return f"{float(f'{n:.2g}'):.0f}"

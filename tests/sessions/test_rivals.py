@@ -1,0 +1,247 @@
+"""Rivals of a model's quantity: what else follows the scores, compared as published methods compare it."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from report_example import TABLES, example
+from scipy import optimize, stats
+from study_example import study
+
+from sessions.report.figures import picture
+from sessions.report.prose import summary
+from sessions.report.study_csv import rivals_csv
+from sessions.report.study_page import study_page
+from sessions.report.tables import tables
+from sessions.report.tables.rivals import rivals_sentences
+from sessions.statistics.crossed_model import akaike_weights, crossed_deviance
+from sessions.statistics.dependent_correlations import (
+    cases_needed,
+    contrast,
+    left_out_error,
+    partial_correlation,
+    steiger_z,
+)
+from sessions.statistics.rivals import GIVEN, MODEL, RivalTrial, rivals_of_means, rivals_within
+from sessions.statistics.within_subjects import repeated_correlation
+from solver import Finger, solve_many
+from solver.scene.published import scenes as published_scenes
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "mutual", "n", "z"),
+    [(0.0228, 0.3522, 0.3718, 553, -7.1345), (0.2493, 0.3395, 0.4082, 553, -2.0660)],
+)
+def test_steigers_z_is_what_the_package_cocor_prints(first, second, mutual, n, z):
+    assert steiger_z(first, second, mutual, n) == pytest.approx(z, abs=2e-3)  # its correlations have four decimals
+
+
+def test_the_interval_of_a_difference_is_that_of_zous_worked_example():
+    found = contrast(0.396, 0.179, 0.088, 66)
+    assert (found.low, found.high) == pytest.approx((-0.093, 0.517), abs=5e-4)
+
+
+def test_a_rival_with_the_other_sign_is_turned_round_before_it_is_compared():
+    assert contrast(0.6, -0.5, -0.3, 30) == contrast(0.6, 0.5, 0.3, 30)
+
+
+def test_steigers_test_at_the_number_of_cases_needed_has_eighty_per_cent_power():
+    first, second, mutual = 0.75, 0.6, 0.5
+    n = cases_needed(first, second, mutual)
+    draw = np.random.default_rng(5)
+    among = np.array([[1.0, first, second], [first, 1.0, mutual], [second, mutual, 1.0]])
+    told = 0
+    for cases in draw.multivariate_normal(np.zeros(3), among, size=(2000, n)):
+        (_, a, b), (_, _, c), _ = np.corrcoef(cases.T)
+        told += abs(steiger_z(a, b, c, n)) > 1.959964
+    assert told / 2000 == pytest.approx(0.8, abs=0.03)  # three standard errors of 2000 draws
+
+
+def test_equal_correlations_are_told_apart_by_no_number_of_cases():
+    assert cases_needed(0.9, 0.9, 0.5) is None
+
+
+def test_a_partial_correlation_is_that_of_what_the_third_variable_leaves():
+    x, y, z = np.random.default_rng(2).normal(size=(3, 12))
+    left = [v - np.polyval(np.polyfit(z, v, 1), z) for v in (x, y)]
+    among = np.corrcoef([x, y, z])
+    assert partial_correlation(among[0, 1], among[0, 2], among[1, 2]) == pytest.approx(np.corrcoef(left)[0, 1])
+    assert partial_correlation(0.9, 1.0, 0.9) is None
+
+
+def test_the_left_out_error_is_that_of_lines_fitted_without_each_point():
+    x, y = np.random.default_rng(3).normal(size=(2, 6))
+    errors = [y[i] - np.polyval(np.polyfit(np.delete(x, i), np.delete(y, i), 1), x[i]) for i in range(len(x))]
+    assert left_out_error(x, y) == pytest.approx(math.sqrt(np.mean(np.square(errors))))
+    assert left_out_error([0.0, 0.0, 1.0], [1.0, 2.0, 3.0]) is None  # without the last nothing varies
+
+
+@pytest.mark.parametrize(
+    ("descriptor", "mu", "tau_max"),
+    [("stickiness", 0.974, 0.954), ("slipperiness", -0.860, -0.979)],
+)
+def test_friction_follows_the_published_indices_as_closely_as_the_sed_does(descriptor, mu, tau_max):
+    found = {rival.name: rival for rival in published(descriptor)}
+    assert found[GIVEN].r == pytest.approx(mu, abs=5e-4)
+    assert found["τ max"].r == pytest.approx(tau_max, abs=5e-4)
+    assert found[GIVEN].same_order
+    assert found["τ max"].same_order is (descriptor == "stickiness")
+    assert found[GIVEN].contrast.low < 0.0 < found[GIVEN].contrast.high
+    assert found[GIVEN].needed > 5
+
+
+def published(descriptor):
+    """Return how the numbers of the published tables go with the index of each surface."""
+    rows = TABLES[descriptor]
+    names = (GIVEN, "τ max", "speed", MODEL)
+    series = {name: {index: row[at] for index, row in rows.items()} for at, name in enumerate(names)}
+    return rivals_of_means({index: float(index) for index in rows}, series)
+
+
+@pytest.mark.parametrize(("radius", "sticky", "slippery"), [(5.0, 1, -1), (7.0, -1, 1)])
+def test_a_tip_of_seven_millimetres_turns_the_published_signs_round(radius, sticky, slippery):
+    ten = [replace(one, finger=Finger(tip_radius=radius)) for one in published_scenes()]
+    seds = [answer.sed_ending for answer in solve_many(ten)]
+    series = zip(TABLES.values(), (seds[:5], seds[5:]), strict=True)
+    signs = [np.sign(np.corrcoef(list(rows), told)[0, 1]) for rows, told in series]
+    assert signs == [sticky, slippery]
+
+
+def test_what_has_no_number_has_a_reason_instead():
+    series = {MODEL: {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0}, "µ static": {0: 1.0}, GIVEN: {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0}}
+    found = {rival.name: rival for rival in rivals_of_means({0: 1.0, 1: 3.0, 2: 4.0, 3: 2.0}, series)}
+    assert found["µ static"].r is None
+    assert set(found["µ static"].reasons) == {"r", "contrast", "partial", "left_out_error"}
+    assert "µ determines it" in found[MODEL].reasons["partial"]
+    assert found[GIVEN].contrast is None  # the two are one variable
+    assert rivals_of_means({0: 1.0}, {GIVEN: {0: 1.0}}) == ()
+
+
+def people(draw, judge, subjects=10):
+    """Return trials of people who judge five surfaces by `judge(µ, SED)`; the SED bends against µ."""
+    trials = []
+    for subject in range(subjects):
+        level = draw.normal(50.0, 8.0)
+        for index, mu in zip((0, 20, 50, 80, 100), (0.28, 0.44, 0.48, 0.64, 0.67), strict=True):
+            own = mu * math.exp(draw.normal(0.0, 0.12))
+            sed = 0.0086 + 0.002 * (own - 0.5) ** 2 + 0.001 * draw.normal(0.0, 0.3)
+            score = level + judge(own, sed) + draw.normal(0.0, 4.0)
+            trials.append(RivalTrial(f"S{subject}", index, score, {MODEL: sed, GIVEN: own, "N": draw.normal(1.0, 0.1)}))
+    return trials
+
+
+def test_the_quantity_that_people_judge_by_is_told_from_its_rivals():
+    draw = np.random.default_rng(7)
+    by_mu = {one.name: one for one in rivals_within(people(draw, lambda mu, _: 120.0 * (mu - 0.5)))}
+    by_sed = {one.name: one for one in rivals_within(people(draw, lambda _, sed: 4e4 * (sed - 0.0086)))}
+    assert by_mu[GIVEN].contrast.high < 0.0 < by_sed[GIVEN].contrast.low
+    assert by_mu[MODEL].partial_low < 0.0 < by_mu[MODEL].partial_high
+    assert by_sed[MODEL].partial_low > 0.5
+    assert by_mu[GIVEN].weight > 0.95
+    assert by_sed[MODEL].weight > 0.95
+    assert by_mu[GIVEN].left_out_error < by_mu[MODEL].left_out_error
+    assert sum(one.weight for one in by_mu.values()) == pytest.approx(1.0)
+
+
+def test_numbers_within_subjects_are_those_of_trials_without_each_subjects_mean():
+    trials = people(np.random.default_rng(8), lambda mu, _: 90.0 * mu, subjects=4)
+    found = {one.name: one for one in rivals_within(trials)}
+    who = [trial.subject for trial in trials]
+    columns = {name: np.array([trial.values[name] for trial in trials]) for name in (MODEL, GIVEN)}
+    columns["score"] = np.array([trial.score for trial in trials])
+    left = {
+        name: (v.reshape(4, 5) - v.reshape(4, 5).mean(axis=1, keepdims=True)).ravel() for name, v in columns.items()
+    }
+    expected = repeated_correlation(who, columns[MODEL], columns["score"])
+    assert (found[MODEL].r, found[MODEL].low) == (expected.r, expected.people[0])
+    steps = [abs(np.corrcoef(left["score"], left[name])[0, 1]) for name in (MODEL, GIVEN)]
+    assert found[GIVEN].contrast.difference == pytest.approx(steps[0] - steps[1])
+    rest = [
+        left[name] - left[GIVEN] * (left[name] @ left[GIVEN]) / (left[GIVEN] @ left[GIVEN]) for name in (MODEL, "score")
+    ]
+    assert found[MODEL].partial == pytest.approx(np.corrcoef(rest)[0, 1])
+
+
+def test_a_quantity_that_trials_lack_gets_no_weight_and_the_others_keep_theirs():
+    trials = people(np.random.default_rng(9), lambda mu, _: 90.0 * mu)
+    some = [
+        RivalTrial(t.subject, t.index, t.score, {k: v for k, v in t.values.items() if k != "N" or t.index})
+        for t in trials
+    ]
+    whole = {one.name: one for one in rivals_within([t for t in trials if t.values])}
+    found = {one.name: one for one in rivals_within(some)}
+    assert found["N"].weight is None
+    assert "10 of 50 trials" in found["N"].reasons["weight"]
+    ratio = found[MODEL].weight / found[GIVEN].weight
+    assert ratio == pytest.approx(whole[MODEL].weight / whole[GIVEN].weight)
+
+
+def test_the_crossed_deviance_is_the_least_of_the_dense_normal_density():
+    draw = np.random.default_rng(4)
+    who, what = np.repeat(np.arange(6), 5), np.tile(np.arange(5), 6)
+    x = draw.normal(size=30)
+    y = 2.0 + 1.5 * x + draw.normal(0.0, 2.0, 6)[who] + draw.normal(0.0, 1.0, 5)[what] + draw.normal(size=30)
+
+    def dense(at):
+        same = [(group[:, None] == group[None, :]) * math.exp(2 * at[i]) for i, group in enumerate((who, what), 2)]
+        covariance = same[0] + same[1] + np.eye(30) * math.exp(2 * at[4])
+        return -2.0 * stats.multivariate_normal.logpdf(y, at[0] + at[1] * x, covariance)
+
+    least = optimize.minimize(dense, np.zeros(5), method="Nelder-Mead", options={"maxiter": 4000, "xatol": 1e-6})
+    assert crossed_deviance([str(one) for one in who], what, y, x) == pytest.approx(least.fun, abs=1e-5)
+
+
+def test_surfaces_that_explain_almost_everything_leave_a_deviance_still():
+    draw = np.random.default_rng(334)  # of 335 such draws the first in which the search leapt to an endless spread
+    who, what = np.repeat(np.arange(10), 5), np.tile(np.arange(5), 10)
+    x = draw.normal(size=50)
+    y = np.array([16.0, 31.0, 38.0, 100.0, 105.2])[what] + 8.0 * draw.normal(size=10)[who] + 2.0 * draw.normal(size=50)
+    assert math.isfinite(crossed_deviance([str(one) for one in who], what, y, x))
+
+
+def test_weights_are_those_of_the_published_rule():
+    assert akaike_weights([204.0, 202.0, 206.0]) == pytest.approx((0.2447, 0.6652, 0.0900), abs=1e-4)
+
+
+def test_a_session_shows_every_rival_beside_the_sed_in_table_picture_data_and_summary():
+    report = example()
+    shown = next(one for one in tables(report)["relation"] if one.name == "table-rivals")
+    assert [row[0].text for row in shown.groups[0].rows] == [MODEL, GIVEN, "µ static", "τ max", "speed"]
+    assert len(shown.caption.split()) <= 60
+    drawn = picture(report, "relation", "stickiness").svg.replace("\N{NO-BREAK SPACE}", " ")
+    assert "τ max +0.95" in drawn
+    in_data = report.to_dict()["experiments"][0]["rivals"][1]["contrast"]
+    assert in_data["z"] == report.experiments[0].rivals[1].contrast.z
+    said = " ".join(summary(report))
+    assert "µ of the model and τ max order these 5 surfaces as the SED does, so no order of scores" in said
+    needed = cases_needed(*correlations_of(report.experiments[0]))
+    assert f"{float(f'{needed:.2g}'):.0f} for µ of the model" in said
+
+
+def correlations_of(experiment):
+    """Return r of SED and of µ with the mean scores, and with each other, of the made-up report."""
+    rows = TABLES[experiment.descriptor]
+    (_, a, b), (_, _, c), _ = np.corrcoef(
+        [[m.mean for m in experiment.scores], [row[3] for row in rows.values()], [row[0] for row in rows.values()]]
+    )
+    return a, b, c
+
+
+def test_a_study_shows_rivals_of_means_and_within_subjects_on_its_page_and_as_csv():
+    found = study()
+    page = study_page(found, "x")
+    assert 'id="table-rivals"' in page
+    assert "stickiness, within subjects" in page
+    rows = rivals_csv(found).splitlines()
+    assert rows[0].startswith("SIMULATED,descriptor,kind,name,n,r,low,high")
+    assert sum(",within," in row for row in rows) == len(found.descriptors[0].rivals)
+
+
+def test_equal_rivals_are_said_to_be_told_apart_by_no_number_of_surfaces():
+    score = {0: 1.0, 1: 3.0, 2: 4.0, 3: 2.0, 4: 6.0}
+    same = {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0, 4: 5.0}
+    twice = {index: 2.0 * value for index, value in same.items()}
+    said = rivals_sentences("roughness", rivals_of_means(score, {MODEL: same, GIVEN: twice}))
+    assert said[0].startswith("Roughness: µ of the model orders these 5 surfaces as the SED does")
+    assert said[0].endswith("no number of surfaces would.")
