@@ -147,6 +147,7 @@ class ToDo(QFrame):
             if self.primary.text() != text:
                 self.primary.setText(text)
                 self.primary.setAccessibleName(f"{primary.label}: {sentence}")
+            self.primary.setEnabled(primary.enabled)
         self.primary.setVisible(primary is not None)
 
     def show_small(self, small: bool) -> None:

@@ -32,8 +32,9 @@ from daq_app.qt.screens import millimetres
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Tare
+from daq_app.window.checklist import headline
 from daq_app.window.messages import DevicesFound, Message, NewSession, Searching
-from daq_app.window.new_session import Bench, Refused, checked, is_code, unfinished
+from daq_app.window.new_session import Bench, Refused, checked, unfinished
 from daq_app.window.view import View
 from daq_app.window.view_course import Button
 from drivers.catalog import reachable
@@ -63,7 +64,7 @@ class MainWindow(QMainWindow):
         self.header = Header(tokens, self.show_subject, self._show_keys)
         self.notice = Notice(scale, bridge.send)
         self.to_do = ToDo(tokens, self._primary)
-        self.page = NewSessionPage(scale, bridge.send)
+        self.page = NewSessionPage(scale, bridge.send, lambda: self.act("ruler"))
         self.course = CoursePanel(scale, bridge.send)
         self.live = LivePanel(bridge.feed, bridge.model, tokens, scale)
         self.bench = BenchPanel(tokens, scale, bridge.send, self._search)
@@ -225,11 +226,15 @@ class MainWindow(QMainWindow):
             Setting("answer line length", LENGTH, "mm", origin),
             Setting("pixels in a millimetre of the answering screen", round(shown.pixels, 4), "1/mm", origin),
         )
+        cards = self.page.check(self._bench(), anew=True)
+        if not all(card.ready for card in cards):
+            self._form_changed()
+            self.page.go_to_missing()
+            return
         made = checked(self.page.form(), self._bench(), datetime.now(), secrets.randbelow(2**31), settings)
         if isinstance(made, Refused):
-            self.page.show_refusals(dict(made.sentences))
+            self.notice.warn(" ".join(made.sentences.values()))
             return
-        self.page.show_refusals({})
         if made.people.kind == "simulated people":
             self.subject.hide()
         self.bridge.send(made)
@@ -239,13 +244,9 @@ class MainWindow(QMainWindow):
         bench = self._bench()
         self.live.show_forces(True)
         self.page.show_bench(bench)
-        form = self.page.form()
-        sentence = "Give the subject's code, then press Enter to start."
-        if form.forces and not bench.connected:
-            sentence = "Connect a transducer, or choose scores only."
-        elif is_code(form.subject):
-            sentence = f"Press Enter to start the session of {form.subject.strip()}."
-        self.to_do.show_what(sentence, Button("Start", "Enter"), 0)
+        cards = self.page.check(bench)
+        ready = all(card.ready for card in cards)
+        self.to_do.show_what(headline(cards, self.page.subject.text()), Button("Start", "Enter", ready), 0)
         self.redo.setEnabled(False)
         say(self.stroke, "No stroke yet.")
         regrade(self.stroke, "")
@@ -263,7 +264,8 @@ class MainWindow(QMainWindow):
     def _bench(self) -> Bench:
         bench = self.bridge.state.bench
         simulated = bench.info is not None and bench.info.simulated and bench.frame is not None
-        return Bench(bench.link == "open", simulated, bench.frame)
+        rate = float("nan") if bench.info is None else bench.info.rate
+        return Bench(bench.link == "open", simulated, bench.frame, rate)
 
     def _show_subject_view(self, view: View) -> None:
         session = self.bridge.state.session
@@ -292,6 +294,8 @@ class MainWindow(QMainWindow):
 
     def _line_changed(self) -> None:
         self.page.show_line(millimetres(self.subject.screen()))
+        if self.bridge.view.course is None:
+            self._form_changed()
 
     def _answered(self, event: Message) -> None:
         self.bridge.send(event)

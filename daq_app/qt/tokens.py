@@ -130,11 +130,13 @@ def style_sheet(t: Tokens, scale: float) -> str:
 QWidget#window, QMainWindow {{ background: {t.ground}; border: none; }}
 QFrame[role="panel"] {{ background: {t.surface}; border: 1px solid {t.line}; border-radius: 6px; }}
 QFrame[role="strip"] {{ background: {t.surface}; border: 1px solid {t.line}; border-radius: 6px; }}
+QFrame[role="card"] {{ border: 1px solid {t.line}; border-radius: 6px; }}
 QLabel {{ background: transparent; }}
 QLabel[role="quiet"] {{ color: {t.quiet}; font-size: {px(SMALL)}; }}
 QLabel[role="value"] {{ font-size: {px(TEXT)}; }}
 QLabel[role="title"] {{ font-size: {px(TITLE)}; font-weight: 600; }}
 QLabel[role="section"] {{ color: {t.quiet}; font-size: {px(SMALL)}; font-weight: 600; }}
+QLabel[role="name"] {{ font-size: {px(TEXT)}; font-weight: 600; }}
 QLabel[role="headline"] {{ font-size: {px(HEADLINE)}; font-weight: 600; }}
 QLabel[role="simulated"] {{ color: {t.look}; font-weight: 700; border: 2px solid {t.look}; border-radius: 4px;
   padding: 2px 8px; }}

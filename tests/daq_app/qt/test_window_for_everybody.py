@@ -40,7 +40,7 @@ def test_every_painted_widget_says_what_it_shows(driver):
 def test_the_tab_key_goes_through_the_page_from_top_to_bottom_and_reaches_every_control(driver):
     window = driver.window
     page = window.page
-    page.subject.setFocus()
+    page.study.setFocus()
     order, seen = [], set()
     for _ in range(60):
         focused = window.focusWidget()
@@ -49,8 +49,8 @@ def test_the_tab_key_goes_through_the_page_from_top_to_bottom_and_reaches_every_
         seen.add(focused)
         order.append(focused)
         QTest.keyClick(focused, Qt.Key.Key_Tab)
-    asked = [page.subject, page.study, page.protocol, page.stroking, page.answering, page.with_forces]
-    asked += [page.area, page.people_score, page.folder, page.seed]
+    asked = [page.study, page.protocol, page.seed, page.people_score, page.subject, page.stroking, page.answering]
+    asked += [page.with_forces, page.area, page.folder]
     places = [order.index(widget) for widget in asked]
     assert places == sorted(places)
     visible = [
