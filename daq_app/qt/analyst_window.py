@@ -127,6 +127,8 @@ class AnalystWindow(QMainWindow):
                 self.keys.hide()
             case Qt.Key.Key_Escape if self.stop.isEnabled():
                 self.ask(m.Stop())
+            case Qt.Key.Key_Home:
+                self.stroke.stroke.show_all()
             case Qt.Key.Key_Z if held:
                 self.stroke.decisions.take_back(again=bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier))
             case Qt.Key.Key_1 | Qt.Key.Key_2 | Qt.Key.Key_3 if held:

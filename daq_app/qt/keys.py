@@ -55,6 +55,7 @@ ANALYST_KEYS = (
     Key("Left  Right", "edge", "move the edge whose button has the focus by 5 ms; with Shift by 50 ms"),
     Key("Enter", "record", "record where the edge is now, as a decision with who and why"),
     Key("Esc", "back", "put the edge back where it was"),
+    Key("Home", "all", "show the whole stroke again after zooming; a double-click on a plot too"),
     Key("Ctrl+Z", "undo", "undo the last decision; that too is recorded"),
     Key("Ctrl+Shift+Z", "redo", "redo what was undone last"),
     Key("Space", "play", "play and pause, in the replay or in the history"),

@@ -40,6 +40,7 @@ from daq_app.window.view_course import Button
 from drivers.catalog import reachable
 from sessions.recording import Setting
 
+# Before the scale of the fonts [px]:
 WIDE = 1366  # below it the bench folds to a strip of lamps
 ROOMY = 1100  # below it the six axes and the sample fold away
 TALL = 620  # below it the type of the headline is smaller
@@ -358,13 +359,14 @@ class MainWindow(QMainWindow):
         self._fit()
 
     def _fit(self) -> None:
-        wide = self.width() >= WIDE * min(self._scale, 1.0)
+        width, height = self.width() / self._scale, self.height() / self._scale
+        wide = width >= WIDE
         shown = wide if self._bench_shown is None else self._bench_shown
         self.bench.setVisible(shown)
-        self.strip.setVisible(not shown and self.width() >= 800)
-        self.live.show_side(self.width() >= ROOMY and not (shown and not wide))
-        self.to_do.show_small(self.height() < TALL or self.width() < ROOMY)
-        self.notice.show_folding(self.height() < LOW)
+        self.strip.setVisible(not shown and width >= 800)
+        self.live.show_side(width >= ROOMY and not (shown and not wide))
+        self.to_do.show_small(height < TALL or width < ROOMY)
+        self.notice.show_folding(height < LOW)
         if self.keys is not None:
             self.keys.fit(self.size(), self._scale)
 

@@ -164,6 +164,14 @@ QPushButton[role="handle"] {{ padding: 4px 2px; font-size: {px(SMALL)}; }}
 QLineEdit, QPlainTextEdit {{ background: {t.raised}; border: 1px solid {t.line};
   border-radius: 4px; padding: 4px 8px; min-height: {TARGET - 12}px; selection-background-color: {t.act};
   selection-color: {t.on_act}; }}
+QAbstractItemView {{ selection-background-color: {t.act}; selection-color: {t.on_act};
+  background: {t.surface}; alternate-background-color: {t.raised}; }}
+QListView::item:selected, QTreeView::item:selected, QTableView::item:selected {{ background: {t.act};
+  color: {t.on_act}; }}
+QComboBox QAbstractItemView {{ background: {t.raised}; }}
+QHeaderView::section {{ background: {t.ground}; color: {t.quiet}; border: 1px solid {t.line}; padding: 3px 6px; }}
+QProgressBar {{ background: {t.raised}; border: 1px solid {t.line}; border-radius: 4px; text-align: center; }}
+QProgressBar::chunk {{ background: {t.line}; }}
 QListWidget, QTreeWidget {{ background: {t.surface}; border: 2px solid transparent; }}
 QListWidget::item {{ padding: 3px 2px; }}
 QScrollBar:vertical {{ background: transparent; width: 12px; }}

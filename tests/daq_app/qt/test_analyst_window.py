@@ -15,7 +15,8 @@ from daq_app.analyst import messages as m
 from daq_app.analyst.frame import Contact, Film, Frame, Instant, Parts
 from daq_app.analyst.lineage import lineage
 from daq_app.analyst.raw import RawReadings
-from daq_app.analyst.shown import points
+from daq_app.analyst.seen import finger_words
+from daq_app.analyst.shown import numbers, points
 from daq_app.analyst.state import AnalystState, chosen, rows
 from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.lineage_label import LineageLabel
@@ -111,6 +112,38 @@ def test_the_table_of_all_strokes_chooses_a_trial_and_the_scene_tells_what_the_m
     cells = {window.model.scene.item(row, 0).text(): window.model.scene.item(row, 1).text() for row in range(4)}
     assert cells["µ of this trial"] == f"{said.mu:.4f}"
     assert cells["indentation"] == f"{said.indentation:.3g} mm"
+
+
+def test_every_sed_carries_its_depth_and_its_strain(window):
+    window.take(m.Found("predicted", replace(example(), model="small strain, settled sliding, τ max mean")))
+    [said] = [row.prediction for row in rows(window.state)[:1]]
+    expected = f"at {said.indentation:.3g} mm, small strain"
+    assert f"SED {expected}" in finger_words(window.state)
+    assert any(name.startswith(f"SED {expected}") for name, _ in numbers(window.state))
+    assert any(expected in link.more for link in lineage(window.state))
+
+
+def test_the_wheel_zooms_a_stroke_and_home_or_a_double_click_shows_all_of_it_again(application, window):
+    view = window.stroke.stroke
+    plot = view._plots[0]
+    whole = plot.getPlotItem().getViewBox().viewRange()[0]
+
+    def shown():
+        application.processEvents()
+        return plot.getPlotItem().getViewBox().viewRange()[0]
+
+    def zoom():
+        plot.getPlotItem().getViewBox().scaleBy((0.2, 0.2))
+        assert shown() != pytest.approx(whole)
+
+    zoom()
+    window.take(m.Idle())
+    assert shown() != pytest.approx(whole)  # news of something else leaves the zoom
+    QTest.keyClick(window, Qt.Key.Key_Home)
+    assert shown() == pytest.approx(whole)
+    zoom()
+    QTest.mouseDClick(plot.viewport(), Qt.MouseButton.LeftButton)
+    assert shown() == pytest.approx(whole)
 
 
 def test_stopping_is_answered_at_once_and_keeps_what_was_found(window):
