@@ -9,11 +9,12 @@ from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from daq_app.qt.parts import button, choice, label, say
-from daq_app.qt.tokens import GRID, MU, TEXT, TITLE, N, T, font
+from daq_app.qt.tokens import GRID, MU, SMALL, TEXT, TITLE, N, T, font
 from daq_app.window.live_trace import CHANNELS
 
 LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
 READ = (("N", "N", 2, N), ("T", "N", 2, T), ("mu", "", 2, MU), ("speed", "mm/s", 0, ""))
+SIZES = ((TITLE, "title"), (TEXT, "value"), (SMALL, "tight"))  # of the numbers: the first for which there is room
 WIDEST = {"N": "−00.00 N", "T": "00.00 N", "mu": "0.00", "speed": "000 mm/s"}  # each number keeps its place
 
 
@@ -86,15 +87,14 @@ class LiveBar(QWidget):
         """Put the acts below the numbers where both find no room in a row, and the numbers in smaller type then."""
         acts = sum(w.sizeHint().width() + GRID for w in (self.finite, self.hold)) + self.length.width()
         beside = self._forces_shown and self._needed(TITLE) + acts <= self.width()
-        large = self._needed(TITLE) <= self.width()
+        size, role = next((pair for pair in SIZES if self._needed(pair[0]) <= self.width()), SIZES[-1])
         direction = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
         self._rows.setDirection(direction if self._forces_shown else QBoxLayout.Direction.LeftToRight)
         room = self.width()
         for channel, (caption, value) in zip(self.values, self._pairs, strict=True):
-            size = TITLE if large else TEXT
             value.setFixedWidth(self._widest(channel, size))
-            if value.property("role") != ("title" if large else "value"):
-                value.setProperty("role", "title" if large else "value")
+            if value.property("role") != role:
+                value.setProperty("role", role)
                 value.style().unpolish(value)
                 value.style().polish(value)
             room -= caption.sizeHint().width() + value.width() + 2 * GRID

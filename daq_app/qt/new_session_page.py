@@ -1,10 +1,13 @@
 """The page on which a session is begun: a checklist of cards, each of which says in one line why not."""
 
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
+    QBoxLayout,
     QButtonGroup,
     QCheckBox,
     QComboBox,
@@ -26,10 +29,21 @@ from daq_app.qt.tokens import GRID, TARGET
 from daq_app.recorder.messages import ResumeSession
 from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
 from daq_app.window.messages import Message
-from daq_app.window.new_session import AXES, Bench, SessionForm, Unfinished, enrolled, enrolment, offered, place_of
+from daq_app.window.new_session import (
+    AXES,
+    Bench,
+    SessionForm,
+    Unfinished,
+    enrolled,
+    enrolment,
+    offered,
+    place_of,
+    unfinished,
+)
 from sessions.plan.plan import Hand
 from sessions.plan.protocols import protocol_names
 
+TWO = 565  # at which the cards stand in two columns, before the font's scale [px]
 HANDS: tuple[tuple[str, Hand | None], ...] = (("not stated", None), ("right", "right"), ("left", "left"))
 
 
@@ -174,6 +188,23 @@ class NewSessionPage(QFrame):
         if first is not None:
             first.setFocus()
 
+    def look_for_unfinished(self) -> None:
+        """Look for sessions that were cut short, without holding up the window."""
+        folder = Path(self.form().folder or ".")
+        results: list[tuple[Unfinished, ...]] = []
+        worker = threading.Thread(target=lambda: results.append(unfinished(folder)), daemon=True)
+        worker.start()
+        self._looking = timer = QTimer(self)
+        timer.setInterval(100)
+
+        def look() -> None:
+            if not worker.is_alive():
+                timer.stop()
+                self.show_unfinished(results[0] if results else ())
+
+        timer.timeout.connect(look)
+        timer.start()
+
     def show_unfinished(self, found: tuple[Unfinished, ...]) -> None:
         """Offer the sessions that were cut short."""
         if found != self._shown:
@@ -246,20 +277,35 @@ class NewSessionPage(QFrame):
         cut_short = QVBoxLayout(self._unfinished)
         for widget in (label("▲ Sessions that were cut short", wrap=True), self._resume, self._go_on):
             cut_short.addWidget(widget)
-        for name, build in (
-            ("Study and protocol", self._build_study),
-            ("Subject", self._build_subject),
-            ("Transducer", self._build_recorded),
-            ("Subject's screen", self._build_screen),
-            ("Disk", self._build_disk),
+        self._columns = QBoxLayout(QBoxLayout.Direction.TopToBottom)
+        left, right = QVBoxLayout(), QVBoxLayout()
+        for column in (left, right):
+            column.setSpacing(GRID)
+            self._columns.addLayout(column, 1)
+        for column, name, build in (
+            (left, "Study and protocol", self._build_study),
+            (left, "Disk", self._build_disk),
+            (right, "Subject", self._build_subject),
+            (right, "Transducer", self._build_recorded),
+            (right, "Subject's screen", self._build_screen),
         ):
-            layout.addWidget(self.frames[name])
+            column.addWidget(self.frames[name])
             build(self.frames[name].body)
+        for column in (left, right):
+            column.addStretch(1)
+        layout.addLayout(self._columns)
         layout.addStretch(1)
         outer = QVBoxLayout(self)
         outer.setContentsMargins(2, 2, 2, 2)
         outer.addWidget(scrolled(inside))
+        self._two = round(TWO * scale)
         self.setMinimumWidth(round(280 * min(scale, 1.25)))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Put the cards in two columns where there is room."""
+        super().resizeEvent(event)
+        wide = self.width() >= self._two
+        self._columns.setDirection(QBoxLayout.Direction.LeftToRight if wide else QBoxLayout.Direction.TopToBottom)
 
     def _build_study(self, layout: QVBoxLayout) -> None:
         """Lay out in which study and by which protocol, and whether it is rehearsed."""

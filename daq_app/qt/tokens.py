@@ -133,6 +133,7 @@ QFrame[role="strip"] {{ background: {t.surface}; border: 1px solid {t.line}; bor
 QFrame[role="card"] {{ border: 1px solid {t.line}; border-radius: 6px; }}
 QLabel {{ background: transparent; }}
 QLabel[role="quiet"] {{ color: {t.quiet}; font-size: {px(SMALL)}; }}
+QLabel[role="tight"] {{ font-size: {px(SMALL)}; }}
 QLabel[role="value"] {{ font-size: {px(TEXT)}; }}
 QLabel[role="title"] {{ font-size: {px(TITLE)}; font-weight: 600; }}
 QLabel[role="section"] {{ color: {t.quiet}; font-size: {px(SMALL)}; font-weight: 600; }}
@@ -159,6 +160,11 @@ QPushButton[role="primary"] {{ background: {t.act}; color: {t.on_act}; border: 2
 QPushButton[role="primary"]:focus {{ border: 3px solid {t.text}; }}
 QPushButton[role="primary"]:disabled {{ background: {t.ground}; color: {t.quiet}; border: 2px dashed {t.line}; }}
 QPushButton:checked {{ border: 2px solid {t.act}; font-weight: 600; }}
+QPushButton[role="rail"] {{ padding: 6px 2px; font-size: {px(SMALL)}; background: transparent; border: none; }}
+QPushButton[role="rail"]:checked {{ background: {t.raised}; border: 2px solid {t.act}; font-weight: 600; }}
+QMenuBar, QMenu {{ background: {t.surface}; }}
+QMenuBar::item:selected, QMenu::item:selected {{ background: {t.act}; color: {t.on_act}; }}
+QMenu::item:disabled {{ color: {t.quiet}; }}
 QPushButton[role="small"] {{ padding: 4px 4px; }}
 QPushButton[role="handle"] {{ padding: 4px 2px; font-size: {px(SMALL)}; }}
 QLineEdit, QPlainTextEdit {{ background: {t.raised}; border: 1px solid {t.line};

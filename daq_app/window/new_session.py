@@ -8,6 +8,7 @@ from datetime import datetime
 from pathlib import Path
 
 from daq_app.recorder.messages import Kind, People, StartSession
+from daq_app.window.bench_state import BenchState
 from daq_app.window.sentences import sentence
 from sessions.plan.plan import Frame, Hand, Phase
 from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, plan, protocol
@@ -79,6 +80,13 @@ class Unfinished:
 
     folder: Path
     words: str
+
+
+def bench_of(bench: BenchState) -> Bench:
+    """Return what the page needs to know of the bench that the window shows."""
+    simulated = bench.info is not None and bench.info.simulated and bench.frame is not None
+    rate = float("nan") if bench.info is None else bench.info.rate
+    return Bench(bench.link == "open", simulated, bench.frame, rate)
 
 
 def checked(

@@ -49,8 +49,8 @@ def test_the_tab_key_goes_through_the_page_from_top_to_bottom_and_reaches_every_
         seen.add(focused)
         order.append(focused)
         QTest.keyClick(focused, Qt.Key.Key_Tab)
-    asked = [page.study, page.protocol, page.seed, page.people_score, page.subject, page.stroking, page.answering]
-    asked += [page.with_forces, page.area, page.folder]
+    asked = [page.study, page.protocol, page.seed, page.people_score, page.folder]
+    asked += [page.subject, page.stroking, page.answering, page.with_forces, page.area]
     places = [order.index(widget) for widget in asked]
     assert places == sorted(places)
     visible = [
