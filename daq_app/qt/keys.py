@@ -59,6 +59,7 @@ ANALYST_KEYS = (
     Key("Enter", "record", "record where the edge is now, as a decision with who and why"),
     Key("Esc", "back", "put the edge back where it was"),
     Key("Home", "all", "show the whole stroke again after zooming; a double-click on a plot too"),
+    Key("Ctrl+C", "copy", "copy the selected cells of a table as tab-separated values; a click on its head sorts"),
     Key("Ctrl+Z", "undo", "undo the last decision; that too is recorded"),
     Key("Ctrl+Shift+Z", "redo", "redo what was undone last"),
     Key("Space", "play", "play and pause, in the replay or in the history"),

@@ -283,11 +283,11 @@ class NewSessionPage(QFrame):
             column.setSpacing(GRID)
             self._columns.addLayout(column, 1)
         for column, name, build in (
-            (left, "Study and protocol", self._build_study),
-            (left, "Disk", self._build_disk),
-            (right, "Subject", self._build_subject),
-            (right, "Transducer", self._build_recorded),
-            (right, "Subject's screen", self._build_screen),
+            (left, "Subject", self._build_subject),
+            (left, "Transducer", self._build_recorded),
+            (left, "Subject's screen", self._build_screen),
+            (right, "Study and protocol", self._build_study),
+            (right, "Disk", self._build_disk),
         ):
             column.addWidget(self.frames[name])
             build(self.frames[name].body)

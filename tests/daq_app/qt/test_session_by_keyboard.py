@@ -33,6 +33,7 @@ def one_trial(driver, *, presses=3):
     QTest.keyClick(window, SPACE)
     driver.phase("scoring")
     driver.until(lambda: driver.session.of(number).quality is not None, "what is said of the stroke")
+    driver.until(lambda: window.live.plots[0]._end == "lift + 1 s", "the stroke that stays while its score is awaited")
     for _ in range(presses):
         QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
     QTest.keyClick(window.subject.line, ENTER)

@@ -40,7 +40,7 @@ def test_every_painted_widget_says_what_it_shows(driver):
 def test_the_tab_key_goes_through_the_page_from_top_to_bottom_and_reaches_every_control(driver):
     window = driver.window
     page = window.page
-    page.study.setFocus()
+    page.subject.setFocus()
     order, seen = [], set()
     for _ in range(60):
         focused = window.focusWidget()
@@ -49,8 +49,8 @@ def test_the_tab_key_goes_through_the_page_from_top_to_bottom_and_reaches_every_
         seen.add(focused)
         order.append(focused)
         QTest.keyClick(focused, Qt.Key.Key_Tab)
-    asked = [page.study, page.protocol, page.seed, page.people_score, page.folder]
-    asked += [page.subject, page.stroking, page.answering, page.with_forces, page.area]
+    asked = [page.subject, page.stroking, page.answering, page.with_forces, page.area]
+    asked += [page.study, page.protocol, page.seed, page.people_score, page.folder]
     places = [order.index(widget) for widget in asked]
     assert places == sorted(places)
     visible = [
