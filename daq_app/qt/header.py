@@ -130,7 +130,7 @@ class ToDo(QFrame):
         self.sentence = label("", "headline", wrap=True)
         self.sentence.setMinimumHeight(2 * GRID)
         self.primary = button("", "do it", primary, "primary")
-        self.second = button("Review  Ctrl+R", "look at the session that has ended", review)
+        self.second = button("Review  F4", "look at the session that has ended", review)
         self.second.hide()
         policy = self.primary.sizePolicy()
         policy.setRetainSizeWhenHidden(True)

@@ -150,9 +150,9 @@ class LivePanel(QFrame):
             self._drawn = drawn
             self._show_until(self.plots[:3], end, seen, clock)
             self._show_until(self.plots[3:], now, seen, clock)
-            stays = newest is not None and end < newest
+            frozen = newest is not None and end < newest
             for plot in (*self.plots[:3], self._model_plot):
-                plot.show_end("lift + 1 s" if stays and self._held is None else "held" if stays else "now")
+                plot.show_end("lift + 1 s" if frozen and self._held is None else "held" if frozen else "now")
             if self.map.isVisible():
                 every = max(round(TRAIL * trace.rate / POINTS), 1)
                 _, values = trace.between(now - TRAIL, np.nextafter(now, np.inf), every)

@@ -14,6 +14,7 @@ WHY_NOT = {
     "prepare": "A session is being recorded: end it before the next is prepared.",
     "run": "No session is in hand: start one in Prepare.",
 }
+KEY = {"prepare": "F2", "run": "F3", "review": "F4"}
 WIDTH = 84  # before the font's scale [px]
 
 
@@ -27,7 +28,10 @@ class Rail(QFrame):
         self.setProperty("role", "strip")
         layout = QVBoxLayout(self)
         layout.setContentsMargins(GRID // 2, GRID, GRID // 2, GRID)
-        self.buttons = {room: button(room.capitalize(), room, lambda room=room: go(room), "rail") for room in ROOMS}
+        self.buttons = {
+            room: button(f"{room.capitalize()}\n{KEY[room]}", room, lambda room=room: go(room), "rail")
+            for room in ROOMS
+        }
         for made in self.buttons.values():
             made.setCheckable(True)
             layout.addWidget(made)
