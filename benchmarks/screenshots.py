@@ -150,7 +150,7 @@ class _Places:
         self.window.page.seed.setText("seven")
         self.window.act("primary")
         self.picture("02-refused")
-        self.window.page.show_refusals({})
+        self.window.page.seed.clear()
         self.play(*p.BEGUN, until=3.5)
         self.picture("03-begin")
         self.play(steps.ShowInstruction(p.PLAN.blocks[0]), steps.AskMount(trial), until=3.6)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from daq_app.analyst.shown import condition
 from daq_app.analyst.state import AnalystState, chosen
 from sessions.report.contents import StrokeFinding
 
@@ -28,7 +29,13 @@ def lineage(state: AnalystState) -> tuple[Link, ...]:
         made.append(Link(f"trial {row.trial}", "trial"))
     said, stroke = row.prediction, row.stroke
     if said is not None and said.sed is not None:
-        made.append(Link(f"SED {1000.0 * said.sed:.3f} kPa", "prediction", "averaged over the ending, settled"))
+        made.append(
+            Link(
+                f"SED {1000.0 * said.sed:.3f} kPa",
+                "prediction",
+                f"{condition(state.report, said)}, averaged over the ending",
+            )
+        )
     if stroke is None:
         return tuple(made)
     made.append(_friction(stroke, None if said is None or said.mu is None else (said.mu, said.mu_rule)))

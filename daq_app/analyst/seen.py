@@ -2,6 +2,7 @@
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.frame import Frame, step_above, top
+from daq_app.analyst.shown import condition
 from daq_app.analyst.state import AnalystState, chosen
 from sessions.report.contents import PredictionFinding
 
@@ -45,7 +46,7 @@ def finger_words(state: AnalystState | None) -> str:
         why = said.reasons.get("sed", "no reason is known")
         return f"No settled finger. {why}"
     finger = state.fingers.get(row.key)
-    parts = [f"Finger of {name}, settled", f"SED at the ending {1000.0 * said.sed:.3f} kPa"]
+    parts = [f"Finger of {name}, settled", f"SED {condition(state.report, said)} {1000.0 * said.sed:.3f} kPa"]
     if finger is not None:
         parts.append(_contact_words(finger.frame))
     return " · ".join(parts)

@@ -61,7 +61,10 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
     if (said := row.prediction) is not None:
         error = "" if said.error_estimate is None else f" ± {100 * said.error_estimate:.1f} %"
         told += [
-            ("SED, averaged over the ending", _value(_kpa(said.sed), "{:.3f} kPa" + error, said.reasons, "sed")),
+            (
+                f"SED {condition(state.report, said)}, averaged over the ending",
+                _value(_kpa(said.sed), "{:.3f} kPa" + error, said.reasons, "sed"),
+            ),
             ("model: µ", _value(said.mu, "{:.3f} (" + said.mu_rule + ")", said.reasons, "mu")),
             ("model: indentation", _value(said.indentation, "{:.2f} mm", said.reasons, "indentation")),
             ("model: normal force", _value(said.normal_force, "{:.2f} N", said.reasons, "normal_force")),
@@ -69,6 +72,16 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
     elif state.stage == "analysed":
         told.append(("SED", "– stopped before this trial" if state.halted else "not predicted yet"))
     return tuple(told)
+
+
+def condition(report: Report | None, said: PredictionFinding) -> str:
+    """Return under which condition a SED holds: the depth that was prescribed, and the strain.
+
+    The window shows another number while a session runs: that at the measured force.
+    """
+    depth = "" if said.indentation is None else f"at {said.indentation:.3g} mm"
+    strain = "" if report is None else report.model.split(",")[0]
+    return ", ".join(part for part in (depth, strain) if part)
 
 
 FRICTION_HEAD = (

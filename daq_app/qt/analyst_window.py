@@ -78,8 +78,11 @@ class AnalystWindow(QMainWindow):
         self._words = Shortened("quiet")
         self.stop = button("Stop  Esc", "stop what is being done", lambda: self.ask(m.Stop()))
         self.go_on = button("Go on", "have the model answer the trials that are left", lambda: self.ask(m.GoOn()))
-        self.report = button("Report…", "write the report", self._report)
-        self.format, self.export = choice("format of the export"), button("Export…", "write an export", self._export)
+        self.report = button("Report…", "write the report", self.write_report)
+        self.format, self.export = (
+            choice("format of the export"),
+            button("Export…", "write an export", self.write_export),
+        )
         self.format.addItems(sorted(FORMATS))
         self._scrolled: list[QScrollArea] = []
         self._parts = [self._panel(name, column) for name, column in self._named()]
@@ -127,6 +130,8 @@ class AnalystWindow(QMainWindow):
                 self.keys.hide()
             case Qt.Key.Key_Escape if self.stop.isEnabled():
                 self.ask(m.Stop())
+            case Qt.Key.Key_Home:
+                self.stroke.stroke.show_all()
             case Qt.Key.Key_Z if held:
                 self.stroke.decisions.take_back(again=bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier))
             case Qt.Key.Key_1 | Qt.Key.Key_2 | Qt.Key.Key_3 if held:
@@ -166,12 +171,14 @@ class AnalystWindow(QMainWindow):
         if said:
             self._show()
 
-    def _report(self) -> None:
+    def write_report(self) -> None:
+        """Ask for a file, and have the report written."""
         name, _ = QFileDialog.getSaveFileName(self, "Report", str(self.state.folder / "report.html"), "*.html")
         if name:
             self.write("report", name)
 
-    def _export(self) -> None:
+    def write_export(self) -> None:
+        """Ask for a folder, and have the chosen export written."""
         what = self.format.currentText()
         name, _ = QFileDialog.getSaveFileName(self, "New folder", f"{self.state.folder.name}-{what}")
         if name:

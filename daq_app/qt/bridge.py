@@ -16,10 +16,11 @@ from daq_app.window.bench_load import Load
 from daq_app.window.live_feed import LiveFeed, together
 from daq_app.window.live_model import Settle
 from daq_app.window.live_model_process import LiveModel
-from daq_app.window.messages import DrawingFailed, Judged, LifeKnown, Loaded, Message, Tick
+from daq_app.window.messages import DevicesFound, DrawingFailed, Judged, LifeKnown, Loaded, Message, Searching, Tick
 from daq_app.window.state import AppState, fold
 from daq_app.window.take_watch import Judge
 from daq_app.window.view import View, derive_view
+from drivers.catalog import reachable
 from sessions.plan.plan import Frame
 
 FRAME = 16  # between two looks at the recorder [ms]: 60 a second
@@ -117,6 +118,11 @@ class Bridge(QObject):
                 self._begin_again()
             self._client.send(message)  # pyright: ignore[reportArgumentType]  it is one of REQUESTS
         self._show()
+
+    def search(self) -> None:
+        """Look for transducers, without holding up the window."""
+        self.send(Searching())
+        threading.Thread(target=lambda: self.post(DevicesFound(reachable())), daemon=True).start()
 
     def poll(self) -> None:
         """Take what has come, and let it be drawn."""

@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractItemView, QHBoxLayout, QTableWidget, QTableWidgetItem, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from daq_app.analyst.compared import NAMES, ComparedRow
 from daq_app.qt.parts import Shortened, button
 from daq_app.qt.picture_view import PictureView, Save
+from daq_app.qt.text_table import TextTable
 
 PICTURE = "compared"  # its name
 
@@ -20,12 +20,9 @@ class ComparedView(QWidget):
         super().__init__()
         self.words = Shortened("quiet")
         self.choose = button("Compare with…", "compare with another session", choose)
-        self.table = QTableWidget(0, 1 + 3 * len(NAMES))
-        self.table.setAccessibleName("two sessions compared")
-        self.table.setTabKeyNavigation(False)
-        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        head = ("stimulus", *(f"{name} {part}" for name in NAMES for part in ("A", "B", "B − A")))
+        self.table = TextTable("two sessions compared", head)
         self.table.setMinimumHeight(130)
-        self.table.verticalHeader().hide()
         self.picture = PictureView("the picture of both sessions", save)
         top = QHBoxLayout()
         top.addWidget(self.words, 1)
@@ -43,21 +40,15 @@ class ComparedView(QWidget):
         self.words.show_whole(f"A: {sessions[0]}   B: {sessions[1]}" if there else "No second session is open.")
         self.table.setVisible(there)
         self.picture.setVisible(there)
-        head = ["stimulus", *(f"{name} {part}" for name in NAMES for part in ("A", "B", "B − A"))]
-        self.table.setHorizontalHeaderLabels(head)
-        self.table.setRowCount(len(rows))
-        for at, row in enumerate(rows):
+        lines: list[tuple[str, ...]] = []
+        for row in rows:
             cells = [f"{row.experiment} {row.index}"]
             for name, pair in zip(NAMES, row.pairs, strict=True):
                 digits = 1 if name == "score" else 3
                 cells += [_number(value, digits) for value in (pair.first, pair.second)]
                 cells.append(_number(pair.difference, digits, sign=True))
-            for column, words in enumerate(cells):
-                item = QTableWidgetItem(words)
-                if column:
-                    item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-                self.table.setItem(at, column, item)
-        self.table.resizeColumnsToContents()
+            lines.append(tuple(cells))
+        self.table.show_lines(tuple(lines))
 
 
 def _number(value: float | None, digits: int, *, sign: bool = False) -> str:

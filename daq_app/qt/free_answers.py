@@ -4,8 +4,8 @@ from collections.abc import Callable
 from math import isfinite
 from typing import Literal
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtCore import QRegularExpression, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QRegularExpressionValidator
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QWidget
 
 from daq_app.qt.parts import button
@@ -15,6 +15,7 @@ from sessions.plan.plan import Hand
 from sessions.run.steps import Event
 
 Which = Literal["first", "second"]
+NUMBER = QRegularExpression(r"\d{0,9}[.,]?\d{0,9}")  # what can be typed of one
 LARGE = 36  # type of the number [device-independent pixels]
 
 
@@ -49,6 +50,7 @@ class NumberField(_Field):
         self.field.setFixedWidth(round(260 * scale))
         self.field.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.field.setStyleSheet(f"font-size: {round(LARGE * scale)}px;")
+        self.field.setValidator(QRegularExpressionValidator(NUMBER, self.field))
         self.field.textEdited.connect(self._typed)
         layout = QHBoxLayout(self)
         layout.addStretch(1)

@@ -29,7 +29,7 @@ class Header(QWidget):
         layout = QHBoxLayout(self)
         layout.setContentsMargins(GRID, 0, GRID, 0)
         layout.setSpacing(GRID)
-        layout.addWidget(self._heading, 1)
+        layout.addWidget(self._heading, 3)
         layout.addWidget(self._simulated)
         layout.addSpacing(GRID)
         layout.addWidget(self._lamp)
@@ -37,11 +37,14 @@ class Header(QWidget):
         layout.addWidget(self._saved)
         layout.addWidget(button("Subject  F6", "show the subject's window", subject))
         layout.addWidget(button("Keys  F1", "show the keys of this window", keys))
+        self._device = Shortened("quiet")
+        layout.insertWidget(1, self._device, 2)
         self._saved.setFixedWidth(self._saved.fontMetrics().horizontalAdvance("nothing saved yet "))
 
     def show_view(self, view: View) -> None:
         """Show the top line."""
         self._heading.show_whole(view.heading)
+        self._device.show_whole(f"{view.bench.name}: {view.bench.lamp_words}")
         self._simulated.setVisible(view.simulated is not None)
         self._simulated.setToolTip(view.simulated or "")
         self._simulated.setAccessibleName(view.simulated or "nothing is simulated")
@@ -117,8 +120,8 @@ class Notice(QFrame):
 class ToDo(QFrame):
     """What to do now, and the one button that does it."""
 
-    def __init__(self, tokens: Tokens, primary: Callable[[], None]) -> None:
-        """Show nothing to do."""
+    def __init__(self, tokens: Tokens, primary: Callable[[], None], review: Callable[[], None]) -> None:
+        """Show nothing to do; `review` opens the session that has ended."""
         super().__init__()
         self.setProperty("role", "panel")
         self.setAccessibleName("what to do now")
@@ -127,6 +130,8 @@ class ToDo(QFrame):
         self.sentence = label("", "headline", wrap=True)
         self.sentence.setMinimumHeight(2 * GRID)
         self.primary = button("", "do it", primary, "primary")
+        self.second = button("Review  F4", "look at the session that has ended", review)
+        self.second.hide()
         policy = self.primary.sizePolicy()
         policy.setRetainSizeWhenHidden(True)
         self.primary.setSizePolicy(policy)
@@ -136,6 +141,7 @@ class ToDo(QFrame):
         layout.setSpacing(2 * GRID)
         layout.addWidget(self._arrow)
         layout.addWidget(self.sentence, 1)
+        layout.addWidget(self.second)
         layout.addWidget(self.primary)
 
     def show_what(self, sentence: str, primary: Button | None, direction: int) -> None:
@@ -147,6 +153,7 @@ class ToDo(QFrame):
             if self.primary.text() != text:
                 self.primary.setText(text)
                 self.primary.setAccessibleName(f"{primary.label}: {sentence}")
+            self.primary.setEnabled(primary.enabled)
         self.primary.setVisible(primary is not None)
 
     def show_small(self, small: bool) -> None:

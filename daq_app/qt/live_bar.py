@@ -6,14 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetrics, QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from daq_app.qt.parts import button, choice, label, say
-from daq_app.qt.tokens import GRID, MU, TITLE, N, T, font
+from daq_app.qt.tokens import GRID, MU, SMALL, TEXT, TITLE, N, T, font
 from daq_app.window.live_trace import CHANNELS
 
 LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
 READ = (("N", "N", 2, N), ("T", "N", 2, T), ("mu", "", 2, MU), ("speed", "mm/s", 0, ""))
+SIZES = ((TITLE, "title"), (TEXT, "value"), (SMALL, "tight"))  # of the numbers: the first for which there is room
 WIDEST = {"N": "−00.00 N", "T": "00.00 N", "mu": "0.00", "speed": "000 mm/s"}  # each number keeps its place
 
 
@@ -38,14 +39,18 @@ class LiveBar(QWidget):
             self.length.addItem(f"{seconds} s", seconds)
         self.length.activated.connect(self._chosen)
         self.length.setFixedWidth(round(84 * scale))
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(GRID)
-        self._place_numbers(row)
-        row.addStretch(1)
-        row.addWidget(self.finite)
-        row.addWidget(self.length)
-        row.addWidget(self.hold)
+        self._rows = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._rows.setContentsMargins(0, 0, 0, 0)
+        self._rows.setSpacing(GRID // 2)
+        numbers, acts = QHBoxLayout(), QHBoxLayout()
+        for row in (numbers, acts):
+            row.setSpacing(GRID)
+            self._rows.addLayout(row)
+        self._place_numbers(numbers)
+        numbers.addStretch(1)
+        acts.addStretch(1)
+        for made in (self.finite, self.length, self.hold):
+            acts.addWidget(made)
         for made in (self.hold, self.finite):
             made.setCheckable(True)
         for made in (self.hold, self.finite, self.length):
@@ -79,18 +84,37 @@ class LiveBar(QWidget):
         self._show_length(LENGTHS[at])
 
     def _fit(self) -> None:
-        room = self.width() - sum(w.sizeHint().width() + GRID for w in (self.finite, self.hold)) - self.length.width()
-        for caption, value in self._pairs:
+        """Put the acts below the numbers where both find no room in a row, and the numbers in smaller type then."""
+        acts = sum(w.sizeHint().width() + GRID for w in (self.finite, self.hold)) + self.length.width()
+        beside = self._forces_shown and self._needed(TITLE) + acts <= self.width()
+        size, role = next((pair for pair in SIZES if self._needed(pair[0]) <= self.width()), SIZES[-1])
+        direction = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
+        self._rows.setDirection(direction if self._forces_shown else QBoxLayout.Direction.LeftToRight)
+        room = self.width()
+        for channel, (caption, value) in zip(self.values, self._pairs, strict=True):
+            value.setFixedWidth(self._widest(channel, size))
+            if value.property("role") != role:
+                value.setProperty("role", role)
+                value.style().unpolish(value)
+                value.style().polish(value)
             room -= caption.sizeHint().width() + value.width() + 2 * GRID
-            caption.setVisible(self._forces_shown and room >= 0)
-            value.setVisible(self._forces_shown and room >= 0)
+            for made in (caption, value):
+                made.setVisible(self._forces_shown and room >= 0)
+
+    def _needed(self, size: int) -> int:
+        """Return the width of all numbers in a type [px]."""
+        captions = sum(caption.sizeHint().width() + 2 * GRID for caption, _ in self._pairs)
+        return captions + sum(self._widest(channel, size) for channel in self.values)
+
+    def _widest(self, channel: str, size: int) -> int:
+        metrics = QFontMetrics(font(size, self._scale, bold=size == TITLE))
+        return metrics.horizontalAdvance(WIDEST[channel]) + 4
 
     def _place_numbers(self, row: QHBoxLayout) -> None:
         for channel, _, _, colour in READ:
             name = {"mu": "µ"}.get(channel, channel)
             value = label("–", "title")
-            bold = font(TITLE, self._scale, bold=True)
-            value.setFixedWidth(QFontMetrics(bold).horizontalAdvance(WIDEST[channel]) + 4)
+            value.setFixedWidth(self._widest(channel, TITLE))
             value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             value.setAccessibleName(f"{name} now")
             caption = label(name, "quiet")

@@ -1,5 +1,7 @@
 """What the transducer measures now: forces, ratio, speed, all six axes, and the finger on the sample."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QGridLayout, QVBoxLayout, QWidget
@@ -11,7 +13,7 @@ from daq_app.qt.live_bar import LENGTHS, LiveBar
 from daq_app.qt.live_plot import LivePlot
 from daq_app.qt.screens import settings
 from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, N, T, Tokens
-from daq_app.window.course_state import Mark
+from daq_app.window.course_state import Mark, picture_end
 from daq_app.window.live_feed import LiveFeed
 from daq_app.window.live_model_process import LiveModel
 from daq_app.window.live_trace import CHANNELS
@@ -141,24 +143,32 @@ class LivePanel(QFrame):
         now = self._held if self._held is not None else newest
         if now is None or newest is None:
             now, marks = 0.0, ()
-        count = self._columns()
-        seen = tuple(mark for mark in marks if mark.stop >= now - self._seconds and mark.start <= now)
-        drawn = (trace, now, self._seconds, count, seen)
+        end = picture_end(marks, now)
+        seen = tuple(mark for mark in marks if mark.stop >= end - self._seconds and mark.start <= now)
+        drawn = (trace, now, end, self._seconds, self._columns(), seen)
         if drawn != self._drawn:
             self._drawn = drawn
-            columns = trace.columns(now - self._seconds, np.nextafter(now, np.inf), count)
-            for plot in self.plots:
-                if plot.isVisible():
-                    plot.show_columns(columns, now, seen, clock)
+            self._show_until(self.plots[:3], end, seen, clock)
+            self._show_until(self.plots[3:], now, seen, clock)
+            frozen = newest is not None and end < newest
+            for plot in (*self.plots[:3], self._model_plot):
+                plot.show_end("lift + 1 s" if frozen and self._held is None else "held" if frozen else "now")
             if self.map.isVisible():
                 every = max(round(TRAIL * trace.rate / POINTS), 1)
                 _, values = trace.between(now - TRAIL, np.nextafter(now, np.inf), every)
                 self.map.show_trail(values[CHANNELS.index("x") : CHANNELS.index("y") + 1].T)
-        self._draw_model(now, clock)
+        self._draw_model(end, clock)
         if clock - self._read_at >= READ_EVERY:
             self._read_at = clock
             _, values = trace.between(now - 0.1, np.nextafter(now, np.inf))
             self.bar.show_numbers(values)
+
+    def _show_until(self, plots: Sequence[LivePlot], end: float, marks: tuple[Mark, ...], clock: float) -> None:
+        """Show the readings up to `end` [s, device time]."""
+        columns = self._feed.trace.columns(end - self._seconds, np.nextafter(end, np.inf), self._columns())
+        for plot in plots:
+            if plot.isVisible():
+                plot.show_columns(columns, end, marks, clock)
 
     def model_says(self) -> None:
         """Take what the model said since the last call."""

@@ -48,6 +48,7 @@ class LivePlot(PaintedWidget):
         self._type_scale = type_scale
         self._seconds = 10.0
         self._times_shown = True
+        self._end = "now"  # what the right edge is
         self._now = 0.0
         self._columns = Columns(np.empty(0), np.empty((len(tuple(channels)), 0)))
         self._marks: tuple[Mark, ...] = ()
@@ -65,6 +66,12 @@ class LivePlot(PaintedWidget):
         """Show the numbers of the time axis, or leave them to the plot below."""
         if shown != self._times_shown:
             self._times_shown = shown
+            self.redraw()
+
+    def show_end(self, words: str) -> None:
+        """Say which instant is at the right edge."""
+        if words != self._end:
+            self._end = words
             self.redraw()
 
     def show_columns(self, columns: Columns, now: float, marks: Sequence[Mark], clock: float) -> None:
@@ -143,7 +150,7 @@ class LivePlot(PaintedWidget):
             painter.drawLine(QPointF(x, inside.bottom()), QPointF(x, inside.bottom() - 4))
             if not self._times_shown:
                 continue
-            text = f"{_number(value)} s" if value else "now"
+            text = f"{_number(value)} s" if value else self._end
             width = metrics.horizontalAdvance(text)
             left = min(max(x - width / 2.0, 0.0), self.width() - width - 1)
             painter.setPen(QColor(self.tokens.quiet))

@@ -1,18 +1,17 @@
 """The experimenter's window: places the panels, and sends what buttons and keys mean."""
 
 import secrets
-import threading
+from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
-from PySide6.QtCore import QSize, Qt, QTimer
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
-    QFileDialog,
+    QGridLayout,
     QHBoxLayout,
     QMainWindow,
-    QSizePolicy,
     QStackedWidget,
     QVBoxLayout,
     QWidget,
@@ -25,29 +24,38 @@ from daq_app.qt.header import Header, Notice, ToDo
 from daq_app.qt.keyboard import Keyboard
 from daq_app.qt.keys import KeysPage
 from daq_app.qt.live_panel import LivePanel
+from daq_app.qt.menus import Menus
 from daq_app.qt.new_session_page import NewSessionPage
 from daq_app.qt.parts import button, label, regrade, say
+from daq_app.qt.rail import Rail, Room
+from daq_app.qt.remembered import restore_place, save_place
+from daq_app.qt.rooms import Rooms
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import millimetres
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Tare
-from daq_app.window.messages import DevicesFound, Message, NewSession, Searching
-from daq_app.window.new_session import Bench, Refused, checked, is_code, unfinished
+from daq_app.window.checklist import headline
+from daq_app.window.messages import Message, NewSession
+from daq_app.window.new_session import Refused, bench_of, checked
 from daq_app.window.view import View
 from daq_app.window.view_course import Button
-from drivers.catalog import reachable
 from sessions.recording import Setting
 
+COURSE = frozenset({"primary", "redo", "skip", "pause", "note", "no answer", "end"})  # of the session in hand
+# Before the scale of the fonts [px]:
 WIDE = 1366  # below it the bench folds to a strip of lamps
 ROOMY = 1100  # below it the six axes and the sample fold away
 TALL = 620  # below it the type of the headline is smaller
 LOW = 500  # below it an empty notice gives up its line
+CARDS, PLAN = 600, 316  # widths of the checklist and of the plan
 LEAVING = 10.0  # closing twice within so long leaves a session that is being recorded [s]
 
 
 class MainWindow(QMainWindow):
     """What the experimenter sees. It knows nothing but the last `View`."""
+
+    theme_wanted = Signal(str)
 
     def __init__(self, bridge: Bridge, tokens: Tokens, scale: float) -> None:
         """Place the panels, and follow `bridge`."""
@@ -62,11 +70,12 @@ class MainWindow(QMainWindow):
         self._bench_shown: bool | None = None  # as somebody wished; None: as there is room
         self.header = Header(tokens, self.show_subject, self._show_keys)
         self.notice = Notice(scale, bridge.send)
-        self.to_do = ToDo(tokens, self._primary)
-        self.page = NewSessionPage(scale, bridge.send)
+        self.to_do = ToDo(tokens, self._primary, lambda: self.act("go to review"))
+        self.rail = Rail(scale, lambda room: self.act(f"go to {room}"))
+        self.page = NewSessionPage(scale, bridge.send, lambda: self.act("ruler"))
         self.course = CoursePanel(scale, bridge.send)
         self.live = LivePanel(bridge.feed, bridge.model, tokens, scale)
-        self.bench = BenchPanel(tokens, scale, bridge.send, self._search)
+        self.bench = BenchPanel(tokens, scale, bridge.send, bridge.search)
         self.strip = BenchStrip(tokens, scale, self._fold_bench)
         self.stroke = label("No stroke yet.", wrap=True)
         self.stroke.setAccessibleName("the last stroke")
@@ -76,6 +85,8 @@ class MainWindow(QMainWindow):
         self.subject.screen_changed.connect(self._line_changed)
         self.keyboard = Keyboard(self, self.course.plan, self.subject, self.act)
         self.keyboard.free.connect(self._bring_subject)
+        self.rooms = Rooms(bridge, tokens, scale, self.rail, Menus(self, self.act, self.theme_wanted.emit))
+        self._acts = self._table()
         self._left = QStackedWidget()
         self._left.addWidget(self.page)
         self._left.addWidget(self.course)
@@ -85,7 +96,8 @@ class MainWindow(QMainWindow):
         bridge.changed.connect(self.show_view)
         bridge.frame.connect(self._draw)
         self.show_view(bridge.view)
-        self._look_for_unfinished()
+        self.page.look_for_unfinished()
+        restore_place(self)
         for made in self.findChildren(QAbstractButton):
             made.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves Space to the primary button
         self.page.subject.setFocus()
@@ -116,12 +128,14 @@ class MainWindow(QMainWindow):
             regrade(self.stroke, {"refused": "wrong", "doubtful": "look"}.get(course.stroke.grade, ""))
             self.redo.setEnabled(course.redo.enabled)
             self.redo.setText(f"{course.redo.label}  {course.redo.key}")
+        self.to_do.second.setVisible(self.rooms.over)
+        self.rooms.show_state()
         self._show_subject_view(view)
 
     def set_tokens(self, tokens: Tokens) -> None:
         """Follow another theme."""
         self._tokens = tokens
-        for part in (self.header, self.to_do, self.live, self.bench, self.strip, self.subject):
+        for part in (self.header, self.to_do, self.live, self.bench, self.strip, self.subject, self.rooms):
             part.set_tokens(tokens)
 
     def show_subject(self) -> None:
@@ -143,46 +157,56 @@ class MainWindow(QMainWindow):
         if others or activating:
             self.subject.show()
 
-    def act(self, act: str) -> None:  # noqa: C901  a table of cases
-        """Do what a key stands for."""
-        match act:
-            case "primary":
-                self._primary()
-            case "redo" | "skip" | "note" | "no answer" | "end" if self.course.isVisible():
-                self.course.ask(act)
-                if self.course.asking:
-                    self._come_back()
-            case "pause" if self.course.isVisible():
-                self.course.pause.click()
-            case "new" if self._view_over():
-                self.bridge.send(NewSession())
-            case "tare" if self.bridge.view.bench.can_tare:
-                self.bridge.send(Tare())
-            case "acknowledge" if self.bridge.view.bench.can_acknowledge:
-                self.bridge.send(AcknowledgeOverloads())
-            case "hold":
-                self.live.toggle_hold()
-            case "model":
-                self.live.toggle_finite()
-            case "longer" | "shorter":
-                self.live.change_length(1 if act == "longer" else -1)
-            case "bench":
-                self._fold_bench()
-            case "subject":
-                self.show_subject()
-            case "ruler":
-                self.show_subject()
-                self.subject.check_ruler()
-            case "open":
-                self._open_session()
-            case "keys":
-                self._show_keys()
-            case "leave":
-                if self.keys is not None:
-                    self.keys.hide()
-                self.course.leave()
-            case _:
-                pass
+    def act(self, act: str) -> None:
+        """Do what a key, a button or an entry of the menu stands for."""
+        if act in COURSE and self.rooms.room == "review":
+            self.go_to("run" if self.bridge.view.course is not None else "prepare")
+        elif act.startswith("open "):
+            self.rooms.open(Path(act.removeprefix("open ")))
+        elif act in self._acts:
+            self._acts[act]()
+        elif act in ("redo", "skip", "note", "no answer", "end") and self.course.isVisible():
+            self.course.ask(act)
+            if self.course.asking:
+                self._come_back()
+
+    def _table(self) -> dict[str, Callable[[], object]]:
+        """Return what is done for each act that is not the course panel's own."""
+        return {
+            "primary": self._primary,
+            "pause": lambda: self.course.isVisible() and self.course.pause.click(),
+            "new": lambda: self.rooms.over and self.bridge.send(NewSession()),
+            "tare": lambda: self.bridge.view.bench.can_tare and self.bridge.send(Tare()),
+            "acknowledge": lambda: self.bridge.view.bench.can_acknowledge and self.bridge.send(AcknowledgeOverloads()),
+            "hold": self.live.toggle_hold,
+            "model": self.live.toggle_finite,
+            "longer": lambda: self.live.change_length(1),
+            "shorter": lambda: self.live.change_length(-1),
+            "bench": self._fold_bench,
+            "subject": self.show_subject,
+            "ruler": lambda: (self.show_subject(), self.subject.check_ruler()),
+            "open": self.rooms.choose,
+            "report": lambda: (at := self.rooms.analyst) and at.write_report(),
+            "export": lambda: (at := self.rooms.analyst) and at.write_export(),
+            "keys": self._show_keys,
+            "leave": self._leave,
+            "go to prepare": lambda: self.go_to("prepare"),
+            "go to run": lambda: self.go_to("run"),
+            "go to review": lambda: self.go_to("review"),
+            "type size": lambda: self.notice.warn("The size of type that was chosen holds from the next start on."),
+            "quit": self.close,
+        }
+
+    def go_to(self, room: Room) -> None:
+        """Show a room, where it can be."""
+        self.rooms.go_to(room)
+        if room != "review":
+            (self.page.subject if self.rooms.room == "prepare" else self).setFocus()
+
+    def _leave(self) -> None:
+        if self.keys is not None:
+            self.keys.hide()
+        self.course.leave()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Obey the keys; those of a field that is typed in never come here."""
@@ -205,7 +229,9 @@ class MainWindow(QMainWindow):
             )
             event.ignore()
             return
+        save_place(self)
         self.bridge.end()
+        self.rooms.leave()
         self.subject.hide()
         QGuiApplication.quit()
 
@@ -225,27 +251,29 @@ class MainWindow(QMainWindow):
             Setting("answer line length", LENGTH, "mm", origin),
             Setting("pixels in a millimetre of the answering screen", round(shown.pixels, 4), "1/mm", origin),
         )
-        made = checked(self.page.form(), self._bench(), datetime.now(), secrets.randbelow(2**31), settings)
-        if isinstance(made, Refused):
-            self.page.show_refusals(dict(made.sentences))
+        cards = self.page.check(bench_of(self.bridge.state.bench), anew=True)
+        if not all(card.ready for card in cards):
+            self._form_changed()
+            self.page.go_to_missing()
             return
-        self.page.show_refusals({})
+        made = checked(
+            self.page.form(), bench_of(self.bridge.state.bench), datetime.now(), secrets.randbelow(2**31), settings
+        )
+        if isinstance(made, Refused):
+            self.notice.warn(" ".join(made.sentences.values()))
+            return
         if made.people.kind == "simulated people":
             self.subject.hide()
         self.bridge.send(made)
 
     def _form_changed(self) -> None:
         """Say what is to be done on the page of a new session."""
-        bench = self._bench()
+        bench = bench_of(self.bridge.state.bench)
         self.live.show_forces(True)
         self.page.show_bench(bench)
-        form = self.page.form()
-        sentence = "Give the subject's code, then press Enter to start."
-        if form.forces and not bench.connected:
-            sentence = "Connect a transducer, or choose scores only."
-        elif is_code(form.subject):
-            sentence = f"Press Enter to start the session of {form.subject.strip()}."
-        self.to_do.show_what(sentence, Button("Start", "Enter"), 0)
+        cards = self.page.check(bench)
+        ready = all(card.ready for card in cards)
+        self.to_do.show_what(headline(cards, self.page.subject.text()), Button("Start", "Enter", ready), 0)
         self.redo.setEnabled(False)
         say(self.stroke, "No stroke yet.")
         regrade(self.stroke, "")
@@ -254,16 +282,12 @@ class MainWindow(QMainWindow):
         """Show the page of a new session (0) or the course (1); keys go where they are of use there."""
         if page != self._left.currentIndex():
             self._left.setCurrentIndex(page)
+            self._fit()
             (self.page.subject if page == 0 else self).setFocus()
             self.subject.given_with = None  # an answer of another session
             if page == 0:
                 self.page.subject.clear()  # the next session is not begun by whoever was there last
-                self._look_for_unfinished()
-
-    def _bench(self) -> Bench:
-        bench = self.bridge.state.bench
-        simulated = bench.info is not None and bench.info.simulated and bench.frame is not None
-        return Bench(bench.link == "open", simulated, bench.frame)
+                self.page.look_for_unfinished()
 
     def _show_subject_view(self, view: View) -> None:
         session = self.bridge.state.session
@@ -292,6 +316,8 @@ class MainWindow(QMainWindow):
 
     def _line_changed(self) -> None:
         self.page.show_line(millimetres(self.subject.screen()))
+        if self.bridge.view.course is None:
+            self._form_changed()
 
     def _answered(self, event: Message) -> None:
         self.bridge.send(event)
@@ -309,39 +335,6 @@ class MainWindow(QMainWindow):
         except Exception as error:  # noqa: BLE001  an error while drawing never stops a recording
             self.bridge.drawing_failed(error)
 
-    def _open_session(self) -> None:
-        """Open the analyst's window on a session that is chosen."""
-        name = QFileDialog.getExistingDirectory(self, "Session folder", self.page.form().folder or ".")
-        if name:
-            from daq_app.qt.analyst_window import AnalystWindow  # loaded when somebody asks for it
-
-            self.analyst = AnalystWindow(Path(name), self._tokens)
-            self.analyst.show()
-
-    def _search(self) -> None:
-        self.bridge.send(Searching())
-        threading.Thread(target=lambda: self.bridge.post(DevicesFound(reachable())), daemon=True).start()
-
-    def _look_for_unfinished(self) -> None:
-        """Look for sessions that were cut short, without holding up the window."""
-        folder = Path(self.page.form().folder or ".")
-        found: list[tuple[object, ...]] = []
-        worker = threading.Thread(target=lambda: found.append(unfinished(folder)), daemon=True)
-        worker.start()
-        self._unfinished_timer = timer = QTimer(self)
-        timer.setInterval(100)
-
-        def look() -> None:
-            if not worker.is_alive():
-                timer.stop()
-                self.page.show_unfinished(found[0] if found else ())  # pyright: ignore[reportArgumentType]
-
-        timer.timeout.connect(look)
-        timer.start()
-
-    def _view_over(self) -> bool:
-        return self.bridge.state.session is not None and self.bridge.state.session.over
-
     def _show_keys(self) -> None:
         if self.keys is None:
             self.keys = KeysPage(self)
@@ -354,13 +347,16 @@ class MainWindow(QMainWindow):
         self._fit()
 
     def _fit(self) -> None:
-        wide = self.width() >= WIDE * min(self._scale, 1.0)
+        width, height = self.width() / self._scale, self.height() / self._scale
+        wide = width >= WIDE
         shown = wide if self._bench_shown is None else self._bench_shown
         self.bench.setVisible(shown)
-        self.strip.setVisible(not shown and self.width() >= 800)
-        self.live.show_side(self.width() >= ROOMY and not (shown and not wide))
-        self.to_do.show_small(self.height() < TALL or self.width() < ROOMY)
-        self.notice.show_folding(self.height() < LOW)
+        cards = self._left.currentIndex() == 0 and width >= WIDE
+        self._left.setMaximumWidth(round((CARDS if cards else PLAN) * min(self._scale, 1.4)))
+        self.strip.setVisible(not shown and width >= 800)
+        self.live.show_side(width >= ROOMY + (CARDS if cards else 0) and not (shown and not wide))
+        self.to_do.show_small(height < TALL or width < ROOMY)
+        self.notice.show_folding(height < LOW)
         if self.keys is not None:
             self.keys.fit(self.size(), self._scale)
 
@@ -376,18 +372,27 @@ class MainWindow(QMainWindow):
         middle.addLayout(row)
         body = QHBoxLayout()
         body.setSpacing(GRID)
-        self._left.setFixedWidth(round(316 * min(self._scale, 1.4)))
-        self._left.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
+        self._left.setMinimumWidth(round(PLAN * min(self._scale, 1.4)))
         self.bench.setFixedWidth(round(290 * min(self._scale, 1.4)))
-        body.addWidget(self._left)
-        body.addLayout(middle, 1)
-        body.addWidget(self.bench)
-        body.addWidget(self.strip)
-        layout = QVBoxLayout(window)
-        layout.setContentsMargins(GRID, GRID, GRID, GRID)
+        body.addWidget(self._left, 4)
+        body.addLayout(middle, 3)
+        for part in (self.bench, self.strip):
+            part.hide()  # until it is known how much room there is
+            body.addWidget(part)
+        here = QWidget()
+        layout = QVBoxLayout(here)
+        layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(GRID)
-        layout.addWidget(self.header)
         layout.addWidget(self.notice)
         layout.addWidget(self.to_do)
         layout.addLayout(body, 1)
+        self.rooms.addWidget(here)
+        frame = QGridLayout(window)
+        frame.setContentsMargins(GRID, GRID // 2, GRID, GRID)
+        frame.setSpacing(GRID)
+        frame.addWidget(self.rail, 0, 0, 2, 1)
+        frame.addWidget(self.header, 0, 1)
+        frame.addWidget(self.rooms, 1, 1)
+        frame.setRowStretch(1, 1)
+        frame.setColumnStretch(1, 1)
         return window

@@ -1,33 +1,49 @@
-"""The page on which a session is begun: what is wrong stands beside the field it is wrong in."""
+"""The page on which a session is begun: a checklist of cards, each of which says in one line why not."""
 
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
+    QBoxLayout,
     QButtonGroup,
     QCheckBox,
     QComboBox,
+    QCompleter,
     QFileDialog,
     QFrame,
     QHBoxLayout,
-    QLabel,
     QLineEdit,
     QRadioButton,
     QVBoxLayout,
     QWidget,
 )
 
-from daq_app.qt.parts import button, choice, label, regrade, say, scrolled
+from daq_app.qt.card import CardFrame
+from daq_app.qt.parts import button, choice, label, say, scrolled
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.recorder.messages import ResumeSession
+from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
 from daq_app.window.messages import Message
-from daq_app.window.new_session import AXES, Bench, SessionForm, Unfinished, enrolled, enrolment, offered
+from daq_app.window.new_session import (
+    AXES,
+    Bench,
+    SessionForm,
+    Unfinished,
+    enrolled,
+    enrolment,
+    offered,
+    place_of,
+    unfinished,
+)
 from sessions.plan.plan import Hand
 from sessions.plan.protocols import protocol_names
 
+TWO = 565  # at which the cards stand in two columns, before the font's scale [px]
 HANDS: tuple[tuple[str, Hand | None], ...] = (("not stated", None), ("right", "right"), ("left", "left"))
 
 
@@ -36,16 +52,21 @@ class NewSessionPage(QFrame):
 
     changed = Signal()
 
-    def __init__(self, scale: float, send: Callable[[Message], None]) -> None:
-        """Show an empty form; `send` takes what is asked for. Enter goes to the window, whose primary button begins."""
+    def __init__(self, scale: float, send: Callable[[Message], None], ruler: Callable[[], None]) -> None:
+        """Show an empty form; `send` takes what is asked for, `ruler` checks the subject's screen.
+
+        Enter goes to the window, whose primary button begins.
+        """
         super().__init__()
         self.setProperty("role", "panel")
         self.setAccessibleName("new session")
         self._send = send
-        self._wrong: dict[str, QLabel] = {}
+        self._ruler = ruler
+        self._cards: tuple[Card, ...] = ()
+        self._checked: object = None  # what the cards were derived from
+        self.frames = {name: CardFrame(name) for name in FIELDS}
         self._shown: tuple[Unfinished, ...] = ()
         self.subject = _line("subject code, never a name")
-        self.subject.setPlaceholderText("e.g. P07")
         self.protocol = choice("protocol")
         self.protocol.addItems([*protocol_names(), "choose a file …"])
         self.protocol.setCurrentText(SessionForm().protocol)
@@ -67,7 +88,7 @@ class NewSessionPage(QFrame):
         self.with_forces = QRadioButton("Forces, with the transducer")
         self.scores_only = QRadioButton("Scores only")
         self.people_score = QRadioButton("People")
-        self.simulated = QRadioButton("Simulated")
+        self.simulated = QRadioButton("Rehearse, simulated")
         for pair, chosen in (((self.with_forces, self.scores_only), 0), ((self.people_score, self.simulated), 0)):
             group = QButtonGroup(self)
             for made in pair:
@@ -76,12 +97,11 @@ class NewSessionPage(QFrame):
                 made.setMinimumHeight(TARGET - GRID)
             pair[chosen].setChecked(True)
         self._people_words = label("", "quiet", wrap=True)
-        self._line_words = label("", "quiet", wrap=True)
-        self._study_words = label("", "quiet", wrap=True)
+        self._screen = ""  # how far the length of the subject's line is known
         self._enrol = button("Enrol", "enrol the subject in the study", self._enrolled)
         self._resume = choice("sessions that were cut short")
         self._go_on = button("Go on with it", "go on with the session that was cut short", self._resumed)
-        self._unfinished, self._height, self._area = QWidget(), QWidget(), QWidget()
+        self._unfinished, self._height, self._area = QFrame(), QWidget(), QWidget()
         self._build(scale)
         for line in (self.subject, self.study, self.folder, self.seed, self.height_above, self.area):
             line.textChanged.connect(self.changed)
@@ -90,6 +110,9 @@ class NewSessionPage(QFrame):
         for line in (self.subject, self.study, self.folder):
             line.textChanged.connect(self._show_study)
         self.protocol.currentTextChanged.connect(self._show_study)
+        for line in (self.study, self.folder):
+            line.textChanged.connect(self._place_changed)
+        self._place_changed()
         self._show_study()
         self.show_unfinished(())
 
@@ -119,7 +142,10 @@ class NewSessionPage(QFrame):
         self._area.setVisible(self.with_forces.isChecked())
         words = "The subject strokes the transducer and scores."
         if self.simulated.isChecked():
-            words = "Nobody is needed: strokes and scores are simulated, and marked so."
+            words = (
+                "Nobody is needed: strokes and scores are simulated, and marked so. "
+                "For a sample of your own the nearest of the bench's ten surfaces stands in."
+            )
         elif bench.simulated and self.with_forces.isChecked():
             words = "A simulated hand strokes when asked; you mount, and you or a subject score."
         elif self.scores_only.isChecked():
@@ -132,14 +158,20 @@ class NewSessionPage(QFrame):
 
     def show_line(self, known: Millimetres) -> None:
         """Say how far the length of the subject's line can be trusted."""
-        say(self._line_words, f"Subject's line: {LENGTH:.0f} mm, {known.words}. Ctrl+M checks it.")
+        self._screen = f"Line of {LENGTH:.0f} mm, {known.words}."
 
-    def show_refusals(self, sentences: dict[str, str]) -> None:
-        """Say what is wrong beside each field; the first wrong one is where typing goes."""
-        for name, shown in self._wrong.items():
-            say(shown, sentences.get(name, ""))
-            shown.setVisible(name in sentences)
-            regrade(shown, "wrong" if name in sentences else "")
+    def check(self, bench: Bench, *, anew: bool = False) -> tuple[Card, ...]:
+        """Show what each card lacks, and return the cards; nothing is read from the disk while nothing has changed."""
+        form = self.form()
+        if anew or (form, bench, self._screen) != self._checked:
+            self._checked = (form, bench, self._screen)
+            self._cards = checklist(form, bench, self._screen)
+            for card in self._cards:
+                self.frames[card.name].show_card(card)
+        return self._cards
+
+    def go_to_missing(self) -> None:
+        """Let typing go to the first field that is wrong, and mark its card."""
         fields: dict[str, QWidget] = {
             "subject": self.subject,
             "protocol": self.protocol,
@@ -149,9 +181,29 @@ class NewSessionPage(QFrame):
             "height": self.height_above,
             "area": self.area,
         }
-        first = next((fields[name] for name in fields if name in sentences), None)
+        missing = [card for card in self._cards if not card.ready]
+        for card in missing:
+            self.frames[card.name].insist()
+        first = next((fields[card.field] for card in missing if card.field in fields), None)
         if first is not None:
             first.setFocus()
+
+    def look_for_unfinished(self) -> None:
+        """Look for sessions that were cut short, without holding up the window."""
+        folder = Path(self.form().folder or ".")
+        results: list[tuple[Unfinished, ...]] = []
+        worker = threading.Thread(target=lambda: results.append(unfinished(folder)), daemon=True)
+        worker.start()
+        self._looking = timer = QTimer(self)
+        timer.setInterval(100)
+
+        def look() -> None:
+            if not worker.is_alive():
+                timer.stop()
+                self.show_unfinished(results[0] if results else ())
+
+        timer.timeout.connect(look)
+        timer.start()
 
     def show_unfinished(self, found: tuple[Unfinished, ...]) -> None:
         """Offer the sessions that were cut short."""
@@ -168,20 +220,18 @@ class NewSessionPage(QFrame):
         found, before = enrolment(self.form()), offered(self.form())
         self.pre_evaluation.setVisible("pre-evaluation" in before)
         self.practice.setVisible("practice" in before)
-        say(self._study_words, "" if found is None else found.words)
-        self._study_words.setVisible(found is not None)
         self._enrol.setVisible(found is not None and found.may_enrol)
         for made in (self.protocol, self.seed):
             made.setEnabled(found is None)
             made.setToolTip("" if found is None else f"the study's own: {found.protocol}")
 
     def _enrolled(self) -> None:
-        if refused := enrolled(self.form()):
-            self.show_refusals({"study": refused})
-        else:
-            self.show_refusals({})
-            self._show_study()
-            self.changed.emit()
+        refused = enrolled(self.form())
+        self._show_study()
+        self._checked = None  # the study has changed, not the form
+        self.changed.emit()
+        if refused:
+            self.frames["Subject"].show_card(Card("Subject", ready=False, words=refused, field="subject"))
 
     def _resumed(self) -> None:
         folder = self._resume.currentData()
@@ -209,92 +259,104 @@ class NewSessionPage(QFrame):
         if name:
             self.folder.setText(name)
 
+    def _place_changed(self) -> None:
+        """Offer the studies of the folder, and the code after those that were there."""
+        folder = Path(self.folder.text().strip() or ".").expanduser()
+        self.study.setCompleter(QCompleter(list(studies_in(folder)), self.study))
+        self.subject.setPlaceholderText(f"e.g. {next_code(codes_in(place_of(self.form())))}")
+
     def _build(self, scale: float) -> None:
         inside = QWidget()
         layout = QVBoxLayout(inside)
-        layout.setContentsMargins(int(1.5 * GRID), GRID, int(1.5 * GRID), GRID)
-        layout.setSpacing(4)
+        layout.setContentsMargins(GRID, GRID, GRID, GRID)
+        layout.setSpacing(GRID)
         layout.addWidget(label("New session", "title"))
-        self._build_subject(layout)
-        layout.addSpacing(GRID)
-        self._build_recorded(layout)
-        self._build_people(layout)
-        layout.addSpacing(GRID)
-        folder = QHBoxLayout()
-        folder.addWidget(self.folder, 1)
-        folder.addWidget(button("…", "choose the folder of sessions", self._choose_folder))
-        self._field(layout, "folder", "Folder", folder)
-        self._field(layout, "seed", "Seed", self.seed)
-        layout.addStretch(1)
-        cut_short = QVBoxLayout(self._unfinished)
-        cut_short.setContentsMargins(0, GRID, 0, 0)
-        for widget in (label("Sessions that were cut short", "section"), self._resume, self._go_on):
-            cut_short.addWidget(widget)
         layout.addWidget(self._unfinished)
+        self._unfinished.setProperty("role", "banner")
+        self._unfinished.setProperty("grade", "look")
+        cut_short = QVBoxLayout(self._unfinished)
+        for widget in (label("▲ Sessions that were cut short", wrap=True), self._resume, self._go_on):
+            cut_short.addWidget(widget)
+        self._columns = QBoxLayout(QBoxLayout.Direction.TopToBottom)
+        left, right = QVBoxLayout(), QVBoxLayout()
+        for column in (left, right):
+            column.setSpacing(GRID)
+            self._columns.addLayout(column, 1)
+        for column, name, build in (
+            (left, "Subject", self._build_subject),
+            (left, "Transducer", self._build_recorded),
+            (left, "Subject's screen", self._build_screen),
+            (right, "Study and protocol", self._build_study),
+            (right, "Disk", self._build_disk),
+        ):
+            column.addWidget(self.frames[name])
+            build(self.frames[name].body)
+        for column in (left, right):
+            column.addStretch(1)
+        layout.addLayout(self._columns)
+        layout.addStretch(1)
         outer = QVBoxLayout(self)
         outer.setContentsMargins(2, 2, 2, 2)
         outer.addWidget(scrolled(inside))
+        self._two = round(TWO * scale)
         self.setMinimumWidth(round(280 * min(scale, 1.25)))
 
-    def _build_subject(self, layout: QVBoxLayout) -> None:
-        """Lay out who takes part, in which study and by which protocol."""
-        self._field(layout, "subject", "Subject code", self.subject)
-        self._field(layout, "study", "Study, may be empty", self.study)
-        layout.addWidget(self._study_words)
-        layout.addWidget(self._enrol)
-        self._field(layout, "protocol", "Protocol", self.protocol)
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Put the cards in two columns where there is room."""
+        super().resizeEvent(event)
+        wide = self.width() >= self._two
+        self._columns.setDirection(QBoxLayout.Direction.LeftToRight if wide else QBoxLayout.Direction.TopToBottom)
+
+    def _build_study(self, layout: QVBoxLayout) -> None:
+        """Lay out in which study and by which protocol, and whether it is rehearsed."""
+        _field(layout, "Study, may be empty", self.study)
+        _field(layout, "Protocol", self.protocol)
         layout.addWidget(self.pre_evaluation)
         layout.addWidget(self.practice)
-        hands = QHBoxLayout()
-        for name, box in (("Stroking hand", self.stroking), ("Answering hand", self.answering)):
-            column = QVBoxLayout()
-            column.setSpacing(4)
-            column.addWidget(label(name, "quiet"))
-            column.addWidget(box)
-            hands.addLayout(column)
-        layout.addLayout(hands)
-
-    def _build_recorded(self, layout: QVBoxLayout) -> None:
-        """Lay out what is recorded, and what the analysis must know of the face."""
-        layout.addWidget(label("What is recorded", "section"))
-        layout.addWidget(self.with_forces)
-        layout.addWidget(self.scores_only)
-        self._refusal(layout, "forces")
-        of_height = QVBoxLayout(self._height)
-        of_height.setContentsMargins(0, 0, 0, 0)
-        self._field(of_height, "height", "Height of the face above the transducer's origin [mm]", self.height_above)
-        self._field(of_height, "normal", "Axis along which pressing is positive", self.normal)
-        layout.addWidget(self._height)
-        of_area = QVBoxLayout(self._area)
-        of_area.setContentsMargins(0, 0, 0, 0)
-        self._field(of_area, "area", "Contact area, for tau_max [mm²]", self.area)
-        layout.addWidget(self._area)
-
-    def _build_people(self, layout: QVBoxLayout) -> None:
-        """Lay out whether people or simulated ones stroke and score."""
-        layout.addWidget(label("Who strokes and scores", "section"))
+        _field(layout, "Seed of the order", self.seed)
+        layout.addWidget(label("Who strokes and scores", "quiet", wrap=True))
         row = QHBoxLayout()
         row.addWidget(self.people_score)
         row.addWidget(self.simulated)
         row.addStretch(1)
         layout.addLayout(row)
         layout.addWidget(self._people_words)
-        layout.addWidget(self._line_words)
-        self._refusal(layout, "simulated")
 
-    def _field(self, layout: QVBoxLayout, name: str, words: str, field: QWidget | QHBoxLayout) -> None:
-        layout.addWidget(label(words, "quiet"))
-        if isinstance(field, QWidget):
-            layout.addWidget(field)
-        else:
-            layout.addLayout(field)
-        self._refusal(layout, name)
+    def _build_subject(self, layout: QVBoxLayout) -> None:
+        """Lay out who takes part."""
+        _field(layout, "Subject code", self.subject)
+        layout.addWidget(self._enrol)
+        _field(layout, "Stroking hand", self.stroking)
+        _field(layout, "Answering hand", self.answering)
 
-    def _refusal(self, layout: QVBoxLayout, name: str) -> None:
-        made = label("", "quiet", wrap=True)
-        made.setVisible(False)
-        self._wrong[name] = made
-        layout.addWidget(made)
+    def _build_recorded(self, layout: QVBoxLayout) -> None:
+        """Lay out what is recorded, and what the analysis must know of the face."""
+        layout.addWidget(self.with_forces)
+        layout.addWidget(self.scores_only)
+        of_height = QVBoxLayout(self._height)
+        of_height.setContentsMargins(0, 0, 0, 0)
+        _field(of_height, "Height of the face above the transducer's origin [mm]", self.height_above)
+        _field(of_height, "Axis along which pressing is positive", self.normal)
+        layout.addWidget(self._height)
+        of_area = QVBoxLayout(self._area)
+        of_area.setContentsMargins(0, 0, 0, 0)
+        _field(of_area, "Contact area, for tau_max [mm²]", self.area)
+        layout.addWidget(self._area)
+
+    def _build_screen(self, layout: QVBoxLayout) -> None:
+        layout.addWidget(button("Check with a ruler  Ctrl+M", "check the subject's line with a ruler", self._ruler))
+
+    def _build_disk(self, layout: QVBoxLayout) -> None:
+        folder = QHBoxLayout()
+        folder.addWidget(self.folder, 1)
+        folder.addWidget(button("…", "choose the folder of sessions", self._choose_folder))
+        layout.addWidget(label("Folder", "quiet"))
+        layout.addLayout(folder)
+
+
+def _field(layout: QVBoxLayout, words: str, field: QWidget) -> None:
+    layout.addWidget(label(words, "quiet", wrap=True))
+    layout.addWidget(field)
 
 
 def _tick(words: str, name: str) -> QCheckBox:

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QHeaderView, QTableView, QVBoxLayout, QWidget
 
 from daq_app.analyst.raw import RawReadings
 from daq_app.qt.parts import Wrapped
+from daq_app.qt.text_table import CopiedTable
 from daq_app.qt.tokens import GRID
 
 HEAD = ("window", "sequence", "counter", "status", "time [s]", "received [ns]")
@@ -21,11 +22,8 @@ class ReadingsTable(QWidget):
         """Show nothing yet."""
         super().__init__()
         self.place = Wrapped("quiet")
-        self.table = QTableView()
-        self.table.setAccessibleName("raw readings")
-        self.table.setTabKeyNavigation(False)
+        self.table = CopiedTable("raw readings")  # in the order in which they came
         self.table.setSelectionBehavior(QTableView.SelectionBehavior.SelectRows)
-        self.table.verticalHeader().hide()
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
         self._model = _Model()
         self.table.setModel(self._model)

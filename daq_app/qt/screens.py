@@ -24,7 +24,7 @@ class Millimetres:
 
 
 def settings() -> QSettings:
-    """Return what the window remembers on this computer: the screens' sizes, nothing of any session."""
+    """Return what the window remembers on this computer: its looks, the screens' sizes, and folders of sessions."""
     # A file on every system: the format that follows the system cannot be led elsewhere by a test.
     return QSettings(QSettings.Format.IniFormat, QSettings.Scope.UserScope, "daq-app", "window")
 

@@ -39,11 +39,12 @@ def look_at(arguments: list[str]) -> int:
         return _said(f"{folder} is no folder: give a session's folder")
 
     def analyst(application: "QApplication") -> "AnalystWindow":
+        from daq_app.qt import remembered
         from daq_app.qt.analyst_window import AnalystWindow
-        from daq_app.qt.tokens import current_tokens, font_scale
 
-        tokens = current_tokens()
-        _dress(application, tokens, font_scale())
+        tokens = remembered.chosen_tokens()
+        _dress(application, tokens, remembered.type_scale())
+        remembered.remember_session(folder)
         return AnalystWindow(folder, tokens)
 
     return _shown(analyst)
@@ -71,22 +72,27 @@ def _opened(application: "QApplication", start: "Callable[[], Client] | None", t
     # The recorder's process starts while the window is being built.
     recorder = (start or Recorder.start)()
     recorder.send(Connect(SIMULATED_BENCH))
+    from daq_app.qt import remembered
     from daq_app.qt.bridge import Bridge
     from daq_app.qt.main_window import MainWindow
-    from daq_app.qt.tokens import current_tokens, font_scale
 
     application.setQuitOnLastWindowClosed(False)
-    scale, tokens = font_scale(), theme or current_tokens()
+    scale, tokens = remembered.type_scale(), theme or remembered.chosen_tokens()
     _dress(application, tokens, scale)
     bridge = Bridge(recorder, start or Recorder.start)
     bridge.connecting(SIMULATED_BENCH)
     window = MainWindow(bridge, tokens, scale)
 
     def theme_changed() -> None:
-        chosen = current_tokens()
+        chosen = remembered.chosen_tokens()
         _dress(application, chosen, scale)
         window.set_tokens(chosen)
 
+    def theme_chosen(name: str) -> None:
+        remembered.choose_theme(name)
+        theme_changed()
+
+    window.theme_wanted.connect(theme_chosen)
     if theme is None:
         application.styleHints().colorSchemeChanged.connect(theme_changed)
 
@@ -119,7 +125,8 @@ def _dress(application: "QApplication", tokens: "Tokens", scale: float) -> None:
     from daq_app.qt.tokens import palette, style_sheet
 
     application.setApplicationName("daq-app")
-    application.setStyle("Fusion")  # the one style that draws alike, and takes our colours, everywhere
+    if application.style().name() != "fusion":
+        application.setStyle("Fusion")  # the one style that draws alike, and takes our colours, everywhere
     application.setPalette(palette(tokens))
     application.setStyleSheet(style_sheet(tokens, scale))
 

@@ -13,6 +13,7 @@ from daq_app.analyst.messages import EDGES, Edge
 from daq_app.analyst.raw import RawReadings
 from daq_app.qt.edge_handle import EdgeHandle
 from daq_app.qt.tokens import GRID, MU, N, T, Tokens
+from daq_app.qt.zoomed_plot import ZoomedPlot
 from sessions.report.contents import StrokeFinding
 
 pg: Any = pyqtgraph  # it has no types
@@ -38,6 +39,7 @@ class StrokeView(QWidget):
         self._plots = [_plot(tokens, name) for name in ("N and T [N]", "µ = T/N [-]")]
         for plot in self._plots:
             layout.addWidget(plot, 1)
+            plot.reset = self.show_all
         self._plots[0].getPlotItem().getAxis("bottom").setLabel("")
         self._plots[1].setXLink(self._plots[0])
         fill = QColor(tokens.act)
@@ -82,6 +84,11 @@ class StrokeView(QWidget):
         if other:
             self.show_readings(None)
         self._draw(None)
+        if other:
+            self.show_all()
+
+    def show_all(self) -> None:
+        """Show the whole stroke, whatever was zoomed or moved."""
         for plot in self._plots:
             plot.enableAutoRange()
             plot.autoRange()
@@ -178,18 +185,9 @@ class StrokeView(QWidget):
 
 
 def _plot(tokens: Tokens, name: str) -> Any:  # noqa: ANN401  pyqtgraph has no types
-    plot = pg.PlotWidget(background=tokens.surface)
-    plot.setMinimumSize(120, 100)
-    plot.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    plot = ZoomedPlot(tokens)
     item = plot.getPlotItem()
-    item.setMenuEnabled(False)
-    item.hideButtons()
     item.showGrid(x=False, y=True, alpha=0.15)
-    for side in ("left", "bottom"):
-        item.getAxis(side).setPen(QColor(tokens.line))
-        item.getAxis(side).setTextPen(QColor(tokens.quiet))
-    item.getAxis("left").enableAutoSIPrefix(False)
-    item.getAxis("bottom").enableAutoSIPrefix(False)
     item.setLabel("left", name)
     item.setLabel("bottom", "time since contact [s]")
     return plot

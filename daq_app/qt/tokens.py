@@ -130,11 +130,14 @@ def style_sheet(t: Tokens, scale: float) -> str:
 QWidget#window, QMainWindow {{ background: {t.ground}; border: none; }}
 QFrame[role="panel"] {{ background: {t.surface}; border: 1px solid {t.line}; border-radius: 6px; }}
 QFrame[role="strip"] {{ background: {t.surface}; border: 1px solid {t.line}; border-radius: 6px; }}
+QFrame[role="card"] {{ border: 1px solid {t.line}; border-radius: 6px; }}
 QLabel {{ background: transparent; }}
 QLabel[role="quiet"] {{ color: {t.quiet}; font-size: {px(SMALL)}; }}
+QLabel[role="tight"] {{ font-size: {px(SMALL)}; }}
 QLabel[role="value"] {{ font-size: {px(TEXT)}; }}
 QLabel[role="title"] {{ font-size: {px(TITLE)}; font-weight: 600; }}
 QLabel[role="section"] {{ color: {t.quiet}; font-size: {px(SMALL)}; font-weight: 600; }}
+QLabel[role="name"] {{ font-size: {px(TEXT)}; font-weight: 600; }}
 QLabel[role="headline"] {{ font-size: {px(HEADLINE)}; font-weight: 600; }}
 QLabel[role="simulated"] {{ color: {t.look}; font-weight: 700; border: 2px solid {t.look}; border-radius: 4px;
   padding: 2px 8px; }}
@@ -157,11 +160,24 @@ QPushButton[role="primary"] {{ background: {t.act}; color: {t.on_act}; border: 2
 QPushButton[role="primary"]:focus {{ border: 3px solid {t.text}; }}
 QPushButton[role="primary"]:disabled {{ background: {t.ground}; color: {t.quiet}; border: 2px dashed {t.line}; }}
 QPushButton:checked {{ border: 2px solid {t.act}; font-weight: 600; }}
+QPushButton[role="rail"] {{ padding: 6px 2px; font-size: {px(SMALL)}; background: transparent; border: none; }}
+QPushButton[role="rail"]:checked {{ background: {t.raised}; border: 2px solid {t.act}; font-weight: 600; }}
+QMenuBar, QMenu {{ background: {t.surface}; }}
+QMenuBar::item:selected, QMenu::item:selected {{ background: {t.act}; color: {t.on_act}; }}
+QMenu::item:disabled {{ color: {t.quiet}; }}
 QPushButton[role="small"] {{ padding: 4px 4px; }}
 QPushButton[role="handle"] {{ padding: 4px 2px; font-size: {px(SMALL)}; }}
 QLineEdit, QPlainTextEdit {{ background: {t.raised}; border: 1px solid {t.line};
   border-radius: 4px; padding: 4px 8px; min-height: {TARGET - 12}px; selection-background-color: {t.act};
   selection-color: {t.on_act}; }}
+QAbstractItemView {{ selection-background-color: {t.act}; selection-color: {t.on_act};
+  background: {t.surface}; alternate-background-color: {t.raised}; }}
+QListView::item:selected, QTreeView::item:selected, QTableView::item:selected {{ background: {t.act};
+  color: {t.on_act}; }}
+QComboBox QAbstractItemView {{ background: {t.raised}; }}
+QHeaderView::section {{ background: {t.ground}; color: {t.quiet}; border: 1px solid {t.line}; padding: 3px 6px; }}
+QProgressBar {{ background: {t.raised}; border: 1px solid {t.line}; border-radius: 4px; text-align: center; }}
+QProgressBar::chunk {{ background: {t.line}; }}
 QListWidget, QTreeWidget {{ background: {t.surface}; border: 2px solid transparent; }}
 QListWidget::item {{ padding: 3px 2px; }}
 QScrollBar:vertical {{ background: transparent; width: 12px; }}

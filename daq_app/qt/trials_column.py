@@ -12,6 +12,7 @@ from daq_app.analyst.shown import marks_of, points, row_words
 from daq_app.analyst.state import AnalystState, chosen, rows
 from daq_app.qt.parts import label
 from daq_app.qt.tokens import MODEL, Tokens
+from daq_app.qt.zoomed_plot import ZoomedPlot
 
 pg: Any = pyqtgraph  # it has no types
 
@@ -75,14 +76,10 @@ class TrialsColumn(QWidget):
             self.asked.emit(m.Choose(row))
 
     def _relation(self) -> tuple[Any, Any]:
-        plot = pg.PlotWidget(background=self._tokens.surface)
-        plot.setMinimumSize(120, 100)
+        plot = ZoomedPlot(self._tokens)
         plot.setAccessibleName("prediction against score: a point chooses its trial")
-        plot.getPlotItem().setMenuEnabled(False)
-        plot.getPlotItem().hideButtons()
         plot.setLabel("bottom", "mean score")
-        plot.setLabel("left", "SED [kPa]")
-        plot.getAxis("left").enableAutoSIPrefix(False)
+        plot.setLabel("left", "SED at the plan's depth [kPa]")
         made = pg.ScatterPlotItem()
         made.sigClicked.connect(self._point_clicked)
         plot.addItem(made)

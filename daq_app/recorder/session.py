@@ -30,7 +30,7 @@ from daq_app.recorder.messages import (
     Tare,
 )
 from daq_app.recorder.pipes import Inbox
-from daq_app.simulation.wiring import SimulatedHand, SimulatedPeople, itself, planted_surface
+from daq_app.simulation.wiring import SimulatedHand, SimulatedPeople, itself
 from drivers.clock import Clock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan, Trial
@@ -273,11 +273,9 @@ def _knowing(plan: SessionPlan, folder: Path) -> Callable[[Trial], Trial]:
 
 
 def _check_people(people: People, plan: SessionPlan, bench: Bench, folder: Path) -> None:
-    """Raise NotNow where simulated people would have to stroke a real bench, SetupError where it lacks a surface."""
+    """Raise NotNow where simulated people would have to stroke a real bench, or cannot tell stimuli apart."""
     if people.kind != "people":
-        known = _knowing(plan, folder)
-        for trial in plan.trials:
-            planted_surface(known(trial))
+        _knowing(plan, folder)
     simulated_bench = bench.connected is not None and bench.connected.bench is not None
     if people.kind == "simulated people" and plan.forces and not simulated_bench:
         raise NotNow("simulated people stroke the simulated bench only: connect sim:")

@@ -38,6 +38,7 @@ class BenchState:
     frame: Frame | None = None  # of a bench that knows it
     problem: str | None = None  # why the link is lost, or was not made
     searching: bool = False
+    searched: bool = False  # a search has ended since somebody connected or let go
     found: tuple[Found, ...] = ()
     health: Health = field(default_factory=Health)
     rate: float = float("nan")  # measured [Hz]
@@ -72,7 +73,7 @@ def bench_after(bench: BenchState, message: Message) -> BenchState:
         case Searching():
             return replace(bench, searching=True)
         case DevicesFound(found):
-            return replace(bench, searching=False, found=found)
+            return replace(bench, searching=False, searched=True, found=found)
         case _:
             return bench
 

@@ -29,6 +29,7 @@ Phase = Literal[
 ]
 TOLD: frozenset[str] = frozenset(get_args(Phase)) - {"resuming"}  # phases that the recorder tells
 Outcome = Literal["coming", "done", "skipped"]
+AFTER_LIFT = 1.0  # of unloaded readings stay beside a stroke that is shown: the way back to zero is seen [s]
 MARKS = 40  # that are kept for the plots: more than a minute can hold
 
 
@@ -50,6 +51,20 @@ class Mark:
     kind: Literal["onset", "lift", "steady"]
     start: float  # [s, device time]
     stop: float
+
+
+def picture_end(marks: tuple[Mark, ...], newest: float) -> float:
+    """Return the instant at which a picture of the readings ends [s, device time].
+
+    After a lift the stroke stays where it is until the next onset, however long its score is awaited.
+
+    >>> picture_end((Mark("onset", 1.0, 1.0), Mark("lift", 3.0, 3.0)), 40.0)
+    4.0
+    >>> picture_end((Mark("lift", 3.0, 3.0), Mark("onset", 41.0, 41.0)), 42.0)
+    42.0
+    """
+    last = max((mark for mark in marks if mark.kind != "steady"), key=lambda mark: mark.start, default=None)
+    return newest if last is None or last.kind == "onset" else min(newest, last.start + AFTER_LIFT)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
 """What the page of a new session asks for, and what is wrong with it: a sentence for each field. No Qt."""
 
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -7,6 +8,7 @@ from datetime import datetime
 from pathlib import Path
 
 from daq_app.recorder.messages import Kind, People, StartSession
+from daq_app.window.bench_state import BenchState
 from daq_app.window.sentences import sentence
 from sessions.plan.plan import Frame, Hand, Phase
 from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, plan, protocol
@@ -14,6 +16,7 @@ from sessions.plan.protocols.protocol import LARGEST_SEED, phases_before
 from sessions.plan.study import StudyError
 from sessions.plan.study_file import enrol, is_study, open_study, study_key
 from sessions.recording import Recording, RecordingError, Setting
+from sessions.recording.disk_space import check_room, need
 from sessions.recording.manifest import is_sealed
 from sessions.run.resuming import check_resumable
 from sessions.toml_file import SettingsError
@@ -58,6 +61,7 @@ class Bench:
     connected: bool = False
     simulated: bool = False
     frame: Frame | None = None
+    rate: float = float("nan")  # readings a second as set [Hz]; nan where unknown
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +71,7 @@ class Enrolment:
     protocol: str  # the study's own, which holds for all its sessions
     words: str
     may_enrol: bool = False  # the subject is a code that nobody in the study has borne
+    enrolled: bool = False  # the subject's session can begin
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +80,13 @@ class Unfinished:
 
     folder: Path
     words: str
+
+
+def bench_of(bench: BenchState) -> Bench:
+    """Return what the page needs to know of the bench that the window shows."""
+    simulated = bench.info is not None and bench.info.simulated and bench.frame is not None
+    rate = float("nan") if bench.info is None else bench.info.rate
+    return Bench(bench.link == "open", simulated, bench.frame, rate)
 
 
 def checked(
@@ -129,6 +141,32 @@ def checked(
     return StartSession(planned, str(folder), people, (*own, *settings))
 
 
+def refusals(form: SessionForm, bench: Bench) -> Mapping[str, str]:
+    """Return everything that keeps a session from beginning: a sentence for each field that is wrong, by its name.
+
+    The protocol is read and the disk is measured, so that what Start would refuse is known before anybody presses it.
+    """
+    wrong = _refusals(form, bench)
+    said = enrolment(form)
+    if said is None:
+        try:
+            protocol(form.protocol)
+        except (SettingsError, OSError) as error:
+            wrong["protocol"] = _told(error)
+    elif not said.enrolled:
+        wrong.setdefault("subject" if said.protocol else "study", said.words)
+    if wrong:
+        return wrong
+    made = checked(form, bench, datetime.now(), 0)
+    if isinstance(made, Refused):
+        return made.sentences
+    try:
+        check_room(Path(made.folder).parent, need(made.plan, bench.rate if form.forces else None))
+    except (RecordingError, OSError) as error:
+        return {"folder": _told(error)}
+    return {}
+
+
 def is_code(subject: str) -> bool:
     """Say whether a text may stand for a subject.
 
@@ -140,7 +178,7 @@ def is_code(subject: str) -> bool:
 
 def offered(form: SessionForm) -> tuple[Phase, ...]:
     """Return what may come before the trials that count, as the study's protocol or the form's has it."""
-    folder = _place(form)
+    folder = place_of(form)
     try:
         in_study = form.study.strip() and is_study(folder)
         return phases_before(open_study(folder).protocol if in_study else protocol(form.protocol))
@@ -150,7 +188,7 @@ def offered(form: SessionForm) -> tuple[Phase, ...]:
 
 def enrolment(form: SessionForm) -> Enrolment | None:
     """Return what the study that the form names says of the subject; None where it names none that was made."""
-    folder = _place(form)
+    folder = place_of(form)
     if not form.study.strip() or not is_study(folder):
         return None
     try:
@@ -167,13 +205,15 @@ def enrolment(form: SessionForm) -> Enrolment | None:
     except StudyError as error:
         return Enrolment(name, _told(error))
     blinded = "" if study.key_sha256 is None or study.unblinded else "; blinded: codes alone are shown"
-    return Enrolment(name, f"{subject} is enrolled: protocol {name}, row {study.row(member.slot)}{blinded}.")
+    return Enrolment(
+        name, f"{subject} is enrolled: protocol {name}, row {study.row(member.slot)}{blinded}.", enrolled=True
+    )
 
 
 def enrolled(form: SessionForm) -> str:
     """Enrol the form's subject in its study, nothing of its finger being known; return why not, empty where done."""
     try:
-        enrol(_place(form), form.subject.strip(), Body())
+        enrol(place_of(form), form.subject.strip(), Body())
     except (StudyError, SettingsError) as error:
         return _told(error)
     return ""
@@ -181,17 +221,17 @@ def enrolled(form: SessionForm) -> str:
 
 def session_folder(form: SessionForm, what: str, now: datetime) -> Path:
     """Return the folder the session will be in: a new one for every visit."""
-    return _place(form) / f"{form.subject.strip()}_{what}_{now.strftime('%Y%m%dT%H%M%S')}"
+    return place_of(form) / f"{form.subject.strip()}_{what}_{now.strftime('%Y%m%dT%H%M%S')}"
 
 
-def _place(form: SessionForm) -> Path:
+def place_of(form: SessionForm) -> Path:
     """Return the folder in which the session gets its own."""
     return Path(form.folder.strip() or ".").expanduser() / form.study.strip()
 
 
 def _decided(form: SessionForm, new_seed: int) -> tuple[Protocol, int, Body | None, StudyPlace | None]:
     """Return protocol, seed, the subject's own and its place, as a study or the form decides them."""
-    folder = _place(form)
+    folder = place_of(form)
     if not form.study.strip() or not is_study(folder):
         return protocol(form.protocol), int(form.seed) if form.seed.strip() else new_seed, None, None
     study = open_study(folder)
@@ -243,6 +283,8 @@ def _refusals(form: SessionForm, bench: Bench) -> dict[str, str]:
     existing = next((p for p in (place, *place.parents) if p.exists()), place)
     if not existing.is_dir():
         wrong["folder"] = f"{existing} is a file: choose a folder."
+    elif not os.access(existing, os.W_OK):
+        wrong["folder"] = f"Nothing can be written in {existing}: choose another folder."
     if form.forces and not bench.connected:
         wrong["forces"] = "No transducer is connected: connect one, or choose scores only."
     if form.simulated and form.forces and bench.connected and not bench.simulated:

@@ -56,7 +56,7 @@ def derive_view(state: AppState) -> View:
     if session is None and state.bench.info is not None and state.bench.info.simulated:
         simulated = "SIMULATED transducer"
     return View(
-        heading="new session" if session is None else f"{session.plan.protocol} · subject {session.plan.subject}",
+        heading="new session" if session is None else f"subject {session.plan.subject} · {session.plan.protocol}",
         simulated=simulated,
         lamp=_lamp(state),
         banner=_banner(state),

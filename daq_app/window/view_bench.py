@@ -63,6 +63,7 @@ class BenchView:
     life: tuple[tuple[str, str], ...]  # of its serial number
     devices: tuple[DeviceRow, ...]
     searching: bool
+    search_words: str  # what a search came to; empty before the first
     uri: str
     connect: Message | None  # what Disconnect or Connect would send; None while neither is possible
     can_tare: bool
@@ -89,11 +90,22 @@ def bench_view(bench: BenchState, *, recording: bool) -> BenchView:
         life=life_rows(info, bench.life),
         devices=_devices(bench),
         searching=bench.searching,
+        search_words=_search_words(bench),
         uri=bench.uri,
         connect=m.Disconnect() if open_now and not recording else None,
         can_tare=open_now and not recording and not bench.taring,
         can_acknowledge=bool(bench.peak.over or bench.saturated),
     )
+
+
+def _search_words(bench: BenchState) -> str:
+    if bench.searching:
+        return "Looking for transducers."
+    if not bench.searched:
+        return ""
+    if not bench.found:
+        return "No transducer answered. Check power and cable, or type an address, such as net-ft://192.168.1.1."
+    return f"Found {len(bench.found)}: choose from the list."
 
 
 def _lamp(bench: BenchState) -> tuple[Literal["off", "well", "look", "wrong"], str]:

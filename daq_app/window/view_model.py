@@ -33,7 +33,7 @@ def model_words(said: Provisional | None, settled: Settled | None, problem: str)
         return ModelWords("These forces are beyond the reach of the model.", "beyond")
     if said.sed[-1] <= 0.0:
         return ModelWords(f"Model at {KINEMATICS[said.kinematics]}: nothing touches.", "none")
-    told = f"PROVISIONAL  SED {_kpa(float(said.sed[-1]))} · {said.depth:.1f} mm deep · "
+    told = f"PROVISIONAL  SED {_kpa(float(said.sed[-1]))} at the measured force, {said.depth:.1f} mm deep · "
     if said.instead[-1]:
         return ModelWords(f"{told}small strain: these forces are beyond the reach of finite strain", "instead")
     return ModelWords(told + KINEMATICS[said.kinematics], "provisional")
@@ -53,7 +53,7 @@ def _of_settled(settled: Settled) -> str:
     by = settled.difference
     if by is not None:
         shown += f" ({100 * by:+.1f} %)".replace("-", "−")
-    return f"Full solve  SED {_kpa(settled.sed)}{error} · {how}{shown}"
+    return f"Full solve  SED {_kpa(settled.sed)}{error} at the measured force, {how}{shown}"
 
 
 def _kpa(sed: float) -> str:

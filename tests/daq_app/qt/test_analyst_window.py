@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pyqtgraph
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtCore import QItemSelection, QItemSelectionModel, QPoint, QPointF, Qt
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLineEdit, QListWidget, QSlider
 
@@ -15,7 +16,8 @@ from daq_app.analyst import messages as m
 from daq_app.analyst.frame import Contact, Film, Frame, Instant, Parts
 from daq_app.analyst.lineage import lineage
 from daq_app.analyst.raw import RawReadings
-from daq_app.analyst.shown import points
+from daq_app.analyst.seen import finger_words
+from daq_app.analyst.shown import numbers, points
 from daq_app.analyst.state import AnalystState, chosen, rows
 from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.lineage_label import LineageLabel
@@ -104,13 +106,68 @@ def test_a_point_of_prediction_against_score_chooses_its_trial_in_every_column(w
 
 def test_the_table_of_all_strokes_chooses_a_trial_and_the_scene_tells_what_the_model_was_given(window):
     table = window.stroke.friction
-    assert table.rowCount() == len(window.state.report.strokes)
-    table.setCurrentCell(3, 0)
+    assert len(table.texts()) == len(window.state.report.strokes)
+    table.go_to(3)
     assert window.state.row == 3
     said = chosen(window.state).prediction
-    cells = {window.model.scene.item(row, 0).text(): window.model.scene.item(row, 1).text() for row in range(4)}
+    cells = {name: value for name, value, _ in window.model.scene.texts()}
     assert cells["µ of this trial"] == f"{said.mu:.4f}"
     assert cells["indentation"] == f"{said.indentation:.3g} mm"
+
+
+def test_a_click_on_the_head_sorts_by_value_and_a_line_still_chooses_its_trial(window):
+    table = window.stroke.friction
+    table.sortByColumn(2, Qt.SortOrder.AscendingOrder)
+    shown = [float(line[2]) for line in table.texts()]
+    assert shown == sorted(shown)
+    least = min(window.state.report.strokes, key=lambda stroke: stroke.mu_dynamic)
+    table.setCurrentIndex(table.model().index(0, 0))
+    assert chosen(window.state).stroke.number == least.number
+    table.sortByColumn(-1, Qt.SortOrder.AscendingOrder)
+    assert [line[0] for line in table.texts()] == [str(s.trial) for s in window.state.report.strokes]
+
+
+def test_ctrl_c_copies_the_selected_range_as_tab_separated_values(window):
+    table = window.stroke.friction
+    model = table.model()
+    table.selectionModel().select(
+        QItemSelection(model.index(0, 1), model.index(1, 2)), QItemSelectionModel.SelectionFlag.ClearAndSelect
+    )
+    QTest.keyClick(table, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
+    first, second = table.texts()[:2]
+    assert QGuiApplication.clipboard().text() == f"{first[1]}\t{first[2]}\n{second[1]}\t{second[2]}"
+
+
+def test_every_sed_carries_its_depth_and_its_strain(window):
+    window.take(m.Found("predicted", replace(example(), model="small strain, settled sliding, τ max mean")))
+    [said] = [row.prediction for row in rows(window.state)[:1]]
+    expected = f"at {said.indentation:.3g} mm, small strain"
+    assert f"SED {expected}" in finger_words(window.state)
+    assert any(name.startswith(f"SED {expected}") for name, _ in numbers(window.state))
+    assert any(expected in link.more for link in lineage(window.state))
+
+
+def test_the_wheel_zooms_a_stroke_and_home_or_a_double_click_shows_all_of_it_again(application, window):
+    view = window.stroke.stroke
+    plot = view._plots[0]
+    whole = plot.getPlotItem().getViewBox().viewRange()[0]
+
+    def shown():
+        application.processEvents()
+        return plot.getPlotItem().getViewBox().viewRange()[0]
+
+    def zoom():
+        plot.getPlotItem().getViewBox().scaleBy((0.2, 0.2))
+        assert shown() != pytest.approx(whole)
+
+    zoom()
+    window.take(m.Idle())
+    assert shown() != pytest.approx(whole)  # news of something else leaves the zoom
+    QTest.keyClick(window, Qt.Key.Key_Home)
+    assert shown() == pytest.approx(whole)
+    zoom()
+    QTest.mouseDClick(plot.viewport(), Qt.MouseButton.LeftButton)
+    assert shown() == pytest.approx(whole)
 
 
 def test_stopping_is_answered_at_once_and_keeps_what_was_found(window):
@@ -277,8 +334,8 @@ def test_pictures_are_drawn_only_when_they_are_looked_at_and_saved_in_three_form
 def test_a_second_session_is_shown_beside_the_first(window):
     window.take(m.Compared("other", example()))
     table = window.model.compared.table
-    assert table.rowCount() == len({(p.experiment, p.index) for p in window.state.report.predictions})
-    assert {table.item(row, 3).text() for row in range(table.rowCount())} == {"+0.000"}
+    assert len(table.texts()) == len({(p.experiment, p.index) for p in window.state.report.predictions})
+    assert {line[3] for line in table.texts()} == {"+0.000"}
     assert m.Draw("compared") in window._work.asked
 
 

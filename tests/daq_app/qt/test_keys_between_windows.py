@@ -151,7 +151,7 @@ def test_the_page_of_the_next_session_has_no_code_and_enter_begins_none(driver):
     assert driver.session is None
     assert driver.window.page.subject.text() == ""
     QTest.keyClick(driver.window.page.subject, ENTER)
-    assert "never a name" in driver.window.page._wrong["subject"].text()
+    assert "never a name" in driver.window.page.frames["Subject"].words.text()
     assert driver.session is None
 
 

@@ -33,6 +33,7 @@ def one_trial(driver, *, presses=3):
     QTest.keyClick(window, SPACE)
     driver.phase("scoring")
     driver.until(lambda: driver.session.of(number).quality is not None, "what is said of the stroke")
+    driver.until(lambda: window.live.plots[0]._end == "lift + 1 s", "the stroke that stays while its score is awaited")
     for _ in range(presses):
         QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
     QTest.keyClick(window.subject.line, ENTER)
@@ -110,10 +111,11 @@ def test_a_subject_is_enrolled_by_key_and_a_session_of_its_study_runs_by_itself_
     page.simulated.setChecked(True)
     QTest.keyClicks(page.subject, "S01")
     QTest.keyClicks(page.study, "pilot")
-    assert "not enrolled" in page._study_words.text()
+    assert "not enrolled" in page.frames["Subject"].words.text()
+    assert not driver.window.to_do.primary.isEnabled()
     assert not page.protocol.isEnabled()
     QTest.keyClick(page._enrol, SPACE)
-    assert "S01 is enrolled" in page._study_words.text()
+    assert "S01 is enrolled" in page.frames["Subject"].words.text()
     assert not page._enrol.isVisible()
     QTest.keyClick(page.subject, ENTER)
     driver.until(lambda: driver.session is not None and driver.session.sealing == "sealed", "the sealed session")
@@ -143,9 +145,14 @@ def test_a_wrong_form_begins_nothing_and_typing_goes_to_the_wrong_field(driver):
     QTest.keyClicks(window.page.subject, "Ada Lovelace")
     QTest.keyClick(window.page.subject, ENTER)
     assert driver.session is None
-    assert "never a name" in window.page._wrong["subject"].text()
-    assert window.page._wrong["subject"].isVisible()
+    words = window.page.frames["Subject"].words
+    assert "never a name" in words.text()
+    assert words.isVisible()
+    assert words.property("grade") == "wrong"
     assert window.focusWidget() is window.page.subject
+    window.page.subject.setText("P07")
+    assert "never a name" not in words.text()  # at once, not at the next Start
+    assert words.property("grade") == ""
 
 
 def test_closing_while_a_session_is_recorded_asks_once_and_leaves_a_session_that_can_be_resumed(driver):

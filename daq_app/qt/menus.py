@@ -1,0 +1,110 @@
+"""The menu of the window. Every entry is an act that a key or button does too; none is found here alone."""
+
+from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from platform import python_version
+
+from PySide6.QtCore import QUrl, qVersion
+from PySide6.QtGui import QAction, QActionGroup, QDesktopServices
+from PySide6.QtWidgets import QMainWindow, QMenu, QMessageBox, QToolButton
+
+from daq_app.qt import remembered
+from daq_app.qt.keys import KEYS
+
+DOCS = Path(__file__).parents[2] / "docs" / "index.md"
+SESSION = (("redo", "Redo…"), ("skip", "Skip…"), ("pause", "Pause or go on"), ("note", "Note…"), ("end", "End…"))
+PANELS = (("bench", "Bench"), ("hold", "Hold the picture"), ("model", "Live model at finite strain"))
+LIBRARIES = ("PySide6", "numpy", "scipy", "numba")
+
+
+class Menus:
+    """Fills the menu bar of a window."""
+
+    def __init__(self, window: QMainWindow, act: Callable[[str], None], theme: Callable[[str], None]) -> None:
+        """Build the menu; `act` does what an entry stands for, `theme` takes a theme's name."""
+        self._window = window
+        self._act = act
+        bar = window.menuBar()
+        if (more := bar.findChild(QToolButton)) is not None:
+            more.setAccessibleName("the rest of the menu")
+        file = bar.addMenu("&File")
+        self._add(file, "open", "Open session…")
+        self.recent = file.addMenu("Open recent")
+        self.recent.aboutToShow.connect(self._list_recent)
+        file.addSeparator()
+        self.report = self._add(file, "report", "Write report…")
+        self.export = self._add(file, "export", "Export…")
+        file.addSeparator()
+        self._add(file, "quit", "Quit")
+        self.session = bar.addMenu("&Session")
+        self._add(self.session, "new", "New session")
+        self._add(self.session, "tare", "Zero the bench")
+        self.session.addSeparator()
+        self.course = [self._add(self.session, name, words) for name, words in SESSION]
+        view = bar.addMenu("&View")
+        for room in ("prepare", "run", "review"):
+            self._add(view, f"go to {room}", room.capitalize())
+        view.addSeparator()
+        self.themes = self._choices(view.addMenu("Theme"), remembered.THEMES, remembered.theme(), theme)
+        sizes = {f"{100 * scale:.0f} %": scale for scale in remembered.SCALES}
+        now = next((words for words, scale in sizes.items() if scale == remembered.type_scale()), "")
+        self.sizes = self._choices(view.addMenu("Font size"), tuple(sizes), now, lambda words: self._size(sizes[words]))
+        panels = view.addMenu("Panels")
+        for name, words in PANELS:
+            self._add(panels, name, words)
+        self._add(view, "subject", "Subject's window")
+        help_menu = bar.addMenu("&Help")
+        self._add(help_menu, "keys", "Keys")
+        docs = help_menu.addAction("Documentation", lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(DOCS))))
+        docs.setEnabled(DOCS.exists())
+        help_menu.addAction("About daq-app", self._about)
+
+    def show_state(self, *, in_hand: bool, over: bool, opened: bool) -> None:
+        """Offer what can be done now."""
+        for made in self.course:
+            made.setEnabled(in_hand and not over)
+        for made in (self.report, self.export):
+            made.setEnabled(opened)
+
+    def _add(self, menu: QMenu, name: str, words: str) -> QAction:
+        """Return an entry; its key is shown, and stays with the window, which routes keys by their meaning."""
+        key = next((known.key for known in KEYS if known.act == name), "")
+        return menu.addAction(f"{words}\t{key}" if key else words, lambda: self._act(name))
+
+    def _choices(self, menu: QMenu, names: tuple[str, ...], now: str, take: Callable[[str], None]) -> QActionGroup:
+        group = QActionGroup(menu)
+        for name in names:
+            made = menu.addAction(name.capitalize(), lambda name=name: take(name))
+            made.setCheckable(True)
+            made.setChecked(name == now)
+            group.addAction(made)
+        return group
+
+    def _size(self, scale: float) -> None:
+        remembered.choose_type_scale(scale)
+        self._act("type size")
+
+    def _list_recent(self) -> None:
+        self.recent.clear()
+        listed = remembered.recent_sessions()
+        for place in listed:
+            self.recent.addAction(place.name, lambda place=place: self._act(f"open {place}"))
+        if not listed:
+            self.recent.addAction("No session was recorded or opened yet").setEnabled(False)
+
+    def _about(self) -> None:
+        QMessageBox.about(self._window, "About daq-app", about_words())
+
+
+def about_words() -> str:
+    """Return the versions of the program and of what it stands on."""
+    known = [f"daq-app {_version('daq-app')}", f"Python {python_version()}", f"Qt {qVersion()}"]
+    return "\n".join((*known, *(f"{name} {_version(name)}" for name in LIBRARIES)))
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "unknown"

@@ -1,0 +1,48 @@
+"""The rail at the left of the window: Prepare, Run and Review."""
+
+from collections.abc import Callable
+from typing import Literal
+
+from PySide6.QtWidgets import QFrame, QVBoxLayout
+
+from daq_app.qt.parts import button
+from daq_app.qt.tokens import GRID
+
+Room = Literal["prepare", "run", "review"]
+ROOMS: tuple[Room, ...] = ("prepare", "run", "review")
+WHY_NOT = {
+    "prepare": "A session is being recorded: end it before the next is prepared.",
+    "run": "No session is in hand: start one in Prepare.",
+}
+KEY = {"prepare": "F2", "run": "F3", "review": "F4"}
+WIDTH = 84  # before the font's scale [px]
+
+
+class Rail(QFrame):
+    """Three buttons, one for each room; that of the room that is shown stays pressed."""
+
+    def __init__(self, scale: float, go: Callable[[Room], None]) -> None:
+        """Show that nothing is open; `go` is called with the room that is wanted."""
+        super().__init__()
+        self.setAccessibleName("rooms")
+        self.setProperty("role", "strip")
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(GRID // 2, GRID, GRID // 2, GRID)
+        self.buttons = {
+            room: button(f"{room.capitalize()}\n{KEY[room]}", room, lambda room=room: go(room), "rail")
+            for room in ROOMS
+        }
+        for made in self.buttons.values():
+            made.setCheckable(True)
+            layout.addWidget(made)
+        layout.addStretch(1)
+        self.setFixedWidth(round(WIDTH * min(scale, 1.4)))
+
+    def show_room(self, room: Room, *, in_hand: bool, over: bool) -> None:
+        """Show which room is open, and which can be; a session may be `in_hand`, or `over`."""
+        for name, made in self.buttons.items():
+            made.setChecked(name == room)
+            closed = (name == "prepare" and in_hand and not over) or (name == "run" and not in_hand)
+            made.setEnabled(not closed)
+            made.setToolTip(WHY_NOT[name] if closed else "")
+            made.setAccessibleDescription(made.toolTip())

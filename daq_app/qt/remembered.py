@@ -1,0 +1,74 @@
+"""What the window remembers from one start to the next: its place, theme, size of type, and recent sessions."""
+
+import json
+from pathlib import Path
+
+from PySide6.QtCore import QByteArray
+from PySide6.QtWidgets import QWidget
+
+from daq_app.qt.screens import settings
+from daq_app.qt.tokens import DARK, LIGHT, Tokens, current_tokens, font_scale
+
+THEMES = ("system", "light", "dark")
+SCALES = (1.0, 1.25, 1.5, 2.0)  # of the type [-]
+RECENT = 12  # sessions that are offered
+_GEOMETRY, _THEME, _SCALE, _RECENT = "window/geometry", "window/theme", "window/type scale", "window/recent sessions"
+
+
+def theme() -> str:
+    """Return the theme that was chosen, one of THEMES."""
+    said = str(settings().value(_THEME))
+    return said if said in THEMES else "system"
+
+
+def choose_theme(name: str) -> None:
+    """Remember a theme."""
+    settings().setValue(_THEME, name)
+
+
+def chosen_tokens() -> Tokens:
+    """Return the tokens of the theme that was chosen, or of the one that the system asks for."""
+    return {"light": LIGHT, "dark": DARK}.get(theme()) or current_tokens()
+
+
+def type_scale() -> float:
+    """Return how much larger than usual the type is [-]: as it was chosen, or as the system asks for."""
+    try:
+        chosen = float(str(settings().value(_SCALE)))
+    except ValueError:
+        return font_scale()
+    return chosen if chosen in SCALES else font_scale()
+
+
+def choose_type_scale(scale: float | None) -> None:
+    """Remember the size of the type; None follows the system again."""
+    settings().setValue(_SCALE, "" if scale is None else repr(scale))
+
+
+def recent_sessions() -> tuple[Path, ...]:
+    """Return the sessions that were recorded or opened last and are still there, the newest first."""
+    try:
+        listed = json.loads(str(settings().value(_RECENT)))
+    except ValueError:
+        return ()
+    places = [Path(one) for one in listed if isinstance(one, str)] if isinstance(listed, list) else []  # pyright: ignore[reportUnknownVariableType]
+    return tuple(place for place in places if place.is_dir())[:RECENT]
+
+
+def remember_session(folder: Path) -> None:
+    """Put a session first among the recent ones."""
+    whole = folder.absolute()
+    kept = [whole, *(place for place in recent_sessions() if place != whole)]
+    settings().setValue(_RECENT, json.dumps([str(place) for place in kept[:RECENT]]))
+
+
+def save_place(window: QWidget) -> None:
+    """Remember where a window is, and how large."""
+    settings().setValue(_GEOMETRY, window.saveGeometry())
+
+
+def restore_place(window: QWidget) -> None:
+    """Put a window where it was; Qt brings it back onto a screen that is there."""
+    kept = settings().value(_GEOMETRY)
+    if isinstance(kept, QByteArray):
+        window.restoreGeometry(kept)

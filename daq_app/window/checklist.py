@@ -1,0 +1,110 @@
+"""What must be right before a session can begin, card by card, each with one line that says why not. No Qt."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from daq_app.window.new_session import Bench, SessionForm, enrolment, is_code, place_of, refusals
+from sessions.plan.study_file import is_study
+
+FIELDS: Mapping[str, tuple[str, ...]] = {
+    "Study and protocol": ("study", "protocol", "seed"),
+    "Subject": ("subject",),
+    "Transducer": ("forces", "simulated", "height", "area"),
+    "Subject's screen": (),
+    "Disk": ("folder",),
+}  # of each card, the worst first
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """One card of the checklist."""
+
+    name: str
+    ready: bool
+    words: str  # why not; or what is worth knowing
+    field: str = ""  # the first that is wrong
+
+
+def checklist(form: SessionForm, bench: Bench, screen: str) -> tuple[Card, ...]:
+    """Return the cards; `screen` says how far the length of the subject's line is known."""
+    wrong = refusals(form, bench)
+    notes = {
+        "Study and protocol": _study_note(form),
+        "Subject": _subject_note(form),
+        "Transducer": "" if not form.forces or not bench.simulated else "The simulated bench.",
+        "Subject's screen": screen,
+    }
+    made: list[Card] = []
+    for name, fields in FIELDS.items():
+        first = next((field for field in fields if field in wrong), "")
+        made.append(Card(name, not first, wrong.get(first, notes.get(name, "")), first))
+    return tuple(made)
+
+
+def headline(cards: tuple[Card, ...], subject: str) -> str:
+    """Return the one sentence that says what to do next."""
+    missing = [card for card in cards if not card.ready]
+    first = next((card for card in missing if card.field == "forces"), missing[0] if missing else None)
+    match first:
+        case None:
+            return f"Press Enter to start the session of {subject.strip()}."
+        case Card(field="forces"):
+            return "Connect a transducer, or choose scores only."
+        case Card(field="subject") if not is_code(subject):
+            return "Give the subject's code, then press Enter to start."
+        case _:
+            return f"Complete the card “{first.name}”."
+
+
+def codes_in(folder: Path) -> tuple[str, ...]:
+    """Return the codes of the subjects that have sessions in a folder, one for each session."""
+    try:
+        names = sorted(place.parent.name for place in folder.glob("*/session.*") if place.stem == "session")
+    except OSError:
+        return ()
+    matched = (re.fullmatch(r"(.+)_[^_]+_\d{8}T\d{6}", name) for name in dict.fromkeys(names))
+    return tuple(found[1] for found in matched if found is not None)
+
+
+def next_code(codes: tuple[str, ...]) -> str:
+    """Return the code after the highest number that a code ends in; "P01" where there is none.
+
+    >>> next_code(("P01", "P09", "pilot")), next_code(())
+    ('P10', 'P01')
+    """
+    numbered = [found.groups() for code in codes if (found := re.fullmatch(r"(.*?)(\d{1,9})", code))]
+    if not numbered:
+        return "P01"
+    before, digits = max(numbered, key=lambda parts: int(parts[1]))
+    return f"{before}{int(digits) + 1:0{len(digits)}d}"
+
+
+def studies_in(folder: Path) -> tuple[str, ...]:
+    """Return the names of the studies in a folder."""
+    try:
+        return tuple(sorted(place.name for place in folder.iterdir() if place.is_dir() and is_study(place)))
+    except OSError:
+        return ()
+
+
+def _study_note(form: SessionForm) -> str:
+    name = form.study.strip()
+    said = enrolment(form)
+    if not name:
+        return ""
+    if said is not None:
+        return f"A study of protocol {said.protocol}."
+    there = ", ".join(studies_in(place_of(form).parent))
+    others = f" Studies there: {there}." if there else ""
+    return f"“{name}” is no study: sessions go to a plain folder, by this page's protocol.{others}"
+
+
+def _subject_note(form: SessionForm) -> str:
+    said = enrolment(form)
+    if said is not None:
+        return said.words
+    before = codes_in(place_of(form)).count(form.subject.strip())
+    times = "a session" if before == 1 else f"{before} sessions"
+    return f"{form.subject.strip()} has {times} here already: is it the same person?" if before else ""

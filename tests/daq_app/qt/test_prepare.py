@@ -1,0 +1,100 @@
+"""Preparing a session in the real window: cards, the bench, a session that was cut short, and a rehearsal."""
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from daq_app.qt.free_answers import NumberField
+from daq_app.recorder.messages import Connect, Disconnect
+from daq_app.window.messages import DevicesFound, Searching
+from daq_app.window.new_session import Unfinished
+
+pytestmark = pytest.mark.qt
+
+OWN = """
+name = "own"
+title = "Cloths"
+label_seed = 1
+contact_angle = 45.0
+[[blocks]]
+name = "softness"
+descriptor = "softness"
+direction = "proximal to distal"
+indentation = 2.0
+indices = [3, 70]
+instruction = "Push your finger once away from you."
+scale_ends = ["not soft at all", "as soft as can be"]
+"""
+
+
+def test_without_a_transducer_no_field_reaches_beyond_the_page(driver):
+    window, page = driver.window, driver.window.page
+    window.bridge.send(Disconnect())
+    driver.until(lambda: driver.state.bench.link == "none", "the end of the link")
+    try:
+        driver.application.processEvents()
+        inside = page.frames["Subject"].parentWidget()
+        assert inside.minimumSizeHint().width() <= inside.parentWidget().width()
+        assert page.height_above.isVisible()
+        edge = page.height_above.mapTo(page, page.height_above.rect().topRight()).x()
+        assert edge < page.width()
+    finally:
+        window.bridge.send(Connect("sim:?rate=200"))
+        driver.until(lambda: driver.state.bench.link == "open", "the simulated bench")
+
+
+def test_start_lights_when_every_card_is_ready_and_a_card_that_is_mended_says_so_at_once(driver):
+    window, page = driver.window, driver.window.page
+    assert not window.to_do.primary.isEnabled()
+    assert page.frames["Subject"].accessibleName().startswith("Subject: not ready. Give a code")
+    QTest.keyClicks(page.subject, "P20")
+    assert window.to_do.primary.isEnabled()
+    assert page.frames["Subject"].accessibleName() == "Subject: ready."
+    page.seed.setText("many")
+    assert not window.to_do.primary.isEnabled()
+    assert "whole number" in page.frames["Study and protocol"].words.text()
+    page.seed.clear()
+    assert window.to_do.primary.isEnabled()
+
+
+def test_a_search_that_finds_nothing_says_so_and_what_to_do(driver):
+    bridge, bench = driver.window.bridge, driver.window.bench
+    bridge.send(Searching())
+    assert "Looking" in bench._search_words.text()
+    bridge.send(DevicesFound(()))
+    assert bench._search_words.text().startswith("No transducer answered. Check power and cable")
+    assert bench._search_words.isVisibleTo(bench)
+
+
+def test_a_session_that_was_cut_short_is_offered_above_every_card(driver, tmp_path):
+    page = driver.window.page
+    page.show_unfinished((Unfinished(tmp_path, "P03: 2 of 10 trials done"),))
+    driver.application.processEvents()
+    offer = page._go_on.mapTo(page, page._go_on.rect().bottomLeft()).y()
+    assert all(frame.mapTo(page, frame.rect().topLeft()).y() > offer for frame in page.frames.values())
+    page.show_unfinished(())
+
+
+@pytest.mark.usefixtures("application")
+def test_a_number_is_typed_of_digits_alone():
+    field = NumberField(1.0, lambda: 0.0)
+    QTest.keyClicks(field.field, "stop")
+    assert field.field.text() == ""
+    QTest.keyClicks(field.field, "-1x2,5")
+    assert field.field.text() == "12,5"
+    assert field.answer.value == 12.5
+
+
+def test_a_protocol_of_ones_own_is_rehearsed_from_its_first_trial_to_its_last(driver, tmp_path):
+    page = driver.window.page
+    (tmp_path / "own.toml").write_text(OWN)
+    page.add_protocol(str(tmp_path / "own.toml"))
+    page.simulated.setChecked(True)
+    QTest.keyClicks(page.subject, "P21")
+    QTest.keyClick(page.subject, Qt.Key.Key_Return)
+    driver.until(lambda: driver.session is not None and driver.session.sealing == "sealed", "the rehearsal")
+    assert [trial.outcome for trial in driver.session.trials] == ["done", "done"]
+    assert "SIMULATED" in driver.view.simulated
+    assert Path(driver.session.folder).name.startswith("P21_own_")

@@ -1,0 +1,137 @@
+"""The rooms of the window, its menu, and what it remembers, in the real window."""
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QMenu, QWidget
+
+from daq_app.qt import remembered, tokens
+from daq_app.qt.menus import about_words
+from daq_app.recorder.messages import Stop
+from tests.daq_app.qt.test_session_by_keyboard import begin
+
+pytestmark = pytest.mark.qt
+
+SESSION = Path(__file__).parents[2] / "data" / "sessions" / "version-1" / "sealed"
+
+
+@pytest.fixture
+def rooms(driver):
+    yield driver.window.rooms
+    driver.window.rooms.leave()
+    driver.window.go_to("prepare")
+
+
+def entries(menu):
+    """Return every entry of a menu and of those below it, by its words without the key."""
+    found = {}
+    for action in menu.actions():
+        below = action.menu()
+        if isinstance(below, QMenu):
+            found |= entries(below)
+        else:
+            found[action.text().split("\t")[0]] = action
+    return found
+
+
+def test_the_rail_opens_the_rooms_that_can_be_entered_and_says_why_another_cannot(driver, rooms):
+    rail = driver.window.rail.buttons
+    assert (rooms.room, rail["prepare"].isChecked()) == ("prepare", True)
+    assert not rail["run"].isEnabled()
+    assert "start one in Prepare" in rail["run"].toolTip()
+    begin(driver)
+    assert (rooms.room, rail["run"].isChecked()) == ("run", True)
+    assert not rail["prepare"].isEnabled()
+    assert "end it" in rail["prepare"].accessibleDescription()
+
+
+def test_a_session_that_has_ended_is_opened_with_the_mouse_and_a_key_leads_back(driver, rooms):
+    window = driver.window
+    begin(driver)
+    window.bridge.send(Stop())
+    driver.until(lambda: driver.session.sealing == "sealed", "the end")
+    folder = Path(driver.session.folder)
+    driver.application.processEvents()
+    assert window.to_do.second.isVisible()
+    QTest.mouseClick(window.to_do.second, Qt.MouseButton.LeftButton)
+    assert rooms.room == "review"
+    assert rooms.analyst.state.folder == folder
+    assert remembered.recent_sessions()[0] == folder.absolute()
+    assert rooms.review.recent.item(0).text() == folder.name
+    QTest.keyClick(rooms.analyst.trials.list, Qt.Key.Key_F3)  # from wherever the keyboard is
+    assert rooms.room == "run"
+
+
+def test_a_key_of_the_course_leads_back_from_review_and_does_nothing_unseen(driver, rooms):
+    window = driver.window
+    begin(driver)
+    rooms.open(SESSION)
+    trial, phase = driver.session.trial, driver.session.phase
+    window.act("primary")
+    assert rooms.room == "run"
+    assert (driver.session.trial, driver.session.phase) == (trial, phase)
+
+
+def test_review_opens_on_the_newest_session_and_a_click_on_another_takes_its_place(driver, rooms, tmp_path):
+    other = tmp_path / "other"
+    other.mkdir()
+    remembered.remember_session(other)
+    remembered.remember_session(SESSION)
+    driver.window.act("go to review")
+    assert rooms.analyst.state.folder == SESSION.absolute()
+    rooms.review.recent.itemClicked.emit(rooms.review.recent.item(1))
+    assert rooms.analyst.state.folder == other
+    other.rmdir()
+    assert other not in remembered.recent_sessions()  # what is gone is not offered
+
+
+def test_every_entry_of_the_menu_does_something_and_course_entries_wait_for_a_session(driver, rooms):
+    window = driver.window
+    found = entries(window.menuBar())
+    assert {"Open session…", "Write report…", "Export…", "Keys", "About daq-app", "Dark", "150 %", "Bench"} <= set(
+        found
+    )
+    assert not found["End…"].isEnabled()
+    assert not found["Write report…"].isEnabled()
+    found["Keys"].trigger()
+    assert window.keys.isVisible()
+    found["Keys"].trigger()
+    rooms.open(SESSION)
+    assert found["Write report…"].isEnabled()
+    begin_room = found["Prepare"]
+    begin_room.trigger()
+    assert rooms.room == "prepare"
+
+
+def test_theme_and_size_of_type_are_chosen_and_remembered(driver):
+    window = driver.window
+    found = entries(window.menuBar())
+    try:
+        found["Dark"].trigger()
+        assert window._tokens == tokens.DARK
+        assert remembered.chosen_tokens() == tokens.DARK
+        found["150 %"].trigger()
+        assert remembered.type_scale() == 1.5
+        assert "next start" in window.notice._words.text()
+    finally:
+        found["Light"].trigger()
+        found["System"].trigger()
+        remembered.choose_type_scale(None)
+
+
+def test_the_window_opens_where_it_was_closed(driver):
+    before, after = QWidget(), QWidget()
+    before.setGeometry(60, 40, 444, 333)
+    before.show()
+    driver.application.processEvents()
+    remembered.save_place(before)
+    remembered.restore_place(after)
+    assert after.geometry() == before.geometry()
+    before.close()
+
+
+def test_about_names_the_versions_it_stands_on():
+    words = about_words()
+    assert all(name in words for name in ("daq-app", "Python 3", "Qt 6", "numpy", "numba"))
