@@ -1,6 +1,6 @@
 """Every check of the project, each with what it proves and how long it took.
 
-`make test` runs the quick ones (under four minutes on two cores), `make test-long` the endurance runs.
+`make test` runs the quick ones (six to nine minutes on two cores), `make test-long` the endurance runs.
 """
 
 import os
