@@ -9,7 +9,7 @@ Run from the repository's root: python -m benchmarks.friction_coverage [SEEDS [S
 import sys
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,7 @@ NUMBERS = ("mu_dynamic", "tau_max", "speed")
 class Trouble:
     """What a set does to its benches and strokes."""
 
-    bench: BenchSettings = BenchSettings()
+    bench: BenchSettings = field(default_factory=BenchSettings)
     hum: float = 0.0  # amplitude at 50 Hz on each force [N]
     flicker: float = 0.0  # standard deviation of 1/f noise of each force [N]
     wander: float = 0.0  # standard deviation of mu's slow wandering [-]
@@ -186,7 +186,7 @@ def coverage(trouble: Trouble, seeds: Sequence[int], progress: Callable[[], obje
     peaks: list[bool] = []
     for seed in seeds:
         analysis, truths = Visit(seed, trouble).strokes()
-        settings = drawn_from(analysis.settings)
+        settings = drawn_from(analysis.settings, analysis.tilt)
         at_trial = {stroke.trial: (at, stroke) for at, stroke in reversed(list(enumerate(analysis.strokes)))}
         for number, truth in enumerate(truths, 1):
             at, stroke = at_trial.get(number, (0, None))
