@@ -160,7 +160,7 @@ def covered(seeds, noise):
         bench = BenchSettings(gains=(a, b, c, d, e, f), noise_force=0.004 * noise, noise_torque=0.05 * noise)
         visit = planted_truth.visit(seed, bench)
         for number, (stroke, truth) in enumerate(zip(visit.analysed().strokes, visit.planted, strict=True)):
-            found = stroke_intervals(stroke, number)
+            found = stroke_intervals(stroke, number, BootstrapSettings(cross_talk=0.0, tilt_error=(0.0, 0.0)))
             for name, planted in truths(seed, truth):
                 low, high = getattr(found, name) or (None, None)
                 if low is None:
