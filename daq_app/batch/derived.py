@@ -200,7 +200,7 @@ def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = 
     """Return an analysis with its bootstrap intervals, as it is kept and printed."""
     return {
         **analysis.to_dict(),
-        "bootstrap": intervals_of(analysis.strokes, bootstrap or drawn_from(analysis.settings)),
+        "bootstrap": intervals_of(analysis.strokes, bootstrap or drawn_from(analysis.settings, analysis.tilt)),
     }
 
 

@@ -71,7 +71,7 @@ def draws_of(
     analysis: Analysis, prediction: SessionPrediction, settings: BootstrapSettings | None = None
 ) -> list[Drawn]:
     """Return for each trial what its friction may have been in each repeat, or why that is not known."""
-    settings = settings or drawn_from(analysis.settings)
+    settings = settings or drawn_from(analysis.settings, analysis.tilt)
     return [_draws(analysis, row, settings) for row in prediction.trials]
 
 

@@ -118,8 +118,8 @@ def findings(
         ),
         scene=scene_file(recording, prediction),
         width=None if prediction is None else prediction.width,
-        interval_kind=drawn_from(analysis.settings).kind,
-        interval_kinds=dict(drawn_from(analysis.settings).kinds),
+        interval_kind=drawn_from(analysis.settings, analysis.tilt).kind,
+        interval_kinds=dict(drawn_from(analysis.settings, analysis.tilt).kinds),
         afferent=more.afferent,
     )
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from sessions.recording.reader import Recording
 from sessions.report.contents import Course, Fact, StrokeFinding, Trace, same_fields
 from sessions.strokes.analysis import Analysis
-from sessions.strokes.bootstrap import NUMBERS, drawn_from, stroke_intervals
+from sessions.strokes.bootstrap import NUMBERS
 from sessions.strokes.flaws import Flaw
 from sessions.strokes.forces import in_face_frame
 from sessions.strokes.stroke import Stroke
@@ -26,7 +26,7 @@ def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ..
     found: list[StrokeFinding] = []
     for position, stroke in enumerate(analysis.strokes):
         trial = None if stroke.trial is None else planned.get(stroke.trial)
-        intervals = stroke_intervals(stroke, position, drawn_from(analysis.settings))
+        intervals = analysis.intervals[position]
         told: dict[str, Any] = {
             "number": position + 1,
             "experiment": "" if trial is None else trial.block,

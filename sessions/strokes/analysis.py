@@ -9,6 +9,7 @@ import numpy as np
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan, Trial
+from sessions.strokes.bootstrap import StrokeIntervals, drawn_from, stroke_intervals
 from sessions.strokes.contacts import Contact, contacts, split_at_reversals, split_at_valleys
 from sessions.strokes.decisions import OF_SESSION, Decided, Decision, Decisions, read
 from sessions.strokes.flaws import Flaw, FlawName
@@ -41,11 +42,17 @@ class Analysis:
     settings: AnalysisSettings
     decisions: tuple[Decision, ...] = ()  # of people, in force
     presses: tuple[Press, ...] = ()  # that tell how the face leans
+    intervals: tuple[StrokeIntervals, ...] = ()  # of each stroke's numbers
 
     @property
     def tilt(self) -> Tilt | None:
         """Return how the face leans against the transducer; None where nothing pressed without sliding."""
         return tilt_of(self.presses, self.settings)
+
+    @property
+    def flawed(self) -> bool:
+        """Say whether anything was lost or is doubtful; that no press tells the lean is only noted."""
+        return any(flaw.name is not FlawName.TILT_ASSUMED for flaw in self.flaws)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, None where honesty allows no number; curves are left out."""
@@ -57,7 +64,7 @@ class Analysis:
             "decisions": [decision.to_dict() for decision in self.decisions],
             "tilt": None if self.tilt is None else self.tilt.to_dict(),
             "filter": self.filtered,
-            "interval": self.settings.interval_kind,
+            "interval": drawn_from(self.settings, self.tilt).kind,
             "settings": self.settings.to_dict(),
             "settings_origin": "default" if self.settings == AnalysisSettings() else "set",
         }
@@ -94,7 +101,17 @@ def analyse(
         if record.take and record.trial.phase != "main"
     ]
     others = analyse_blocks(aside, recording.plan, recording.info, chosen).presses
-    return replace(found, simulated=recording.simulated, presses=(*others, *found.presses))
+    whole = replace(found, simulated=recording.simulated, presses=(*others, *found.presses))
+    told = 0 if whole.tilt is None else len(whole.tilt.presses)
+    if told < chosen.press.press_fewest and any(stroke.mu_dynamic is not None for stroke in whole.strokes):
+        prior = chosen.systematic.tilt_prior
+        sentence = (
+            f"{told or 'No'} press{'es' if told > 1 else ''} cannot tell how the face leans: intervals of friction "
+            f"allow for a standard deviation of {prior:g}° about each axis. Press {chosen.press.press_fewest} times "
+            "without sliding to narrow them."
+        )
+        whole = replace(whole, flaws=(*whole.flaws, Flaw(FlawName.TILT_ASSUMED, sentence, "note")))
+    return _with_intervals(whole) if others else whole
 
 
 def analyse_blocks(
@@ -127,16 +144,33 @@ def analyse_blocks(
         presses += found.presses
         filtered = filtered or found.filtered
     flaws += _without_stroke(decided, strokes)
-    return Analysis(
-        info.simulated,
-        tuple(strokes),
-        tuple(friction),
-        tuple(flaws),
-        filtered,
-        settings,
-        decided.in_force,
-        tuple(presses),
+    return _with_intervals(
+        Analysis(
+            info.simulated,
+            tuple(strokes),
+            tuple(friction),
+            tuple(flaws),
+            filtered,
+            settings,
+            decided.in_force,
+            tuple(presses),
+        )
     )
+
+
+def _with_intervals(analysis: Analysis) -> Analysis:
+    """Return an analysis with the bootstrap intervals of its numbers."""
+    drawn = drawn_from(analysis.settings, analysis.tilt)
+    found = tuple(stroke_intervals(stroke, at, drawn) for at, stroke in enumerate(analysis.strokes))
+    strokes = tuple(
+        replace(stroke, mu_dynamic_interval=ends.mu_dynamic)
+        for stroke, ends in zip(analysis.strokes, found, strict=True)
+    )
+    friction = tuple(
+        replace(row, mu_interval=found[row.stroke].mu_max if row.rule == "maximum" else found[row.stroke].mu_dynamic)
+        for row in analysis.friction
+    )
+    return replace(analysis, strokes=strokes, friction=friction, intervals=found)
 
 
 def _given(strokes: tuple[Stroke, ...], trial: Trial | None, decided: Decisions) -> tuple[Stroke, ...]:

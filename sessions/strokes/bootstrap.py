@@ -1,12 +1,12 @@
 """Intervals of a stroke's numbers from sensor noise, zero, calibration and choice of window: a seeded block bootstrap.
 
 Readings within a tenth of a second are alike, so blocks of them are drawn again, not readings (Künsch 1989, Ann.
-Statist. 17:1217). Every repeat also draws how wrong calibration and zero may be, and where the window may have begun
-and ended; the interval lies between two quantiles of what the repeats give.
+Statist. 17:1217). Every repeat also draws how wrong calibration, lean of the face and zero may be, and where the
+window may have begun and ended; the interval lies between two quantiles of what the repeats give.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from sessions.strokes.event_uncertainty import break_away_draws, onset_draws, slide_onset_draws
 from sessions.strokes.friction import Rule
 from sessions.strokes.onset import DetectorSettings
-from sessions.strokes.settings import ASSUMED_GAIN_ERROR, AnalysisSettings
+from sessions.strokes.settings import ASSUMED_GAIN_ERROR, AnalysisSettings, SystematicSettings
 from sessions.strokes.sliding import strays
 from sessions.strokes.stroke import Interval, Stroke, StrokeCurve
+from sessions.strokes.systematic import SystematicDraws, drag_direction
+from sessions.strokes.tilt import Tilt
 
 Array = NDArray[np.float64]
 
@@ -37,6 +39,7 @@ NUMBERS = (  # of a stroke that have an interval
     "slide_onset",
 )
 _RANGES = ("onset", "slide_onset")
+_PRIOR = SystematicSettings().tilt_prior
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +53,10 @@ class BootstrapSettings:
     slide_share: tuple[float, float] = (0.1, 0.3)  # of the steady speed: at any between them the slide has begun [-]
     gain_error: float = ASSUMED_GAIN_ERROR  # standard uncertainty of each axis' gain [-]
     gain_error_origin: str = "assumed"  # nobody stated it for this transducer; "set" where somebody did
+    cross_talk: float = ASSUMED_GAIN_ERROR  # standard uncertainty of what each force shows of another [-]
+    tilt: tuple[float, float] = (0.0, 0.0)  # lean of the face's normal to +x and +y that is not levelled [degrees]
+    tilt_error: tuple[float, float] = (_PRIOR, _PRIOR)  # its standard uncertainty [degrees]
+    tilt_origin: str = "assumed: too few presses tell it"
     confidence: float = 0.95
     fewest_blocks: int = 4  # of which a spread is told
     fewest_quiet: int = 10  # readings before the onset of which noise is told ...
@@ -62,8 +69,15 @@ class BootstrapSettings:
         return (
             f"{100 * self.confidence:g} % percentile interval of {self.repeats} block-bootstrap repeats (blocks of "
             f"{self.block:g} s, neighbours being alike allowed for, seed {self.seed}): sensor noise, zero and its "
-            f"drift, calibration ({self.calibration}), choice of window (ends up to {100 * self.inwards:g} % inwards)"
+            f"drift, calibration ({self.calibration}; cross-talk {100 * self.cross_talk:g} % of each other force), "
+            f"lean of the face ({self.leaning}), choice of window (ends up to {100 * self.inwards:g} % inwards)"
         )
+
+    @property
+    def leaning(self) -> str:
+        """The lean of the face that is not levelled, and its standard uncertainty, for people."""
+        x, y = (f"{a:.2g} ± {error:.2g}°" for a, error in zip(self.tilt, self.tilt_error, strict=True))
+        return f"{x} to +x and {y} to +y, {self.tilt_origin}"
 
     @property
     def calibration(self) -> str:
@@ -90,11 +104,18 @@ class BootstrapSettings:
         }
 
 
-def drawn_from(settings: AnalysisSettings) -> BootstrapSettings:
-    """Return what the intervals of an analysis are drawn from: the calibration's error that was set, or the assumed."""
-    if settings.gain_error is None:
-        return BootstrapSettings(seed=settings.bootstrap_seed)
-    return BootstrapSettings(seed=settings.bootstrap_seed, gain_error=settings.gain_error, gain_error_origin="set")
+def drawn_from(settings: AnalysisSettings, tilt: Tilt | None) -> BootstrapSettings:
+    """Return what the intervals of an analysis are drawn from; `tilt` is what its presses tell, None without any."""
+    drawn = BootstrapSettings(seed=settings.bootstrap_seed, cross_talk=settings.cross_talk_uncertainty)
+    if settings.gain_error is not None:
+        drawn = replace(drawn, gain_error=settings.gain_error, gain_error_origin="set")
+    if tilt is None or len(tilt.presses) < settings.press.press_fewest:  # of fewer, the hand's own push is not known
+        prior = settings.systematic.tilt_prior
+        return replace(drawn, tilt_error=(prior, prior))
+    left = (tilt.lean[0] - settings.tilt[0], tilt.lean[1] - settings.tilt[1])
+    return replace(
+        drawn, tilt=left, tilt_error=tilt.error(settings.confidence), tilt_origin=f"by {len(tilt.presses)} presses"
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +157,9 @@ def stroke_intervals(stroke: Stroke, number: int, settings: BootstrapSettings | 
         low, high = np.quantile(found[name], [(1 - chosen.confidence) / 2, (1 + chosen.confidence) / 2]).tolist()
         told = getattr(stroke, name)
         # An instant told at the end of the stretch in which it may lie, as by the first reading after it, is one too.
-        return (min(low, told), max(high, told)) if name in _RANGES else (low, high)
+        # A lean that is known and was not levelled moves the truth away from the number told: it lies within as well.
+        within = name in _RANGES or chosen.tilt != (0.0, 0.0)
+        return (min(low, told), max(high, told)) if within else (low, high)
 
     told = {name: interval(name) for name in NUMBERS}
     return StrokeIntervals(number, stroke.trial, **told, direction_agrees=_agreeing(stroke, found))
@@ -190,7 +213,9 @@ class _Repeats:
         self._stroke, self._curve, self._settings, self._draw = stroke, curve, settings, draw
         n = settings.repeats
         self._step = float(np.median(np.diff(curve.time)))
-        self._gain_t, self._gain_n, self._gain_torque = 1.0 + settings.gain_error * draw.standard_normal((3, n))
+        accuracy = (settings.gain_error, settings.cross_talk)
+        self._shared = SystematicDraws(n, settings.seed, accuracy, settings.tilt, settings.tilt_error)
+        self._gain_t, self._gain_n = self._shared.gain_t, self._shared.gain_n
         self._noise_t, self._noise_n = curve.noise
         # The zero's drift was seen as one length of three axes; within it the zero may lie anywhere.
         drift = (stroke.zero_drift or 0.0) / np.sqrt(3.0 * 12.0)
@@ -204,7 +229,11 @@ class _Repeats:
         found: dict[str, Array] = {}
         if self._stroke.tau_max is not None and self._stroke.peak_tangential:
             area = self._stroke.contact_area or self._stroke.peak_tangential / self._stroke.tau_max
-            moved = self._zero_t + self._top(self._curve.tangential, self._noise_t)
+            curve = self._curve
+            at = int(np.nanargmax(curve.tangential if curve.crests is None else curve.crests))
+            of_normal, _ = self._shared.shares(drag_direction(self._curve.force[at : at + 1]))
+            top = self._top(curve.tangential, self._noise_t) if curve.crests is None else self._crest(curve.crests)
+            moved = self._zero_t + top + of_normal * curve.normal[at]
             peak = self._stroke.tau_max * area * self._gain_t + moved
             found["tau_max"] = peak / (area * self._gain_n**self._stroke.area_exponent)
             found["peak_tangential"] = self._stroke.peak_tangential * self._gain_t + moved
@@ -217,16 +246,24 @@ class _Repeats:
             found |= window
         if self._stroke.peak_normal is not None:
             top = self._top(self._curve.normal, self._noise_n)
-            found["peak_normal"] = self._stroke.peak_normal * self._gain_n + self._zero_n + top
+            at = int(np.nanargmax(self._curve.normal))
+            _, of_drag = self._shared.shares(drag_direction(self._curve.force[at : at + 1]))
+            moved = self._zero_n + of_drag * self._curve.tangential[at]
+            found["peak_normal"] = self._stroke.peak_normal * self._gain_n + moved + top
         return found | self._instants(found.get("speed")) | self._onset()
 
-    def _top(self, force: Array, noise: float) -> Array:
+    def _crest(self, force: Array) -> Array:
+        """Return how far the true greatest unfiltered force may lie from the one told (repeats,) [N]."""
+        missed = self._curve.crest_missed * self._draw.uniform(size=self._settings.repeats)
+        return self._top(force, self._curve.crest_noise, alike=0.0) + missed
+
+    def _top(self, force: Array, noise: float, alike: float = 0.25) -> Array:
         """Return how far the true greatest force may lie from the one told (repeats,) [N].
 
         Noise has raised the one told about as far as noise drawn once more raises that on average.
         """
         high = force[force >= self._settings.top_share * np.nanmax(force)]
-        every = max(1, round(self._settings.block / 4 / self._step))  # filtered readings nearer than this are alike
+        every = max(1, round(alike * self._settings.block / self._step))  # filtered readings nearer than it are alike
         high = high[::every]
         tops = (high + noise * self._draw.standard_normal((self._settings.repeats, len(high)))).max(axis=1)
         return tops - 2.0 * tops.mean() + high.max()
@@ -238,7 +275,9 @@ class _Repeats:
         normal = float(self._curve.normal[at])
         noise = np.hypot(self._noise_t, value * self._noise_n) / normal
         from_zero = (self._zero_t - value * self._zero_n) / normal
-        return value * self._gain_t / self._gain_n + from_zero + noise * self._draw.standard_normal(len(self._gain_t))
+        along = drag_direction(self._curve.force[at : at + 1])
+        scatter = noise * self._draw.standard_normal(len(self._gain_t))
+        return self._shared.ratio(value, along) + from_zero + scatter
 
     def _window(self) -> dict[str, Array] | None:
         """Return dynamic friction and speed (repeats,) from blocks of the steady window drawn again."""
@@ -265,21 +304,23 @@ class _Repeats:
         further *= np.sqrt(total / np.maximum(total - 1.0, 1.0) * free / self._draw.chisquare(free, len(total)))
         lightness = float(blocks[:, 1].mean())
         mu = self._stroke.mu_dynamic + (means[:, 0] - blocks[:, 0].mean()) * further
-        found = {
-            "mu_dynamic": mu * self._gain_t / self._gain_n
-            + (self._zero_t - self._stroke.mu_dynamic * self._zero_n) * lightness
-        }
+        along = drag_direction(curve.force[inside])
+        of_normal, of_drag = self._shared.shares(along)
+        from_zero = (self._zero_t - self._stroke.mu_dynamic * self._zero_n) * lightness
+        found = {"mu_dynamic": self._shared.ratio(mu, along) + from_zero}
         if self._stroke.normal_force is not None and self._stroke.tangential_force is not None:
             # A force may change along the stroke: its mean is that of a window, not of blocks drawn again. Windows are
             # drawn inwards, where N may be greater, but might have been wider too: about their own mean.
             other = kept @ blocks[:, 5:7] / total[:, None]
             other -= other.mean(axis=0)
-            found["normal_force"] = (self._stroke.normal_force + other[:, 0]) * self._gain_n + self._zero_n
-            found["tangential_force"] = (self._stroke.tangential_force + other[:, 1]) * self._gain_t + self._zero_t
+            pressing, dragging = self._stroke.normal_force, self._stroke.tangential_force
+            shared_n, shared_t = of_drag * dragging + self._zero_n, of_normal * pressing + self._zero_t
+            found["normal_force"] = (pressing + other[:, 0]) * self._gain_n + shared_n
+            found["tangential_force"] = (dragging + other[:, 1]) * self._gain_t + shared_t
         way = means[:, 7:] + self._zero_t_sd * self._draw.standard_normal((len(means), 2))
         if self._stroke.speed is not None and np.isfinite(blocks[:, 3:5]).all():
-            way = self._slopes(drawn, weight) * self._gain_torque[:, None]
-            found["speed"] = np.hypot(way[:, 0], way[:, 1]) / self._gain_n
+            way = self._slopes(drawn, weight) * self._shared.gain_torque[:, None]
+            found["speed"] = np.hypot(way[:, 0], way[:, 1]) / (self._gain_n + of_drag * self._stroke.mu_dynamic)
         if self._stroke.heading is not None:
             found["heading"] = self._headings(way, self._stroke.heading)
         return found

@@ -22,6 +22,7 @@ class FlawName(StrEnum):
     NO_UNLOADED_STRETCH = "no_unloaded_stretch"
     ZERO_AFTER_CONTACT = "zero_after_contact"
     DRIFT = "drift"
+    TILT_ASSUMED = "tilt_assumed"  # no press tells how the face leans
     NORMAL_IMPLAUSIBLE = "normal_axis_implausible"
     UNITS_IMPLAUSIBLE = "units_implausible"
     NO_STROKE = "no_stroke"
@@ -36,6 +37,7 @@ class FlawName(StrEnum):
     TOO_LITTLE_FORCE = "too_little_force"
     RATIO_ABOVE_ONE = "ratio_above_one_at_low_force"
     RATIO_ABOVE_ONE_THROUGHOUT = "ratio_above_one"
+    STICK_SLIP = "stick_slip"
     SIDE_LOAD = "side_load"
     NO_STEADY_SLIDING = "no_steady_sliding"
     ROLLED = "may_only_roll"

@@ -16,7 +16,7 @@ class FrictionParameters:
     trial: int | None
     stroke: int  # position in `Analysis.strokes`
     mu: float | None  # [-]
-    mu_interval: tuple[float, float] | None  # of the mean; None for a maximum, of which none is told
+    mu_interval: tuple[float, float] | None  # the bootstrap's, of that very number; None before it is drawn
     tau_max: float | None  # [MPa]
     contact_area: float  # that tau_max was told for [mm2]
     speed: float | None  # [mm/s]
@@ -45,7 +45,7 @@ def friction_parameters(stroke: Stroke, at: int, trial: Trial | None, contact_ar
         trial=stroke.trial,
         stroke=at,
         mu=stroke.mu_max if rule == "maximum" else stroke.mu_dynamic,
-        mu_interval=None if rule == "maximum" else stroke.mu_dynamic_interval,
+        mu_interval=None,
         tau_max=stroke.tau_max,
         contact_area=stroke.contact_area or contact_area,
         speed=stroke.speed,

@@ -134,6 +134,12 @@ class RatioSettings:
     static_noise: float = 3.0  # ... and so many standard deviations of the noise of T/N [-] ...
     static_after: float = 0.2  # ... that follows it for so long [s]; ...
     static_late: float = 0.1  # ... it may come so long after the slide began [s]
+    law_steepest: float = -1.0 / 3.0  # power by which mu may follow N unseen: T as the area of a Hertz contact [-]
+    slip_within: float = 0.02  # a slip drops T/N within so long: a fifth of a period at 10 Hz [s] ...
+    slip_share: float = 0.05  # ... by this share of its level, as a static peak stands out [-] ...
+    slip_noise: float = 4.0  # ... and so many deviations of a difference: once in 15000 readings by chance [-]
+    slips_fewest: int = 3  # slips of stick-slip: two periods
+    slips_upwards: float = 1.0 / 3.0  # climbs as sudden, for each slip, at most: hum has one for each [-]
     stick_rise: float = 0.1  # a stick phase: T/N climbs by this share of its level before it stays there [-] ...
     stick_left: float = 0.5  # ... and the climb leaves no more than this share of its variance [-]
 
@@ -150,6 +156,16 @@ class PressSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class SystematicSettings:
+    """What all readings of a session share, where nobody measured it."""
+
+    # Standard uncertainty of what each force shows of another [-]; None: that of a gain. A certificate states one error
+    # of an axis in per cent of full scale, whatever is loaded, so it holds for gain and cross-talk alike.
+    cross_talk: float | None = None
+    tilt_prior: float = 1.0  # of the lean about each axis: 1 mm under one end of a sample 60 mm long [degrees]
+
+
+@dataclass(frozen=True, slots=True)
 class AnalysisSettings:
     """How strokes are found and measured."""
 
@@ -162,6 +178,7 @@ class AnalysisSettings:
     slide: SlideSettings = field(default_factory=SlideSettings)
     ratio: RatioSettings = field(default_factory=RatioSettings)
     press: PressSettings = field(default_factory=PressSettings)
+    systematic: SystematicSettings = field(default_factory=SystematicSettings)
     area: AreaLaw = FIXED  # by which tau_max is told
     confidence: float = 0.95
     gain_error: float | None = None  # standard uncertainty of each axis' gain that somebody set [-]; None: assumed
@@ -174,14 +191,9 @@ class AnalysisSettings:
         return ASSUMED_GAIN_ERROR if self.gain_error is None else self.gain_error
 
     @property
-    def interval_kind(self) -> str:
-        """What an interval of mu is."""
-        return (
-            f"{100 * self.confidence:g} % t interval of the mean over the steady window from {self.filter.block:g} s "
-            "means, neighbours being alike allowed for, widened by the zero's noise, its drift where that was seen, "
-            f"and the calibration ({100 * self.gain_uncertainty:g} % of each axis, "
-            f"{'assumed' if self.gain_error is None else 'set'}): not by choice of window"
-        )
+    def cross_talk_uncertainty(self) -> float:
+        """Standard uncertainty of what each force shows of another [-]: the one that was set, or that of a gain."""
+        return self.gain_uncertainty if self.systematic.cross_talk is None else self.systematic.cross_talk
 
     def to_dict(self) -> dict[str, Any]:
         """Return every setting by its group, and for one release each also under its name alone, as it was before."""

@@ -20,7 +20,6 @@ _EDGES = 121  # windows begin and end on a grid of so many instants
 _QUARTERS = 4
 _ALIKE = 0.8  # most that neighbours may be alike: more cannot be told from so few
 _LEAST_FREE = 2.0  # degrees of freedom, likewise
-_MANY_FREE = 1e6  # Student's t is normal to seven digits from there on
 _ROUNDING = 1e-9  # instants are told to the last bit, or rounded by people [s]
 
 
@@ -99,38 +98,6 @@ def _trimmed(ratio: Array, window: slice, settings: AnalysisSettings) -> slice:
     with np.errstate(invalid="ignore"):
         inside = np.flatnonzero(np.abs(part - level) <= max(settings.steady.steady_trend * level, 2.0 * scatter))
     return slice(window.start + int(inside[0]), window.start + int(inside[-1]) + 1)
-
-
-@dataclass(frozen=True, slots=True)
-class Mean:
-    """A mean over a window."""
-
-    value: float
-    sd: float  # standard deviation of the readings
-    readings: int
-    interval: tuple[float, float] | None  # t interval from block means; None where there are too few blocks
-
-
-def mean_of(values: Array, rate: float, common: float, settings: AnalysisSettings) -> Mean:
-    """Return the mean of values (n,), leaving out nan, with an interval that allows for neighbours being alike.
-
-    `common` is the standard uncertainty that all values share.
-    """
-    held = values[np.isfinite(values)]
-    mean = float(held.mean())
-    blocks = block_means(values[:, None], rate, settings)[:, 0]
-    interval = None
-    if len(blocks) >= settings.filter.fewest_blocks:
-        from scipy.special import stdtrit  # slow to load, and neither window nor recorder has need of it
-
-        further, free = strays(blocks)
-        error = further * float(blocks.std(ddof=1)) / len(blocks) ** 0.5
-        whole = float(np.hypot(error, common))
-        # Only the blocks' part has few degrees of freedom (Welch 1947 and Satterthwaite 1946, as in JCGM 100, G.4.1).
-        free *= (whole / error) ** 4 if error > 0.0 else np.inf
-        half = float(stdtrit(min(free, _MANY_FREE), 0.5 + settings.confidence / 2) * whole)
-        interval = (mean - half, mean + half)
-    return Mean(mean, float(held.std(ddof=1)), len(held), interval)
 
 
 def strays(blocks: Array) -> tuple[float, float]:

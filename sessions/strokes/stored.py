@@ -16,7 +16,7 @@ from sessions.toml_file import SettingsError, from_table
 
 class _Intervals(msgspec.Struct):
     kind: str
-    settings: BootstrapSettings
+    settings: dict[str, Any]  # checked below: one of an older program lacks what was not drawn then
     strokes: tuple[StrokeIntervals, ...]
 
 

@@ -25,6 +25,9 @@ class StrokeCurve:
     speed: Array  # (n,) of the centre of pressure [mm/s]
     noise: tuple[float, float]  # standard deviations of each force sideways, and along the normal, unloaded [N]
     quiet: float  # how long that was seen [s]
+    crests: Array | None = None  # (n,) unfiltered tangential force [N], where the contact sticks and slips
+    crest_noise: float = 0.0  # its standard deviation, unloaded [N]
+    crest_missed: float = 0.0  # how far readings may miss its greatest value [N]
 
     def __post_init__(self) -> None:
         """Make the columns read-only views."""
@@ -52,7 +55,7 @@ class Stroke:
     mu_static: float | None  # height of the static peak [-]; None where none stands out
     mu_dynamic: float | None  # mean of T/N over the steady window [-]
     mu_dynamic_sd: float | None  # standard deviation of T/N in it [-]
-    mu_dynamic_interval: Interval | None  # see `AnalysisSettings.interval_kind`
+    mu_dynamic_interval: Interval | None  # the bootstrap's: see `BootstrapSettings.kind`
     mu_max: float | None  # greatest T/N above the force floor, smoothed as the settings say [-]
     tau_max: float | None  # greatest tangential force over the contact area there [MPa]
     normal_force: float | None  # mean over the steady window [N]

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, SessionPlan, Trial
 from sessions.strokes.break_away import break_away
@@ -10,11 +11,14 @@ from sessions.strokes.contacts import Contact
 from sessions.strokes.decisions import Decided
 from sessions.strokes.flaws import Flaw, FlawName
 from sessions.strokes.settings import AnalysisSettings
-from sessions.strokes.sliding import mean_of, slide
+from sessions.strokes.sliding import slide
 from sessions.strokes.span import Span, ZeroInForce
+from sessions.strokes.stick_slip import power_of_normal_force, stick_slip
 from sessions.strokes.stroke import Stroke
 from sessions.strokes.stroke_findings import COEFFICIENTS, DIRECTION, EVERYTHING, PEAKS, SPEED, Findings
-from sessions.strokes.track import Track, curve_of, mean_vector, track_of
+from sessions.strokes.track import Track, curve_of, felt_forces, mean_vector, noise_of_ratio, track_of
+
+Array = NDArray[np.float64]
 
 _SLIDES_BEFORE = "the contact slides before T/N stops climbing"
 _NO_PEAK = "no static peak stands out"
@@ -35,7 +39,7 @@ def measured(
 
     `number` is that of the stroke within its trial; what was `decided` of it goes before what is found.
     """
-    found, frame = Findings(), plan.frame
+    found, frame, missed = Findings(), plan.frame, None
     decided = decided or Decided({})
     track = track_of(span, contact, zero, frame.height, settings)
     _judge_ends(found, contact, track, settings)
@@ -50,7 +54,8 @@ def measured(
         window = slide(found, span, track, frame, settings, decided.span("steady"), whole)
         _take_slide_onset(found, decided)
         if window is not None:
-            _friction(found, track, window, zero, settings)
+            missed = _stick_slip(found, span, contact, track, window, zero, plan.contact_area, settings)
+            _friction(found, track, window)
             _static_peak(found, track, window, zero, settings, turned=contact.start in contact.turns)
             _break_away(found, track, window, settings)
             _judge_way(found, track, window, settings)
@@ -72,7 +77,7 @@ def measured(
         number=number,
         kept=decided.kept,
         decided=decided.sentences,
-        curve=curve_of(span, contact, zero, frame.height, settings),
+        curve=curve_of(span, contact, zero, frame.height, settings, missed),
         **numbers,
     )
     return stroke, tuple(found.flaws)
@@ -145,7 +150,7 @@ def _judge_loads(found: Findings, track: Track, contact_area: float, settings: A
     """Give the greatest forces, and say where they are implausible."""
     peak = float(np.nanmax(track.normal, initial=0.0))
     greatest = float(np.nanmax(track.tangential, initial=0.0))
-    traction, area = _greatest_traction(track, contact_area, settings)
+    traction, area = _greatest_traction(track, track.tangential, contact_area, settings)
     found.numbers |= {
         "peak_normal": peak,
         "peak_tangential": greatest,
@@ -174,16 +179,18 @@ def _judge_loads(found: Findings, track: Track, contact_area: float, settings: A
         found.numbers["mu_max"] = _greatest_ratio(track, half, settings)
 
 
-def _greatest_traction(track: Track, planned: float, settings: AnalysisSettings) -> tuple[float | None, float | None]:
+def _greatest_traction(
+    track: Track, tangential: Array, planned: float, settings: AnalysisSettings
+) -> tuple[float | None, float | None]:
     """Return the greatest mean traction [MPa] and the area [mm2] it acts on; None where an area that grows has no N."""
     if settings.area.law == "fixed":
-        return float(np.nanmax(track.tangential, initial=0.0)) / planned, planned
+        return float(np.nanmax(tangential, initial=0.0)) / planned, planned
     with np.errstate(invalid="ignore"):
         pressed = np.flatnonzero(track.normal >= track.floor)
     if not len(pressed):
         return None, None
     areas = settings.area.area(track.normal[pressed], planned)
-    tractions = track.tangential[pressed] / areas
+    tractions = tangential[pressed] / areas
     top = int(np.argmax(tractions))
     return float(tractions[top]), float(areas[top])
 
@@ -209,29 +216,54 @@ def _greatest_ratio(track: Track, floor: float, settings: AnalysisSettings) -> f
     return float(means.max()) if len(means) else None
 
 
-def _friction(found: Findings, track: Track, window: slice, zero: ZeroInForce, settings: AnalysisSettings) -> None:
-    """Give the mean of T/N over the steady window; its interval allows for a wrong zero and wrong gains too."""
-    drag = mean_vector(track.wrench[window, :2])
-    sideways = float(np.linalg.norm(drag / np.linalg.norm(drag) * zero.error[:2]))
-    ratio = float(np.nanmean(track.ratio[window]))
-    lightness = float(np.nanmean(1.0 / track.normal[window]))
-    from_zero = float(np.hypot(sideways, ratio * zero.error[2])) * lightness
-    from_gains = np.sqrt(2.0) * settings.gain_uncertainty * ratio  # of the drag's axis and of the normal one
-    mean = mean_of(track.ratio[window], track.rate, float(np.hypot(from_zero, from_gains)), settings)
-    if mean.value > 1.0:
+def _friction(found: Findings, track: Track, window: slice) -> None:
+    """Give the mean of T/N over the steady window, and of the forces."""
+    held = track.ratio[window][np.isfinite(track.ratio[window])]
+    mean = float(held.mean())
+    if mean > 1.0:
         sentence = (
-            f"T/N is {mean.value:.2f} in the steady window: a surface that sticks can make it so, but so do a clipped "
+            f"T/N is {mean:.2f} in the steady window: a surface that sticks can make it so, but so do a clipped "
             "axis, a wrong gain or zero, or a face that leans."
         )
         found.flaw(FlawName.RATIO_ABOVE_ONE_THROUGHOUT, sentence, "doubtful")
     found.numbers |= {
-        "mu_dynamic": mean.value,
-        "mu_dynamic_sd": mean.sd,
-        "mu_dynamic_interval": mean.interval,
-        "readings": mean.readings,
+        "mu_dynamic": mean,
+        "mu_dynamic_sd": float(held.std(ddof=1)),
+        "readings": len(held),
         "normal_force": float(np.nanmean(track.normal[window])),
         "tangential_force": float(np.nanmean(track.tangential[window])),
     }
+
+
+def _stick_slip(
+    found: Findings,
+    span: Span,
+    contact: Contact,
+    track: Track,
+    window: slice,
+    zero: ZeroInForce,
+    planned: float,
+    settings: AnalysisSettings,
+) -> float | None:
+    """Tell tau_max by the unfiltered force where the contact sticks and slips; return how far it may be missed [N]."""
+    dragging, normal = felt_forces(span, slice(contact.start, contact.stop), zero)
+    with np.errstate(invalid="ignore"):
+        ratio = np.where(normal >= track.floor, dragging / np.maximum(normal, track.floor), np.nan)
+    level, pressing = float(np.nanmean(track.ratio[window])), float(np.nanmean(track.normal[window]))
+    slips = stick_slip(track.time[window], ratio[window], noise_of_ratio(zero, level, pressing), settings)
+    if slips is None:
+        return None
+    missed = slips.missed * pressing
+    filtered, told = found.numbers["peak_tangential"], float(np.nanmax(dragging))
+    traction, area = _greatest_traction(track, dragging, planned, settings)
+    found.numbers |= {"tau_max": traction, "contact_area": area, "peak_tangential": told}
+    sentence = (
+        f"The contact sticks and slips at {slips.frequency:.2g} Hz: the greatest tangential force and tau_max are "
+        f"those of unfiltered forces, {100 * (told / filtered - 1.0):.2g} % above the filtered ones; readings may miss "
+        f"the crest by {100 * missed / told:.1g} %, and noise raises it."
+    )
+    found.flaw(FlawName.STICK_SLIP, sentence, "note")
+    return missed
 
 
 def _judge_drift(found: Findings, zero: ZeroInForce, settings: AnalysisSettings) -> None:
@@ -264,7 +296,10 @@ def _static_peak(
 ) -> None:
     """Give the static peak where one stands out of what follows it by its noise and by a share.
 
-    The filter overshoots a sudden change by 3.5 % of it, which is twice the level where the finger `turned`.
+    What follows is both the level just after it and the highest crest of the steady window, for a contact that sticks
+    and slips peaks again and again. Both count as they would be under the peak's own normal force, as far as T/N may
+    follow that. The filter overshoots a sudden change by 3.5 % of it, which is twice the level where the finger
+    `turned`.
     """
     began = found.numbers.get("slide_onset", track.time[window.start])
     last = int(np.searchsorted(track.time, float(began + settings.ratio.static_late)))
@@ -274,12 +309,16 @@ def _static_peak(
         return
     top = int(np.nanargmax(before))
     end = int(np.searchsorted(track.time, float(track.time[top] + settings.ratio.static_after)))
-    follows = track.ratio[top : end + 1]
-    level = float(np.nanmedian(follows))
-    noise = float(np.hypot(*zero.noise[:2])) / np.sqrt(2.0)
-    sd = np.hypot(noise, level * float(zero.noise[2])) / float(track.normal[top])
+    length = max(1, round(settings.filter.block * track.rate))
+    power = power_of_normal_force(track.normal[end:], track.ratio[end:], length, settings)
+    with np.errstate(invalid="ignore"):
+        alike = track.ratio * (track.normal[top] / track.normal) ** power  # as T/N would be under the peak's N
+    level = float(np.nanmedian(alike[top : end + 1]))
+    later = alike[max(end, window.start) : window.stop]
+    crest = float(np.nanmax(later)) if np.isfinite(later).any() else level
+    sd = noise_of_ratio(zero, level, float(track.normal[top]))
     share = settings.ratio.static_share * (2.0 if turned else 1.0)
-    if before[top] - level > max(settings.ratio.static_noise * sd, share * level):
+    if before[top] - max(level, crest) > max(settings.ratio.static_noise * sd, share * level):
         found.numbers["mu_static"] = float(before[top])
         if found.reasons["mu_static"] == _NO_PEAK:
             del found.reasons["mu_static"]

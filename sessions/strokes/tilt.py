@@ -7,6 +7,7 @@ weight in place of a finger, tell the face from the hand.
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,11 @@ class Tilt:
     y_interval: Pair
     presses: tuple[Press, ...]
     kind: str  # what the intervals hold, for people
+
+    def error(self, confidence: float) -> Pair:
+        """Return the standard uncertainty [degrees] of a normal lean whose intervals of a `confidence` are these."""
+        wide = 2.0 * NormalDist().inv_cdf(0.5 + confidence / 2)
+        return (self.x_interval[1] - self.x_interval[0]) / wide, (self.y_interval[1] - self.y_interval[0]) / wide
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""

@@ -1,6 +1,6 @@
 """The filtered readings of one contact: forces, ratio, centre of pressure and its speed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,13 +72,39 @@ def _speed(time: Array, position: Array, span: Span, settings: AnalysisSettings)
     return speed
 
 
-def curve_of(span: Span, contact: Contact, zero: ZeroInForce, height: float, settings: AnalysisSettings) -> StrokeCurve:
-    """Return the stroke's course with some time around it."""
+def felt_forces(span: Span, part: slice, zero: ZeroInForce) -> tuple[Array, Array]:
+    """Return the tangential and the normal force (n,) [N] of a part, zeroed and unfiltered."""
+    wrench = span.wrench[part] - zero.level
+    return np.hypot(wrench[:, 0], wrench[:, 1]), -wrench[:, 2]
+
+
+def noise_of_ratio(zero: ZeroInForce, level: float, normal: float) -> float:
+    """Return the standard deviation [-] of unfiltered T/N about `level` under a normal force [N]."""
+    sideways = float(np.hypot(*zero.noise[:2])) / np.sqrt(2.0)
+    return float(np.hypot(sideways, level * float(zero.noise[2]))) / normal
+
+
+def curve_of(
+    span: Span,
+    contact: Contact,
+    zero: ZeroInForce,
+    height: float,
+    settings: AnalysisSettings,
+    missed: float | None = None,
+) -> StrokeCurve:
+    """Return the stroke's course with some time around it.
+
+    `missed` [N] is how far readings may miss the greatest force of a contact that sticks and slips, None of another.
+    """
     first = int(np.searchsorted(span.time, float(span.time[contact.start]) - _AROUND[0]))
     last = int(np.searchsorted(span.time, float(span.time[contact.stop - 1]) + _AROUND[1]))
     shown = track_of(span, Contact(first, last, None, None), zero, height, settings)
     force = shown.wrench[:, :2]
-    felt = zero.level[2] - span.wrench[first:last, 2]
+    dragging, felt = felt_forces(span, slice(first, last), zero)
     columns = (shown.time, shown.normal, felt, shown.tangential, force, shown.ratio, shown.position, shown.speed)
     sideways = float(np.sqrt((zero.filtered[:2] ** 2).mean()))
-    return StrokeCurve(*columns, noise=(sideways, float(zero.filtered[2])), quiet=zero.lasts)
+    curve = StrokeCurve(*columns, noise=(sideways, float(zero.filtered[2])), quiet=zero.lasts)
+    if missed is None:
+        return curve
+    crest_noise = float(np.sqrt((zero.noise[:2] ** 2).mean()))
+    return replace(curve, crests=dragging, crest_noise=crest_noise, crest_missed=missed)

@@ -11,6 +11,7 @@ from sessions.strokes.contact_area import FIXED, HERTZ, AreaLaw
 
 T = times()
 PRESSED = 6.0  # N, with a mu of 0.5: 3 N sideways
+GAINS_ALONE = BootstrapSettings(repeats=20000, gain_error=0.02, cross_talk=0.0, tilt_error=(0.0, 0.0))
 
 
 def found(law):
@@ -44,7 +45,7 @@ def test_the_law_stands_in_the_settings_and_says_what_was_assumed():
 def test_an_error_of_calibration_reaches_tau_max_through_the_area_too():
     # T over N^m: relative errors of 2 % of each make 2 % sqrt(1 + m^2).
     (one,) = found(AreaLaw("hertz", HERTZ)).strokes
-    low, high = stroke_intervals(one, 0, BootstrapSettings(repeats=20000, gain_error=0.02)).tau_max
+    low, high = stroke_intervals(one, 0, GAINS_ALONE).tau_max
     assert (high - low) / one.tau_max == pytest.approx(2 * 1.95996 * 0.02 * np.hypot(1.0, HERTZ), rel=0.04)
 
 

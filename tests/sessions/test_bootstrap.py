@@ -24,6 +24,7 @@ _spec.loader.exec_module(planted_truth)
 
 NUMBERS = ("mu_dynamic", "mu_max", "tau_max", "speed")
 FORCES = ("normal_force", "tangential_force", "peak_normal", "peak_tangential")
+GAINS_ALONE = BootstrapSettings(repeats=20000, gain_error=0.02, cross_talk=0.0, tilt_error=(0.0, 0.0))
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +54,7 @@ def test_every_number_lies_in_its_interval(strokes):
 
 def test_of_a_calibration_alone_tau_max_has_the_closed_form(strokes):
     # The gain of a long-known force, normal with 2 %: 1.96 * 2 % to both sides, noise of 4 mN being far below.
-    found = stroke_intervals(strokes[4], 4, BootstrapSettings(repeats=20000, gain_error=0.02))
+    found = stroke_intervals(strokes[4], 4, GAINS_ALONE)
     assert width(found.tau_max) / strokes[4].tau_max == pytest.approx(2 * 1.95996 * 0.02, rel=0.03)
 
 
@@ -159,7 +160,7 @@ def covered(seeds, noise):
         bench = BenchSettings(gains=(a, b, c, d, e, f), noise_force=0.004 * noise, noise_torque=0.05 * noise)
         visit = planted_truth.visit(seed, bench)
         for number, (stroke, truth) in enumerate(zip(visit.analysed().strokes, visit.planted, strict=True)):
-            found = stroke_intervals(stroke, number)
+            found = stroke_intervals(stroke, number, BootstrapSettings(cross_talk=0.0, tilt_error=(0.0, 0.0)))
             for name, planted in truths(seed, truth):
                 low, high = getattr(found, name) or (None, None)
                 if low is None:

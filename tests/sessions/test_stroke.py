@@ -1,6 +1,7 @@
 """Strokes: found, bounded, timed; forces in the face frame; steady windows and speed. Truth is in closed form."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -24,8 +25,10 @@ from made_strokes import (
 from scipy.signal import lfilter
 
 from sessions.plan.plan import Frame
+from sessions.strokes.bootstrap import BootstrapSettings, stroke_intervals
 from sessions.strokes.forces import Filter, centre_of_pressure, friction_ratio, in_face_frame, normal_force
-from sessions.strokes.sliding import mean_of, movement, steady_window
+from sessions.strokes.sliding import movement, steady_window
+from sessions.strokes.stroke import StrokeCurve
 
 T = times()
 PLAIN = stroke(T)
@@ -266,13 +269,30 @@ def test_the_middle_half_and_the_whole_slide_ask_for_no_steadiness():
     assert (windows["middle half"], windows["whole slide"]) == (slice(200, 400), slice(100, 500))
 
 
+@cache
+def plain_stroke():
+    (one,) = analysed(block(T, felt(PLAIN))).strokes
+    return one
+
+
+def interval_of_mean(ratio):
+    """Return the interval of the mean of T/N (n,) at 200 readings a second, of an exact bench."""
+    one, n = np.ones(len(ratio)), len(ratio)
+    columns = (np.arange(n) / 200.0, 2 * one, 2 * one, 2 * ratio, np.outer(2 * ratio, [1, 0]), ratio)
+    curve = StrokeCurve(*columns, np.zeros((n, 2)), one, noise=(0.0, 0.0), quiet=1.0)
+    steady, mean = (0.0, float(columns[0][-1])), float(ratio.mean())
+    made = plain_stroke()
+    exact = BootstrapSettings(repeats=500, gain_error=0.0, cross_talk=0.0, tilt_error=(0.0, 0.0))
+    bare = replace(made, curve=curve, steady=steady, mu_dynamic=mean, zero_drift=None, speed=None, break_away=None)
+    return stroke_intervals(
+        replace(bare, heading=None, slide_onset=None, tau_max=None, onset=None), 0, exact
+    ).mu_dynamic
+
+
 def test_a_mean_of_white_noise_lies_in_its_interval_as_often_as_it_says():
     draw = np.random.default_rng(1)
-    inside = 0
-    for _ in range(400):
-        low, high = mean_of(0.5 + 0.05 * draw.standard_normal(300), 200.0, 0.0, SETTINGS).interval
-        inside += low <= 0.5 <= high
-    assert 0.92 <= inside / 400 <= 0.98  # 0.95 within three standard deviations of 400 draws
+    ends = [interval_of_mean(0.5 + 0.05 * draw.standard_normal(300)) for _ in range(400)]
+    assert 0.90 <= np.mean([low <= 0.5 <= high for low, high in ends]) <= 0.98
 
 
 @pytest.mark.parametrize("alike", [0.05, 0.1, 0.2, 0.4])  # [s]
@@ -280,7 +300,7 @@ def test_a_mean_of_a_ratio_that_wanders_lies_in_its_interval_as_often_as_it_says
     draw, kept = np.random.default_rng(2), np.exp(-1 / (200.0 * alike))
     steps = draw.standard_normal((400, 800)) * np.sqrt(1.0 - kept**2)
     wandering = lfilter([1.0], [1.0, -kept], steps, axis=1)[:, 400:]
-    ends = [mean_of(0.5 + 0.02 * one, 200.0, 0.0, SETTINGS).interval for one in wandering]
+    ends = [interval_of_mean(0.5 + 0.02 * one) for one in wandering]
     assert 0.90 <= np.mean([low <= 0.5 <= high for low, high in ends]) <= 0.98
 
 

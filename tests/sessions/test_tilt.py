@@ -1,12 +1,14 @@
 """How the face leans, told from presses: the lean is planted by turning a whole bench in closed form."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from made_strokes import INFO, SETTINGS, analysed, block, felt, plan, stroke, times, trapezium, trial, wrench
 
-from sessions.strokes.analysis import analyse_blocks
+from sessions.recording import Recording
+from sessions.strokes.analysis import analyse, analyse_blocks
 from sessions.strokes.tilt import tilt_of
 
 T = times(12.0)
@@ -88,3 +90,25 @@ def test_presses_of_practice_count_and_its_strokes_do_not():
     one = replace(trial(), phase="practice")
     found = analyse_blocks([(one, block(T, felt(leaning(presses()))))], plan([one]), INFO, SETTINGS)
     assert [press.trial for press in found.presses] == [1, 1, 1]
+
+
+def width(found):
+    low, high = found.strokes[-1].mu_dynamic_interval
+    return high - low
+
+
+def test_three_presses_narrow_the_interval_of_mu_and_a_lean_that_nobody_levelled_moves_it_over_the_true_mu():
+    clean = [leaning(stroke(T, mu=0.5)), leaning(presses())]
+    parts = [(trial(number=number), block(T, felt(one))) for number, one in zip((1, 2), clean, strict=True)]
+    pressed = analyse_blocks(parts, plan([of for of, _ in parts]), INFO, SETTINGS)
+    alone = analyse_blocks(parts[:1], plan([parts[0][0]]), INFO, SETTINGS)
+    (low, high), told = pressed.strokes[0].mu_dynamic_interval, pressed.strokes[0].mu_dynamic
+    assert low <= told < 0.5 < high  # told is off by 2 degrees: 0.044
+    assert width(alone) > 1.2 * (high - max(low, told))
+
+
+def test_a_recording_without_presses_names_the_lean_it_assumes_and_is_not_flawed_by_it():
+    kept = Path(__file__).parents[1] / "data" / "sessions" / "version-1" / "sealed"
+    found = analyse(Recording.open(kept))
+    assert [flaw.grade for flaw in found.flaws if flaw.name == "tilt_assumed"] == ["note"]
+    assert "1°" in found.to_dict()["interval"]

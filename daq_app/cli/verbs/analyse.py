@@ -12,7 +12,7 @@ from daq_app.cli.area_option import add_area, area_law
 from daq_app.cli.calibration_option import add_calibration, calibration_error
 from daq_app.console import Console, WrongValue, number, span, table
 from sessions.recording import Recording
-from sessions.strokes.bootstrap import StrokeIntervals, drawn_from, stroke_intervals
+from sessions.strokes.bootstrap import StrokeIntervals, drawn_from
 from sessions.strokes.tilt import Tilt
 
 EXAMPLE = "daq-app analyse recordings/P07 --json"
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     older = made_otherwise(recording, analysis.settings)
     if older is not None:
         console.note(older)
-    chosen = drawn_from(analysis.settings)
+    chosen = drawn_from(analysis.settings, analysis.tilt)
     console.result(analysis_document(analysis, chosen))
     if recording.simulated_sentence:
         console.say(recording.simulated_sentence)
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.say(table(rows, head=HEAD) if rows else "no stroke")
     for decision in analysis.decisions:
         console.say(f"* {decision.sentence}")
-    intervals = [stroke_intervals(stroke, at, chosen) for at, stroke in enumerate(analysis.strokes)]
+    intervals = analysis.intervals
     if any(end != "–" for found in intervals for end in _row(found)[1:] + _course(found)[1:]):
         console.say(f"\n{chosen.kind}:")
         console.say(table([_row(found) for found in intervals], head=INTERVALS))
@@ -74,7 +74,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     for flaw in analysis.flaws:
         where = "" if flaw.trial is None else f"trial {flaw.trial}: "
         console.say(f"{flaw.grade}: {where}{flaw.sentence}")
-    return 3 if analysis.flaws else 0
+    return 3 if analysis.flawed else 0
 
 
 def _leaning(tilt: Tilt, levelled: tuple[float, float]) -> str:

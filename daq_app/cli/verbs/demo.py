@@ -77,7 +77,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     }
     console.result(summary)
     _print(summary, rows, console)
-    return 3 if analysis.flaws or study.lost else 0
+    return 3 if analysis.flawed or study.lost else 0
 
 
 def _rows(

@@ -86,7 +86,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     pictures = html.write_figures(report, options.figures, drawings) if options.figures else ()
     console.result({"page": str(page), "pictures": [str(path) for path in pictures], "flaws": len(report.flaws)})
     console.say(f"{page}{' (SIMULATED)' if report.simulated else ''}")
-    return 3 if analysis.flaws else 0
+    return 3 if analysis.flawed else 0
 
 
 def _asked(recording: Recording, options: argparse.Namespace) -> PredictionOptions:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from sessions.report import Planted, PredictionFinding, Report, StrokeFinding
 from sessions.report.tables.cells import Cell, Notes, Row, Table, grouped, table
-from sessions.report.wording import NONE, places, signed, tau, with_error
+from sessions.report.wording import NONE, places, signed, tau
 
 Told = Callable[[float], str]
 
@@ -32,14 +32,12 @@ def stroke_table(report: Report) -> Table | None:
         def cell(name: str, shown: Told, ends: Told | None = None, unit: float = 1.0) -> Cell:
             return _estimate(notes, stroke, name, shown, ends, unit)
 
-        half = None if stroke.mu_interval is None else (stroke.mu_interval[1] - stroke.mu_interval[0]) / 2
-        error = stroke.speed_error
         return (
             cell("mu_static", places(3)),
-            cell("mu_dynamic", lambda v: with_error(v, half, 3), places(3)),
+            cell("mu_dynamic", places(3)),
             cell("mu_max", places(3)),
             cell("tau_max", tau, unit=1e3),
-            cell("speed", lambda v: with_error(v, error, 1), places(1)),
+            cell("speed", places(1)),
             notes.number(
                 stroke.direction, lambda v: {1: "p → d", -1: "d → p"}[int(v)], stroke.reasons.get("direction")
             ),
@@ -48,9 +46,9 @@ def stroke_table(report: Report) -> Table | None:
 
     kind = f" Under each number: {report.interval_kind}." if report.interval_kind else ""
     caption = (
-        "Strokes. µ dynamic: mean over the steady window (± half its 95 % interval: noise, zero, gains); µ static: "
-        "height of the static peak; µ maximum: greatest above the force floor; τ max: greatest tangential force over "
-        "the contact area, which is taken as given; speed: slope of the centre of pressure (± its standard error)."
+        "Strokes. µ dynamic: mean over the steady window; µ static: height of the static peak; µ maximum: greatest "
+        "above the force floor; τ max: greatest tangential force over the contact area, which is taken as given; "
+        "speed: slope of the centre of pressure."
         f"{kind}"
     )
     return _table(report, "table-strokes", caption, columns, row, notes)

@@ -20,7 +20,7 @@ from sessions.recording.unblinding import revealed
 from sessions.statistics.multiverse import Seds, trial_paths
 from sessions.statistics.scores import Score, ScoreTable
 from sessions.strokes import Analysis, AnalysisSettings, FrictionParameters, analyse
-from sessions.strokes.bootstrap import drawn_from, stroke_intervals
+from sessions.strokes.bootstrap import drawn_from
 from sessions.strokes.contact_area import FIXED, AreaLaw
 
 FORM = 10  # raised when a row holds something else: what was stored before is then computed anew
@@ -151,7 +151,7 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
         sha256=file_sha256(known.folder / LIVE_FILE),
         sealed="" if prediction is None else _sealed(known, prediction),
         decisions=tuple(decision.sentence for decision in analysis.decisions),
-        calibration=drawn_from(analysis.settings).calibration,
+        calibration=drawn_from(analysis.settings, analysis.tilt).calibration,
         model=tuple(fact for fact in model_facts(prediction) if fact[0] != "audits"),
     )
 
@@ -200,7 +200,7 @@ def _row(
 def _with_friction(row: TrialRow, friction: FrictionParameters, analysis: Analysis) -> TrialRow:
     """Return the row with what was measured in the trial's stroke."""
     stroke = analysis.strokes[friction.stroke]
-    intervals = stroke_intervals(stroke, friction.stroke, drawn_from(analysis.settings))
+    intervals = analysis.intervals[friction.stroke]
     mu_low, mu_high = (intervals.mu_max if friction.rule == "maximum" else intervals.mu_dynamic) or (None, None)
     tau_max_low, tau_max_high = intervals.tau_max or (None, None)
     speed_low, speed_high = intervals.speed or (None, None)

@@ -1,0 +1,223 @@
+"""Coverage of the 95 % intervals of friction on planted strokes, in nine kinds of trouble, and false static peaks.
+
+Every bench errs as its stated accuracy allows: gains and cross-talk of the forces are drawn with a standard deviation
+of 1 %, the lean of the face with 1° about each axis. A set adds its own trouble. None of its strokes has a static peak.
+
+Run from the repository's root: python -m benchmarks.friction_coverage [SEEDS [SET ...]]; 100 seeds by default.
+"""
+
+import sys
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.calibration import Calibration
+from drivers.readings import ReadingBlock
+from drivers.transducer import TransducerInfo
+from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
+from sessions.strokes.analysis import Analysis, analyse_blocks
+from sessions.strokes.bootstrap import drawn_from, stroke_intervals
+from sessions.strokes.settings import AnalysisSettings
+from simulators.bench import RATED, Bench, BenchSettings, PlantedStroke
+from simulators.subject import SimulatedSubject
+from simulators.surface import CONTACT_AREA, paper_surfaces
+
+Array = NDArray[np.float64]
+Truth = dict[str, float]
+
+RATE = 200.0  # [Hz]
+ACCURACY = 0.01  # standard deviation of gains and of cross-talk [-]
+LEAN = 1.0  # standard deviation of the face's lean about each axis [degrees]
+FINE = 20000  # instants at which the planted greatest force is sought, and the planted mean formed
+HEIGHT = BenchSettings().height
+CALIBRATION = Calibration("FT0001", "counts", np.diag([1e-6] * 3 + [1e-3] * 3), np.array(RATED), "the bench's own")
+INFO = TransducerInfo("sim:", "net-ft", "SIMULATED", "FT0001", True, RATE, 7000.0, CALIBRATION, {})
+NUMBERS = ("mu_dynamic", "tau_max", "speed")
+
+
+@dataclass(frozen=True)
+class Trouble:
+    """What a set does to its benches and strokes."""
+
+    bench: BenchSettings = field(default_factory=BenchSettings)
+    hum: float = 0.0  # amplitude at 50 Hz on each force [N]
+    flicker: float = 0.0  # standard deviation of 1/f noise of each force [N]
+    wander: float = 0.0  # standard deviation of mu's slow wandering [-]
+    law: float = 0.0  # mu follows N by this power [-]
+    cross_talk: float | None = None  # each force errs by exactly so much of each other, either sign; None: drawn [-]
+    tilt: tuple[float, float] | None = None  # [degrees]; None: drawn
+    slips: bool = False  # T/N climbs and drops again and again while the finger slides
+
+
+SETS = {
+    "base": Trouble(),
+    "noise x 5": Trouble(BenchSettings(noise_force=0.02, noise_torque=0.25)),
+    "drift x 5": Trouble(BenchSettings(drift_force=0.05, drift_torque=0.5)),
+    "mains hum": Trouble(hum=0.02),
+    "1/f noise": Trouble(flicker=0.01),
+    "wandering mu": Trouble(wander=0.03),
+    "cross-talk 1 %": Trouble(cross_talk=0.01),
+    "tilt 1 + 1 degrees": Trouble(tilt=(1.0, 1.0)),
+    "stick-slip": Trouble(slips=True),
+    "mu falls with N": Trouble(law=-1.0 / 3.0),
+}
+
+
+class Visit:
+    """Ten strokes of one simulated subject on one bench that errs."""
+
+    def __init__(self, seed: int, trouble: Trouble) -> None:
+        """Draw how the bench errs and how friction changes along each stroke."""
+        self._trouble, self._seed = trouble, seed
+        draw = np.random.default_rng([seed, 77])
+        self._bench, self._subject = Bench(seed, trouble.bench), SimulatedSubject(seed)
+        size = trouble.cross_talk
+        errors = ACCURACY * draw.standard_normal((3, 3))
+        if size is not None:
+            errors = np.where(np.eye(3) > 0.0, errors, size * draw.choice([-1.0, 1.0], (3, 3)))
+        self._errors = np.eye(6)
+        self._errors[:3, :3] += errors
+        self._errors[3:, 3:] += np.diag(ACCURACY * draw.standard_normal(3))
+        tilt = trouble.tilt or tuple((LEAN * draw.standard_normal(2)).tolist())
+        self._turn = _turned(tilt)
+        self._phases = draw.uniform(0.0, 2.0 * np.pi, 8)
+        self._slips_each = draw.uniform(5.0, 15.0)  # [Hz]
+        self._drop = draw.uniform(0.1, 0.3)  # of mu in each slip [-]
+
+    def strokes(self) -> tuple[Analysis, list[Truth]]:
+        """Return the analysis of the ten strokes, and what was planted in each."""
+        parts: list[tuple[Trial, ReadingBlock]] = []
+        truths: list[Truth] = []
+        begin = 0.5
+        for number, surface in enumerate(paper_surfaces().values(), 1):
+            self._bench.mount(surface)
+            planted = self._bench.begin_stroke(self._subject.stroke(surface), begin)
+            position = np.arange(np.ceil((begin - 0.2) * RATE), (planted.end + 0.6) * RATE).astype(np.int64)
+            time = position / RATE
+            counts = np.rint(self._felt(time, planted) / np.diag(CALIBRATION.matrix))
+            healthy = np.zeros(len(time), np.int64)
+            block = ReadingBlock(position, position, healthy, time, np.rint(time * 1e9).astype(np.int64), counts)
+            trial = Trial(number, "b", Stimulus("slipperiness", surface.index, f"K{number}"), surface.direction, 1)
+            parts.append((trial, block))
+            truths.append(self._truth(planted))
+            begin = planted.end + 1.0
+        blocks = (Block("b", "", 1, 2.0, ("", ""), tuple(trial for trial, _ in parts)),)
+        plan = SessionPlan("sensotact", "S1", 0, "given", blocks, forces=True, frame=Frame("-z", "set", HEIGHT, "set"))
+        return analyse_blocks(parts, plan, INFO, AnalysisSettings()), truths
+
+    def _truth(self, planted: PlantedStroke) -> Truth:
+        steady = np.linspace(*planted.steady, FINE)
+        whole = np.linspace(planted.touch, planted.end, FINE)
+        tangential = np.hypot(*self._exerted(whole, planted)[:, :2].T)
+        mu = planted.mu * float(self._factor(steady, planted).mean())
+        return {"mu_dynamic": mu, "tau_max": float(tangential.max()) / CONTACT_AREA, "speed": planted.speed}
+
+    def _factor(self, time: Array, planted: PlantedStroke) -> Array:
+        """Return friction over the surface's own (n,) [-] at `time` (n,) [s]."""
+        factor = np.ones_like(time)
+        if self._trouble.wander:
+            waves = [np.sin(2 * np.pi * f * time + p) for f, p in zip((0.4, 0.9, 1.7), self._phases[:3], strict=True)]
+            factor += self._trouble.wander * np.sqrt(2.0 / 3.0) * np.sum(waves, axis=0)
+        if self._trouble.slips:
+            phase = np.maximum(time - planted.slip, 0.0) * self._slips_each % 1.0
+            # A climb over nine tenths of the time, a drop in the last: 7 to 20 ms, as fingers' relaxation allows.
+            saw = np.where(phase < 0.9, phase / 0.9, (1.0 - phase) / 0.1)
+            factor *= np.where(time > planted.slip, 1.0 - self._drop * (1.0 - saw), 1.0)
+        if self._trouble.law:
+            pressed = np.maximum(-self._bench.exerted(time)[:, 2], 1e-3)
+            factor *= (pressed / planted.peak_normal_force) ** self._trouble.law
+        return factor
+
+    def _exerted(self, time: Array, planted: PlantedStroke) -> Array:
+        """Return the true wrench (n, 6) [N, N mm] in the face's frame."""
+        plain = self._bench.exerted(time)
+        more = plain[:, :2] * (self._factor(time, planted) - 1.0)[:, None]
+        pressed = np.minimum(plain[:, 2], -1e-12)
+        x = (HEIGHT * plain[:, 0] - plain[:, 4]) / pressed
+        y = (plain[:, 3] + HEIGHT * plain[:, 1]) / pressed
+        torques = np.column_stack([-HEIGHT * more[:, 1], HEIGHT * more[:, 0], x * more[:, 1] - y * more[:, 0]])
+        return plain + np.hstack([more, np.zeros((len(time), 1)), torques])
+
+    def _felt(self, time: Array, planted: PlantedStroke) -> Array:
+        """Return the wrench (n, 6) [N, N mm] that the transducer tells."""
+        true = self._exerted(time, planted)
+        turned = np.hstack([true[:, :3] @ self._turn.T, true[:, 3:] @ self._turn.T])
+        felt = turned @ self._errors.T + self._bench.wrench(time) - self._bench.exerted(time)
+        if self._trouble.hum:
+            felt[:, :3] += self._trouble.hum * np.sin(2 * np.pi * 50.0 * time[:, None] + self._phases[3:6])
+        if self._trouble.flicker:
+            felt[:, :3] += self._trouble.flicker * _flicker(len(time), 3, (self._seed, int(time[0] * RATE)))
+        return felt
+
+
+def _turned(lean: Sequence[float]) -> Array:
+    """Return the matrix (3, 3) from the face's frame to that of a transducer about whose x and y it is turned [deg]."""
+    (sx, sy), (cx, cy) = np.sin(np.radians(lean)), np.cos(np.radians(lean))
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
+    return np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]]) @ about_x
+
+
+def _flicker(n: int, channels: int, seed: Sequence[int]) -> Array:
+    """Return noise (n, channels) whose power falls as 1/f, of standard deviation 1."""
+    spectrum = np.fft.rfft(np.random.default_rng(seed).standard_normal((n, channels)), axis=0)
+    spectrum[1:] /= np.sqrt(np.arange(1, len(spectrum)))[:, None]
+    spectrum[0] = 0.0
+    noise = np.fft.irfft(spectrum, n, axis=0)
+    return noise / noise.std(axis=0)
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How often intervals of a set hold what was planted."""
+
+    held: dict[str, float]  # of those given, by number [-]
+    withheld: dict[str, float]  # share of strokes without one, by number [-]
+    errors: dict[str, float]  # median of told over planted, less 1 [-]
+    false_peaks: float  # share of strokes with a static peak [-]
+
+
+def coverage(trouble: Trouble, seeds: Sequence[int], progress: Callable[[], object] = lambda: None) -> Coverage:
+    """Return how often intervals hold what was planted, over ten strokes of each seed."""
+    held: dict[str, list[bool | None]] = defaultdict(list)
+    errors: dict[str, list[float]] = defaultdict(list)
+    peaks: list[bool] = []
+    for seed in seeds:
+        analysis, truths = Visit(seed, trouble).strokes()
+        settings = drawn_from(analysis.settings, analysis.tilt)
+        at_trial = {stroke.trial: (at, stroke) for at, stroke in reversed(list(enumerate(analysis.strokes)))}
+        for number, truth in enumerate(truths, 1):
+            at, stroke = at_trial.get(number, (0, None))
+            found = None if stroke is None else stroke_intervals(stroke, at, settings)
+            peaks.append(stroke is not None and stroke.mu_static is not None)
+            for name in NUMBERS:
+                ends = None if found is None else getattr(found, name)
+                held[name].append(None if ends is None else ends[0] <= truth[name] <= ends[1])
+                if ends is not None:
+                    errors[name].append(getattr(stroke, name) / truth[name] - 1.0)
+        progress()
+    return Coverage(
+        {name: float(np.mean([hit for hit in hits if hit is not None] or [np.nan])) for name, hits in held.items()},
+        {name: hits.count(None) / len(hits) for name, hits in held.items()},
+        {name: float(np.median(errors[name] or [np.nan])) for name in NUMBERS},
+        float(np.mean(peaks)),
+    )
+
+
+def main() -> None:
+    """Print a row for each set."""
+    seeds = range(5000, 5000 + int(sys.argv[1]) if len(sys.argv) > 1 else 5100)
+    print(f"{'':20s}" + "".join(f"{name:>12s} (withheld, off)" for name in NUMBERS) + "   static peaks")
+    for name in sys.argv[2:] or SETS:
+        found = coverage(SETS[name], seeds)
+        numbers = "".join(
+            f"{100 * found.held[n]:10.1f} % ({100 * found.withheld[n]:4.1f} %, {100 * found.errors[n]:+5.2f} %)"
+            for n in NUMBERS
+        )
+        print(f"{name:20s}{numbers}   {100 * found.false_peaks:6.1f} %", flush=True)
+
+
+if __name__ == "__main__":
+    main()
