@@ -13,11 +13,18 @@ from sessions.strokes.friction import FrictionParameters
 from sessions.strokes.stroke import Stroke
 from sessions.toml_file import SettingsError, from_table
 
+# What programs before 2026-11-23 did not draw, and their documents lack. Once no such document is read, this goes.
+_NOT_DRAWN = {name: getattr(BootstrapSettings(), name) for name in ("cross_talk", "tilt", "tilt_error", "tilt_origin")}
+
 
 class _Intervals(msgspec.Struct):
     kind: str
-    settings: dict[str, Any]  # checked below: one of an older program lacks what was not drawn then
+    settings: dict[str, Any]  # checked below, without what an older program did not draw
     strokes: tuple[StrokeIntervals, ...]
+
+
+class _Settings(msgspec.Struct):
+    settings: BootstrapSettings
 
 
 class _Analysis(msgspec.Struct):
@@ -40,4 +47,6 @@ def check_analysis(document: Mapping[str, Any]) -> None:
     beyond = [row.stroke for row in held.friction if not 0 <= row.stroke < len(held.strokes)]
     if beyond:
         raise SettingsError(f"it tells the friction of stroke {beyond[0]}, which it does not hold")
-    from_table(document["bootstrap"]["settings"], BootstrapSettings, "bootstrap")
+    settings = {**_NOT_DRAWN, **held.bootstrap.settings}
+    complete({"settings": settings}, _Settings)
+    from_table(settings, BootstrapSettings, "bootstrap")

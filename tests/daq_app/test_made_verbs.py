@@ -12,6 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from examples import SCENE
 from page_numbers import estimates
@@ -63,8 +64,10 @@ def test_every_number_of_a_reported_session_has_a_unit_and_an_interval(reported)
     found = list(estimates((reported / "report.html").read_text(encoding="utf-8")))
     assert len(found) > 50
     assert [place for place, unit, _, _ in found if not unit] == []
-    # One subject gave the scores, and with tau_max as printed no trial is solved under the measured force.
-    without = {(place.split(",")[1].strip(), why.split(";")[0]) for place, _, interval, why in found if not interval}
+    # One subject gave the scores, and with tau_max as printed no trial is solved under the measured force. A state that
+    # no finger can be in has none either.
+    told = [(place, why) for place, _, interval, why in found if not interval and "turned inside out" not in why]
+    without = {(place.split(",")[1].strip(), why.split(";")[0]) for place, why in told}
     assert without == {
         ("mean score", "one subject alone has no interval"),
         ("depth to match", "no interval: found on a rough mesh"),
@@ -266,7 +269,8 @@ def test_a_calibration_error_that_was_set_is_taken_by_every_verb_until_another_i
     run(["analyse", str(small), "--calibration-error", "0.1", "--json"])
     known = printed(capsys)["bootstrap"]
     for one, other in zip(known["strokes"], assumed["strokes"], strict=True):
-        assert one["mu_max"][1] - one["mu_max"][0] < 0.5 * (other["mu_max"][1] - other["mu_max"][0])
+        # What is not known of the lean is in both.
+        assert np.ptp(one["normal_force"]) < np.ptp(other["normal_force"])
     (small / "analysis.json").write_text("torn")  # what was set is no part of what can be made anew
     run(["analyse", str(small), "--json"])
     assert printed(capsys)["bootstrap"] == known

@@ -16,6 +16,8 @@ from sessions.strokes.bootstrap import BootstrapSettings, friction_draws, stroke
 from simulators.bench import BenchSettings
 from solver.response.derivatives import By
 
+# Of a levelled face and a calibration without cross-talk, so that the friction's interval is narrow.
+LEVEL = BootstrapSettings(tilt_error=(0.0, 0.0), cross_talk=0.0)
 PLANTED = Path(__file__).parents[1] / "end_to_end" / "test_planted_truth.py"
 _spec = importlib.util.spec_from_file_location("planted_truth", PLANTED)
 assert _spec is not None
@@ -41,7 +43,7 @@ def prediction(analysis):
 
 @pytest.fixture(scope="module")
 def intervals(analysis, prediction):
-    return [row.interval for row in with_intervals(analysis, prediction).trials]
+    return [row.interval for row in with_intervals(analysis, prediction, LEVEL).trials]
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +71,7 @@ def test_draws_are_those_of_the_intervals_of_friction(analysis):
 def test_derivatives_give_what_solving_the_draws_gives(analysis, prediction, intervals):
     row, found = prediction.trials[0], intervals[0]
     assert found.method == "derivatives"
-    mu, tau_max, _ = friction_draws(analysis.strokes[0], 0, "maximum")
+    mu, tau_max, _ = friction_draws(analysis.strokes[0], 0, "maximum", LEVEL)
     scene = row.prediction.scene
     drawn = settled([with_loads(scene, {"mu": m, "tau_max": t}) for m, t in zip(mu[:24], tau_max[:24], strict=True)])
     low, high = np.quantile([one.sed_ending for one in drawn], [0.025, 0.975])
@@ -81,7 +83,9 @@ def test_derivatives_give_what_solving_the_draws_gives(analysis, prediction, int
         forces = np.array([getattr(one, name) for one in drawn]) * scene.finger.width
         assert low < value < high
         assert 0.85 <= np.mean((low <= forces) & (forces <= high)) <= 1.0
-        assert (high - low) / np.ptp(forces) == pytest.approx(1.0, abs=0.25)  # 95 % of all against all of two dozen
+        # 95 % of normal draws, two dozen of which are solved: those spread otherwise than all by what their mu does.
+        spread = 2 * 1.96 * np.std(forces) * np.std(mu) / np.std(mu[:24])
+        assert (high - low) / spread == pytest.approx(1.0, abs=0.25)
 
 
 def test_a_stickier_surface_has_the_wider_interval(intervals):
@@ -91,7 +95,7 @@ def test_a_stickier_surface_has_the_wider_interval(intervals):
 
 def test_twice_the_error_of_calibration_makes_the_interval_nearly_twice_as_wide(analysis, prediction, intervals):
     alone = replace(prediction, trials=prediction.trials[:1])
-    doubled = with_intervals(analysis, alone, BootstrapSettings(gain_error=0.02)).trials[0].interval
+    doubled = with_intervals(analysis, alone, replace(LEVEL, gain_error=0.02)).trials[0].interval
     assert (doubled.high - doubled.low) / (intervals[0].high - intervals[0].low) == pytest.approx(2.0, rel=0.1)
 
 
@@ -116,7 +120,7 @@ def interval_of(analysis, prediction, monkeypatch, formula, by_mu=0.0, gain_erro
     slide = Made(formula, by_mu, row)
     monkeypatch.setattr(uncertainty, "slides", lambda found, _=None: iter([slide] * len(found)))
     alone = replace(prediction, trials=(row,))
-    return with_intervals(analysis, alone, BootstrapSettings(gain_error=gain_error)).trials[0].interval
+    return with_intervals(analysis, alone, replace(LEVEL, gain_error=gain_error)).trials[0].interval
 
 
 def test_where_the_sed_bends_draws_are_solved_and_missing_states_are_counted(analysis, prediction, monkeypatch):
@@ -143,7 +147,7 @@ def test_what_bends_only_where_both_loads_change_together_is_seen(analysis, pred
 def test_draws_that_are_solved_give_the_interval_of_all_of_them(analysis, prediction, monkeypatch):
     found = interval_of(analysis, prediction, monkeypatch, lambda mu, _: np.exp(60.0 * mu), by_mu=60.0)
     row = prediction.trials[0]
-    mu = friction_draws(analysis.strokes[0], 0, "maximum", BootstrapSettings(gain_error=0.004)).mu
+    mu = friction_draws(analysis.strokes[0], 0, "maximum", replace(LEVEL, gain_error=0.004)).mu
     low, high = row.sed - 1.0 + np.exp(60.0 * (np.quantile(mu, [0.025, 0.975]) - row.mu))
     assert found.method == "sampling"
     assert [found.low, found.high] == pytest.approx([low, high], abs=0.03 * (high - low))
@@ -169,7 +173,7 @@ def test_the_other_way_and_every_variant_have_intervals_that_hold_their_seds(bes
 def test_pressed_by_the_force_measured_the_uncertainty_of_that_force_is_in_the_interval(analysis, beside):
     (row,) = beside.trials
     pressed = next(one for one in row.alternatives if one.variant.driven == "force")
-    _, _, normal = friction_draws(analysis.strokes[0], 0, "maximum")
+    _, _, normal = friction_draws(analysis.strokes[0], 0, "maximum", LEVEL)
     least, most = np.quantile(normal, [0.025, 0.975])
     scene = scene_along(row, pressed.variant, beside.options)
     low, high = solved([with_loads(scene, {"force": least}), with_loads(scene, {"force": most})])
@@ -214,9 +218,9 @@ FINITE = PredictionOptions(course="steady", kinematics="finite", intervals=True)
 def test_at_finite_strain_draws_lie_where_the_derivatives_carry_them(number):
     """Against each draw's own solve from nothing, on a mesh of its own."""
     analysis, plan = shallow(planted_truth.visit(1), number)
-    (row,) = with_intervals(analysis, predict(analysis, plan, FINITE)).trials
+    (row,) = with_intervals(analysis, predict(analysis, plan, FINITE), LEVEL).trials
     found, scene = row.interval, row.prediction.scene
-    draws = friction_draws(analysis.strokes[0], 0, "maximum")
+    draws = friction_draws(analysis.strokes[0], 0, "maximum", LEVEL)
     mu, tau_max = draws.mu[:60], draws.tau_max[:60]
     seds = np.array(solved([with_loads(scene, {"mu": m, "tau_max": t}) for m, t in zip(mu, tau_max, strict=True)]))
     carried = row.sed + found.by_mu * (mu - row.mu) + found.by_tau_max * (tau_max - row.tau_max)
@@ -233,7 +237,7 @@ def test_intervals_of_200_visits_hold_the_sed_of_the_friction_planted(kinematics
         gains = np.random.default_rng([seed, 9]).normal(1.0, 0.01, 6).tolist()
         visit = planted_truth.visit(seed, BenchSettings(gains=tuple(gains)))
         analysis, plan = shallow(visit, 2)
-        (row,) = with_intervals(analysis, predict(analysis, plan, options), both_ways=False).trials
+        (row,) = with_intervals(analysis, predict(analysis, plan, options), LEVEL, both_ways=False).trials
         truth = visit.planted[1]
         (planted,) = solved([with_loads(row.prediction.scene, {"mu": truth.mu, "tau_max": truth.tau_max})])
         held.append(row.interval.low <= planted <= row.interval.high)
