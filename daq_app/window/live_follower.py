@@ -8,7 +8,7 @@ whole tangential force is taken to act along the finger, in the sense of its par
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Self
 
 import numpy as np
 
@@ -19,16 +19,10 @@ from sessions.strokes import FrictionParameters
 from sessions.strokes.settings import RatioSettings
 from solver import Friction, Loading, Scene, Solve, SolveFailure, solve
 from solver.arrays import Array, Indices
-from solver.equilibrium.finger import FingerModel
-from solver.mesh.mesher import Sizing
 from solver.prediction import ROW
 from solver.response.fields import fields_of
 from solver.response.live_picture import LivePicture
-from solver.response.small_stepper import Condensed, SmallStepper
-from solver.response.stepper import FINENESS, MARGIN
-
-if TYPE_CHECKING:
-    from daq_app.window.live_finite import LiveFinite
+from solver.response.stepper import Stepper, stepper_and_picture
 
 TOUCH = 0.05  # less normal force is no touch [N]
 FLOOR = RatioSettings().force_floor  # a ratio means nothing below this normal force [N]
@@ -76,6 +70,26 @@ class _Seen:
     depth: float
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Model:
+    """A stepper, and the picture of its finger."""
+
+    stepper: Stepper
+    picture: LivePicture
+
+    @classmethod
+    def of(cls, scene: Scene) -> Self:
+        stepper, picture = stepper_and_picture(scene)
+        assert picture is not None
+        return cls(stepper, picture)
+
+    def drawn(self) -> tuple[Picture, Array]:
+        """Return what is drawn, and where its nodes are while nothing touches (n, 2) [mm]."""
+        state, picture = self.stepper.state, self.picture
+        nodes, sed = picture.nodes(state), picture.sed(state)
+        return Picture(nodes, picture.faces, sed, self.stepper.outline()), picture.rest
+
+
 class Follower:
     """Follows one finger, batch by batch; holds the steppers' states and the last minute of predictions.
 
@@ -87,13 +101,9 @@ class Follower:
         self._made_for = _finger(use)
         scene, self._area, _ = self._made_for
         self._kinematics: Kinematics = use.kinematics
-        sizing = Sizing(FINENESS["small"], scene.loading.depth, margin=MARGIN["small"])
-        finger = FingerModel.of(scene, sizing)
         self._scene = scene
-        self._small, self._drawn = SmallStepper(Condensed.of(finger), LEAST_MU), LivePicture.of(finger)
-        self._small.step(1e-3, 0.0)  # compiles, or loads what was compiled
-        self._small.forget()
-        self._finite = _finite(live_scene(use.plan, "finite")) if use.kinematics == "finite" else None
+        self._small = _Model.of(scene)
+        self._finite = _Model.of(live_scene(use.plan, "finite")) if use.kinematics == "finite" else None
         self._reached = False  # by finite strain, at the last step
         self._mu, self._tangential = LEAST_MU, 0.0
         self._stream: int | None = None
@@ -118,11 +128,11 @@ class Follower:
         while self._said and self._said[0][0] < forces.time[-1] - KEPT:
             self._said.popleft()
         shown = self._finite if self._finite is not None and self._reached else self._small
-        row, now, (picture, rest) = shown.row(), float(forces.time[-1]), self._picture()
+        row, now, (picture, rest) = shown.stepper.row(), float(forces.time[-1]), shown.drawn()
         if sed[-1] > 0.0 and (not self._seen or abs(now - self._seen[-1].time) >= SEEN_EVERY):
-            self._seen.append(_Seen(now, row, picture, rest, shown.depth))
+            self._seen.append(_Seen(now, row, picture, rest, shown.stepper.depth))
         return Provisional(
-            forces.time, sed, row, picture, shown.depth, self._mu,
+            forces.time, sed, row, picture, shown.stepper.depth, self._mu,
             self._kinematics, instead, forces.received_ns, forces.stream,
         )  # fmt: skip
 
@@ -147,14 +157,17 @@ class Follower:
         if normal >= FLOOR:
             self._mu = max(self._mu, abs(pull) / normal)
             self._tangential = max(self._tangential, abs(pull))
-        self._small.mu, self._small.tau = self._mu, self._bound()
         normal, pull = normal / self._scene.finger.width, pull / self._scene.finger.width
-        small = self._small.step(normal, pull)
-        if self._finite is not None:
-            finite = self._finite.step(normal, pull, self._mu, self._bound())
-            self._reached = not np.isnan(finite)
-            return (finite, True) if self._reached else (small, False)
-        return small, False
+        small, finite = (self._said_by(model, normal, pull) for model in (self._small, self._finite))
+        self._reached = not np.isnan(finite)
+        return (finite, True) if self._reached else (small, False)
+
+    def _said_by(self, model: _Model | None, normal: float, pull: float) -> float:
+        """Return the SED of a model under forces [N/mm]; nan without one."""
+        if model is None:
+            return float("nan")
+        model.stepper.mu, model.stepper.tau = self._mu, self._bound()
+        return model.stepper.step(normal, pull)
 
     def _bound(self) -> float:
         """Return the traction bound so far [MPa]: as the analysis has it, the largest T over the contact area."""
@@ -162,18 +175,10 @@ class Follower:
 
     def _untouched(self) -> None:
         self._mu, self._tangential = LEAST_MU, 0.0
-        self._small.forget()
+        self._small.stepper.forget()
         self._reached = self._finite is not None
         if self._finite is not None:
-            self._finite.forget()
-
-    def _picture(self) -> tuple[Picture, Array]:
-        """Return what is drawn, and where its nodes are while nothing touches (n, 2) [mm]."""
-        if self._finite is not None and self._reached:
-            return Picture(*self._finite.drawn(), self._finite.outline()), self._finite.rest
-        state = self._small.state
-        sed = self._drawn.sed(state)
-        return Picture(self._drawn.nodes(state), self._drawn.faces, sed, self._small.outline()), self._drawn.rest
+            self._finite.stepper.forget()
 
 
 def _settled(asked: Settle, kinematics: Kinematics, provisional: float | None, seen: _Seen | None) -> Settled:
@@ -226,10 +231,3 @@ def most_squeezed(rest: Array, moved: Array, faces: Indices) -> tuple[float, flo
 def _finger(use: Use) -> tuple[Scene, float, Kinematics]:
     """Return all that tells one finger to be followed from another."""
     return live_scene(use.plan), DEFAULT_AREA if use.plan is None else use.plan.contact_area, use.kinematics
-
-
-def _finite(scene: Scene) -> "LiveFinite":
-    # Imported here: only what is asked for is loaded, compiled loops of finite strain are not.
-    from daq_app.window.live_finite import LiveFinite
-
-    return LiveFinite(scene, LEAST_MU)

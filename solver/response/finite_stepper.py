@@ -5,19 +5,15 @@ system, with as many iterations per reading as it is given, usually one, and mor
 of a finger do that lifts. Between readings nothing is lost: what one iteration leaves over, the next takes up.
 """
 
-from dataclasses import replace
-from math import isfinite
-
 import numpy as np
 
 from solver._kernels import OPEN, SLIP, STICK
 from solver.arrays import Array
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.force_control import corrected
-from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, Given, Pull
+from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, Given
+from solver.response.stepper import SLIDING, Stepper
 
-SLIDING = 0.995  # part of the friction limit beyond which the tangential force means sliding
-LIGHT = 1e-7  # N/mm: less than this is no touch
 MET = 0.02  # part of the normal force by which a state may miss the forces and still be told of
 EASED = 0.7  # of the normal force at which the state was lost and led to in vain: from there it is sought again [-]
 STAIRS, LEADING = 12, 3  # that lead a finger from nothing to forces it bears already, and iterations on each
@@ -29,51 +25,32 @@ STIFF = 1e3  # bulk over shear stiffness from which on a tangent from elsewhere 
 FURTHEST = 5.0  # displacement in one iteration beyond which the state is lost [mm]
 
 
-class FiniteStepper:
-    """Follows one finger on one surface; holds the last state."""
+class FiniteStepper(Stepper):
+    """Follows one finger on one surface at finite strain."""
 
     def __init__(self, finger: FiniteFinger, mu: float, tau: float = np.inf) -> None:
         """Start untouched, for a surface of friction `mu` and traction bound `tau` [MPa]."""
-        newton = finger.newton
-        self._finger, self._newton = finger, newton
-        self.mu, self.tau = mu, tau
-        self.shape = EquilibriumState.undeformed(newton.body)
+        super().__init__(finger.newton.body, mu, tau)
+        self._finger, self._newton = finger, finger.newton
         self._lost_at: float | None = None  # normal force [N/mm]
         self._hopeless = False  # whether these forces were led to in vain
         self._behind = False  # whether the last state had not caught up with its forces
         self._stiffness = 0.0  # of the finger pressed deeper, in the last iteration [N/mm per mm]
 
-    @property
-    def depth(self) -> float:
-        """Indentation found [mm]."""
-        return self.shape.pull.depth
-
-    @property
-    def travel(self) -> float:
-        """How far the bone has moved along +x while something stuck [mm]; sliding, which forces do not tell, adds 0."""
-        return -self.shape.pull.travel
-
     def forget(self) -> None:
         """Start afresh from the untouched finger."""
-        self.shape = EquilibriumState.undeformed(self._newton.body)
+        super().forget()
         self._lost_at, self._hopeless, self._behind = None, False, False
 
-    def step(self, normal: float, tangential: float, iterations: int = 1) -> float:
-        """Take one reading and return the SED averaged over the ending [MPa]; nan where no state can be told of.
+    def _advance(self, normal: float, tangential: float) -> float:
+        """Do as `Stepper` says.
 
-        `normal` [N/mm] presses the finger, `tangential` [N/mm] is the surface's pull on it along +x. A state is lost
-        where contact leaves the skin that may touch, and where skin is squeezed so far that it may have folded: with
-        the next reading it is led to from nothing, and where that is in vain again once the normal force has eased. One
-        that has not caught up with the forces is not told of. A reading that is no number is nan too, and leaves the
-        state as it was.
+        A state is lost where contact leaves the skin that may touch, and where skin is squeezed so far that it may have
+        folded. The next reading leads to it from nothing. Where that is in vain, it is tried again once the normal
+        force has eased. One that has not caught up with the forces is not told of.
         """
-        if not isfinite(normal + tangential):
-            return float("nan")
-        if normal < LIGHT:
-            self.forget()
-            return 0.0
         if self._lost_at is None:
-            return self._followed(normal, tangential, iterations)
+            return self._followed(normal, tangential)
         if self._hopeless and normal >= EASED * self._lost_at:
             return float("nan")
         return self._led(normal, tangential)
@@ -95,14 +72,12 @@ class FiniteStepper:
         """Whether there is no state until the normal force eases."""
         return self._lost_at is not None
 
-    def _followed(self, normal: float, tangential: float, iterations: int) -> float:
+    def _followed(self, normal: float, tangential: float, iterations: int = 1) -> float:
         """Return what `step` does of a state that is not lost, or of the untouched finger."""
         newton = self._newton
-        most = self.mu * normal
-        pull_back = float(np.clip(tangential, -most, most))
-        shape = self._ready(normal, pull_back)
+        shape = self._ready(normal, tangential)
         origin, before = shape.place(newton.body)[:, 0], shape.pull.travel
-        given, hurried = Given(normal, pull_back), self._goes_far(normal)
+        given, hurried = Given(normal, tangential), self._goes_far(normal)
         far, turns = (NEAR, ARRIVING) if self._behind else (FAR, HURRIED)
         for number in range(1, max(iterations, turns) + 1):
             kept = hurried and number == 1
@@ -118,9 +93,9 @@ class FiniteStepper:
         compression = self._finger.skin_compression(shape)
         if compression.least < FOLDING:
             return self._lose(normal)
-        self.shape = shape
+        self.state = shape
         x, y = shape.force
-        behind = max(abs(y - normal), abs(x - pull_back) if (shape.state == STICK).any() else 0.0)
+        behind = max(abs(y - normal), abs(x - tangential) if (shape.state == STICK).any() else 0.0)
         self._behind = behind > MET * normal
         if self._behind:
             return float("nan")
@@ -133,8 +108,8 @@ class FiniteStepper:
 
         With it an iteration takes a third of the time, and only where the finger has come to is worth a new one.
         """
-        missing = abs(normal - float(self.shape.force[1]))
-        far = self.shape.touching.any() and 0.0 < FAR * self._stiffness < missing
+        missing = abs(normal - float(self.state.force[1]))
+        far = self.state.touching.any() and 0.0 < FAR * self._stiffness < missing
         return bool(far) and self._newton.bulk < STIFF
 
     def _lose(self, normal: float) -> float:
@@ -144,26 +119,19 @@ class FiniteStepper:
 
     def row(self) -> Array:
         """Return the SED of the row of endings as it is now (r,) [MPa]; nan where the finger ends before one."""
-        return self._finger.row.average(self._newton.body, self.shape.u)
+        return self._finger.row.average(self._newton.body, self.state.u)
 
     def outline(self) -> Array:
         """Return the deformed skin (w, 2) [mm] from the palmar cut round the tip, the surface being y = 0."""
         whole = self._finger.geometry.whole
-        return self._newton.body.mesh.nodes[whole] + self.shape.u[whole] - [0.0, self.depth]
+        return self._newton.body.mesh.nodes[whole] + self.state.u[whole] - [0.0, self.depth]
 
     def _ready(self, normal: float, tangential: float) -> EquilibriumState:
         """Return the last shape with states that can carry the forces: something touches, and slides or does not."""
-        shape = self.shape
-        state, sense, pull = shape.state.copy(), shape.sense.copy(), shape.pull
+        slides = abs(tangential) > SLIDING * self.mu * normal
+        shape = self._under_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
         if not shape.touching.any():
-            lowest = int(np.argmin(shape.place(self._newton.body)[:, 1]))
-            state[lowest] = STICK
-        sliding = abs(tangential) > SLIDING * self.mu * normal
-        if sliding:
-            state[state == STICK] = SLIP
-            turned = 1 if tangential > 0.0 else -1
-            sense[:] = turned
-        elif not (state == STICK).any():
-            state[state != OPEN] = STICK
-        turned = int(np.sign(tangential)) if sliding else 0
-        return replace(shape, state=state, sense=sense, pull=Pull(pull.depth, self.mu, self.tau, turned, pull.travel))
+            shape.state[int(np.argmin(shape.place(self._newton.body)[:, 1]))] = SLIP if slides else STICK
+        elif not slides and not (shape.state == STICK).any():
+            shape.state[shape.state != OPEN] = STICK
+        return shape

@@ -1,17 +1,21 @@
-"""The whole finger as a picture, as fast as it moves: where its elements are and what energy they hold, by its forces.
+"""The whole finger as a picture, as fast as it moves: where its elements are, and what energy they hold."""
 
-At small strain both follow from the contact forces by matrices made once, so that a picture costs two products.
-"""
-
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from solver.arrays import Array, Indices
-from solver.body.stiffness import Probes
+from solver.body.finite import FiniteBody, FiniteProbes
+from solver.body.receptor import Endings
+from solver.body.stiffness import Elastic, Probes
+from solver.body.tissues import settled_moduli
 from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.newton import EquilibriumState
+from solver.mesh import Mesh
+from solver.scene import Scene
 
 # A nine-node element as four quadrilaterals, and the middle of each in its coordinates.
 QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
@@ -19,11 +23,35 @@ MIDDLES = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LivePicture:
-    """A finger as the displacements (2 k,) of its skin see it."""
+class LivePicture(ABC):
+    """A finger in quadrilaterals, four to an element."""
 
-    faces: Indices  # (f, 4) nodes of the quadrilaterals that are drawn
+    faces: Indices  # (f, 4) nodes of the quadrilaterals
     rest: Array  # (n, 2) undeformed nodes [mm]
+
+    @abstractmethod
+    def nodes(self, state: EquilibriumState) -> Array:
+        """Return where the nodes are (n, 2) [mm], the surface being y = 0."""
+
+    @abstractmethod
+    def sed(self, state: EquilibriumState) -> Array:
+        """Return the SED in the middle of each face (f,) [MPa]."""
+
+
+def _faces(mesh: Mesh) -> Indices:
+    return mesh.elements[:, QUARTERS].reshape(-1, 4)
+
+
+def _middles(mesh: Mesh) -> tuple[Indices, Array]:
+    """Return the element (f,) and the local coordinates (f, 2) of the middle of each face."""
+    count = len(mesh.elements)
+    return np.repeat(np.arange(count), len(MIDDLES)), np.tile(MIDDLES, (count, 1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SmallPicture(LivePicture):
+    """A finger as the displacements (2 k,) of its skin see it: a picture costs two products."""
+
     _moved: Array  # (2 n, 2 k) displacements, x and y in turn [mm per mm]
     _strain: Array  # (3, f, 2 k) xx, yy and xy times root of 2 in the middle of each face [1/mm]
     _theta: Array  # (f, 2 k) volume strain there
@@ -35,12 +63,11 @@ class LivePicture:
         """Make the matrices of `finger`."""
         mesh, elastic = finger.geometry.mesh, finger.body.elastic
         everywhere = finger.body.every_step()  # (nodes, 2, 2 k)
-        count = len(mesh.elements)
-        element = np.repeat(np.arange(count), len(MIDDLES))
-        probes = Probes.at(mesh, elastic, element, np.tile(MIDDLES, (count, 1)))
+        element, local = _middles(mesh)
+        probes = Probes.at(mesh, elastic, element, local)
         strain = np.moveaxis(probes.strains(mesh, everywhere), 1, 0)
         return cls(
-            mesh.elements[:, QUARTERS].reshape(-1, 4),
+            _faces(mesh),
             mesh.nodes,
             np.ascontiguousarray(everywhere.reshape(2 * len(mesh.nodes), -1)),
             strain[:3],
@@ -59,3 +86,28 @@ class LivePicture:
         xx, yy, xy = self._strain @ skin
         theta = self._theta @ skin
         return self._shear * (xx**2 + yy**2 + xy**2) + self._lame / 2.0 * theta**2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FinitePicture(LivePicture):
+    """A finger at finite strain."""
+
+    _body: FiniteBody
+    _at: FiniteProbes
+
+    @classmethod
+    def of(cls, finger: FiniteFinger, scene: Scene) -> Self:
+        """Place a probe in the middle of each face of the `finger` of `scene`."""
+        body, mesh = finger.newton.body, finger.geometry.mesh
+        element, local = _middles(mesh)
+        probes = Probes.at(mesh, Elastic.of(mesh, settled_moduli(scene.materials)), element, local)
+        each = Endings(probes, np.ones(len(element)), np.arange(len(element)), len(element))
+        return cls(_faces(mesh), mesh.nodes, body, FiniteProbes.of(body, each))
+
+    def nodes(self, state: EquilibriumState) -> Array:
+        """Return where the nodes are (n, 2) [mm], the surface being y = 0."""
+        return self.rest + state.u - [0.0, state.pull.depth]
+
+    def sed(self, state: EquilibriumState) -> Array:
+        """Return the SED in the middle of each face (f,) [MPa]."""
+        return self._at.energy(self._body, state.u)

@@ -1,45 +1,61 @@
-"""A settled slide that was predicted, taken up again: its derivatives, and the SED of slides beside it.
+"""The SED and its derivatives of slides near a predicted one, on its mesh and from its state.
 
-It goes on where the prediction stopped, on the same mesh and from the same state, without all else that a prediction
-carries: a state beside it costs a few small systems, and its SED differs for its friction alone.
+A nearby slide costs a few small systems, and its SED differs for its load alone.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solver import _kernels as kernels
 from solver._kernels import SLIP
 from solver.arrays import Array
+from solver.body.finite_measures import pressure
 from solver.contact.law import NAMES
+from solver.continuation.arc_length import jumped_branch
+from solver.continuation.limit_point import sound
+from solver.equilibrium import force_control, full_slip
 from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import slide_beside
 from solver.equilibrium.loads import sliding_pull
-from solver.equilibrium.newton import EquilibriumState
-from solver.failures import ContactLost
+from solver.equilibrium.newton import EquilibriumState, Given, Pull
+from solver.failures import ContactLost, NotConverged
 from solver.prediction import Prediction, Skin
-from solver.response.derivatives import Derivatives, of_contact
+from solver.response.derivatives import Derivatives, of_slide
 from solver.scene import Scene
 
+GOOD = 1e-8  # tolerance of the displacements [mm]: far less than a difference of friction that anybody could tell
 NUMBERS = {name: state for state, name in NAMES.items()}
 
 
-class Nearby(Protocol):
-    """A settled slide, and those beside it."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Nearby(ABC):
+    """A settled slide, and those near it."""
 
+    scene: Scene
+    here: EquilibriumState
+
+    @abstractmethod
     def derivatives(self) -> Derivatives:
         """Return its derivatives, by the tangent at convergence."""
-        ...
 
+    @abstractmethod
     def seds(self, scenes: Sequence[Scene]) -> Array:
         """Return the SED (n, 2) [MPa] of scenes that differ from its own in friction, depth or force alone.
 
-        First that averaged over the ending, then that in its middle. nan where no settled slide is found beside
-        this one; how far there would be one is not looked for.
+        First that averaged over the ending, then that in its middle. nan where no settled slide is found near this one;
+        how far there would be one is not looked for.
         """
-        ...
+
+    def _reaches_out(self, there: EquilibriumState) -> bool:
+        """Return whether a state touches at an end of the skin where this one does not: skin beyond may touch too."""
+        return bool((there.touching & ~self.here.touching)[[0, -1]].any())
 
 
 def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
@@ -54,42 +70,34 @@ def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
         if scene.loading.direction == 0 or scene.loading.dragged:
             yield None
             continue
-        if scene.solve.kinematics == "finite":
-            # Imported here: small strain need not wait for the compiled loops to be loaded.
-            from solver.response.finite_nearby import met_again
-
-            yield met_again(found)
-            continue
-        if model is None or model.geometry is not found.geometry:
-            model = FingerModel.on(scene, found.geometry)
-        guess = states(found.skin)
         try:
-            yield _SmallNearby(scene, model, _slide(model, scene, guess))
-        except ContactLost:
+            if scene.solve.kinematics == "finite":
+                yield _FiniteNearby.of(found)
+                continue
+            if model is None or model.geometry is not found.geometry:
+                model = FingerModel.on(scene, found.geometry)
+            yield _SmallNearby(scene, _slide(model, scene, states(found.skin)), model)
+        except NotConverged:
             yield None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _SmallNearby:
-    scene: Scene
+class _SmallNearby(Nearby):
     finger: FingerModel
-    here: EquilibriumState
 
     def derivatives(self) -> Derivatives:
-        return of_contact(self.finger, self.scene, self.here)
+        return of_slide(self.finger, self.scene, self.here)
 
     def seds(self, scenes: Sequence[Scene]) -> Array:
         out = np.full((len(scenes), 2), np.nan)
-        held: list[tuple[int, EquilibriumState]] = []
+        held: dict[int, EquilibriumState] = {}
         for number, scene in enumerate(scenes):
-            try:
+            with suppress(ContactLost):
                 contact = _slide(self.finger, scene, self.here.state)
-            except ContactLost:
-                continue
-            if not (contact.touching & ~self.here.touching)[[0, -1]].any():  # else skin may touch that nobody looked at
-                held.append((number, contact))
+                if not self._reaches_out(contact):
+                    held[number] = contact
         if held:
-            out[[number for number, _ in held]] = self.finger.seds([contact for _, contact in held])
+            out[list(held)] = self.finger.seds(list(held.values()))
         return out
 
 
@@ -101,3 +109,46 @@ def states(skin: Skin) -> NDArray[np.int64]:
 def _slide(finger: FingerModel, scene: Scene, guess: NDArray[np.integer]) -> EquilibriumState:
     """Return the settled slide of a scene that a guess of its states leads to. Raises ContactLost."""
     return slide_beside(finger.newton, sliding_pull(scene), guess, scene.normal_force)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _FiniteNearby(Nearby):
+    """Near slides lie on the same branch of states, continued from here."""
+
+    finger: FiniteFinger
+
+    @classmethod
+    def of(cls, found: Prediction) -> Self:
+        """Return the settled slide of `found` from what is kept of it. Raises NotConverged where it is not met."""
+        finger, scene, skin = FiniteFinger.on(found.scene, found.geometry), found.scene, found.skin
+        body, sense = finger.newton.body, -scene.loading.direction
+        length = np.empty(len(skin.x))
+        kernels.tributary(skin.x, body.middle, length)
+        pull = Pull(found.indentation, float(scene.friction.mu), scene.friction.cap, sense)
+        state = states(skin).astype(np.int32)
+        reaction = np.stack([skin.traction, skin.pressure], axis=1) * length[:, None]
+        modes, senses = pressure(body, found.displacement), np.full(len(state), sense, np.int32)
+        start = EquilibriumState(found.displacement, modes, state, senses, reaction, pull, 0)
+        return cls(scene, finger.newton.settle(start, pull), finger)
+
+    def derivatives(self) -> Derivatives:
+        return of_slide(self.finger, self.scene, self.here)
+
+    def seds(self, scenes: Sequence[Scene]) -> Array:
+        found = [self._beside(scene) for scene in scenes]
+        return np.array([(np.nan, np.nan) if shape is None else self.finger.seds(shape) for shape in found])
+
+    def _beside(self, scene: Scene) -> EquilibriumState | None:
+        newton, here = self.finger.newton, self.here
+        pull = here.pull._replace(mu=float(scene.friction.mu), tau=scene.friction.cap)
+        try:
+            if scene.normal_force is None:
+                there = full_slip.settled(newton, pull._replace(depth=scene.loading.depth), here, GOOD)
+            else:
+                there = force_control.balanced(newton, replace(here, pull=pull), Given(scene.normal_force, None), GOOD)
+        except NotConverged:
+            return None
+        beyond = there.pull.mu > here.pull.mu or there.pull.depth > here.pull.depth
+        # Skin that may have folded since: whether the branch goes on as far as that, this mesh cannot tell.
+        unproven = beyond and not sound(self.finger, there)
+        return None if self._reaches_out(there) or unproven or jumped_branch(self.finger, here, there) else there

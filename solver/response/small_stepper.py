@@ -6,22 +6,19 @@ A reading is then one search for contact states, forces given.
 """
 
 from dataclasses import dataclass
-from math import isfinite
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver._kernels import SLIP, STICK
 from solver.arrays import Array
 from solver.body.linear import CondensedLinear
 from solver.body.receptor import Endings
 from solver.equilibrium.finger import FingerModel
-from solver.equilibrium.newton import EquilibriumState, Given, Newton, Pull, lowered
+from solver.equilibrium.newton import Given, Newton, lowered
 from solver.failures import ContactLost
+from solver.response.stepper import SLIDING, Stepper
 
-SLIDING = 0.995  # part of the friction limit beyond which the tangential force means sliding
-LIGHT = 1e-7  # N/mm: less than this is no touch
 CHANGES = 60  # systems after which a reading is given up: 1 to 3 are usual
 NOTHING = 1e-14  # part of an energy that is left out of its quadratic form
 
@@ -76,47 +73,24 @@ def _square_roots(finger: FingerModel, endings: Endings, everywhere: Array) -> l
     return out
 
 
-class SmallStepper:
-    """Follows one finger on one surface; holds the last state, and memory of fixed size."""
+class SmallStepper(Stepper):
+    """Follows one finger on one surface at small strain."""
 
     def __init__(self, finger: Condensed, mu: float, tau: float = np.inf) -> None:
         """Start untouched, for a surface of friction `mu` and traction bound `tau` [MPa]."""
+        super().__init__(finger.skin, mu, tau)
         self._finger, self._newton = finger, Newton(finger.skin)
-        self.mu, self.tau = mu, tau
-        self.state = EquilibriumState.undeformed(finger.skin)
 
-    @property
-    def depth(self) -> float:
-        """Indentation found [mm]."""
-        return self.state.pull.depth
+    def _advance(self, normal: float, tangential: float) -> float:
+        """Do as `Stepper` says.
 
-    @property
-    def travel(self) -> float:
-        """How far the bone has moved along +x while something stuck [mm]; sliding, which forces do not tell, adds 0."""
-        return 0.0 - self.state.pull.travel
-
-    def forget(self) -> None:
-        """Start afresh from the untouched finger."""
-        self.state = EquilibriumState.undeformed(self._finger.skin)
-
-    def step(self, normal: float, tangential: float) -> float:
-        """Take one reading and return the SED averaged over the ending [MPa]; nan where the state was lost.
-
-        `normal` [N/mm] presses the finger, `tangential` [N/mm] is the surface's pull on it along +x. Backward Euler: a
-        point sticks where it was, or slips from there against its friction force. A lost state starts afresh from the
-        untouched finger with the next reading; a reading that is no number is nan too, and leaves the state as it was.
+        Backward Euler: a point sticks where it was, or slips from there against its friction force.
         """
-        normal, tangential = float(normal), float(tangential)  # loops are compiled for these alone
-        if not isfinite(normal + tangential):
-            return float("nan")
-        if normal < LIGHT:
-            self.forget()
-            return 0.0
-        pull = min(max(tangential, -self.mu * normal), self.mu * normal)
-        slides = abs(pull) >= SLIDING * self._most(normal)
-        start = self._ready(pull, slides=slides)
-        before = start.pull.travel
-        given = Given(normal, None, before) if slides else Given(normal, pull)
+        slides = abs(tangential) >= SLIDING * self._most(normal)
+        start = self._under_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
+        if not start.state.any():
+            start = lowered(self._newton.condensed, start)
+        given = Given(normal, None, start.pull.travel) if slides else Given(normal, tangential)
         x = start.u[:, 0] + self._newton.skin_x
         try:
             found = self._newton.solved(start, start.pull, x, given, CHANGES)
@@ -129,17 +103,6 @@ class SmallStepper:
         self.state = found
         stretched = self._finger.ending @ found.u.ravel()
         return float(stretched @ stretched)
-
-    def _ready(self, tangential: float, *, slides: bool) -> EquilibriumState:
-        """Return the last state under today's friction; where the finger `slides` all that touches slips."""
-        state, sense = self.state.state, self.state.sense
-        way = (1 if tangential > 0.0 else -1) if slides else 0
-        if slides:
-            state, sense = np.where(state == STICK, SLIP, state).astype(np.int32), np.full(len(sense), way, np.int32)
-        last, before = self.state, self.state.pull
-        under = Pull(before.depth, self.mu, self.tau, way, before.travel)
-        start = EquilibriumState(last.u, last.pressure, state, sense, last.reaction, under, 0)
-        return start if state.any() else lowered(self._newton.condensed, start)
 
     def _most(self, normal: float) -> float:
         """Return the largest tangential force the surface can carry [N/mm], pressures shared out as they last were."""

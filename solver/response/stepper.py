@@ -1,17 +1,31 @@
 """What a live view asks of a warm stepper, and how one is made for a scene: forces in, the state and its SED out."""
 
-from typing import Protocol
+from abc import ABC, abstractmethod
+from dataclasses import replace
+from math import isfinite
+from typing import TYPE_CHECKING
 
+import numpy as np
+
+from solver._kernels import SLIP, STICK
 from solver.arrays import Array
 from solver.equilibrium.expected_depth import expected_depth
+from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.newton import Deformable, EquilibriumState, Pull
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
 
+if TYPE_CHECKING:
+    from solver.response.live_picture import LivePicture
+
 FINENESS = {"small": 4.0, "finite": 2.7}  # meshes on which the response is good to about 1 % of its peak
 MARGIN = {"small": 4.0, "finite": 6.0}  # how far above the indentation undeformed skin is looked at for contact
+SLIDING = 0.995  # part of the friction limit beyond which the tangential force means sliding
+LIGHT = 1e-7  # N/mm: less than this is no touch
 
 
-class Stepper(Protocol):
+class Stepper(ABC):
     """Follows one finger on one surface, reading by reading; holds the last state and memory of fixed size.
 
     >>> from solver.scene.published import SLIPPERINESS, scene
@@ -21,39 +35,61 @@ class Stepper(Protocol):
     (True, True)
     """
 
-    mu: float  # coefficient of friction, taken anew with every reading [-]
-    tau: float  # traction bound, likewise [MPa]
+    def __init__(self, body: Deformable, mu: float, tau: float) -> None:
+        """Start untouched."""
+        self._rest = body
+        self.mu = mu  # coefficient of friction, taken anew with every reading [-]
+        self.tau = tau  # traction bound, likewise [MPa]
+        self.state = EquilibriumState.undeformed(body)
 
     @property
     def depth(self) -> float:
         """Indentation found [mm]."""
-        ...
+        return self.state.pull.depth
 
     @property
     def travel(self) -> float:
         """How far the bone has moved along +x while something stuck [mm]; sliding, which forces do not tell, adds 0."""
-        ...
+        return 0.0 - self.state.pull.travel
 
     def step(self, normal: float, tangential: float) -> float:
         """Take one reading and return the SED averaged over the ending [MPa]; nan where no state can be told of.
 
         `normal` [N/mm] presses the finger, `tangential` [N/mm] is the surface's pull on it along +x. At small strain
         the next reading starts afresh from the untouched finger; at finite strain, where that is in vain, the first
-        after the force has eased.
+        after the force has eased. A reading that is no number is nan too, and leaves the state as it was.
         """
-        ...
-
-    def row(self) -> Array:
-        """Return the SED of the row of endings as it is now (r,) [MPa], at `receptor.ROW`; nan beyond the finger."""
-        ...
-
-    def outline(self) -> Array:
-        """Return the deformed skin (w, 2) [mm] from the palmar cut round the tip, the surface being y = 0."""
-        ...
+        normal, tangential = float(normal), float(tangential)  # loops are compiled for these alone
+        if not isfinite(normal + tangential):
+            return float("nan")
+        if normal < LIGHT:
+            self.forget()
+            return 0.0
+        return self._advance(normal, min(max(tangential, -self.mu * normal), self.mu * normal))
 
     def forget(self) -> None:
         """Start afresh from the untouched finger."""
-        ...
+        self.state = EquilibriumState.undeformed(self._rest)
+
+    @abstractmethod
+    def _advance(self, normal: float, tangential: float) -> float:
+        """Return what `step` does of forces [N/mm] that press the finger and that friction carries."""
+
+    @abstractmethod
+    def row(self) -> Array:
+        """Return the SED of the row of endings as it is now (r,) [MPa], at `receptor.ROW`; nan beyond the finger."""
+
+    @abstractmethod
+    def outline(self) -> Array:
+        """Return the deformed skin (w, 2) [mm] from the palmar cut round the tip, the surface being y = 0."""
+
+    def _under_friction(self, *, slides: bool, sense: int) -> EquilibriumState:
+        """Return the last state under today's friction; all that touches slips to `sense` where it `slides`."""
+        last, pull = self.state, self.state.pull
+        state = np.where(last.state == STICK, SLIP, last.state).astype(np.int32) if slides else last.state.copy()
+        senses = np.full(len(state), sense, np.int32) if slides else last.sense.copy()
+        pull = Pull(pull.depth, self.mu, self.tau, sense if slides else 0, pull.travel)
+        return replace(last, state=state, sense=senses, pull=pull)
 
 
 def stepper(scene: Scene) -> Stepper:
@@ -61,19 +97,30 @@ def stepper(scene: Scene) -> Stepper:
 
     Forces that press much deeper lose the state. Raises SceneError where the finger cannot be meshed.
     """
+    return stepper_and_picture(scene, picture=False)[0]
+
+
+def stepper_and_picture(scene: Scene, *, picture: bool = True) -> "tuple[Stepper, LivePicture | None]":
+    """Return a stepper, and the picture of its finger where that is asked for. Raises as `stepper`."""
     kind = scene.solve.kinematics
     sizing = Sizing(FINENESS[kind], expected_depth(scene), margin=MARGIN[kind])
     mu, tau = float(scene.friction.mu), scene.friction.cap
-    # Imported here: only what is asked for is loaded, compiled loops of the other kinematics are not.
-    if kind == "finite":
-        from solver.equilibrium.finite_finger import FiniteFinger
-        from solver.response.finite_stepper import FiniteStepper
-
-        return FiniteStepper(FiniteFinger.of(scene, sizing), mu, tau)
-    from solver.equilibrium.finger import FingerModel
+    # Imported here: both kinds are steppers themselves, and only what is asked for is loaded.
+    from solver.response.finite_stepper import FiniteStepper
+    from solver.response.live_picture import FinitePicture, SmallPicture
     from solver.response.small_stepper import Condensed, SmallStepper
 
-    follower = SmallStepper(Condensed.of(FingerModel.of(scene, sizing)), mu, tau)
+    drawn: LivePicture | None = None
+    if kind == "finite":
+        finite = FiniteFinger.of(scene, sizing)
+        drawn = FinitePicture.of(finite, scene) if picture else None
+        follower: Stepper = FiniteStepper(finite, mu, tau)
+    else:
+        finger = FingerModel.of(scene, sizing)
+        drawn = SmallPicture.of(finger) if picture else None
+        follower = SmallStepper(Condensed.of(finger), mu, tau)
     follower.step(1e-3, 0.0)  # compiles, or loads what was compiled
+    if drawn is not None:
+        drawn.sed(follower.state)
     follower.forget()
-    return follower
+    return follower, drawn

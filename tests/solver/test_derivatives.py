@@ -22,8 +22,7 @@ from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.newton import Newton, Pull
 from solver.mesh.mesher import Sizing
-from solver.response.derivatives import of_contact, of_skin
-from solver.response.finite_derivatives import of_shape, slope
+from solver.response.derivatives import of_skin, of_slide, slope
 from tests.solver.finite_examples import block
 
 NAMES = ("mu", "tau_max", "press")
@@ -98,21 +97,21 @@ def test_at_small_strain_they_are_the_differences_of_solves_within_one_set_of_st
         return small_numbers(small, one, contact.state)
 
     steps = (2e-5, 2e-7 if here.friction.tau_max else 0.0, 2e-5)
-    assert_alike(told(of_contact(small, here, contact)), differences(numbers, here, steps), numbers(here))
+    assert_alike(told(of_slide(small, here, contact)), differences(numbers, here, steps), numbers(here))
 
 
 def test_between_changes_of_state_forces_are_straight_in_the_depth_and_the_sed_a_parabola(small):
     # Closed form: a slope of a straight line and of a parabola are those of their chords, however long.
     here = SMALL["beside its limit"]
     contact = settled(here, small)
-    found = of_contact(small, here, contact)
+    found = of_slide(small, here, contact)
     wide = [small_numbers(small, moved(here, "press", by), contact.state) for by in (-5e-3, 5e-3)]
     assert (wide[1] - wide[0])[:3] / 1e-2 == pytest.approx(told(found)[:3, 2], rel=1e-9)
 
 
 def test_a_given_force_drags_with_mu_times_it(small):
     here = SMALL["under a force"]
-    found = of_contact(small, here, settled(here, small))
+    found = of_slide(small, here, settled(here, small))
     assert found.tangential.mu == pytest.approx(0.12, rel=1e-12)
     assert found.tangential.normal_force == pytest.approx(0.4, rel=1e-12)
     assert found.normal == (0.0, 0.0, None, 1.0)
@@ -156,7 +155,7 @@ def test_at_a_kink_each_side_has_the_slope_of_its_own_states(small):
     for side, depth in ((-1.0, low), (1.0, high)):
         far, near = (small.numbers([at(depth + side * by)])[0, 0] for by in (1e-3, 0.0))
         begun, ended = (
-            of_contact(small, moved(here, "press", one - 1.2), at(one)).sed.indentation
+            of_slide(small, moved(here, "press", one - 1.2), at(one)).sed.indentation
             for one in (depth, depth + side * 1e-3)
         )
         assert side * (far - near) / 1e-3 == pytest.approx((begun + ended) / 2.0, rel=1e-6)  # a parabola's chord
@@ -169,7 +168,7 @@ def test_a_state_that_sticks_has_no_derivatives_of_its_own(small):
     contact = settled(SMALL["without a bound"], small)
     stuck = replace(contact, state=np.where(contact.state == SLIP, STICK, contact.state).astype(np.int32))
     with pytest.raises(ValueError, match="depends on the way"):
-        of_contact(small, SMALL["without a bound"], stuck)
+        of_slide(small, SMALL["without a bound"], stuck)
 
 
 # Finite strain
@@ -216,7 +215,7 @@ def test_at_finite_strain_they_are_the_differences_of_solves_within_one_set_of_s
         return finite_numbers(finite, one, shape)
 
     steps = (1e-5, 1e-7 if here.friction.tau_max else 0.0, 1e-5)
-    found = told(of_shape(finite, here, shape))
+    found = told(of_slide(finite, here, shape))
     assert_alike(found, differences(numbers, here, steps), numbers(here))
 
 
@@ -261,4 +260,4 @@ def test_a_state_that_is_no_slide_has_no_derivatives_of_its_own(finite):
     here = FINITE["without a bound"]
     shape = slid(finite, here)
     with pytest.raises(ValueError, match="depends on the way"):
-        of_shape(finite, here, replace(shape, pull=shape.pull._replace(sense=0)))
+        of_slide(finite, here, replace(shape, pull=shape.pull._replace(sense=0)))
