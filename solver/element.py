@@ -1,4 +1,4 @@
-"""EquilibriumState functions and quadrature, a class each; the list of elements is at the foot.
+"""Shape functions and quadrature, a class each; the list of elements is at the foot.
 
 Q2/P-1: nine-node quadrilateral, biquadratic displacements, and a pressure that is linear in x and y inside each element
 and discontinuous between elements, so that it can be condensed in the element. Stable and of optimal order up to the

@@ -203,8 +203,7 @@ def on_nested(
             shape = nearby(finger, scene, begun.shape, stop) or settled(finger, scene, stop, begun.shape)
     except SolveFailure:
         return None, steps
-    numbers = finger.all_numbers([shape])[0]
     given = None if relaxes(scene) else forces_of(scene, shape.pull)
-    of_edges = edge_changes(finger.newton, shape, given, finger.all_numbers)
+    (numbers,), (of_edges,) = edge_changes(finger.newton, [(shape, given)], finger.all_numbers)
     row = finger.row.average(finger.newton.body, shape.u)
     return NestedNumbers(numbers if steps is None else steps.taken(numbers), of_edges, row), steps

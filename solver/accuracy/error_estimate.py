@@ -40,24 +40,34 @@ class Errors(NamedTuple):
 
 def edge_changes(
     newton: Newton,
-    state: EquilibriumState,
-    given: Given | None,
+    states: Sequence[tuple[EquilibriumState, Given | None]],
     numbers: Callable[[Sequence[EquilibriumState]], Array],
-) -> Array:
-    """Return what numbers (n,) change by when edges of contact move by a node: root of the sum of squares over edges.
+) -> tuple[Array, Array]:
+    """Return the numbers (c, n) of states, and what each changes by when its edges of contact move by a node (c, n).
 
-    `state` is an equilibrium, under the forces `given` or at its depth; `numbers` makes (c, n) of c states. Infinite
-    where contact with a moved edge has no equilibrium.
+    The latter is the root of the sum of squares over a state's edges. `states` are equilibria, each with the forces it
+    is under or None for its depth; `numbers` makes (c, n) of c states. Infinite where contact with a moved edge has no
+    equilibrium.
     """
+    moved = [_with_moved_edges(newton, state, given) for state, given in states]
+    known = [one for ones in moved for one in ones if one is not None]
+    values = numbers([*(state for state, _ in states), *known])
+    here, there = values[: len(states)], iter(values[len(states) :])
+    out = np.zeros_like(here)
+    for number, ones in enumerate(moved):
+        changes = [np.full_like(here[0], np.inf) if one is None else np.abs(next(there) - here[number]) for one in ones]
+        worst = np.max(np.reshape(changes, (len(ones) // 2, 2, -1)), axis=1) if ones else np.zeros((1, 1))
+        out[number] = np.sqrt(np.sum(worst**2, axis=0))
+    return here, out
+
+
+def _with_moved_edges(newton: Newton, state: EquilibriumState, given: Given | None) -> list[EquilibriumState | None]:
+    """Return the equilibria with each edge of contact moved by a node to one side and to the other, edge after edge."""
     x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
     edges = np.flatnonzero(np.diff(state.state)).tolist()
     pairs = [pair for edge in edges for pair in ((edge, edge + 1), (edge + 1, edge))]
     found = newton.linearise(state, state.pull, x, 0, given)
-    moved = [_moved(newton, state, given, x, *pair) if found else None for pair in pairs]
-    values = iter(numbers([state, *(one for one in moved if one is not None)]))
-    here = next(values)
-    changes = [np.full(len(here), np.inf) if one is None else np.abs(next(values) - here) for one in moved]
-    return np.sqrt(np.sum(np.max(np.reshape(changes, (len(edges), 2, len(here))), axis=1) ** 2, axis=0))
+    return [_moved(newton, state, given, x, *pair) if found else None for pair in pairs]
 
 
 def _moved(

@@ -1,11 +1,14 @@
 """A scene at small strain on the nested mesh, and the load steps it asks for: what its errors are estimated from."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from solver.accuracy.error_estimate import edge_changes
 from solver.continuation.small_states import end, nearest
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.loads import forces_of, pull_of
+from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import HALF, Steps
 from solver.failures import SolveFailure
 from solver.prediction import NestedNumbers
@@ -31,16 +34,29 @@ def times_on_way(scene: Scene, finger: FingerModel) -> int:
     return steps_asked(scene.pressed_only(), finger).times
 
 
-def on_nested(scene: Scene, mesh: FingerModel, steps: Steps | None) -> NestedNumbers | None:
-    """Return the numbers of a scene on the nested `mesh`, None where it has no state there.
+def on_nested(mesh: FingerModel, asked: Sequence[tuple[Scene, Steps | None]]) -> list[NestedNumbers | None]:
+    """Return the numbers of scenes on the nested `mesh`, None where one has no state there.
 
-    `steps` are those taken where they depend on their way.
+    Each comes with the load steps that it takes where its state depends on its way. Numbers of all are made at once.
     """
+    states = [_state(scene, mesh, steps) for scene, steps in asked]
+    held = [number for number, state in enumerate(states) if state is not None]
+    out: list[NestedNumbers | None] = [None] * len(asked)
+    known = [state for state in states if state is not None]
+    if not known:
+        return out
+    forced = [(state, forces_of(asked[n][0], state.pull)) for n, state in zip(held, known, strict=True)]
+    numbers, of_edges = edge_changes(mesh.newton, forced, mesh.all_numbers)
+    rows = mesh.sed_rows(known)
+    for place, number in enumerate(held):
+        steps = asked[number][1]
+        taken = numbers[place] if steps is None else steps.taken(numbers[place])
+        out[number] = NestedNumbers(taken, of_edges[place], rows[:, place])
+    return out
+
+
+def _state(scene: Scene, mesh: FingerModel, steps: Steps | None) -> EquilibriumState | None:
     try:
-        state = nearest(scene, mesh) if steps is None else end(scene, mesh)
+        return nearest(scene, mesh) if steps is None else end(scene, mesh)
     except SolveFailure:
         return None
-    numbers = mesh.all_numbers([state])[0]
-    of_edges = edge_changes(mesh.newton, state, forces_of(scene, state.pull), mesh.all_numbers)
-    row = mesh.sed_row(mesh.displacement(state))
-    return NestedNumbers(numbers if steps is None else steps.taken(numbers), of_edges, row)

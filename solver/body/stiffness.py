@@ -101,7 +101,7 @@ class Probes:
         jacobian = np.swapaxes(corners, 1, 2) @ slopes
         place = (values[:, None] @ corners)[:, 0] - elements.centre[element]
         modes = np.concatenate([np.ones((len(element), 1)), place], axis=1)
-        gradient = slopes @ np.linalg.inv(jacobian)
+        gradient = slopes @ inverse(jacobian)
         return Probes(element, gradient, modes, _strains(elements, element, gradient, modes))
 
     def displacement_gradient(self, mesh: Mesh, displacement: Array) -> Array:
@@ -116,9 +116,10 @@ class Probes:
 
         For probes of an elastic body alone.
         """
-        local = displacement[mesh.elements]
+        held, place = np.unique(self.element, return_inverse=True)
+        local = displacement[mesh.elements[held]]
         local = (local - local[:, 8:]).reshape(len(local), 18, -1)  # moved as a whole, strains would drown in round-off
-        return (self.strain @ local[self.element]).reshape(len(self.element), 4, *displacement.shape[2:])
+        return (self.strain @ local[place]).reshape(len(self.element), 4, *displacement.shape[2:])
 
     def energy(self, mesh: Mesh, elastic: Elastic, displacement: Array) -> Array:
         """Return the SED (p, ...) [MPa] for displacements (nodes, 2, ...): G eps:eps + lambda/2 theta^2."""
@@ -139,14 +140,19 @@ def _strains(elements: Centred, element: Indices, gradient: Array, modes: Array)
     return out
 
 
+def inverse(matrices: Array) -> Array:
+    """Return the inverses of matrices (p, 2, 2), in closed form."""
+    (a, b), (c, d) = np.moveaxis(matrices, 0, 2)
+    return np.moveaxis(np.array([[d, -b], [-c, a]]) / (a * d - b * c), 2, 0)
+
+
 def local_coordinates(corners: Array, points: Array, start: Array) -> Array:
     """Return the local coordinates (p, 2) of `points` (p, 2) in elements with nodes `corners` (p, 9, 2), by Newton."""
     local: NDArray[np.float64] = start.copy()
     for _ in range(8):
         values, slopes = Q2P1.shape(local)
         missing = points - (values[:, None] @ corners)[:, 0]
-        jacobian = np.swapaxes(corners, 1, 2) @ slopes
-        step = np.linalg.solve(jacobian, missing[..., None])[..., 0]
+        step = np.einsum("pab,pb->pa", inverse(np.swapaxes(corners, 1, 2) @ slopes), missing)
         local += step
         if np.abs(step).max(initial=0.0) < 1e-13:
             break

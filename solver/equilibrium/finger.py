@@ -59,11 +59,12 @@ class FingerModel:
         return endings(self.geometry, self.body.elastic, self.receptor, ROW)
 
     @cached_property
-    def corners(self) -> Probes:
-        """Every corner of every element: strains are largest at corners."""
+    def _corners(self) -> Array:
+        """The gradients (e, 8, 9) of shape functions, along x and y at each corner: strains are largest at corners."""
         count = len(self.geometry.mesh.elements)
-        element = np.repeat(np.arange(count), 4)
-        return Probes.at(self.geometry.mesh, self.body.elastic, element, np.tile(Q2P1.corners, (count, 1)))
+        element, local = np.repeat(np.arange(count), 4), np.tile(Q2P1.corners, (count, 1))
+        gradient = Probes.at(self.geometry.mesh, self.body.elastic, element, local).gradient
+        return np.ascontiguousarray(np.swapaxes(gradient, 1, 2).reshape(count, 8, 9))
 
     @cached_property
     def newton(self) -> Newton:
@@ -104,16 +105,20 @@ class FingerModel:
         ending, middle = self.seds(states).T
         return np.column_stack([ending, rest, middle])
 
+    def sed_rows(self, states: Sequence[EquilibriumState]) -> Array:
+        """Return the SED averaged over each ending of the row (r, c) [MPa] of states; nan where the finger ends."""
+        return self.row.average(self.geometry.mesh, self.body.elastic, self._recovered(states, self.row))
+
     def _averaged(self, states: Sequence[EquilibriumState], *patches: Endings) -> Array:
-        """Return the SED averaged over the first ending of each of the patches (c, p) [MPa], recovered there alone."""
+        """Return the SED averaged over the first ending of each of the patches (c, p) [MPa]."""
         mesh, elastic = self.geometry.mesh, self.body.elastic
-        nodes = distinct(np.concatenate([patch.nodes(mesh) for patch in patches]))
-        displacement = self.body.displacement(np.stack([state.u for state in states], axis=2), only=nodes)
+        displacement = self._recovered(states, *patches)
         return np.stack([patch.average(mesh, elastic, displacement)[0] for patch in patches], axis=1)
 
-    def sed_point(self, displacement: Array) -> float:
-        """Return the SED in the middle of the reference ending [MPa]."""
-        return float(self.point.average(self.geometry.mesh, self.body.elastic, displacement[:, :, None])[0, 0])
+    def _recovered(self, states: Sequence[EquilibriumState], *patches: Endings) -> Array:
+        """Return the displacements (nodes, 2, c) of states, of the nodes that patches need alone."""
+        nodes = distinct(np.concatenate([patch.nodes(self.geometry.mesh) for patch in patches]))
+        return self.body.displacement(np.stack([state.u for state in states], axis=2), only=nodes)
 
     def sed_row(self, displacement: Array) -> Array:
         """Return the SED averaged over each ending of the row (r,) [MPa]; nan where the finger ends before it."""
@@ -124,7 +129,8 @@ class FingerModel:
 
         They are the singular values of F = 1 + du/dX; a folded place has a negative smallest one.
         """
-        f = self.corners.displacement_gradient(self.geometry.mesh, displacement) + np.eye(2)
+        local = displacement[self.geometry.mesh.elements]
+        f = (self._corners @ (local - local[:, 8:])).reshape(-1, 2, 2) + np.eye(2)  # transposed, of the same stretches
         det = f[:, 0, 0] * f[:, 1, 1] - f[:, 0, 1] * f[:, 1, 0]
         total = np.sum(f * f, axis=(1, 2))
         plus, minus = np.sqrt(total + 2.0 * det), np.sqrt(np.maximum(total - 2.0 * det, 0.0))

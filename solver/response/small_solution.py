@@ -37,7 +37,7 @@ from solver.equilibrium.step_error import Steps
 from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.mesh.grid import MeshError
 from solver.mesh.mesher import Sizing
-from solver.prediction import ROW, History, Prediction, Row, Skin, drag
+from solver.prediction import ROW, History, NestedNumbers, Prediction, Row, Skin, drag
 from solver.scene import Scene, SceneError
 
 ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements once more
@@ -111,12 +111,20 @@ def answers(
         solve = mesh.solve_s / len(scenes)
         shared = _Shared(mesh, nested, took - mesh.solve_s, solve, more / len(scenes), widest=margin == WIDE)
         done = []
-        for number, scene in enumerate(scenes):
-            _report(progress, number / len(scenes))
-            answer, way = _answer(scene, shared, _of_all(progress, number, len(scenes)))
-            if watch is not None and answer is not None:
-                watch(number, answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer, mesh, way)
-            done.append(answer)
+        # Settled slides take milliseconds and are estimated together; a course is watched as soon as it is marched.
+        together = 1 if any(scene.solve.course == "history" for scene in scenes) else len(scenes)
+        for first in range(0, len(scenes), together):
+            states: list[_Solved | SolveFailure | None] = []
+            for number, scene in enumerate(scenes[first : first + together], first):
+                _report(progress, number / len(scenes))
+                try:
+                    states.append(_solved(scene, shared, _of_all(progress, number, len(scenes))))
+                except SolveFailure as failure:
+                    states.append(failure)
+            for number, (answer, way) in enumerate(_estimated(states, shared), first):
+                if watch is not None and answer is not None:
+                    watch(number, answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer, mesh, way)
+                done.append(answer)
         if all(answer is not None for answer in done):
             break
     lost = NotConverged(
@@ -129,14 +137,6 @@ def answers(
 def _of_all(progress: Progress | None, number: int, count: int) -> Progress | None:
     """Return what is told the part done of one of `count` scenes."""
     return None if progress is None else lambda part: progress((number + part) / count)
-
-
-def _answer(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[Answer | None, Way | None]:
-    """Return the answer, None where contact must be looked for on more of the skin; and the way where it has one."""
-    try:
-        return _predicted(scene, shared, progress) or (None, None)
-    except SolveFailure as failure:
-        return failure, None
 
 
 def _report(progress: Progress | None, part: float) -> None:
@@ -168,10 +168,25 @@ def _in_steps(scene: Scene, shared: _Shared) -> tuple[EquilibriumState | None, S
     return (contact if steps.times == 1 else direct(scene, shared.mesh, steps.times, widest=shared.widest)), steps
 
 
-def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[Prediction, Way | None] | None:
-    """Return the prediction of one scene, and its way where it has one that can be drawn from forces alone.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solved:
+    """The state of a scene on one mesh."""
 
-    None where contact must be looked for on more of the skin.
+    scene: Scene
+    contact: EquilibriumState
+    displacement: Array  # (nodes, 2) [mm]
+    checks: dict[str, float]
+    steps: Steps | None  # of a course, where the state depends on its way
+    way: Way | None
+    over_time: Array | None  # (m, 2) SED of ending and point along the way of tissues that relax [MPa]
+    sed: float  # of the ending [MPa]
+    wall_s: float
+
+
+def _solved(scene: Scene, shared: _Shared, progress: Progress | None) -> _Solved | None:
+    """Return the state of one scene; None where contact must be looked for on more of the skin.
+
+    Raises SolveFailure.
     """
     finger = shared.mesh
     begun = perf_counter()
@@ -204,17 +219,47 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
             checks["course_viscous_work"] = checks.pop("course_work_balance")
         if over_time is None or not (contact.state == STICK).any():  # stuck and relaxing, the end depends on the way
             checks["course_against_direct"] = abs(finger.sed_ending(finger.displacement(direct)) / sed - 1.0)
-    left = model(scene.driven(depth), finger, contact, displacement)
-    history = None if way is None else _history(scene, finger, way, over_time)
-    sed_row = finger.sed_row(displacement)
-    solved = perf_counter()
-    numbers, shift = finger.all_numbers([contact])[0], shift_of(scene, contact)
-    numbers[0], numbers[4] = sed, shift or 0.0
-    nested = on_nested(scene, shared.nested, steps)
-    off = errors(scene, numbers, nested, steps)
-    found = Prediction(
+    return _Solved(scene, contact, displacement, checks, steps, way, over_time, sed, perf_counter() - begun)
+
+
+def _estimated(
+    states: Sequence[_Solved | SolveFailure | None], shared: _Shared
+) -> list[tuple[Answer | None, Way | None]]:
+    """Return the prediction of each state that was solved, and its way where that can be drawn from forces alone."""
+    solved = [one for one in states if isinstance(one, _Solved)]
+    if not solved:
+        return [(one, None) for one in states if not isinstance(one, _Solved)]
+    begun, finger = perf_counter(), shared.mesh
+    numbers = finger.all_numbers([one.contact for one in solved])
+    rows = finger.row.average(
+        finger.geometry.mesh, finger.body.elastic, np.stack([one.displacement for one in solved], axis=2)
+    )
+    nested = on_nested(shared.nested, [(one.scene, one.steps) for one in solved])
+    took = (perf_counter() - begun) / len(solved)
+    predictions = iter(
+        [
+            _prediction(one, shared, numbers[number], rows[:, number], nested[number], took)
+            for number, one in enumerate(solved)
+        ]
+    )
+    return [
+        (next(predictions), one.way if one.over_time is None else None) if isinstance(one, _Solved) else (one, None)
+        for one in states
+    ]
+
+
+def _prediction(
+    solved: _Solved, shared: _Shared, numbers: Array, row: Array, nested: NestedNumbers | None, estimate_s: float
+) -> Prediction:
+    """Return the prediction of a state with its `numbers` (7,), and the SED (r,) of the row of receptors [MPa]."""
+    scene, contact, checks, finger = solved.scene, solved.contact, solved.checks, shared.mesh
+    shift, depth = shift_of(scene, contact), contact.pull.depth
+    left = model(scene.driven(depth), finger, contact, solved.displacement)
+    numbers[0], numbers[4] = solved.sed, shift or 0.0
+    off = errors(scene, numbers, nested, solved.steps)
+    return Prediction(
         scene=scene,
-        sed_ending=sed,
+        sed_ending=solved.sed,
         sed_point=float(numbers[6]),
         normal_force=float(contact.normal.sum()),
         tangential_force=drag(scene, float(contact.tangential.sum())),
@@ -231,16 +276,16 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
         sed_point_error=off.point,
         dofs=finger.body.dofs,
         newton_iterations=contact.iterations,
-        wall_s=solved - begun + shared.solve_s,
+        wall_s=solved.wall_s + shared.solve_s,
         setup_s=shared.setup_s,
-        estimate_s=perf_counter() - solved + shared.estimate_s,
-        row=Row(ROW, sed_row, row_errors(sed_row, nested)),
+        estimate_s=estimate_s + shared.estimate_s,
+        row=Row(ROW, row, row_errors(row, nested)),
         model=left,
         audits=checks,
         skin=skin_of(finger, contact),
         geometry=finger.geometry,
-        displacement=displacement,
-        history=history,
+        displacement=solved.displacement,
+        history=None if solved.way is None else _history(scene, finger, solved.way, solved.over_time),
         warnings=(
             *warnings(scene, left["left_out"]),
             *filter(None, [inside_out(checks)]),
@@ -248,7 +293,6 @@ def _predicted(scene: Scene, shared: _Shared, progress: Progress | None) -> tupl
             *rounding(checks),
         ),
     )
-    return found, way if over_time is None else None
 
 
 def _balanced(
