@@ -24,7 +24,7 @@ from sessions.report.figures.style import (
     svg,
 )
 from solver.verification.costs import Cost
-from solver.verification.estimates import Estimate
+from solver.verification.estimates import Estimate, Guaranteed
 from solver.verification.growth import FEWEST, Growth, exponent
 from solver.verification.measuring import Measured
 from solver.verification.orders import Order
@@ -54,11 +54,13 @@ def speed_plate(found: Measured) -> Plate:
     panels = [
         _speed_panel(rows, doubt, "first_s", "one surface from undeformed"),
         _speed_panel(rows, doubt, "next_s", "each further surface"),
+        _guaranteed_panel(found.of(Guaranteed)),
     ]
     caption = (
         f"Time against true error: largest error of the SED on {len(JUDGED)} surfaces (slipperiness 0 to 100, "
         "stickiness 0), median time of a solve, mesh and estimate not included. One point a mesh; hollow where the "
-        "error is below three times the doubt of the truth."
+        "error is below three times the doubt of the truth. Last, surfaces solved together to a tolerance, every mesh "
+        "and estimate included: filled by the largest estimate, hollow by the largest true error."
     )
     return Plate("speed", caption, tuple(panel for panel in panels if panel is not None))
 
@@ -94,6 +96,44 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
     return Panel(
         name, f"Time against true error, {title}", svg(drawn, name, title, simulated=False), header, tuple(table)
     )
+
+
+def _guaranteed_panel(rows: Sequence[Guaranteed]) -> Panel | None:
+    if not rows:
+        return None
+    drawn = sheet(*SQUARE)
+    axes = drawn.axes[0]
+    for kinematics in dict.fromkeys(row.kinematics for row in rows):
+        mine = [row for row in rows if row.kinematics == kinematics]
+        colour, mark = COLOURS[kinematics], MARKS[kinematics]
+        sure = [(100 * row.worst_estimate, 1e3 * row.took_s / row.surfaces, row) for row in mine]
+        true = [(100 * row.worst_error, 1e3 * row.took_s / row.surfaces, row) for row in mine if row.worst_error]
+        for points, face, words in ((sure, colour, "guaranteed"), (true, "white", "true")):
+            axes.plot([x for x, _, _ in points], [y for _, y, _ in points], color=colour, linewidth=0.8)
+            for error, span, row in points:
+                gid = drawn.note(
+                    f"{row.surfaces} surfaces, {row.dofs} unknowns: {words} {error:.2g} %, {span:.3g} ms each"
+                )
+                axes.plot(error, span, mark, color=colour, markerfacecolor=face, markersize=4.5, gid=gid)
+        axes.plot([], [], mark, color=colour, markersize=4, label=f"{kinematics} strain")
+    _logarithmic(axes)
+    axes.legend(frameon=False, loc="upper right")
+    axes.set_xlabel("guaranteed, and true, error of the SED [%]")
+    axes.set_ylabel("time for a surface [ms]")
+    title = "surfaces solved to a tolerance"
+    axes.set_title(title)
+    header = (
+        "kinematics", "tolerance [-]", "surfaces", "unknowns", "guaranteed error [-]", "largest true error [-]",
+        "time for a surface [s]",
+    )  # fmt: skip
+    table = tuple(
+        (r.kinematics, r.tolerance, r.surfaces, r.dofs, r.worst_estimate,
+         "not known" if r.worst_error is None else r.worst_error, r.took_s / r.surfaces)
+        for r in rows
+    )  # fmt: skip
+    name = "speed-guaranteed"
+    words = f"Time against guaranteed error, {title}"
+    return Panel(name, words, svg(drawn, name, words, simulated=False), header, table)
 
 
 def benchmark_plate(found: Measured) -> Plate:

@@ -7,6 +7,7 @@ from time import perf_counter
 
 import pytest
 
+from daq_app.accuracy_page.figures import plates
 from daq_app.accuracy_page.page import page, write
 from daq_app.accuracy_page.tables import Table, tables
 from daq_app.child_process import interpreter
@@ -104,6 +105,7 @@ def test_pictures_are_files_of_their_own_and_the_data_is_json(written):
     assert {path.stem for path in pictures} >= {
         "speed-first",
         "speed-next",
+        "speed-guaranteed",
         "estimate-sed",
         "orders",
         "costs",
@@ -114,6 +116,13 @@ def test_pictures_are_files_of_their_own_and_the_data_is_json(written):
     data = json.loads((written[0].parent / "accuracy.json").read_text(encoding="utf-8"))
     assert data["truth"][0]["numbers"] == [5e-3, 0.1, 0.06]
     assert data["speed"][0]["kind"] == "Speed"
+
+
+def test_time_is_drawn_against_the_error_that_is_guaranteed_and_against_the_true_one(example):
+    (panel,) = (panel for panel in plates(example)["speed"].panels if panel.name == "speed-guaranteed")
+    assert panel.rows == (("small", 0.01, 6, 900, 0.009, 0.003, pytest.approx(0.05)),)
+    assert "guaranteed 0.9 %, 50 ms each" in panel.svg
+    assert "true 0.3 %, 50 ms each" in panel.svg
 
 
 def test_what_is_timed_at_finite_strain_is_what_the_program_answers():
