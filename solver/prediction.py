@@ -56,6 +56,7 @@ class NestedNumbers:
     numbers: Array  # (7,)
     of_edges: Array  # (7,) what they change by when edges of contact move by a node of that mesh
     row: Array  # (r,) SED of the row of receptors [MPa]
+    row_of_edges: Array  # (r,) and what that changes by likewise
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
 
-from solver.accuracy.error_estimate import edge_changes
+from solver.accuracy.error_estimate import edge_changes, nested_numbers
 from solver.accuracy.finite_ends import end, relaxes, steps_asked
 from solver.continuation.existence import refuse_far_beyond, steep
 from solver.continuation.finite_states import course, depends_on_way, nearby, roughly, settled
@@ -204,6 +204,5 @@ def on_nested(
     except SolveFailure:
         return None, steps
     given = None if relaxes(scene) else forces_of(scene, shape.pull)
-    (numbers,), (of_edges,) = edge_changes(finger.newton, [(shape, given)], finger.all_numbers)
-    row = finger.row.average(finger.newton.body, shape.u)
-    return NestedNumbers(numbers if steps is None else steps.taken(numbers), of_edges, row), steps
+    (values,), (changes,) = edge_changes(finger.newton, [(shape, given)], finger.numbers_and_row)
+    return nested_numbers(values, changes, steps), steps

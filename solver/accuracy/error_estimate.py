@@ -23,6 +23,7 @@ from solver.scene import Scene
 
 FROM_HALVING = 4.0 / 3.0  # error on a mesh by what halving its elements changes: errors fall with their square
 FROM_EDGES = 0.5  # of what a number changes by when an edge of contact moves by one node
+NUMBERS = 7  # of `all_numbers`, before the row of receptors
 SHIFT = 4  # place of the bone's shift among the numbers
 
 
@@ -59,6 +60,15 @@ def edge_changes(
         worst = np.max(np.reshape(changes, (len(ones) // 2, 2, -1)), axis=1) if ones else np.zeros((1, 1))
         out[number] = np.sqrt(np.sum(worst**2, axis=0))
     return here, out
+
+
+def nested_numbers(values: Array, changes: Array, steps: Steps | None) -> NestedNumbers:
+    """Return what a nested mesh has of one scene: its `values` (7 + r,) and what edges of contact change of them.
+
+    `steps` are those taken where its state depends on its way.
+    """
+    numbers = values[:NUMBERS] if steps is None else steps.taken(values[:NUMBERS])
+    return NestedNumbers(numbers, changes[:NUMBERS], values[NUMBERS:], changes[NUMBERS:])
 
 
 def _with_moved_edges(newton: Newton, state: EquilibriumState, given: Given | None) -> list[EquilibriumState | None]:
@@ -107,7 +117,8 @@ def row_errors(row: Array, nested: NestedNumbers | None) -> Array:
     """Return the errors of the SED of a row of receptors `row` (r,), relative (r,); nan where nothing is known."""
     if nested is None:
         return np.full(len(row), np.nan)
-    return FROM_HALVING * np.abs(nested.row - row) / np.maximum(row, np.finfo(float).tiny)
+    off = FROM_HALVING * np.abs(nested.row - row) + FROM_EDGES * nested.row_of_edges
+    return off / np.maximum(row, np.finfo(float).tiny)
 
 
 def _without_given(scene: Scene, found: Errors) -> Errors:

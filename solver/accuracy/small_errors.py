@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solver.accuracy.error_estimate import edge_changes
+from solver.accuracy.error_estimate import edge_changes, nested_numbers
 from solver.continuation.small_states import end, nearest
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.loads import forces_of, pull_of
@@ -46,12 +46,8 @@ def on_nested(mesh: FingerModel, asked: Sequence[tuple[Scene, Steps | None]]) ->
     if not known:
         return out
     forced = [(state, forces_of(asked[n][0], state.pull)) for n, state in zip(held, known, strict=True)]
-    numbers, of_edges = edge_changes(mesh.newton, forced, mesh.all_numbers)
-    rows = mesh.sed_rows(known)
-    for place, number in enumerate(held):
-        steps = asked[number][1]
-        taken = numbers[place] if steps is None else steps.taken(numbers[place])
-        out[number] = NestedNumbers(taken, of_edges[place], rows[:, place])
+    for number, values, changes in zip(held, *edge_changes(mesh.newton, forced, mesh.numbers_and_row), strict=True):
+        out[number] = nested_numbers(values, changes, asked[number][1])
     return out
 
 

@@ -105,9 +105,10 @@ class FingerModel:
         ending, middle = self.seds(states).T
         return np.column_stack([ending, rest, middle])
 
-    def sed_rows(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return the SED averaged over each ending of the row (r, c) [MPa] of states; nan where the finger ends."""
-        return self.row.average(self.geometry.mesh, self.body.elastic, self._recovered(states, self.row))
+    def numbers_and_row(self, states: Sequence[EquilibriumState]) -> Array:
+        """Return `all_numbers`, then the SED of each ending of the row (c, 7 + r) [MPa]; nan where the finger ends."""
+        row = self.row.average(self.geometry.mesh, self.body.elastic, self._recovered(states, self.row))
+        return np.hstack([self.all_numbers(states), row.T])
 
     def _averaged(self, states: Sequence[EquilibriumState], *patches: Endings) -> Array:
         """Return the SED averaged over the first ending of each of the patches (c, p) [MPa]."""

@@ -86,6 +86,11 @@ class FiniteFinger:
             ]
         )
 
+    def numbers_and_row(self, states: Sequence[EquilibriumState]) -> Array:
+        """Return `all_numbers`, then the SED of each ending of the row (c, 7 + r) [MPa]; nan where the finger ends."""
+        row = [self.row.average(self.newton.body, state.u) for state in states]
+        return np.hstack([self.all_numbers(states), row])
+
     def transfer(self, shape: EquilibriumState, other: "FiniteFinger") -> EquilibriumState:
         """Return `shape`, found on `other`, as a start on this mesh."""
         return self.bridge(other).carried(shape)

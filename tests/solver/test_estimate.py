@@ -64,7 +64,7 @@ def test_an_error_that_falls_with_the_square_of_an_element_is_known_and_edges_ad
     asked = Scene(friction=Friction(0.3), loading=Loading(1.0))
     truth, error = np.array([1.0, 2.0, 0.6, 1.0, 0.0, 5.0, 1.1]), 0.04
     none, edges = np.zeros(7), np.full(7, 0.01)
-    nested = NestedNumbers(truth * (1.0 + error / 4.0), none, none)
+    nested = NestedNumbers(truth * (1.0 + error / 4.0), none, none, none)
     found = errors(asked, truth * (1.0 + error), nested, None)
     assert found.sed == pytest.approx(error / (1.0 + error), rel=1e-12)
     more = errors(asked, truth * (1.0 + error), replace(nested, of_edges=edges), None)
