@@ -191,12 +191,17 @@ def bind_arguments(loop: Callable[..., Result], *last: object) -> Callable[..., 
 
 def _kind(argument: Any) -> object:  # noqa: ANN401 - an array, a number, or a tuple of both
     """Return what tells apart the types that numba knows, found faster than these."""
-    kind: object = cast("object", argument.__class__)
+    kind: object = argument.__class__
     if kind is np.ndarray:
-        return argument.dtype.num, argument.ndim, argument.flags.num
-    if isinstance(argument, tuple):
-        return kind, *[_kind(one) for one in cast("tuple[object, ...]", argument)]
-    return kind
+        return _array_kind(argument)
+    if not isinstance(argument, tuple):
+        return kind
+    parts = cast("tuple[Any, ...]", argument)
+    return kind, *[_array_kind(one) if one.__class__ is np.ndarray else one.__class__ for one in parts]
+
+
+def _array_kind(array: Any) -> object:  # noqa: ANN401 - of any type
+    return array.dtype.num, array.ndim, array.flags.num
 
 
 _ENTRIES: dict[tuple[object, ...], Callable[..., Any]] = {}  # by loop and the kinds of its arguments
