@@ -73,7 +73,10 @@ class LiveBar(QWidget):
             known = known[np.isfinite(known)]
             # Adding nothing makes a zero of what would be a minus zero.
             text = f"{round(float(known.mean()), digits) + 0.0:.{digits}f} {unit}".strip() if len(known) else "–"
-            say(self.values[channel], text.replace("-", "−"))
+            text = text.replace("-", "−")
+            if text != self.values[channel].text():
+                say(self.values[channel], text)
+                self.values[channel].setAccessibleName(f"{_name(channel)} {text}")
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Leave out the numbers that would be cut, the last first."""
@@ -112,11 +115,11 @@ class LiveBar(QWidget):
 
     def _place_numbers(self, row: QHBoxLayout) -> None:
         for channel, _, _, colour in READ:
-            name = {"mu": "µ"}.get(channel, channel)
+            name = _name(channel)
             value = label("–", "title")
             value.setFixedWidth(self._widest(channel, TITLE))
             value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            value.setAccessibleName(f"{name} now")
+            value.setAccessibleName(f"{name}: no number")
             caption = label(name, "quiet")
             if colour:
                 caption.setStyleSheet(f"border-bottom: 3px solid {colour};")
@@ -124,3 +127,7 @@ class LiveBar(QWidget):
             row.addWidget(value)
             self.values[channel] = value
             self._pairs.append((caption, value))
+
+
+def _name(channel: str) -> str:
+    return {"mu": "µ"}.get(channel, channel)

@@ -12,10 +12,10 @@ from PySide6.QtGui import (
     QPaintEvent,
     QPen,
     QTouchEvent,
+    QWheelEvent,
 )
-from PySide6.QtWidgets import QSizePolicy
+from PySide6.QtWidgets import QAbstractSlider, QSizePolicy
 
-from daq_app.qt.painted import Painted
 from daq_app.qt.tokens import Tokens
 from daq_app.window.answer import LEAP, STEP, Answer, Device
 from sessions.plan.plan import Hand
@@ -37,25 +37,36 @@ KEYS = {
 }
 
 
-class ScoreLine(Painted):
-    """Takes mouse, touch, pen and keyboard alike; every position is kept with its time."""
+class ScoreLine(QAbstractSlider):
+    """Takes mouse, touch, pen and keyboard alike; every position is kept with its time.
+
+    To assistive technology it is a slider from 0 to 100.
+    """
 
     changed = Signal()
 
     def __init__(self, tokens: Tokens, now: Callable[[], float]) -> None:
         """Show an empty line; `now` tells the session clock [s]."""
-        super().__init__(tokens)
+        super().__init__()
+        self.tokens = tokens
         self._now = now
         self._pixels_per_mm = 96 / 25.4
         self._answer = Answer()
         self._ends = ("", "")
         self._ticks = 0
+        self.setRange(0, 100)
         self.setAccessibleName("line to answer on")
+        self.valueChanged.connect(self._moved)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_AcceptTouchEvents)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._resize()
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        self.tokens = tokens
+        self.update()
 
     @property
     def answer(self) -> Answer:
@@ -121,6 +132,10 @@ class ScoreLine(Painted):
             return
         self._take(self._answer.stepped(self._now(), step))
 
+    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802  Qt's name
+        """Move nothing: a wheel is turned by mistake."""
+        event.ignore()
+
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint the line, its two ends, and the mark where there is one."""
         t, mm, line = self.tokens, self._pixels_per_mm, self._line()
@@ -153,12 +168,18 @@ class ScoreLine(Painted):
             case _:
                 self._take(self._answer.released())
 
+    def _moved(self, value: int) -> None:
+        """Take a value that assistive technology sets."""
+        if value != round(self._answer.score or 0.0):
+            self._take(self._answer.pressed(self._now(), float(value), "keyboard").released())
+
     def _take(self, answer: Answer) -> None:
         if answer is self._answer:
             return
         self._answer = answer
         low, high = self._ends
         self.setAccessibleName(f"line from {low} to {high}")
+        self.setValue(round(answer.score or 0.0))
         where = "no answer yet" if answer.score is None else f"answer at {answer.score:.0f} of 100"
         self.setAccessibleDescription(f"{where}; arrow keys move it")
         self.update()

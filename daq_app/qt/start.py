@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # Qt is loaded only once it is known that it can be
     from daq_app.qt.tokens import Tokens
 
 SIMULATED_BENCH = "sim:?rate=200"
+ICON = Path(__file__).with_name("daq-app.svg")
 FAILED = 1  # exit code: could not be done
 WRONG = 2  # likewise: the command line was wrong
 
@@ -122,9 +123,13 @@ def _shown(made: "Callable[[QApplication], QWidget]") -> int:
 
 def _dress(application: "QApplication", tokens: "Tokens", scale: float) -> None:
     """Give every window the colours and type of a theme."""
+    from PySide6.QtGui import QIcon
+
     from daq_app.qt.tokens import palette, style_sheet
 
     application.setApplicationName("daq-app")
+    application.setDesktopFileName("daq-app")
+    application.setWindowIcon(QIcon(str(ICON)))
     if application.style().name() != "fusion":
         application.setStyle("Fusion")  # the one style that draws alike, and takes our colours, everywhere
     application.setPalette(palette(tokens))

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QLocale, QPointF, Qt
-from PySide6.QtGui import QColor, QKeyEvent
+from PySide6.QtGui import QAccessible, QColor, QKeyEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLineEdit, QListWidget, QWidget
 
@@ -287,3 +287,34 @@ def test_the_bar_of_how_hard_the_finger_presses_shows_the_mean_of_the_last_momen
 def _filled(bar):
     image, colour = bar.grab().toImage(), QColor(bar.tokens.act)
     return sum(image.pixelColor(x, image.height() // 2) == colour for x in range(image.width()))
+
+
+@pytest.mark.usefixtures("application")
+def test_the_line_is_a_slider_to_assistive_technology_which_may_move_it():
+    line = score_line.ScoreLine(tokens.LIGHT, lambda: 0.0)
+    line.begin(("not at all", "very"))
+    told = QAccessible.queryAccessibleInterface(line)
+    assert told.role() == QAccessible.Role.Slider
+    assert "no answer yet" in told.text(QAccessible.Text.Description)
+    assert not line.answered
+    told.valueInterface().setCurrentValue(72)
+    assert line.answer.score == 72.0
+    QTest.keyClick(line, Qt.Key.Key_Left)
+    assert told.valueInterface().currentValue() == 71
+    line.begin(("not at all", "very"))
+    assert not line.answered
+
+
+def test_a_number_is_read_aloud_with_its_value(driver):
+    bar = driver.window.live.bar
+    bar.show_numbers(np.full((len(CHANNELS), 3), 0.5))
+    assert bar.values["N"].accessibleName() == "N 0.50 N"
+    assert bar.values["mu"].accessibleName() == "µ 0.50"
+
+
+@pytest.mark.parametrize("size", [16, 64, 256])
+def test_the_window_has_an_icon_that_is_drawn_at_every_size(driver, size):
+    picture = driver.window.windowIcon().pixmap(size, size).toImage()
+    assert picture.width() == size
+    colours = {picture.pixelColor(x, y).rgb() for x in range(0, size, 2) for y in range(0, size, 2)}
+    assert len(colours) > 3
