@@ -55,16 +55,6 @@ def test_every_file_of_a_simulated_session_says_simulated(session, capsys):
         assert "SIMULATED" in (session / name).read_text()[:200], name
 
 
-def test_the_reading_of_tau_as_printed_is_asked_for_by_name_and_is_a_hundredth(session, capsys):
-    run(["analyse", str(session), "--json"])
-    computed = printed(capsys)["friction"]
-    run(["predict", str(session), "--beside", "none", "--json", "--tau", "as-printed"])
-    document = printed(capsys)
-    assert document["options"]["tau_reading"] == "as-printed"
-    for row, other in zip(document["trials"], computed, strict=True):
-        assert row["tau_max"] == pytest.approx(other["tau_max"] / 100)
-
-
 def test_verify_names_a_changed_byte_of_the_recording_with_exit_code_3(session, capsys):
     live = session / "session.sqlite"
     live.chmod(stat.S_IRUSR | stat.S_IWUSR)
