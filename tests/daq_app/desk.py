@@ -1,6 +1,7 @@
 """A client of the recorder with people in front of it, for tests."""
 
 import time
+from dataclasses import replace
 
 from sessions.plan.plan import Frame
 from sessions.plan.protocols import VisitSetting, plan, protocol
@@ -9,6 +10,7 @@ from sessions.run.steps import AskBegin, AskFinish, AskMount, AskScore, Begin, F
 PACE = 20.0
 DEADLINE = 60.0  # of a machine that hangs, not of a slow one [s]
 PLAN = plan(protocol("sensotact-friction"), "S01", 3, setting=VisitSetting(frame=Frame("-z", "set", 20.0, "set")))
+SHORT = replace(PLAN, blocks=(replace(PLAN.blocks[0], trials=PLAN.blocks[0].trials[:3]),))
 
 
 class Desk:

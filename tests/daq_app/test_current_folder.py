@@ -60,6 +60,7 @@ def test_the_recorder_runs_nothing_that_lies_in_the_current_folder():
     assert isinstance(first, Device)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("malicious")
 def test_the_live_model_runs_nothing_that_lies_in_the_current_folder():
     model = LiveModel()
@@ -78,6 +79,7 @@ def test_the_live_model_runs_nothing_that_lies_in_the_current_folder():
         process.join()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("malicious")
 def test_the_watch_over_takes_runs_nothing_that_lies_in_the_current_folder():
     judge = Judge(lambda _: None)
@@ -86,6 +88,7 @@ def test_the_watch_over_takes_runs_nothing_that_lies_in_the_current_folder():
     judge._worker.shutdown()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("malicious")
 def test_the_analysts_work_runs_nothing_that_lies_in_the_current_folder(tmp_path):
     analyst = Analyst(tmp_path / "no session")
@@ -98,6 +101,7 @@ def test_the_analysts_work_runs_nothing_that_lies_in_the_current_folder(tmp_path
         process.join()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("malicious")
 def test_the_pool_of_a_study_runs_nothing_that_lies_in_the_current_folder(tmp_path):
     (answer,) = _in_pool([tmp_path / "none"], VisitOptions(), 1)
@@ -105,6 +109,7 @@ def test_the_pool_of_a_study_runs_nothing_that_lies_in_the_current_folder(tmp_pa
     assert "holds no recording" in answer[1]
 
 
+@pytest.mark.slow
 def test_processes_that_are_timed_run_nothing_that_lies_in_the_current_folder(malicious):
     commands = [command for _, command in processes._commands(malicious, tuple(interpreter()))]
     for command in (commands[1], commands[2], [*commands[-1][:-3], "verify", "--help"]):
@@ -136,6 +141,7 @@ def test_the_program_started_as_a_module_leaves_the_current_folder(malicious):
     assert "holds no recording" in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.qt
 @pytest.mark.usefixtures("malicious")
 def test_the_window_and_its_processes_run_nothing_that_lies_in_the_current_folder():

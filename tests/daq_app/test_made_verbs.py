@@ -74,6 +74,13 @@ def test_every_number_of_a_reported_session_has_a_unit_and_an_interval(reported)
     }
 
 
+def test_the_reading_of_tau_as_printed_is_asked_for_by_name_and_is_a_hundredth(reported):
+    computed, document = (json.loads((reported / f"{name}.json").read_text()) for name in ("analysis", "prediction"))
+    assert document["options"]["tau_reading"] == "as-printed"
+    for row, other in zip(document["trials"], computed["friction"], strict=True):
+        assert row["tau_max"] == pytest.approx(other["tau_max"] / 100)
+
+
 def test_exports_carry_the_error_of_calibration_that_their_intervals_hold(reported, tmp_path):
     assert run(["export", str(reported), "--format", "csv", "--out", str(tmp_path / "csv")]) == 0
     with (tmp_path / "csv" / "strokes.csv").open(newline="") as file:  # a table that every format writes

@@ -8,7 +8,7 @@ from pathlib import Path
 from urllib.parse import quote, unquote
 
 import pytest
-from desk import PACE, PLAN, Desk
+from desk import PACE, SHORT, Desk
 
 from daq_app.cli.main import run
 from daq_app.recorder.client import Recorder
@@ -85,7 +85,7 @@ def recorded(tmp_path_factory):
             desk = Desk(recorder)
             recorder.send(Connect("sim:?seed=7"))
             desk.until(Device)
-            recorder.send(StartSession(PLAN, str(folder), People("simulated people", 7)))
+            recorder.send(StartSession(SHORT, str(folder), People("simulated people", 7)))
             desk.until(Sealed)
         assert run(["analyse", str(folder)]) in (0, 3)
     return folder

@@ -10,6 +10,7 @@ from contextlib import closing
 from dataclasses import fields
 
 import pytest
+from examples import short_protocol
 
 from daq_app.cli.main import run
 from sessions.recording.schema import COLUMNS
@@ -19,9 +20,11 @@ from sessions.strokes.settings import FilterSettings
 
 @pytest.fixture(scope="session")
 def recorded(tmp_path_factory):
-    """One simulated session; tests that change it take a copy."""
+    """One simulated session of three trials; tests that change it take a copy."""
     folder = tmp_path_factory.mktemp("recorded") / "P07"
-    words = ["run", "sensotact-friction", "--device", "sim:?seed=7", "--subject", "P07", "--headless"]
+    protocol = folder.with_name("three.toml")
+    protocol.write_text(short_protocol("three", "Three surfaces", [0, 100], [100]))
+    words = ["run", str(protocol), "--device", "sim:?seed=7", "--subject", "P07", "--headless"]
     assert run([*words, "--simulate-subject", "7", "--pace", "20", "--seed", "3", "--out", str(folder), "--json"]) == 0
     return folder
 
@@ -39,7 +42,7 @@ def test_a_simulated_session_analyses_without_a_flaw_and_says_simulated(session,
     assert run(["analyse", str(session), "--json"]) == 0
     document = printed(capsys)
     assert {flaw["name"] for flaw in document["flaws"]} <= {"tilt_assumed"}
-    assert [stroke["trial"] for stroke in document["strokes"]] == list(range(1, 11))
+    assert [stroke["trial"] for stroke in document["strokes"]] == [1, 2, 3]
     wanted = {"trial", "onset", "lift", "steady", "mu_static", "mu_dynamic", "tau_max", "speed", "direction", "flaws"}
     assert all(wanted <= set(stroke) for stroke in document["strokes"])
     assert "SIMULATED" in json.dumps(document)
@@ -50,16 +53,6 @@ def test_every_file_of_a_simulated_session_says_simulated(session, capsys):
     capsys.readouterr()
     for name in ("session.json", "analysis.json", "prediction.json", "MANIFEST.json"):
         assert "SIMULATED" in (session / name).read_text()[:200], name
-
-
-def test_the_reading_of_tau_as_printed_is_asked_for_by_name_and_is_a_hundredth(session, capsys):
-    run(["analyse", str(session), "--json"])
-    computed = printed(capsys)["friction"]
-    run(["predict", str(session), "--beside", "none", "--json", "--tau", "as-printed"])
-    document = printed(capsys)
-    assert document["options"]["tau_reading"] == "as-printed"
-    for row, other in zip(document["trials"], computed, strict=True):
-        assert row["tau_max"] == pytest.approx(other["tau_max"] / 100)
 
 
 def test_verify_names_a_changed_byte_of_the_recording_with_exit_code_3(session, capsys):
@@ -75,11 +68,11 @@ def test_verify_names_a_changed_byte_of_the_recording_with_exit_code_3(session, 
 def test_verify_names_a_derived_number_that_comes_out_otherwise(session, capsys):
     run(["analyse", str(session)])
     stored = json.loads((session / "analysis.json").read_text())
-    stored["strokes"][4]["mu_dynamic"] += 1e-9
+    stored["strokes"][1]["mu_dynamic"] += 1e-9
     (session / "analysis.json").write_text(json.dumps(stored))
     capsys.readouterr()
     assert run(["verify", str(session), "--json"]) == 3
-    assert any("strokes[4].mu_dynamic" in problem for problem in printed(capsys)["problems"])
+    assert any("strokes[1].mu_dynamic" in problem for problem in printed(capsys)["problems"])
 
 
 def test_verify_names_every_number_that_a_changed_constant_of_the_analysis_changes(session, capsys, monkeypatch):

@@ -1,6 +1,6 @@
 """What the simulated bench plants, the analysis finds again: ten surfaces of the paper, default bench.
 
-Ten seeds in `make test`, fifty in `make test-long`.
+Three seeds in `make test`, fifty in `make test-long`.
 """
 
 from dataclasses import dataclass
@@ -57,7 +57,7 @@ def visit(seed, settings=None, rate=RATE):
     return Visit(parts, planted)
 
 
-@pytest.fixture(scope="module", params=[10, pytest.param(50, marks=pytest.mark.slow)], ids="{} seeds".format)
+@pytest.fixture(scope="module", params=[3, pytest.param(50, marks=pytest.mark.slow)], ids="{} seeds".format)
 def visits(request):
     return [visit(seed) for seed in range(request.param)]
 

@@ -130,7 +130,7 @@ def test_the_csv_holds_every_number_of_the_live_file_to_the_last_bit(sources, ex
     assert wrench == pytest.approx([r * s for r, s in zip(kept[0][5:], [1e-6] * 3 + [1e-3] * 3, strict=True)])
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", [pytest.param(form, marks=[pytest.mark.slow] * (form == "nwb")) for form in FORMATS])
 def test_one_long_answer_takes_room_and_memory_once_in_every_export(exports, tmp_path, form):
     assert exports[form, "whole"].exists()  # so that its libraries are loaded
     writer = begun(tmp_path / "s")

@@ -27,6 +27,11 @@ def tables():
     return analysis(friction, [stroke(n + 1) for n in range(10)])
 
 
+def beginning(whole, count):
+    """Return an analysis of the first strokes alone."""
+    return analysis(whole.friction[:count], whole.strokes[:count])
+
+
 @pytest.fixture(scope="module")
 def watched(tables):
     """The prediction, and what was told on the way to it when the seventh trial was wanted first."""
@@ -129,15 +134,15 @@ def test_the_course_presses_a_second_then_slides_at_the_measured_speed(predicted
 
 
 def test_the_bound_read_as_printed_is_a_named_choice_that_leaves_next_to_no_drag(tables):
-    found = predict(tables, PLAN, PredictionOptions(tau_reading="as-printed", course="steady"))
+    found = predict(beginning(tables, 2), PLAN, PredictionOptions(tau_reading="as-printed", course="steady"))
     assert found.trials[0].tau_max == pytest.approx(0.8033e-4)
-    assert max(row.tangential_per_mm for row in found.trials) < 0.0040
+    assert max(row.tangential_per_mm for row in found.trials[:2]) < 0.0040
     assert found.to_dict()["options"]["tau_reading"] == "as-printed"
 
 
 def test_another_finger_is_taken_from_a_scene(tables):
     other = Scene(finger=Finger(tip_radius=6.0, width=12.0), friction=Friction(0.1), loading=Loading(1.0))
-    found = predict(tables, PLAN, PredictionOptions(scene=other, course="steady"))
+    found = predict(beginning(tables, 1), PLAN, PredictionOptions(scene=other, course="steady"))
     assert (found.width, found.width_origin) == (12.0, "set")
     assert found.trials[0].prediction.scene.finger.tip_radius == 6.0
     assert found.trials[0].prediction.scene.loading.indentation == 2.0

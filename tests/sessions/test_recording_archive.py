@@ -166,7 +166,7 @@ def test_a_recording_without_trials_is_sealed(tmp_path):
 
 def test_one_long_answer_takes_room_and_memory_once_not_once_for_each_event(tmp_path):
     writer = begun(tmp_path / "s")
-    positions = [[1000.0 + i / 60, i % 101 * 0.99] for i in range(60_000)]
+    positions = [[1000.0 + i / 60, i % 101 * 0.99] for i in range(20_000)]
     writer.event("scored", 1, {"score": 42.5, "positions": positions}, commit=False)
     for i in range(118):
         writer.event("note", data={"text": f"{i}"}, commit=False)
@@ -179,7 +179,7 @@ def test_one_long_answer_takes_room_and_memory_once_not_once_for_each_event(tmp_
     tracemalloc.stop()
     assert problems(tmp_path / "s") == ()
     recorded = (tmp_path / "s" / "session.sqlite").stat().st_size  # [bytes]
-    assert recorded > 1e6
+    assert recorded > 3e5
     assert (tmp_path / "s" / "session.h5").stat().st_size < 1.5 * recorded
     assert peak < 60 * recorded  # the answer as Python holds it, in one recording and in the next; 120 times is padding
 

@@ -29,8 +29,8 @@ SUITE = {(case.kinematics, case.name): case for kind in ("small", "finite") for 
 
 
 def shown(case: Case):
-    """At finite strain make test runs those that tell most, make test-long all."""
-    slow = case.slow or (case.kinematics == "finite" and case.name not in TELLING)
+    """`make test` runs those that tell most, `make test-long` all."""
+    slow = case.slow or case.name not in TELLING
     return pytest.param(case, id=f"{case.kinematics}: {case.name}", marks=[pytest.mark.slow] if slow else [])
 
 

@@ -74,6 +74,7 @@ def test_a_history_takes_the_steps_that_its_tolerance_asks_for_and_still_ends_in
     assert ends[0] == pytest.approx(ends[1], rel=0.01)
 
 
+@pytest.mark.slow
 def test_at_finite_strain_a_press_under_a_bound_is_not_judged_as_a_slide():
     # skin slips at the bound both ways, which a slide one way would turn round
     found = solve(

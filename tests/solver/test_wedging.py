@@ -41,6 +41,7 @@ def test_a_drag_that_does_not_lift_the_bone_is_not_told():
     assert not any(LIFTED in told for told in solve(pressed(0.03, 1.5)).warnings)
 
 
+@pytest.mark.slow
 def test_under_a_force_a_refusal_tells_the_largest_friction_force_and_depth_and_they_hold_to_3_percent():
     told = refusal(pressed(0.1, 2.0))
     assert told.limit_mu == pytest.approx(1.675, rel=0.01)  # where the depth falls to 0, on twice as fine a mesh
@@ -93,6 +94,7 @@ def test_a_slide_that_settles_late_near_the_limit_is_gone_to_its_end():
     assert found.audits["course_against_direct"] < 1e-9
 
 
+@pytest.mark.slow
 def test_an_earlier_slide_without_a_settled_state_is_refused_with_its_limits_where_the_course_is_asked_for():
     told = refusal(driven(2.0, 1.25, ("-x", "+x"), course="history"))
     assert "along -x" in str(told)

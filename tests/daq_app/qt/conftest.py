@@ -8,7 +8,7 @@ import pytest
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from examples import short_protocol
-from PySide6.QtCore import QSettings
+from PySide6.QtCore import QEvent, QSettings
 from PySide6.QtWidgets import QApplication
 
 from daq_app.qt.start import opened
@@ -17,7 +17,7 @@ from daq_app.recorder.messages import Stop
 from daq_app.window.live_model_process import LiveModel
 from daq_app.window.messages import Dismissed, NewSession
 
-PACE = 20.0  # told seconds in a real one
+PACE = 8.0  # simulated seconds in a real one; the drawing of twice as many readings costs more than waiting
 PATIENCE = 60.0  # far beyond what anything takes [s]
 
 
@@ -66,7 +66,7 @@ def application(tmp_path_factory):
 def one_window(application, request):
     """One window for all tests of a file: a session that is over leaves it as it was.
 
-    A file without a session sets its own PACE of 1: readings that come 20 times as fast keep a core half busy.
+    A file without a session sets its own PACE of 1: readings that come 8 times as fast keep a core half busy.
 
     Its live model does not start by itself, for with time running so fast it would keep a core busy all along.
     """
@@ -77,8 +77,10 @@ def one_window(application, request):
     window.show()
     yield window
     window.bridge.end()
-    window.subject.hide()
-    window.hide()
+    for widget in (window.subject, window):  # one that stays is styled again with every window that opens
+        widget.hide()
+        widget.deleteLater()
+    application.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 @pytest.fixture

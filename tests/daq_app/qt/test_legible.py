@@ -2,7 +2,15 @@
 
 import pytest
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QLabel, QListWidget, QProgressBar, QTableWidget, QTableWidgetItem, QTreeWidget
+from PySide6.QtWidgets import (
+    QLabel,
+    QListWidget,
+    QProgressBar,
+    QStyleFactory,
+    QTableWidget,
+    QTableWidgetItem,
+    QTreeWidget,
+)
 
 from daq_app.qt import tokens
 from daq_app.qt.main_window import MainWindow
@@ -10,6 +18,10 @@ from daq_app.qt.parts import Shortened
 from tests.daq_app.qt.test_window_for_everybody import contrast
 
 pytestmark = pytest.mark.qt
+PACE = 1.0  # no test here waits for a session
+SCREENS = [(1366, 768), (1920, 1080), (3840, 2160)]
+SCALES = [1.0, 1.5, 2.0]
+TIGHTEST = [(SCREENS[0], SCALES[0]), (SCREENS[0], SCALES[-1])]  # where a label has least room
 
 
 def painted_contrast(widget, box):
@@ -26,14 +38,17 @@ def painted_contrast(widget, box):
 
 @pytest.fixture(params=[tokens.LIGHT, tokens.DARK], ids=["light", "dark"])
 def themed(application, request):
-    before = application.styleSheet(), application.palette(), application.style().objectName()
-    application.setStyle("Fusion")
-    application.setPalette(tokens.palette(request.param))
-    application.setStyleSheet(tokens.style_sheet(request.param, 1.0))
-    yield application
-    application.setStyle(before[2])
-    application.setPalette(before[1])
-    application.setStyleSheet(before[0])
+    """Return a function that shows a widget in a theme; the other windows of this process keep theirs."""
+    fusion = QStyleFactory.create("Fusion")
+
+    def shown(widget):
+        widget.setStyle(fusion)
+        widget.setPalette(tokens.palette(request.param))
+        widget.setStyleSheet(tokens.style_sheet(request.param, 1.0))
+        widget.show()
+        application.processEvents()
+
+    return shown
 
 
 @pytest.mark.parametrize("kind", [QListWidget, QTableWidget, QTreeWidget])
@@ -54,8 +69,7 @@ def test_a_selected_row_can_be_read_in_both_themes(themed, kind):
         widget.addTopLevelItem(QTreeWidgetItem(["HHHH 12"]))
         widget.setCurrentItem(widget.topLevelItem(0))
     widget.resize(200, 120)
-    widget.show()
-    themed.processEvents()
+    themed(widget)
     box = widget.visualItemRect(widget.item(0, 0) if kind is QTableWidget else widget.itemAt(30, 10))
     box = box.translated(widget.viewport().mapTo(widget, box.topLeft() * 0))
     assert painted_contrast(widget, box) >= 4.5
@@ -66,8 +80,7 @@ def test_the_progress_bar_can_be_read_empty_and_full(themed, part):
     bar = QProgressBar()
     bar.resize(140, 30)
     bar.setValue(part)
-    bar.show()
-    themed.processEvents()
+    themed(bar)
     assert painted_contrast(bar, bar.rect().adjusted(4, 4, -4, -4)) >= 4.5
 
 
@@ -84,13 +97,18 @@ def cut_off(window):
     return found
 
 
-@pytest.mark.parametrize("size", [(1366, 768), (1920, 1080), (3840, 2160)])
-@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize(
+    ("size", "scale"),
+    [
+        pytest.param(size, scale, marks=[] if (size, scale) in TIGHTEST else pytest.mark.slow)
+        for size in SCREENS
+        for scale in SCALES
+    ],
+)
 def test_no_label_is_cut_off_and_every_live_number_is_there(driver, size, scale):
     application = driver.application
-    before = application.styleSheet()
-    application.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
     window = MainWindow(driver.window.bridge, tokens.LIGHT, scale)
+    window.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
     try:
         window.resize(*size)
         window.show()
@@ -104,5 +122,4 @@ def test_no_label_is_cut_off_and_every_live_number_is_there(driver, size, scale)
         driver.window.bridge.frame.disconnect(window._draw)
         window.hide()
         window.deleteLater()
-        application.setStyleSheet(before)
         assert QColor(tokens.LIGHT.text).isValid()

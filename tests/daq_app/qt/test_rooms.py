@@ -13,6 +13,7 @@ from daq_app.recorder.messages import Stop
 from tests.daq_app.qt.test_session_by_keyboard import begin
 
 pytestmark = pytest.mark.qt
+PACE = 1.0  # no test here waits for a stroke
 
 SESSION = Path(__file__).parents[2] / "data" / "sessions" / "version-1" / "sealed"
 
@@ -34,6 +35,21 @@ def entries(menu):
         else:
             found[action.text().split("\t")[0]] = action
     return found
+
+
+def test_theme_and_size_of_type_are_chosen_and_remembered(driver):
+    window = driver.window
+    found = entries(window.menuBar())
+    try:
+        found["Dark"].trigger()
+        assert window._tokens == tokens.DARK
+        assert remembered.chosen_tokens() == tokens.DARK
+        found["150 %"].trigger()
+        assert remembered.type_scale() == 1.5
+        assert "next start" in window.notice._words.text()
+    finally:
+        found["System"].trigger()
+        remembered.choose_type_scale(None)
 
 
 def test_the_rail_opens_the_rooms_that_can_be_entered_and_says_why_another_cannot(driver, rooms):
@@ -103,22 +119,6 @@ def test_every_entry_of_the_menu_does_something_and_course_entries_wait_for_a_se
     begin_room = found["Prepare"]
     begin_room.trigger()
     assert rooms.room == "prepare"
-
-
-def test_theme_and_size_of_type_are_chosen_and_remembered(driver):
-    window = driver.window
-    found = entries(window.menuBar())
-    try:
-        found["Dark"].trigger()
-        assert window._tokens == tokens.DARK
-        assert remembered.chosen_tokens() == tokens.DARK
-        found["150 %"].trigger()
-        assert remembered.type_scale() == 1.5
-        assert "next start" in window.notice._words.text()
-    finally:
-        found["Light"].trigger()
-        found["System"].trigger()
-        remembered.choose_type_scale(None)
 
 
 def test_the_window_opens_where_it_was_closed(driver):
