@@ -71,6 +71,20 @@ def test_an_error_that_falls_with_the_square_of_an_element_is_known_and_edges_ad
     assert more.sed - found.sed == pytest.approx(0.005 / 1.04, rel=1e-12)
 
 
+def test_estimates_of_the_row_lie_above_its_errors_beneath_the_edges_of_contact_too():
+    asked = Scene(friction=Friction(0.35), loading=Loading(1.3, "+x"), finger=Finger(contact_angle=52.0))
+    found = solve(replace(asked, solve=Solve(tolerance=0.02, evidence="quick")))
+    fine = solve(replace(asked, solve=Solve(tolerance=2e-4, evidence="quick")))
+    assert fine.dofs > 5 * found.dofs
+    true = fine.nested.row
+    known = np.isfinite(true) & (fine.row.error < found.row.error / 3.0)
+    assert known.sum() >= 40
+    errors_of_row = np.abs(found.row.sed - true)[known]
+    assert np.mean(errors_of_row <= (found.row.error * found.row.sed)[known]) >= 0.95
+    # What halving changes would not do: it says nothing of where contact ends.
+    assert np.mean(errors_of_row <= (4 / 3 * np.abs(found.nested.row - found.row.sed))[known]) < 0.95
+
+
 def test_where_the_nested_mesh_has_no_state_nothing_is_known():
     found = errors(Scene(friction=Friction(0.3), loading=Loading(1.0)), np.ones(7), None, None)
     assert (found.sed, found.normal, found.tangential) == (1.0, 1.0, 1.0)
