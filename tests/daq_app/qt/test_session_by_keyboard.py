@@ -28,14 +28,13 @@ def begin(driver, subject="P07"):
 
 
 def one_trial(driver, *, presses=3, drawn=True):
-    """Mount, let the simulated hand stroke, score with the arrow keys once the stroke is `drawn`."""
+    """Mount, let the simulated hand stroke, score with the arrow keys; a stroke that is `drawn` stays meanwhile."""
     window, number = driver.window, driver.session.trial
     QTest.keyClick(window, SPACE)
     driver.phase("scoring")
     driver.until(lambda: driver.session.of(number).quality is not None, "what is said of the stroke")
     if drawn:
-        stays = "the stroke that stays while its score is awaited"
-        driver.until(lambda: window.live.plots[0]._end == "lift + 1 s", stays)
+        driver.until(lambda: window.live.plots[0]._end == "lift + 1 s", "the stroke stays while its score is awaited")
     for _ in range(presses):
         QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
     QTest.keyClick(window.subject.line, ENTER)
