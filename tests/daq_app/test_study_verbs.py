@@ -8,15 +8,15 @@ from examples import short_protocol
 from daq_app.cli.main import run
 from sessions.recording import Recording
 
-FOUR = short_protocol("four", "Four surfaces", [0, 100], [0, 100])
+TWO = short_protocol("two", "Two surfaces", [0], [0])
 
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     """A blinded study of two subjects: both score, one strokes as well."""
     folder = tmp_path_factory.mktemp("studies") / "friction"
-    protocol = folder.with_name("four.toml")
-    protocol.write_text(FOUR)
+    protocol = folder.with_name("two.toml")
+    protocol.write_text(TWO)
     assert run(["enrol", str(folder), "--protocol", str(protocol), "--blind", "--seed", "5"]) == 0
     own = ["--finger", "tip_radius=5.5", "contact_angle=40", "--depth", "stickiness=1.8"]
     assert run(["enrol", str(folder), "--subject", "P01", *own]) == 0
@@ -60,7 +60,7 @@ def test_a_blinded_study_is_run_predicted_unblinded_and_reported(study, capsys):
     assert said(capsys, "replay", study / "P01_scores", "--fast")[1]["differences"] == []
 
     code, clear = said(capsys, "predict", study, "--subject", "P01", "--beside", "none")
-    assert sorted(row["stimulus"]["index"] for row in clear["trials"])[:2] == [0, 0]
+    assert sorted(row["stimulus"]["index"] for row in clear["trials"]) == [0, 0]
     assert [row["sed"] for row in clear["trials"]] == [row["sed"] for row in blind["trials"]]
     assert run(["unblind", str(study), "--by", "E02"]) == 1
     assert "was unblinded before" in capsys.readouterr().err

@@ -39,11 +39,21 @@ PAPER = protocol("sensotact-friction")
 
 
 def recorded(
-    folder, *, forces=True, instead=None, stop=lambda _: False, hands=Hands, protocol=PAPER, phases=None, **transducer
+    folder,
+    *,
+    forces=True,
+    instead=None,
+    stop=lambda _: False,
+    hands=Hands,
+    protocol=PAPER,
+    phases=None,
+    most=3,
+    **transducer,
 ):
-    """A session in told time; `stop` is asked with the number of readings sent."""
+    """Record a session in simulated time, `most` trials a block; `stop` is asked with the number of readings sent."""
     clock = ToldClock()
     planned = plan(protocol, "S01", 3, forces=forces, phases=phases)
+    planned = replace_fields(planned, blocks=tuple(replace_fields(b, trials=b.trials[:most]) for b in planned.blocks))
     info = INFO if forces else None
     writer = SessionWriter.create(folder, planned, info, provenance(clock), subject_simulated=True, clock=clock)
     device = StandIn(clock, **transducer) if forces else None
@@ -75,7 +85,7 @@ def identical(recording, tmp_path):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    return recorded(tmp_path_factory.mktemp("replay") / "whole")
+    return recorded(tmp_path_factory.mktemp("replay") / "whole", most=5)
 
 
 def once(*events):
@@ -135,7 +145,7 @@ def test_every_built_in_protocol_is_carried_to_its_end_with_its_rests_and_comes_
     name, phases, forces, outcomes, tmp_path
 ):
     assert name in protocol_names()
-    session = recorded(tmp_path / "session", protocol=protocol(name), phases=phases, forces=forces)
+    session = recorded(tmp_path / "session", protocol=protocol(name), phases=phases, forces=forces, most=99)
     assert session.end["complete"]
     assert {record.outcome for record in session.trials} == outcomes
     kinds = [event.kind for event in session.events]
@@ -147,7 +157,7 @@ def test_every_built_in_protocol_is_carried_to_its_end_with_its_rests_and_comes_
 
 def test_a_rest_that_ends_by_the_clock_comes_out_at_the_same_reading(tmp_path):
     often = replace_fields(PAPER, rests=RestRules(after_trials=2, duration=1.5))
-    session = recorded(tmp_path / "session", protocol=often)
+    session = recorded(tmp_path / "session", protocol=often, most=99)
     assert [event.kind for event in session.events].count("rest_over") == 4
     identical(session, tmp_path)
 
@@ -284,7 +294,7 @@ def test_an_onset_that_was_stored_otherwise_is_named_with_both_values(tmp_path):
 
 
 def test_an_onset_that_the_readings_do_not_show_comes_no_more(tmp_path):
-    recording = recorded(tmp_path / "session")
+    recording = recorded(tmp_path / "session", most=99)
     change(recording.folder, "DELETE FROM blocks WHERE number > 3")
     torn = Recording.open(recording.folder)
     found = differences(torn, replayed(torn, tmp_path))

@@ -202,7 +202,9 @@ def test_the_page_says_what_was_left_out_and_how_much_it_may_matter(predicted):
 def test_a_trial_without_friction_keeps_its_row_with_a_dash_and_the_reason(tmp_path):
     recording = foreign(tmp_path / "light", press=0.2)
     analysis = analyse(recording)
-    made = findings(recording, analysis, predict(analysis, recording.plan, PredictionOptions(indentation=1.0)))
+    made = findings(
+        recording, analysis, predict(analysis, recording.plan, PredictionOptions(indentation=1.0, course="steady"))
+    )
     assert [p.sed for p in made.predictions] == [None, None]
     for row in made.predictions:
         assert "too_little_force" in row.reasons["sed"]
@@ -213,7 +215,9 @@ def test_a_trial_without_friction_keeps_its_row_with_a_dash_and_the_reason(tmp_p
 def test_strokes_without_a_plan_are_predicted_at_the_depth_given_for_them(tmp_path):
     recording = foreign(tmp_path / "wipes")
     analysis = analyse(recording)
-    made = findings(recording, analysis, predict(analysis, recording.plan, PredictionOptions(indentation=1.0)))
+    made = findings(
+        recording, analysis, predict(analysis, recording.plan, PredictionOptions(indentation=1.0, course="steady"))
+    )
     assert [p.stroke for p in made.predictions] == [1, 2]
     assert "Predicted responses" in page(made)
 

@@ -19,7 +19,7 @@ SLOW = pytest.mark.slow
 @pytest.mark.parametrize(
     ("mu", "tau", "deepest"),
     [
-        (0.44, 0.015478, 1.85),
+        pytest.param(0.44, 0.015478, 1.85, marks=SLOW),
         pytest.param(0.48, 0.019038, 1.75, marks=SLOW),
         pytest.param(0.64, 0.049998, 1.45, marks=SLOW),
         pytest.param(0.67, 0.05255, 1.43, marks=SLOW),

@@ -102,6 +102,7 @@ def test_an_earlier_slide_without_a_settled_state_is_refused_with_its_limits_whe
     assert told.limit_indentation == pytest.approx(1.81, rel=0.03)
 
 
+@pytest.mark.slow
 def test_an_earlier_slide_without_a_settled_state_is_told_where_the_last_one_alone_is_solved():
     warned = [told for told in solve(driven(2.0, 1.25, ("-x", "+x"))).warnings if "A slide before this one" in told]
     assert len(warned) == 1

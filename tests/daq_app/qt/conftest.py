@@ -72,6 +72,7 @@ def one_window(application, request):
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(LiveModel, "prepare", lambda _: None)
+        patch.setattr("daq_app.qt.start.SIMULATED_BENCH", "sim:?rate=100")  # half the readings to take and draw
         window = opened(application, lambda: Recorder.start(pace=getattr(request.module, "PACE", PACE)))
     window.resize(1440, 900)
     window.show()
