@@ -18,7 +18,7 @@ STATIC = [
     ("the code keeps the house's rules", ["ruff", "check", "."]),
     ("imports go one way", ["lint-imports", "--no-cache"]),
 ]
-# One thread works for a minute and a half, nearly all of it checking. It runs beside all the others, and what it prints comes after theirs.
+# One thread works for a minute and a half. It runs beside all the others, and what it prints comes after theirs.
 BESIDE = [("types agree (strict)", ["basedpyright", "--level", "error", *PACKAGES])]
 # A file's tests stay together, so that what they share is made once. On two cores a third worker runs while the others
 # wait for devices, whose tests go by the clock.
