@@ -11,7 +11,7 @@ from daq_app.cli.main import run
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     folder = tmp_path_factory.mktemp("replay") / "P07"
-    words = ["run", "sensotact-friction", "--device", "sim:?seed=7", "--subject", "P07", "--headless"]
+    words = ["run", "sensotact-friction", "--device", "sim:?seed=7&rate=200", "--subject", "P07", "--headless"]
     assert run([*words, "--simulate-subject", "7", "--pace", "50", "--seed", "3", "--out", str(folder), "--json"]) == 0
     assert run(["analyse", str(folder), "--json"]) == 0
     return folder

@@ -239,8 +239,7 @@ def test_a_bound_lets_even_the_stickiest_surface_slide():
     assert found.audits["cone_violation"] < 1e-10
 
 
-@settings(deadline=None, max_examples=5, derandomize=True)
-@given(
+any_scene = given(
     depth=st.floats(-4, 0.4).map(lambda power: 10**power),
     mu=st.sampled_from([0.0, 1e-9, 0.3, 0.7, 1.5, 1000.0]),
     bound=st.sampled_from([None, 0.0, 1e-9, 0.005, 0.05, 1e9]),
@@ -249,7 +248,22 @@ def test_a_bound_lets_even_the_stickiest_surface_slide():
     nu=st.sampled_from([0.0, 0.3, 0.48, 0.4999999]),
     course=st.sampled_from(["steady", "steady", "history"]),
 )
-def test_any_scene_ends_in_a_balanced_answer_or_in_a_sentence(depth, mu, bound, slide, angle, nu, course):
+
+
+@settings(deadline=None, max_examples=5, derandomize=True)
+@any_scene
+def test_any_scene_ends_in_a_balanced_answer_or_in_a_sentence(**drawn):
+    balanced_or_refused(**drawn)
+
+
+@pytest.mark.slow
+@settings(deadline=None, max_examples=60)
+@any_scene
+def test_sixty_scenes_end_in_balanced_answers_or_in_sentences(**drawn):
+    balanced_or_refused(**drawn)
+
+
+def balanced_or_refused(depth, mu, bound, slide, angle, nu, course):
     asked = Scene(
         finger=Finger(contact_angle=angle),
         materials=Materials(Material(0.136, nu), Material(0.08, nu), Material(0.034, nu)),
