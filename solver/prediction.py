@@ -2,15 +2,18 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from solver.arrays import Array
 from solver.mesh import Mesh
 from solver.mesh.mesher import FingerMesh
+from solver.quantities import NAMES, QUANTITIES
 from solver.scene import Scene
 
+FORCES_AND_PLACES = 7  # numbers with an estimate beside the quantities: `all_numbers` begins with them
+COUNT = FORCES_AND_PLACES + len(NAMES)
 ROW: Array = 0.25 * np.arange(-32.0, 25.0)  # arc positions of the row of receptors [mm]
 
 
@@ -21,6 +24,13 @@ class Row:
     arc: Array  # (r,) from first touch, positive towards the tip, on the undeformed skin [mm]
     sed: Array  # (r,) SED averaged over each ending [MPa]; nan where the finger ends before it
     error: Array  # (r,) estimated, of each, relative, but for what edges of contact add; nan where nothing is known
+
+
+class Response(NamedTuple):
+    """One quantity at the ending, averaged over it, in its own unit."""
+
+    value: float
+    error: float  # estimated; nan where nothing is known
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,8 +63,8 @@ class History:
 class NestedNumbers:
     """A scene on the nested mesh, every element in four: its `all_numbers`, SED of the ending first."""
 
-    numbers: Array  # (7,)
-    of_edges: Array  # (7,) what they change by when edges of contact move by a node of that mesh
+    numbers: Array  # (COUNT,)
+    of_edges: Array  # (COUNT,) what they change by when edges of contact move by a node of that mesh
     row: Array  # (r,) SED of the row of receptors [MPa]
     row_of_edges: Array  # (r,) and what that changes by likewise
 
@@ -78,6 +88,7 @@ class Prediction:
     setup_s: float  # mesh and tables; shared by scenes solved together [s]
     estimate_s: float  # what the error estimate took beside the solve, likewise [s]
     row: Row
+    responses: Mapping[str, Response]  # every quantity of `solver.quantities` at the ending, by its name
     model: Mapping[str, Any]  # what was modelled, what was left out, and the evidence that it could be
     audits: Mapping[str, float]  # checks; residuals relative unless their name says otherwise
     skin: Skin
@@ -134,6 +145,10 @@ class Prediction:
         plain["title"] = self.scene.title
         plain["sed_ending_corrected"] = None if self.nested is None else self.sed_ending_corrected
         plain["row"] = {name: _plain(getattr(self.row, name)) for name in ("arc", "sed", "error")}
+        plain["responses"] = {
+            one.name: {"unit": one.unit, "meaning": one.meaning, **_response(self.responses[one.name])}
+            for one in QUANTITIES
+        }
         plain["model"] = dict(self.model)
         plain["audits"] = dict(self.audits)
         plain["warnings"] = list(self.warnings)
@@ -142,6 +157,11 @@ class Prediction:
             plain["time"], plain["bone_x"], plain["bone_y"] = (course.pop(k) for k in ("time", "bone_x", "bone_y"))
             plain["history"] = course
         return plain
+
+
+def _response(found: Response) -> dict[str, float | None]:
+    value, error = _plain(np.array(found))
+    return {"value": value, "error": error}
 
 
 def _plain(numbers: Array) -> list[float | None]:

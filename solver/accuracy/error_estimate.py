@@ -18,12 +18,12 @@ import numpy as np
 from solver.arrays import Array
 from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Given, Newton
 from solver.equilibrium.step_error import Steps
-from solver.prediction import NestedNumbers
+from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Response
+from solver.quantities import NAMES
 from solver.scene import Scene
 
 FROM_HALVING = 4.0 / 3.0  # error on a mesh by what halving its elements changes: errors fall with their square
 FROM_EDGES = 0.5  # of what a number changes by when an edge of contact moves by one node
-NUMBERS = 7  # of `all_numbers`, before the row of receptors
 SHIFT = 4  # place of the bone's shift among the numbers
 
 
@@ -37,6 +37,7 @@ class Errors(NamedTuple):
     shift: float | None  # [mm]
     width: float | None  # of the contact
     point: float  # of the SED in the ending's middle
+    responses: Array  # (q,) of each quantity at the ending, in its own unit; nan where nothing is known
 
 
 def edge_changes(
@@ -63,12 +64,12 @@ def edge_changes(
 
 
 def nested_numbers(values: Array, changes: Array, steps: Steps | None) -> NestedNumbers:
-    """Return what a nested mesh has of one scene: its `values` (7 + r,) and what edges of contact change of them.
+    """Return what a nested mesh has of one scene: its `values` (COUNT + r,) and what edges of contact change of them.
 
     `steps` are those taken where its state depends on its way.
     """
-    numbers = values[:NUMBERS] if steps is None else steps.taken(values[:NUMBERS])
-    return NestedNumbers(numbers, changes[:NUMBERS], values[NUMBERS:], changes[NUMBERS:])
+    numbers = values[:COUNT] if steps is None else steps.taken(values[:COUNT])
+    return NestedNumbers(numbers, changes[:COUNT], values[COUNT:], changes[COUNT:])
 
 
 def _with_moved_edges(newton: Newton, state: EquilibriumState, given: Given | None) -> list[EquilibriumState | None]:
@@ -98,19 +99,26 @@ def _moved(
 
 
 def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: Steps | None) -> Errors:
-    """Return the errors of SED, both forces, indentation, shift, contact width and the middle's SED, `numbers` (7,).
+    """Return the errors of the `numbers` (COUNT,) of `all_numbers`.
 
     `nested` is None where the nested mesh has no such state, so that nothing is known of them; `steps` are those that a
     course has taken whose end depends on its way.
     """
     if nested is None:
-        return _without_given(scene, Errors(1.0, 1.0, 1.0, 1.0, None, 1.0, 1.0))
+        return _without_given(scene, Errors(1.0, 1.0, 1.0, 1.0, None, 1.0, 1.0, np.full(len(NAMES), np.nan)))
     off = FROM_HALVING * np.abs(nested.numbers - numbers) + FROM_EDGES * nested.of_edges
     if steps is not None:
         off += steps.error(numbers)
     relative = np.where(off > 0.0, np.minimum(off / np.maximum(np.abs(numbers), np.finfo(float).tiny), 1.0), 0.0)
-    sed, normal, tangential, depth, _, width, point = relative.tolist()
-    return _without_given(scene, Errors(sed, normal, tangential, depth, float(off[SHIFT]), width, point))
+    sed, normal, tangential, depth, _, width, point = relative[:FORCES_AND_PLACES].tolist()
+    found = Errors(sed, normal, tangential, depth, float(off[SHIFT]), width, point, off[FORCES_AND_PLACES:])
+    return _without_given(scene, found)
+
+
+def responses(numbers: Array, errors: Errors) -> dict[str, Response]:
+    """Return the quantities at the ending among `numbers` (COUNT,), each with its error, by name."""
+    pairs = zip(NAMES, numbers[FORCES_AND_PLACES:].tolist(), errors.responses.tolist(), strict=True)
+    return {name: Response(value, error) for name, value, error in pairs}
 
 
 def row_errors(row: Array, nested: NestedNumbers | None) -> Array:

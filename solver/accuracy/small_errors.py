@@ -11,7 +11,7 @@ from solver.equilibrium.loads import forces_of, pull_of
 from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import HALF, Steps
 from solver.failures import SolveFailure
-from solver.prediction import NestedNumbers
+from solver.prediction import COUNT, NestedNumbers
 from solver.scene import Scene
 
 
@@ -20,7 +20,7 @@ def steps_asked(scene: Scene, finger: FingerModel) -> Steps:
     try:
         whole, half = finger.all_numbers([end(scene, finger, times) for times in (1.0, HALF)])
     except SolveFailure:
-        return Steps(1, np.full(7, np.nan), np.zeros(7))  # nor will there be an estimate
+        return Steps(1, np.full(COUNT, np.nan), np.zeros(COUNT))  # nor will there be an estimate
     return Steps.of(whole, half, scene.solve.tolerance)
 
 

@@ -11,10 +11,11 @@ from solver._kernels.arguments import BodyState, ElementArrays, ElementSystem, P
 from solver.arrays import Array, Indices, Narrow
 from solver.body.receptor import Endings
 from solver.body.validation import check_body, check_driven, check_laws
-from solver.constitutive.hyperelastic import Law
+from solver.constitutive.hyperelastic import Law, log1p
 from solver.element import Q2P1
 from solver.linalg.multifrontal import Elimination, symbolic_factorization
 from solver.mesh import Mesh
+from solver.quantities import QUANTITIES, LocalState
 
 VALUES, _SLOPES = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
 
@@ -216,6 +217,7 @@ class FiniteProbes:
     weights: Array  # (p,) areas [mm2]
     patch: Indices  # (p,)
     areas: Array  # (r,) [mm2]; nan where there is no patch
+    tangent: Array  # (p, 2) direction of the undeformed skin above each probe, towards the tip
 
     @staticmethod
     def of(body: FiniteBody, endings: Endings) -> "FiniteProbes":
@@ -234,6 +236,7 @@ class FiniteProbes:
             endings.weights[order],
             endings.patch[order],
             np.where(areas > 0.0, areas, np.nan),
+            endings.tangent[order],
         )
 
     def energy(self, body: FiniteBody, displacement: Array) -> Array:
@@ -246,3 +249,41 @@ class FiniteProbes:
     def average(self, body: FiniteBody, displacement: Array) -> Array:
         """Return the SED averaged over each patch (r,) [MPa]; nan where there is no patch."""
         return np.bincount(self.patch, self.energy(body, displacement) * self.weights, len(self.areas)) / self.areas
+
+    def responses(self, body: FiniteBody, displacement: Array) -> Array:
+        """Return every quantity averaged over each patch (q, r, ...) for displacements (nodes, 2, ...), even complex."""
+        state = self._state(body, displacement)
+        wide = (slice(None), *([None] * (displacement.ndim - 2)))
+        means = []
+        for quantity in QUANTITIES:
+            values = quantity.finite(state) * self.weights[wide]
+            total = np.zeros((len(self.areas), *values.shape[1:]), values.dtype)
+            np.add.at(total, self.patch, values)
+            means.append(total / self.areas[wide])
+        return np.stack(means)
+
+    def _state(self, body: FiniteBody, displacement: Array) -> LocalState:
+        """Return what is known of the places for displacements (nodes, 2, ...): arrays (p, ...)."""
+        wide = (slice(None), *([None] * (displacement.ndim - 2)))
+        held, place = np.unique(self.element, return_inverse=True)
+        local = displacement[body.nodes[held]]  # (e, 9, 2, ...)
+        log = _log_volume(body.grad_x[held], body.grad_y[held], local)
+        fit = np.einsum("eq,eqm,eq...->em...", body.weight[held], body.modes[held], log)[place]
+        gradient = [np.einsum("pi,pi...->p...", grad, local[place]) for grad in (self.grad_x, self.grad_y)]
+        return LocalState(
+            xx=gradient[0][:, 0],
+            xy=gradient[1][:, 0],
+            yx=gradient[0][:, 1],
+            yy=gradient[1][:, 1],
+            dilatation=np.einsum("pm,pm...->p...", self.modes, fit),
+            shear=body.shear[self.element][wide],
+            lame=body.lame[self.element][wide],
+            stiffening=body.stiffening[self.element][wide],
+            tangent=(self.tangent[:, 0][wide], self.tangent[:, 1][wide]),
+        )
+
+
+def _log_volume(grad_x: Array, grad_y: Array, local: Array) -> Array:
+    """Return ln J (e, q, ...) at the quadrature points of elements for displacements of their nodes (e, 9, 2, ...)."""
+    along_x, along_y = (np.einsum("eqi,eia...->aeq...", grad, local) for grad in (grad_x, grad_y))
+    return log1p(along_x[0] + along_y[1] + along_x[0] * along_y[1] - along_x[1] * along_y[0])

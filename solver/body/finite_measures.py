@@ -6,7 +6,7 @@ import numpy as np
 
 from solver.arrays import Array
 from solver.body.finite import FiniteBody
-from solver.constitutive.hyperelastic import shape, slopes
+from solver.constitutive.hyperelastic import log1p, shape, slopes
 
 IMAGINARY = 1e-30  # step whose square is nothing [-]
 
@@ -33,14 +33,8 @@ def _turned(H: Array) -> tuple[Array, Array]:
 def _logarithm(body: FiniteBody, H: Array) -> tuple[Array, Array]:
     """Return ln J (e, 9) and its modes (e, 3) for F = 1 + H."""
     grown = H[..., 0, 0] + H[..., 1, 1] + (H[..., 0, 0] * H[..., 1, 1] - H[..., 0, 1] * H[..., 1, 0])
-    log = _log1p(grown)
+    log = log1p(grown)
     return log, np.einsum("eq,eqm,eq->em", body.weight, body.modes, log)
-
-
-def _log1p(x: Array) -> Array:
-    """Return ln(1 + x), of complex numbers for steps as small as IMAGINARY: NumPy's own loses a small x's digits."""
-    log = np.log1p(x.real)
-    return cast("Array", log + 1j * (x.imag / (1.0 + x.real))) if np.iscomplexobj(x) else log
 
 
 def _excess(H: Array, log: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The endings as patches of tissue: where the strain energy is probed, and with which weights it is averaged."""
+"""The endings as patches of tissue: where their responses are probed, and with which weights they are averaged."""
 
 from dataclasses import dataclass
 
@@ -9,6 +9,7 @@ from solver.body.stiffness import Centred, Elastic, Probes, local_coordinates
 from solver.element import GAUSS_3
 from solver.mesh import Mesh, distinct
 from solver.mesh.mesher import FingerMesh
+from solver.quantities import QUANTITIES
 from solver.scene import Receptor
 
 _POINTS, _WEIGHTS = GAUSS_3
@@ -23,12 +24,21 @@ class Endings:
     weights: Array  # (p,) areas [mm2]
     patch: Indices  # (p,) number of the patch each probe belongs to
     count: int
+    tangent: Array  # (p, 2) direction of the undeformed skin above each probe, towards the tip
 
     def average(self, mesh: Mesh, elastic: Elastic, displacement: Array) -> Array:
         """Return the SED averaged over each patch (r, c) [MPa] for displacements (nodes, 2, c); nan where no patch."""
-        sed = self.probes.energy(mesh, elastic, displacement)
-        total = np.zeros((self.count, sed.shape[1]))
-        np.add.at(total, self.patch, sed * self.weights[:, None])
+        return self._means(self.probes.energy(mesh, elastic, displacement))
+
+    def responses(self, mesh: Mesh, elastic: Elastic, displacement: Array) -> Array:
+        """Return every quantity averaged over each patch (q, r, c) for displacements (nodes, 2, c)."""
+        state = self.probes.state(mesh, elastic, displacement, self.tangent)
+        return np.stack([self._means(quantity.small(state)) for quantity in QUANTITIES])
+
+    def _means(self, values: Array) -> Array:
+        """Return values (p, c) averaged over each patch (r, c); nan where no patch."""
+        total = np.zeros((self.count, values.shape[1]), values.dtype)
+        np.add.at(total, self.patch, values * self.weights[:, None])
         area = np.bincount(self.patch, self.weights, self.count)
         return total / np.where(area > 0.0, area, np.nan)[:, None]
 
@@ -59,14 +69,15 @@ def endings(finger: FingerMesh, elements: Centred, receptor: Receptor, arcs: Arr
     # a length on the tip's arc shrinks with the depth
     curved = (arc > outline.palmar) & (arc < outline.dorsal)
     area = area * np.where(curved, 1.0 - depth / outline.finger.tip_radius, 1.0)
-    return Endings(_probes(finger, elements, arc, depth), area, patch, len(arcs))
+    return Endings(_probes(finger, elements, arc, depth), area, patch, len(arcs), outline.tangent(arc))
 
 
 def middle(finger: FingerMesh, elements: Centred, receptor: Receptor) -> Endings:
     """Return the point in the middle of the reference ending: the mean of its limits from the elements around it."""
     arc = _ASIDE * np.array([-1.0, 1.0, -1.0, 1.0])
     depth = receptor.depth + _ASIDE * np.array([-1.0, -1.0, 1.0, 1.0])
-    return Endings(_probes(finger, elements, arc, depth), np.full(4, 0.25), np.zeros(4, np.int64), 1)
+    probes, tangent = _probes(finger, elements, arc, depth), finger.outline.tangent(arc)
+    return Endings(probes, np.full(4, 0.25), np.zeros(4, np.int64), 1, tangent)
 
 
 def _gauss(start: Array, stop: Array) -> tuple[Array, Array]:

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from solver._kernels import hooke
 from solver._kernels.arguments import LinearElements, LinearMesh, ShapeFunctions
 from solver.arrays import Array, Indices
+from solver.constitutive.hyperelastic import PLAIN
 from solver.element import Q2P1
 from solver.mesh import Mesh
+from solver.quantities import SED, LocalState
 
 _VALUES, _GRADIENTS = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
 _SHAPES = ShapeFunctions(
@@ -121,12 +123,30 @@ class Probes:
         local = (local - local[:, 8:]).reshape(len(local), 18, -1)  # moved as a whole, strains would drown in round-off
         return (self.strain @ local[place]).reshape(len(self.element), 4, *displacement.shape[2:])
 
-    def energy(self, mesh: Mesh, elastic: Elastic, displacement: Array) -> Array:
-        """Return the SED (p, ...) [MPa] for displacements (nodes, 2, ...): G eps:eps + lambda/2 theta^2."""
+    def state(self, mesh: Mesh, elastic: Elastic, displacement: Array, tangent: Array | None = None) -> LocalState:
+        """Return what is known of the places for displacements (nodes, 2, ...): arrays (p, ...).
+
+        `tangent` (p, 2) are the skin's directions there; the x axis where none are given.
+        """
         strain = self.strains(mesh, displacement)
         wide = (slice(None), *([None] * (strain.ndim - 2)))
-        shear, lame = elastic.shear[self.element][wide], elastic.lame[self.element][wide]
-        return shear * np.sum(strain[:, :3] ** 2, axis=1) + lame / 2.0 * strain[:, 3] ** 2
+        half = strain[:, 2] / np.sqrt(2.0)
+        along = np.array([[1.0, 0.0]]) if tangent is None else tangent
+        return LocalState(
+            xx=strain[:, 0],
+            xy=half,
+            yx=half,
+            yy=strain[:, 1],
+            dilatation=strain[:, 3],
+            shear=elastic.shear[self.element][wide],
+            lame=elastic.lame[self.element][wide],
+            stiffening=np.array(PLAIN),
+            tangent=(along[:, 0][wide], along[:, 1][wide]),
+        )
+
+    def energy(self, mesh: Mesh, elastic: Elastic, displacement: Array) -> Array:
+        """Return the SED (p, ...) [MPa] for displacements (nodes, 2, ...)."""
+        return SED.small(self.state(mesh, elastic, displacement))
 
 
 def _strains(elements: Centred, element: Indices, gradient: Array, modes: Array) -> Array:

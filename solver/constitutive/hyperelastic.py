@@ -6,7 +6,7 @@ Q = tr C - 3 - 2 ln J >= 0, so that elements may replace ln J in the last term b
 """
 
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar, Protocol, cast
 
 import numpy as np
 
@@ -100,6 +100,12 @@ class Ogden:
     def lame(self) -> float:
         """Lamé's first constant [MPa]."""
         return lame_modulus(self.E, self.nu)
+
+
+def log1p(x: Array) -> Array:
+    """Return ln(1 + x), of complex numbers for the smallest imaginary parts: NumPy's own loses a small x's digits."""
+    log = np.log1p(x.real)
+    return cast("Array", log + 1j * (x.imag / (1.0 + x.real))) if np.iscomplexobj(x) else log
 
 
 def shape(exponent: Array, Q: Array) -> Array:

@@ -97,16 +97,27 @@ class FingerModel:
         return np.column_stack([self._averaged(states, self.ending)[:, 0], forces])
 
     def all_numbers(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return SED, both forces, depth, the bone's shift along +x, contact width and the middle's SED (c, 7)."""
+        """Return the `COUNT` numbers of each state (c, COUNT) whose errors are estimated.
+
+        They are the SED, both forces, depth, the bone's shift along +x, contact width, the middle's SED, and every
+        quantity at the ending.
+        """
         rest = [
             (s.normal.sum(), s.tangential.sum(), s.pull.depth, 0.0 - s.pull.travel, self.contact_width(s))
             for s in states
         ]
-        ending, middle = self.seds(states).T
-        return np.column_stack([ending, rest, middle])
+        mesh, elastic = self.geometry.mesh, self.body.elastic
+        displacement = self._recovered(states, self.ending, self.point)
+        middle = self.point.average(mesh, elastic, displacement)[0]
+        responses = self.responses(displacement)
+        return np.column_stack([responses[:, 0], rest, middle, responses])
+
+    def responses(self, displacement: Array) -> Array:
+        """Return every quantity at the reference ending (c, q) for displacements (nodes, 2, c), even complex ones."""
+        return self.ending.responses(self.geometry.mesh, self.body.elastic, displacement)[:, 0].T
 
     def numbers_and_row(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return `all_numbers`, then the SED of each ending of the row (c, 7 + r) [MPa]; nan where the finger ends."""
+        """Return `all_numbers`, then the SED of each ending of the row (c, COUNT + r) [MPa]; nan where the finger ends."""
         row = self.row.average(self.geometry.mesh, self.body.elastic, self._recovered(states, self.row))
         return np.hstack([self.all_numbers(states), row.T])
 

@@ -78,16 +78,20 @@ class FiniteFinger:
         return np.array([self.sed_ending(shape), up, along])
 
     def all_numbers(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return SED, both forces, depth, the bone's shift along +x, contact width and the middle's SED (c, 7)."""
-        return np.array(
-            [
-                (*self.numbers(s), s.pull.depth, 0.0 - s.pull.travel, self.contact_width(s), self.seds(s)[1])
-                for s in states
-            ]
-        )
+        """Return the numbers of each state (c, COUNT) whose errors are estimated, as `FingerModel` has them."""
+        return np.array([self._all_numbers(state) for state in states])
+
+    def _all_numbers(self, s: EquilibriumState) -> tuple[float, ...]:
+        middle = self.point.average(self.newton.body, s.u)[0]
+        rest = s.pull.depth, 0.0 - s.pull.travel, self.contact_width(s), middle
+        return *self.numbers(s), *rest, *self.responses(s.u[:, :, None])[0]
+
+    def responses(self, displacement: Array) -> Array:
+        """Return every quantity at the reference ending (c, q) for displacements (nodes, 2, c), even complex ones."""
+        return self.ending.responses(self.newton.body, displacement)[:, 0].T
 
     def numbers_and_row(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return `all_numbers`, then the SED of each ending of the row (c, 7 + r) [MPa]; nan where the finger ends."""
+        """Return `all_numbers`, then the SED of each ending of the row (c, COUNT + r) [MPa]; nan where the finger ends."""
         row = [self.row.average(self.newton.body, state.u) for state in states]
         return np.hstack([self.all_numbers(states), row])
 

@@ -60,6 +60,16 @@ class Outline:
         radius = self.finger.tip_radius - depth
         return self.world(radius * np.cos(angle) - back, radius * np.sin(angle))
 
+    def tangent(self, arc: Array) -> Array:
+        """Return the directions (..., 2) of the skin at `arc`, towards the tip: unit vectors in the world.
+
+        >>> Outline.of(Finger()).tangent(np.array([0.0, -20.0])).round(4)  # at first touch, and on the palmar side
+        array([[ 1.    ,  0.    ],
+               [ 0.7071, -0.7071]])
+        """
+        angle = self._course(arc)[0]
+        return self._turned(-np.sin(angle), np.cos(angle))
+
     def bone(self, arc: Array, part: Array | float = 1.0) -> Array:
         """Return the points (..., 2) of the bone's outline that the mesh pairs with `arc` on the skin.
 
@@ -72,10 +82,12 @@ class Outline:
 
     def world(self, x: Array, y: Array) -> Array:
         """Return the points (..., 2) of the world for finger coordinates `x`, `y`."""
+        return self._turned(x, y) + [0.0, self.finger.tip_radius]
+
+    def _turned(self, x: Array, y: Array) -> Array:
+        """Return vectors (..., 2) of the finger frame in the world."""
         angle = radians(self.finger.contact_angle)
-        across = x * cos(angle) + y * sin(angle)
-        up = y * cos(angle) - x * sin(angle) + self.finger.tip_radius
-        return np.stack([across, up], axis=-1)
+        return np.stack([x * cos(angle) + y * sin(angle), y * cos(angle) - x * sin(angle)], axis=-1)
 
     def along(self, arc: Array | float, depth: float, distance: Array | float) -> Array:
         """Return the arc positions that lie `distance` from `arc`, measured at `depth` below the skin.

@@ -5,6 +5,7 @@ changes. At a kink, where a node is about to change its state, the derivatives a
 stay. Differences across a kink lie between the derivatives of both sides.
 """
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -14,11 +15,11 @@ from solver import _kernels as kernels
 from solver._kernels import SHEAR_LIMITED, STICK
 from solver._kernels.arguments import ContactStates, SkinPosition
 from solver.arrays import Array
-from solver.body.finite import FiniteBody, FiniteProbes
-from solver.constitutive.hyperelastic import slopes
+from solver.body.finite_measures import IMAGINARY
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, FiniteNewton, Newton, load_state
+from solver.quantities import NAMES, SED
 from solver.scene import Scene
 
 MU, TAU_MAX, DEPTH = range(3)
@@ -41,6 +42,7 @@ class Derivatives:
     normal: By  # force of the surface on the finger along +y [N/mm]
     tangential: By  # drag opposing the slide [N/mm]
     indentation: By  # [mm]
+    responses: Mapping[str, By]  # of every quantity at the ending, by its name
 
 
 def of_slide(finger: FingerModel | FiniteFinger, scene: Scene, state: EquilibriumState) -> Derivatives:
@@ -50,14 +52,24 @@ def of_slide(finger: FingerModel | FiniteFinger, scene: Scene, state: Equilibriu
     """
     skin = of_skin(finger.newton, state)
     along, up = finger.newton.follows(skin)
-    sed = _of_sed(finger, state, skin) if isinstance(finger, FingerModel) else _of_finite_sed(finger, state, skin)
-    rows = np.array([sed, up, drag_along(scene) * along, [0.0, 0.0, 1.0]]) + 0.0  # never -0
+    ending = (
+        _of_responses(finger, state, skin)
+        if isinstance(finger, FingerModel)
+        else _of_finite_responses(finger, state, skin)
+    )
+    rows = np.array([*ending, up, drag_along(scene) * along, [0.0, 0.0, 1.0]]) + 0.0  # never -0
     if scene.normal_force is None:
-        return Derivatives(*(By(mu, tau, depth, None) for mu, tau, depth in rows.tolist()))
+        return _derivatives([By(mu, tau, depth, None) for mu, tau, depth in rows.tolist()])
     rows[:, 2] /= up[2]  # the depth makes up for what friction changes of the force
     rows[:, :2] -= rows[:, 2:] * up[:2]
-    found = Derivatives(*(By(mu, tau, None, force) for mu, tau, force in rows.tolist()))
+    found = _derivatives([By(mu, tau, None, force) for mu, tau, force in rows.tolist()])
     return replace(found, normal=By(0.0, 0.0, None, 1.0))
+
+
+def _derivatives(rows: Sequence[By]) -> Derivatives:
+    """Return the derivatives of every quantity, both forces and the indentation by their names."""
+    of = dict(zip(NAMES, rows, strict=False))
+    return Derivatives(of[SED.name], *rows[len(NAMES) :], responses=of)
 
 
 def of_skin(newton: Newton, state: EquilibriumState) -> Array:
@@ -89,26 +101,27 @@ def of_skin(newton: Newton, state: EquilibriumState) -> Array:
     return out
 
 
-def _of_sed(finger: FingerModel, state: EquilibriumState, skin: Array) -> Array:
-    """Return the derivatives (3,) of the ending's SED at small strain, for those of the skin (2 k, 3).
-
-    The SED is a square of the displacements u, so that (W(u + s) - W(u - s)) / 2 is its derivative along any step s.
-    """
+def _of_responses(finger: FingerModel, state: EquilibriumState, skin: Array) -> Array:
+    """Return the derivatives (q, 3) of the ending's responses at small strain, for those of the skin (2 k, 3)."""
     moved = np.concatenate([state.u.reshape(-1, 1), skin], axis=1).reshape(*state.u.shape, -1)
     moved = finger.body.displacement(moved, only=finger.ending.nodes(finger.geometry.mesh))
-    u, steps = moved[:, :, :1], moved[:, :, 1:]
-    longest = np.abs(steps).max(axis=(0, 1))
-    size = np.abs(u).max() / np.where(longest > 0.0, longest, np.inf)  # steps as large as u: less drowns in round-off
-    both = np.concatenate([u + size * steps, u - size * steps], axis=2)
-    ahead, behind = finger.ending.average(finger.geometry.mesh, finger.body.elastic, both)[0].reshape(2, -1)
-    return (ahead - behind) / 2.0 / np.where(size > 0.0, size, 1.0)
+    return slope(finger.responses, moved[:, :, 0], moved[:, :, 1:])
 
 
-def _of_finite_sed(finger: FiniteFinger, state: EquilibriumState, skin: Array) -> Array:
-    """Return the derivatives (3,) of the ending's SED at finite strain, for those of the skin (2 k, 3)."""
+def _of_finite_responses(finger: FiniteFinger, state: EquilibriumState, skin: Array) -> Array:
+    """Return the derivatives (q, 3) of the ending's responses at finite strain, for those of the skin (2 k, 3)."""
     newton = finger.newton
     moved = [newton.finite.inside.back_substitute(one, still=True) for one in skin.T.copy()]
-    return slope(finger.ending, newton.body, state.u, _spread(newton, np.stack(moved, axis=1)))[0]
+    return slope(finger.responses, state.u, _spread(newton, np.stack(moved, axis=1)))
+
+
+def slope(responses: Callable[[Array], Array], displacement: Array, steps: Array) -> Array:
+    """Return how responses change (q, c) at a `displacement` (nodes, 2) along `steps` (nodes, 2, c).
+
+    `responses` makes (c, q) of (nodes, 2, c). By steps in imaginary direction (Squire and Trapp 1998, SIAM Rev. 40,
+    110), exact to round-off.
+    """
+    return responses(displacement[:, :, None] + 1j * IMAGINARY * steps).imag.T / IMAGINARY
 
 
 def _spread(newton: FiniteNewton, unknowns: Array) -> Array:
@@ -119,36 +132,6 @@ def _spread(newton: FiniteNewton, unknowns: Array) -> Array:
     out[body.nodes[:, :8]] = outer
     out[body.nodes[:, 8]] = -newton.finite.system.recovery_matrix[:, :, :16] @ outer.reshape(len(outer), 16, -1)
     return out
-
-
-def slope(probes: FiniteProbes, body: FiniteBody, displacement: Array, steps: Array) -> Array:
-    """Return how the SED averaged over each patch (r, c) [MPa] changes along `steps` (nodes, 2, c) of displacements."""
-    e = probes.element
-    local, moves = displacement[body.nodes[e]], steps[body.nodes[e]]
-    F, dF = _gradients(local, moves, np.stack([body.grad_x, body.grad_y], axis=-1)[e])  # at quadrature points
-    fit, dfit = (
-        np.einsum("pm,pqm,pq,pq...->p...", probes.modes, body.modes[e], body.weight[e], one)
-        for one in _logarithm(F, dF)
-    )
-    f, df = _gradients(local, moves, np.stack([probes.grad_x, probes.grad_y], axis=-1)[:, None])
-    log, dlog = _logarithm(f, df)
-    excess = np.sum(f * f, axis=(-2, -1)) - 2.0 - 2.0 * log
-    stiff = body.shear[e] * slopes(body.stiffening[e], excess[:, 0])[0]
-    energy = stiff[:, None] * (np.einsum("pqaA,pqcaA->pqc", f, df) - dlog)[:, 0]
-    energy += (body.lame[e] * fit)[:, None] * dfit
-    total = np.zeros((len(probes.areas), energy.shape[1]))
-    np.add.at(total, probes.patch, energy * probes.weights[:, None])
-    return total / probes.areas[:, None]
-
-
-def _gradients(local: Array, steps: Array, gradient: Array) -> tuple[Array, Array]:
-    """Return F (p, q, 2, 2) and its changes (p, q, c, 2, 2) from those of nodes (p, 9, 2, c)."""
-    return np.eye(2) + np.einsum("pia,pqiA->pqaA", local, gradient), np.einsum("piac,pqiA->pqcaA", steps, gradient)
-
-
-def _logarithm(F: Array, dF: Array) -> tuple[Array, Array]:
-    """Return ln J (p, q) and its changes F^-T : dF (p, q, c)."""
-    return np.log(np.linalg.det(F)), np.einsum("pqAa,pqcaA->pqc", np.linalg.inv(F), dF)
 
 
 def drag_along(scene: Scene) -> int:

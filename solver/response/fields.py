@@ -108,7 +108,7 @@ def _energies(prediction: Prediction, sketch: Sketch) -> Array:
     count = len(sketch.probes.element)
 
     def energies(probes: Probes) -> Array:
-        places = Endings(probes, np.ones(count), np.arange(count), count)
+        places = Endings(probes, np.ones(count), np.arange(count), count, np.tile([1.0, 0.0], (count, 1)))
         return FiniteProbes.of(body, places).energy(body, prediction.displacement)
 
     found = energies(sketch.probes)

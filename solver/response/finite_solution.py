@@ -16,7 +16,7 @@ from solver._kernels import STICK
 from solver.accuracy import omitted_effects as evidence
 from solver.accuracy.adaptivity import Maker, MeshSolution, NestedSolution, coarse_solution, on_nested, refine
 from solver.accuracy.audits import forces_missed, refuse_unsound, rounding, unbalanced
-from solver.accuracy.error_estimate import errors, row_errors
+from solver.accuracy.error_estimate import errors, responses, row_errors
 from solver.accuracy.finite_audits import audits, course_audits
 from solver.accuracy.finite_ends import times_on_way
 from solver.contact.law import NAMES
@@ -29,7 +29,7 @@ from solver.equilibrium.load_path import Way
 from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, FiniteNewton
 from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
-from solver.prediction import ROW, History, Prediction, Row, Skin, drag
+from solver.prediction import FORCES_AND_PLACES, ROW, History, Prediction, Row, Skin, drag
 from solver.progress import report_progress
 from solver.scene import Scene
 
@@ -103,7 +103,7 @@ def _predicted(scene: Scene, nested: NestedSolution, stop: Callable[[], bool], m
     shape, checks = _balanced(newton, shape, lambda found: audits(driven, finger, found, newton))
     refuse_unsound(checks, shape.pull.depth)
     numbers = finger.all_numbers([shape])[0]
-    sed, normal, tangential, depth, shift, width, point = numbers.tolist()
+    sed, normal, tangential, depth, shift, width, point = numbers[:FORCES_AND_PLACES].tolist()
     skin = _skin(finger, shape)
     checks |= forces_missed(scene, float(shape.force[1]), float(shape.force[0]))
     if way:
@@ -143,6 +143,7 @@ def _predicted(scene: Scene, nested: NestedSolution, stop: Callable[[], bool], m
         setup_s=setup,
         estimate_s=estimated - solved,
         row=Row(ROW, row, row_errors(row, finer)),
+        responses=responses(numbers, off),
         model=model,
         audits=checks,
         skin=skin,

@@ -22,7 +22,7 @@ from solver.accuracy.audits import (
     rounding,
     unbalanced,
 )
-from solver.accuracy.error_estimate import errors, row_errors
+from solver.accuracy.error_estimate import errors, responses, row_errors
 from solver.accuracy.omitted_effects import model, warnings
 from solver.accuracy.small_errors import on_nested, steps_asked, times_on_way
 from solver.arrays import Array
@@ -37,7 +37,7 @@ from solver.equilibrium.step_error import Steps
 from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.mesh.grid import MeshError
 from solver.mesh.mesher import Sizing
-from solver.prediction import ROW, History, NestedNumbers, Prediction, Row, Skin, drag
+from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag
 from solver.scene import Scene, SceneError
 
 ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements once more
@@ -231,9 +231,9 @@ def _estimated(
         return [(one, None) for one in states if not isinstance(one, _Solved)]
     begun, finger = perf_counter(), shared.mesh
     numbers = finger.all_numbers([one.contact for one in solved])
-    rows = finger.row.average(
-        finger.geometry.mesh, finger.body.elastic, np.stack([one.displacement for one in solved], axis=2)
-    )
+    displacements = np.stack([one.displacement for one in solved], axis=2)
+    numbers[:, FORCES_AND_PLACES:] = finger.responses(displacements)
+    rows = finger.row.average(finger.geometry.mesh, finger.body.elastic, displacements)
     nested = on_nested(shared.nested, [(one.scene, one.steps) for one in solved])
     took = (perf_counter() - begun) / len(solved)
     predictions = iter(
@@ -251,7 +251,7 @@ def _estimated(
 def _prediction(
     solved: _Solved, shared: _Shared, numbers: Array, row: Array, nested: NestedNumbers | None, estimate_s: float
 ) -> Prediction:
-    """Return the prediction of a state with its `numbers` (7,), and the SED (r,) of the row of receptors [MPa]."""
+    """Return the prediction of a state with its `numbers` (COUNT,), and the SED (r,) of the row of receptors [MPa]."""
     scene, contact, checks, finger = solved.scene, solved.contact, solved.checks, shared.mesh
     shift, depth = shift_of(scene, contact), contact.pull.depth
     left = model(scene.driven(depth), finger, contact, solved.displacement)
@@ -280,6 +280,7 @@ def _prediction(
         setup_s=shared.setup_s,
         estimate_s=estimate_s + shared.estimate_s,
         row=Row(ROW, row, row_errors(row, nested)),
+        responses=responses(numbers, off),
         model=left,
         audits=checks,
         skin=skin_of(finger, contact),

@@ -22,6 +22,7 @@ from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.newton import Newton, Pull
 from solver.mesh.mesher import Sizing
+from solver.quantities import QUANTITIES
 from solver.response.derivatives import of_skin, of_slide, slope
 from tests.solver.finite_examples import block
 
@@ -43,22 +44,23 @@ def moved(scene, name, by):
 
 
 def told(found):
-    """Return derivatives as a table (4, 3): SED, normal force, drag and depth by mu, tau_max and what presses."""
-    rows = (found.sed, found.normal, found.tangential, found.indentation)
+    """Return derivatives as a table: SED, normal force, drag, depth, then each quantity, by mu, tau_max and press."""
+    rows = (found.sed, found.normal, found.tangential, found.indentation, *found.responses.values())
     return np.array([[one for one in by if one is not None] for by in rows])
 
 
 def differences(numbers, scene, steps):
-    """Return the same table from central differences of solves; `numbers` gives (4,) of a scene."""
-    columns = [(numbers(moved(scene, n, h)) - numbers(moved(scene, n, -h))) / (2 * h) if h else np.zeros(4)
+    """Return the same table from central differences of solves; `numbers` gives its rows' numbers of a scene."""
+    none = np.zeros(4 + len(QUANTITIES))
+    columns = [(numbers(moved(scene, n, h)) - numbers(moved(scene, n, -h))) / (2 * h) if h else none
                for n, h in zip(NAMES, steps, strict=True)]  # fmt: skip
     return np.stack(columns, axis=1)
 
 
 def assert_alike(found, expected, scale):
-    """Assert that tables agree to 1e-6 of each entry; `scale` (4,) are the numbers, to whose round-off 0 is known."""
+    """Assert that tables agree to 1e-6 of each entry; `scale` are the numbers, to whose round-off 0 is known."""
     for row, other, number in zip(found, expected, scale, strict=True):
-        np.testing.assert_allclose(row, other, rtol=1e-6, atol=1e-8 * number)
+        np.testing.assert_allclose(row, other, rtol=1e-6, atol=1e-8 * abs(number))
 
 
 # Small strain
@@ -70,12 +72,12 @@ def small():
 
 
 def small_numbers(finger, scene, states):
-    """Return SED, normal force, drag and depth of a settled slide, which must have these states."""
+    """Return SED, normal force, drag, depth and each quantity of a settled slide, which must have these states."""
     contact = settled(scene, finger)
     assert (contact.state == states).all()
     depth = contact.pull.depth
-    sed, normal, tangential = finger.numbers([contact])[0]
-    return np.array([sed, normal, -scene.loading.direction * tangential, depth])
+    sed, normal, tangential, *rest = finger.all_numbers([contact])[0]
+    return np.array([sed, normal, -scene.loading.direction * tangential, depth, *rest[-len(QUANTITIES) :]])
 
 
 SMALL = {
@@ -194,8 +196,8 @@ def slid(finger, scene, start=None):
 def finite_numbers(finger, scene, here):
     shape = slid(finger, scene, replace(here, pull=pull_of(scene, here.pull.depth)))
     assert (shape.state == here.state).all()
-    sed, normal, tangential = finger.numbers(shape)
-    return np.array([sed, normal, -scene.loading.direction * tangential, shape.pull.depth])
+    sed, normal, tangential, *rest = finger.all_numbers([shape])[0]
+    return np.array([sed, normal, -scene.loading.direction * tangential, shape.pull.depth, *rest[-len(QUANTITIES) :]])
 
 
 FINITE = {
@@ -227,10 +229,10 @@ def test_how_the_sed_of_a_patch_bends_is_a_complex_step_of_its_energy(law):
     local = np.random.default_rng(1).uniform(-0.9, 0.9, (len(elements), 2))
     places = Probes.at(mesh, Elastic.of(mesh, [Hooke(0.08, 0.48)]), elements, local)
     count = len(elements)
-    probes = FiniteProbes.of(body, Endings(places, np.linspace(1.0, 2.0, count), np.arange(count) % 3, 3))
+    probes = FiniteProbes.of(body, Endings(places, np.linspace(1.0, 2.0, count), np.arange(count) % 3, 3, np.tile([1.0, 0.0], (count, 1))))
     draw = np.random.default_rng(2)
     u, steps = draw.uniform(-0.015, 0.015, mesh.nodes.shape), draw.normal(size=(*mesh.nodes.shape, 2))
-    found = slope(probes, body, u, steps)
+    found = slope(lambda moved: probes.responses(body, moved)[0].T, u, steps)
     for column in range(2):
         expected = average(body, probes, u + 1e-30j * steps[..., column])
         assert np.real(expected) == pytest.approx(probes.average(body, u), rel=1e-12)

@@ -7,7 +7,7 @@ import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve, solve
 from solver.accuracy.error_estimate import errors
-from solver.prediction import NestedNumbers
+from solver.prediction import COUNT, NestedNumbers
 from solver.scene.published import STICKINESS, scene
 from tests.solver.drawn_scenes import DRAWN, HELD_OUT
 
@@ -62,13 +62,14 @@ def test_the_tolerance_is_met_with_no_more_work_than_it_needs(tolerance):
 
 def test_an_error_that_falls_with_the_square_of_an_element_is_known_and_edges_add_half_of_what_a_node_changes():
     asked = Scene(friction=Friction(0.3), loading=Loading(1.0))
-    truth, error = np.array([1.0, 2.0, 0.6, 1.0, 0.0, 5.0, 1.1]), 0.04
-    none, edges = np.zeros(7), np.full(7, 0.01)
+    truth, error = np.ones(COUNT), 0.04
+    none, edges = np.zeros(COUNT), np.full(COUNT, 0.01)
     nested = NestedNumbers(truth * (1.0 + error / 4.0), none, none, none)
     found = errors(asked, truth * (1.0 + error), nested, None)
     assert found.sed == pytest.approx(error / (1.0 + error), rel=1e-12)
     more = errors(asked, truth * (1.0 + error), replace(nested, of_edges=edges), None)
     assert more.sed - found.sed == pytest.approx(0.005 / 1.04, rel=1e-12)
+    assert more.responses - found.responses == pytest.approx(0.005, rel=1e-12)
 
 
 def test_estimates_of_the_row_lie_above_its_errors_beneath_the_edges_of_contact_too():

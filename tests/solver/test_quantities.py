@@ -1,0 +1,133 @@
+"""Every quantity at a receptor: objective, with its small-strain limit, and as closed forms say."""
+
+import numpy as np
+import pytest
+
+from solver import Friction, Loading, Scene, Solve, solve
+from solver.constitutive.hyperelastic import NeoHooke, Ogden, energy, stress
+from solver.constitutive.linear import Hooke
+from solver.quantities import NAMES, QUANTITIES, LocalState
+
+E, NU = 0.08, 0.48
+LAWS = [NeoHooke(E, NU), Ogden(E, NU)]
+BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
+EVERY = pytest.mark.parametrize("name", NAMES)
+
+
+def state(H, law=LAWS[0], angle=0.3, small=False):
+    """Return what is known of places with displacement gradients H (n, 2, 2), the skin's tangent turned by an angle."""
+    H = np.asarray(H, float)
+    volume = np.trace(H, axis1=-2, axis2=-1) if small else np.log(np.linalg.det(np.eye(2) + H))
+    along = np.full(len(H), np.cos(angle)), np.full(len(H), np.sin(angle))
+    moduli = (np.array(number) for number in (law.shear, law.lame, law.stiffening))
+    return LocalState(H[:, 0, 0], H[:, 0, 1], H[:, 1, 0], H[:, 1, 1], volume, *moduli, along)
+
+
+def drawn(size, count=20):
+    return np.random.default_rng(5).uniform(-size, size, (count, 2, 2))
+
+
+@EVERY
+@pytest.mark.parametrize("law", LAWS, ids=str)
+def test_a_rotation_of_the_deformed_body_changes_no_quantity(name, law):
+    H = drawn(0.25)
+    turn = np.array([[np.cos(0.9), -np.sin(0.9)], [np.sin(0.9), np.cos(0.9)]])
+    turned = turn @ (np.eye(2) + H) - np.eye(2)
+    finite = BY_NAME[name].finite
+    np.testing.assert_allclose(finite(state(turned, law)), finite(state(H, law)), rtol=1e-9, atol=1e-13)
+
+
+@EVERY
+def test_at_small_strain_a_small_rotation_changes_no_quantity(name):
+    H = drawn(0.01)
+    small = BY_NAME[name].small
+    turned = H + 0.02 * np.array([[0.0, -1.0], [1.0, 0.0]])
+    np.testing.assert_allclose(small(state(turned, small=True)), small(state(H, small=True)), rtol=1e-9, atol=1e-15)
+
+
+@EVERY
+@pytest.mark.parametrize("law", LAWS, ids=str)
+def test_the_small_strain_form_is_the_limit_of_the_finite_one(name, law):
+    """The part by which they differ falls with the strain, so ten times less strain leaves a tenth of it."""
+    H, off = drawn(1.0), []
+    for size in (1e-4, 1e-5):
+        small = BY_NAME[name].small(state(size * H, law, small=True))
+        finite = BY_NAME[name].finite(state(size * H, law))
+        off.append(np.abs(finite - small).max() / np.abs(small).max())
+    assert off[0] < 1e-3
+    assert off[1] <= 0.15 * off[0]
+
+
+def test_energy_and_stresses_are_those_of_the_laws():
+    H = drawn(0.2)
+    F, det = np.eye(2) + H, np.linalg.det(np.eye(2) + H)
+    for law in LAWS:
+        at = state(H, law)
+        np.testing.assert_allclose(BY_NAME["sed"].finite(at), energy(law, F), rtol=1e-12)
+        cauchy = np.zeros((len(H), 3, 3))
+        cauchy[:, :2, :2] = stress(law, F) @ np.swapaxes(F, 1, 2) / det[:, None, None]
+        cauchy[:, 2, 2] = law.lame * np.log(det) / det
+        np.testing.assert_allclose(BY_NAME["pressure"].finite(at), -np.trace(cauchy, axis1=1, axis2=2) / 3, rtol=1e-10)
+        deviator = cauchy - np.trace(cauchy, axis1=1, axis2=2)[:, None, None] * np.eye(3) / 3.0
+        mises = np.sqrt(1.5 * np.sum(deviator**2, axis=(1, 2)))
+        np.testing.assert_allclose(BY_NAME["von_mises"].finite(at), mises, rtol=1e-9)
+    hooke = Hooke(E, NU)
+    np.testing.assert_allclose(BY_NAME["sed"].small(state(H, hooke_like(), small=True)), hooke.energy(H), rtol=1e-12)
+
+
+def hooke_like():
+    """Return Hooke's moduli where a law of finite strain is expected."""
+    return NeoHooke(E, NU)
+
+
+def test_principal_strains_are_singular_values_of_the_deformation():
+    H = drawn(0.3)
+    values = np.linalg.svd(np.eye(2) + H, compute_uv=False)
+    at = state(H)
+    np.testing.assert_allclose(BY_NAME["principal_strain_greatest"].finite(at), values[:, 0] - 1.0, rtol=1e-12)
+    np.testing.assert_allclose(BY_NAME["principal_strain_least"].finite(at), values[:, 1] - 1.0, rtol=1e-11)
+    np.testing.assert_allclose(BY_NAME["shear_greatest"].finite(at), values[:, 0] - values[:, 1], rtol=1e-11)
+    strains = np.linalg.eigvalsh((H + np.swapaxes(H, 1, 2)) / 2.0)
+    np.testing.assert_allclose(BY_NAME["principal_strain_greatest"].small(at), strains[:, 1], rtol=1e-11, atol=1e-15)
+    np.testing.assert_allclose(BY_NAME["shear_greatest"].small(at), strains[:, 1] - strains[:, 0], rtol=1e-11)
+
+
+@pytest.mark.parametrize("kind", ["small", "finite"])
+def test_simple_shear_along_the_skin_by_gamma_is_a_shear_of_gamma_and_stretches_no_line_along_it(kind):
+    gamma = 0.2
+    at = state([[[0.0, gamma], [0.0, 0.0]]], angle=0.0, small=kind == "small")
+    assert getattr(BY_NAME["shear_along_skin"], kind)(at) == pytest.approx([gamma], rel=1e-14)
+    assert getattr(BY_NAME["stretch_along_skin"], kind)(at) == pytest.approx([0.0], abs=1e-15)
+    across = state([[[0.0, 0.0], [-gamma, 0.0]]], angle=np.pi / 2, small=kind == "small")  # the same, all turned
+    assert getattr(BY_NAME["shear_along_skin"], kind)(across) == pytest.approx([gamma], rel=1e-14)
+
+
+def test_a_pure_dilation_has_no_energy_of_shape_but_for_the_plane_that_holds_it():
+    """Plane strain has no equal stretch in all directions: the deviator of (e, e, 0) holds 2/3 G e^2."""
+    e, law = 1e-6, LAWS[0]
+    at = state([[[e, 0.0], [0.0, e]]], small=True)
+    assert BY_NAME["sed_deviatoric"].small(at) == pytest.approx([2.0 / 3.0 * law.shear * e**2], rel=1e-12)
+    bulk = law.lame + 2.0 / 3.0 * law.shear
+    assert BY_NAME["sed_volumetric"].small(at) == pytest.approx([bulk / 2.0 * (2.0 * e) ** 2], rel=1e-12)
+
+
+def test_energies_of_shape_and_volume_are_neither_negative_and_add_up():
+    at = state(drawn(0.3))
+    shape, volume = BY_NAME["sed_deviatoric"].finite(at), BY_NAME["sed_volumetric"].finite(at)
+    assert min(shape.min(), volume.min()) > 0.0
+    np.testing.assert_allclose(shape + volume, BY_NAME["sed"].finite(at), rtol=1e-12)
+
+
+@pytest.mark.parametrize("kinematics", ["small", "finite"])
+def test_every_quantity_of_a_prediction_lies_within_its_error_of_a_mesh_three_times_as_fine(kinematics):
+    """The truth is a mesh whose own error is a small part of the coarse one's: all fall with its square."""
+    coarse, fine = (
+        solve(Scene(friction=Friction(0.5, 0.02), loading=Loading(1.2, "-x"), solve=Solve(kinematics, "steady", size)))
+        for size in (0.05, 0.002)
+    )
+    for name in NAMES:
+        value, error = coarse.responses[name]
+        truth, rest = fine.responses[name]
+        assert abs(value - truth) < error + rest, name
+    assert coarse.responses["sed"].value == pytest.approx(coarse.sed_ending, rel=1e-12)
+    assert coarse.responses["sed"].error == pytest.approx(coarse.error_estimate * coarse.sed_ending, rel=1e-9)
